@@ -16,7 +16,9 @@ PANEL = PIPELINE
 
 
 def run(
-    source: Annotated[Path, typer.Argument(help="A folder or file of measured data: CSV, NPZ, Parquet, MATLAB.")],
+    source: Annotated[
+        Path, typer.Argument(help="A folder or file of measured data: CSV, Excel, NumPy, MATLAB, Parquet.")
+    ],
     mapping: Annotated[
         Path | None, typer.Option(help="Mapping file: columns, units, clocks. Left out: says what is in the source.")
     ] = None,
@@ -37,7 +39,7 @@ def run(
             "--mapping FILE --out SESSION, or --propose FILE alone", "add --out, or leave --propose out",
         )  # fmt: skip
     made = import_session(source, mapping, out, progress=say)
-    for note in made.notes:
+    for note in _together(made.notes):
         print(f"note: {note}")
     for text in made.refused:
         print(f"left out: {text}")
@@ -46,20 +48,41 @@ def run(
     return Result(made, Exit.FORMAT if made.refused else Exit.DONE)
 
 
+def _together(notes: tuple[str, ...]) -> list[str]:
+    """Return notes with those that say the same of several files as one."""
+    files: dict[str, list[str]] = {}
+    for note in notes:
+        name, colon, rest = note.partition(": ")
+        files.setdefault(rest if colon and "." in name else note, []).append(name)
+    return [
+        f"{names[0]} and {len(names) - 1} more files: {text}" if len(names) > 1
+        else next(note for note in notes if note.endswith(text))
+        for text, names in files.items()
+    ]  # fmt: skip
+
+
 def _inspect(source: Path, propose: Path | None) -> Result:
     from tacdata import documents
     from tacdata.errors import UsageError
-    from tacdata.importing.proposal import described, proposed_mapping
+    from tacdata.importing.proposing.description import described
+    from tacdata.importing.proposing.proposal import proposed_mapping
+    from tacdata.importing.proposing.trial_run import tried
 
     if propose is not None and propose.exists():
         raise UsageError(f"{propose} exists", "a new file; nothing is overwritten", "choose another --propose")
-    tables, text = described(source)
+    kinds, text = described(source)
     print(text)
-    mapping = proposed_mapping(source, tables)
+    proposal = proposed_mapping(source, kinds)
+    mapping, result = proposal.mapping, {"mapping": proposal.mapping, "questions": list(proposal.questions)}
     if propose is None:
         suggest("import", source, "--propose mapping.yaml")
-        return Result({"mapping": mapping})
+        return Result(result)
     documents.write(propose, mapping, "import_mapping")
-    print(f"a mapping to start from is in {propose}; correct it by hand, its guesses are guesses")
+    heads = "".join(f"# ? {question}\n" for question in proposal.questions)
+    propose.write_text(heads + propose.read_text(encoding="utf-8"), encoding="utf-8")
+    print(f"a mapping to start from is in {propose}; read it over, it rests on names, units and values")
+    for question in proposal.questions:
+        print(f"  ? {question}")
+    print(tried(source, mapping, propose.parent))
     suggest("import", source, "--mapping", propose, "--out SESSION")
-    return Result({"mapping": mapping, "written": propose})
+    return Result({**result, "written": propose})

@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.documents import composed
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.text_layout import THOUSANDS
 from tacdata.importing.units import factor, split_unit
 
@@ -127,7 +127,8 @@ def axis(
 def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
     """Return the unit of a column, by the mapping or the file; "" if neither gives one."""
     name = single(table, entry["column"], where)
-    return entry.get("unit") or table.units.get(name) or split_unit(name)[1]
+    whole = inner[1] if (inner := INNER.fullmatch(name)) and table.inner(inner[1]) else name
+    return entry.get("unit") or table.units.get(whole) or split_unit(whole)[1]
 
 
 def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:

@@ -93,14 +93,18 @@ class _Import:
         self.presses: list[ImportedPress] = []
         self.failures: list[tuple[str, TacdataError]] = []
         self.notes: list[str] = []
+        self.seen: dict[tuple[Any, ...], str] = {}
 
     def add(self, files: FileSet) -> None:
         """Import one set of files."""
         if files.fault:
             self.failures.append((files.label or self.source.name, files.fault))
             return
+        if copied := self._copied(files):
+            self.notes.append(copied)
+            return
         try:
-            tables = {name: read_table(path, self.mapping["files"][name]) for name, path in files.paths.items()}
+            tables = {name: read_table(path, files.options(name, self.mapping)) for name, path in files.paths.items()}
         except TacdataError as error:
             self.failures.append((files.label or self.source.name, error))
             return
@@ -116,6 +120,17 @@ class _Import:
                     self._write(imported)
             except TacdataError as error:
                 self.failures.append((named or self.source.name, error))
+
+    def _copied(self, files: FileSet) -> str:
+        """Return that a set of files holds, byte by byte, what one before it holds; empty if it does not.
+
+        A copy is no second measurement: counted as one, it would make every error look smaller.
+        """
+        tables = [files.options(name, self.mapping).get("table") for name in files.paths]
+        same = zip(map(source_hash, files.paths.values()), tables, strict=True)
+        name = ", ".join(path.name for path in files.paths.values())
+        first = self.seen.setdefault(tuple(same), name)
+        return f"{name} is the same, byte by byte, as {first} and is left out" if first != name else ""
 
     def _presses(
         self, files: FileSet, label: str, whole: dict[str, SourceTable], rows: dict[str, SourceTable]

@@ -66,7 +66,7 @@ def press_path(time_ns: np.ndarray, tip: np.ndarray) -> PressPath:
     near = _run(depth >= deepest - 4 * STILL * stroke, peak)
     if hold < SHORTEST_HOLD or (time_ns[near[1]] - time_ns[near[0]]) / 1e9 > ROUNDED * hold:
         hold = 0.0
-    phases = () if _strokes(depth, low) > 1 else _phases(time_ns, begin, first, last, end, hold)
+    phases = () if strokes(depth, low) > 1 else _phases(time_ns, begin, first, last, end, hold)
     return PressPath(deepest, speed, hold, x, y, phases)
 
 
@@ -77,7 +77,7 @@ def _run(mask: np.ndarray, at: int) -> tuple[int, int]:
     return (int(before[-1]) + 1 if len(before) else 0), (int(behind[0]) - 1 if len(behind) else len(mask) - 1)
 
 
-def _strokes(depth: np.ndarray, low: float) -> int:
+def strokes(depth: np.ndarray, low: float) -> int:
     """Count the strokes: how often the path goes from the bottom tenth into the top half of its range."""
     high = low + 0.5 * (float(depth.max()) - low)
     state, count = False, 0

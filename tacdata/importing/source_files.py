@@ -10,6 +10,7 @@ from typing import Any
 from tacdata import provenance
 from tacdata.documents import composed
 from tacdata.errors import FormatError, UsageError
+from tacdata.importing.formats.source_format import tables_in
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,11 @@ class FileSet:
     """Name under ``files`` -> path."""
     fault: FormatError | None = None
     """Why the files are not complete."""
+
+    def options(self, name: str, mapping: dict[str, Any]) -> dict[str, Any]:
+        """Return how a mapping has a file read, with the {parts} of its table filled in."""
+        entry: dict[str, Any] = mapping["files"][name]
+        return {**entry, "table": entry["table"].format(**self.parts)} if "{" in entry.get("table", "") else entry
 
     @property
     def label(self) -> str:
@@ -72,15 +78,18 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
                 f"{source} is one file, the mapping names {len(files)} ({', '.join(files)})",
                 "the folder that holds them", "give the folder",
             )  # fmt: skip
-        return [FileSet({}, dict.fromkeys(files, source))]
-    matches = {name: _matches(source, entry["path"]) for name, entry in files.items()}
+        matches: dict[str, list[tuple[dict[str, str], Path]]] = {name: [({}, source)] for name in files}
+    else:
+        matches = {name: _matches(source, entry["path"]) for name, entry in files.items()}
     for name, found in matches.items():
         if not found:
             raise UsageError(
                 f"no file fits {files[name]['path']} below {source}", "one or more",
                 f"correct files/{name}/path in the mapping; there is {_listing(source)}",
             )  # fmt: skip
-    keys = {name: tuple(re.findall(r"\{(\w+)\}", entry["path"])) for name, entry in files.items()}
+        if "{" in files[name].get("table", ""):
+            matches[name] = _in_tables(found, files[name])
+    keys = {name: tuple(found[0][0]) for name, found in matches.items()}
     # The kind of file with the most parts defines the trials; others are shared by those whose parts agree.
     leading = max(keys, key=lambda name: len(keys[name]))
     sets = []
@@ -101,7 +110,30 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     return sets
 
 
+def _in_tables(found: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) -> list[tuple[dict[str, str], Path]]:
+    """Return each table of the files that fits the entry's, as "Run {n}" does, with its parts beside the path's."""
+    fitting = [
+        ({**parts, **match.groupdict()}, path)
+        for parts, path in found
+        for table in tables_in(path)
+        if (match := re.fullmatch(_regex(entry["table"]), composed(table)))
+    ]
+    if not fitting:
+        tables = ", ".join(tables_in(found[0][1]))
+        raise UsageError(f"{found[0][1]}: no table fits {entry['table']}", tables, "correct table in the mapping")
+    return fitting
+
+
 def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
+    regex, found = _regex(pattern), []
+    for path in files_below(source):
+        if match := re.fullmatch(regex, composed(path.relative_to(source).as_posix())):
+            found.append((match.groupdict(), path))
+    return sorted(found, key=lambda item: [_natural(value) for value in item[0].values()])
+
+
+def _regex(pattern: str) -> str:
+    """Return a pattern of a path or a table as a regular expression with a group for each {part}."""
     seen: set[str] = set()
 
     def part(match: re.Match[str]) -> str:
@@ -117,12 +149,7 @@ def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
         return f"(?P<{name}>[^/]+?)"
 
     tokens = re.split(r"(\*\*/|\*|\{\w+\})", composed(pattern))
-    regex = "".join(re.sub(r"^(\*\*/|\*|\{\w+\})$", part, t) if k % 2 else re.escape(t) for k, t in enumerate(tokens))
-    found = []
-    for path in files_below(source):
-        if match := re.fullmatch(regex, composed(path.relative_to(source).as_posix())):
-            found.append((match.groupdict(), path))
-    return sorted(found, key=lambda item: [_natural(value) for value in item[0].values()])
+    return "".join(re.sub(r"^(\*\*/|\*|\{\w+\})$", part, t) if k % 2 else re.escape(t) for k, t in enumerate(tokens))
 
 
 def _natural(text: str) -> list[tuple[int, int, str]]:

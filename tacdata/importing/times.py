@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import single
+from tacdata.importing.columns import single, unit_of
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.units import FACTORS, clock_unit, factor, plain, split_unit
+from tacdata.importing.units import FACTORS, clock_unit, factor, plain
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
 """Unix times between which a clock that does not say its zero is taken for Unix time [s]."""
@@ -48,7 +48,7 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
     if isinstance(clock["column"], list):
         table, clock = _joined(table, clock, where)
     name = single(table, clock["column"], f"{where}: column")
-    unit = clock.get("unit") or plain(table.units.get(name) or split_unit(name)[1] or clock_unit(name))
+    unit = plain(unit_of(table, clock, where) or clock_unit(name))
     values = table.column(name)
     if values.dtype == object and (clocked := _times_of_day(values)) is not None:
         return _shifted(clocked, clock), clock.get("zero", "shared")
@@ -220,6 +220,7 @@ def _datetimes(values: np.ndarray, layout: str | None, where: str) -> np.ndarray
     moments = _iso(texts) if layout is None else None
     if moments is None:
         layout = layout or _layout(texts, where)
+        texts = texts if "," in layout.partition("%S")[2] else [_pointed(text) for text in texts]
         moments = [_parsed(text, layout, f"{where}, row {row + 1}") for row, text in enumerate(texts)]
     result = np.full(len(values), NEVER, dtype=np.int64)
     for row, moment in enumerate(moments):
@@ -238,6 +239,11 @@ def _iso(texts: list[str]) -> list[datetime | None] | None:
         return None
 
 
+def _pointed(text: str) -> str:
+    """Return a time with a point before the parts of a second, where a comma stands."""
+    return re.sub(r"(:\d{2}),(\d+)", r"\1.\2", text)
+
+
 def _parsed(text: str, layout: str, where: str) -> datetime | None:
     if not text:
         return None
@@ -250,6 +256,18 @@ def _parsed(text: str, layout: str, where: str) -> datetime | None:
         ) from None  # fmt: skip
 
 
+def layouts_of(known: list[str]) -> dict[str, list[datetime]]:
+    """Return every layout of dates that fits texts, with a sample of the times that it makes of them."""
+    sample = [_pointed(text).replace("T", " ") for text in known[:: max(len(known) // 200, 1)] + known[-1:]]
+    fitting = {}
+    for layout in (f"{date} {clock}" for date in DATES for clock in CLOCKS):
+        try:
+            fitting[layout] = [datetime.strptime(text, layout) for text in sample]
+        except ValueError:
+            continue
+    return fitting
+
+
 def _layout(texts: list[str], where: str) -> str:
     """Return the only layout of dates that fits all texts.
 
@@ -257,18 +275,11 @@ def _layout(texts: list[str], where: str) -> str:
         FormatError: If none fits, or days and months could change places.
     """
     known = [text for text in texts if text]
-    sample = known[:: max(len(known) // 200, 1)] + known[-1:]
-    fitting = []
-    for layout in (f"{date} {clock}" for date in DATES for clock in CLOCKS):
-        try:
-            moments = [datetime.strptime(text.replace("T", " "), layout) for text in sample]
-        except ValueError:
-            continue
-        fitting.append((layout, moments))
-    different = {tuple(moments) for _, moments in fitting}
+    fitting = layouts_of(known)
+    different = {tuple(moments) for moments in fitting.values()}
     example = known[0] if known else ""
     if len(different) == 1:
-        return fitting[0][0]
+        return next(iter(fitting))
     if not different:
         raise FormatError(
             f"{where}: {example!r} is no time that is known",
@@ -276,6 +287,6 @@ def _layout(texts: list[str], where: str) -> str:
             "give format under time in the mapping, for example '%d.%m.%Y %H:%M:%S.%f'",
         )
     raise FormatError(
-        f"{where}: {example!r} can be read as {' or as '.join(sorted(layout for layout, _ in fitting))}",
+        f"{where}: {example!r} can be read as {' or as '.join(sorted(fitting))}",
         "dates that can be read in one way", "give format under time in the mapping",
     )  # fmt: skip

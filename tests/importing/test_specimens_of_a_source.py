@@ -8,7 +8,8 @@ from foreign import mapping
 from tacdata.discrepancy.data.recordings import course_of
 from tacdata.errors import FormatError
 from tacdata.importing.imported_session import import_session
-from tacdata.importing.proposal import described, proposed_mapping
+from tacdata.importing.proposing.description import described
+from tacdata.importing.proposing.proposal import proposed_mapping
 
 MATERIALS = ("eco30", "ds10", "eco30", "ds10")
 KNOTS = np.cumsum([0.0, 0.5, 1.0, 0.5, 1.0, 0.5])
@@ -68,7 +69,7 @@ def test_a_proposal_finds_the_column_and_the_path(tmp_path):
     in_a_column(tmp_path)
     (tmp_path / "mapping.yaml").unlink()
     tables, _ = described(tmp_path)
-    found = proposed_mapping(tmp_path, tables)
+    found = proposed_mapping(tmp_path, tables).mapping
     assert found["press"] == {"specimen": {"file": "wide", "column": "material"}}
     assert found["taxels"]["columns"] == ["cap0"]
     (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(found))
@@ -79,4 +80,4 @@ def test_a_proposal_finds_the_column_and_the_path(tmp_path):
         lines = ["t,disp,cap0", *(row.split(",", 2)[2] for row in rows(0, "eco30"))]
         (named / f"spec{number}_cyc{number}.csv").write_text("\n".join(lines) + "\n")
     tables, _ = described(named)
-    assert proposed_mapping(named, tables)["press"] == {"specimen": {"part": "part0"}}
+    assert proposed_mapping(named, tables).mapping["press"] == {"specimen": {"part": "part0"}}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ SHOWN = 40
 """Letters of a text that an error quotes."""
 SNIFFED, HEAD = 256 * 1024, 4096
 """Bytes from which the layout is recognized; among which a header's cells may hold line breaks."""
+RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
+"""How a serial monitor marks when a line came."""
 MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 """Byte order marks and what they announce; the longer ones first."""
 
@@ -52,6 +55,7 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
     Raises:
         FormatError: If it has no rows of numbers.
     """
+    data = _with_receipt(data)
     layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
     own = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
     body, comments, headers = _body(data, layout, own)
@@ -67,6 +71,24 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
     if skipped:
         notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
     return SourceTable(path, columns, dict(layout.units), tuple(notes))
+
+
+def _with_receipt(data: bytes) -> bytes:
+    """Return a serial monitor's lines with the time before "->" as a column of its own; other text as it is."""
+    lines = data.split(b"\n")
+    tail = [line for line in lines[len(lines) // 2 :] if line.strip()]
+    if 2 * sum(bool(RECEIPT.match(line)) for line in tail) <= len(tail):
+        return data
+    cut = [line.partition(b"->")[2].strip() if RECEIPT.match(line) else b"" for line in lines]
+    layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), {}, "")
+    between = b"\t" if layout.delimiter == " " else layout.delimiter.encode()
+    rest = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]
+    begin = [b"received" if number < layout.skip else RECEIPT.match(line) for number, line in enumerate(lines)]
+    made = [
+        (first if isinstance(first, bytes) else first[1]) + between + text if first and text else b""
+        for first, text in zip(begin, rest, strict=True)
+    ]
+    return b"\n".join(made)
 
 
 def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:

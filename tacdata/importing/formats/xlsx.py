@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from contextlib import suppress
 from datetime import datetime, time
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,30 @@ from tacdata.errors import FormatError
 from tacdata.importing.formats.csv import table_of
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
+TABS = {"delimiter": "tab", "decimal": "."}
+HEAD = 60
+"""Rows of a sheet that tell whether it holds numbers."""
+
 
 class Xlsx(SourceFormat):
     """The sheet that ``table`` names, else the first with numbers; headers and units as in a text file."""
 
     endings = (".xlsx", ".xlsm")
+
+    def tables(self, path: Path) -> tuple[str, ...]:
+        """Return the sheets whose first rows hold numbers, if there are several; see the base."""
+        from openpyxl import load_workbook
+
+        book, found = load_workbook(path, read_only=True, data_only=True), []
+        try:
+            for sheet in book.worksheets:
+                sheet.reset_dimensions()
+                with suppress(FormatError):
+                    table_of(path, _as_text(sheet, HEAD), TABS, [])
+                    found.append(sheet.title)
+        finally:
+            book.close()
+        return tuple(found) if len(found) > 1 else ("",)
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read a sheet; dates come as ISO 8601. See the base."""
@@ -43,15 +63,11 @@ def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[Source
     wanted, refused, sheets = options.get("table"), None, {}
     for sheet in [book[wanted]] if wanted else book.worksheets:
         sheet.reset_dimensions()  # programs other than Excel write wrong ones, by which rows would be cut off
-        text = io.StringIO()
-        rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
-        width = max(map(len, rows), default=0)
-        csv.writer(text, delimiter="\t", lineterminator="\n").writerows([*r, *[""] * (width - len(r))] for r in rows)
-        if any(map(any, rows)):
-            sheets[sheet.title] = text.getvalue().encode()
+        if text := _as_text(sheet):
+            sheets[sheet.title] = text
     for name, data in sheets.items():
         try:
-            table = table_of(path, data, {**options, "delimiter": "tab", "decimal": "."}, [])
+            table = table_of(path, data, {**options, **TABS}, [])
         except FormatError as error:
             refused = refused or error
             continue
@@ -60,6 +76,15 @@ def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[Source
         f"{path}: no sheet with rows of numbers ({', '.join(sheets)})" if refused else f"{path} holds no rows",
         "a sheet with a header and rows", "leave it out, or name the sheet by table and its first lines by skip",
     )  # fmt: skip
+
+
+def _as_text(sheet: Any, most: int | None = None) -> bytes:
+    """Return a sheet's rows as text with tabs between cells; empty if no cell is full."""
+    text = io.StringIO()
+    rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True, max_row=most)]
+    width = max(map(len, rows), default=0)
+    csv.writer(text, delimiter="\t", lineterminator="\n").writerows([*r, *[""] * (width - len(r))] for r in rows)
+    return text.getvalue().encode() if any(map(any, rows)) else b""
 
 
 def _never_computed(path: Path, sheet: str) -> list[str]:

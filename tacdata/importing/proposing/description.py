@@ -1,0 +1,177 @@
+"""What is in foreign files: one table of each kind, and a listing for a person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
+from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
+from tacdata.importing.proposing.roles import is_whole, roles_of
+from tacdata.importing.source_files import files_below, is_one
+
+SHOWN = 30
+"""Columns that are listed per file."""
+SENTINELS = (-1, 0, -999, -9999, 9999, 65535)
+"""Numbers that loggers write for no value."""
+
+
+@dataclass
+class FoundKind:
+    """Files, or tables in files, that hold the same columns."""
+
+    table: SourceTable
+    """The first one's."""
+    count: int = 1
+    options: dict[str, Any] = field(default_factory=dict)
+    """What a mapping has to say under the file to read it so."""
+    words: dict[int, list[str]] = field(default_factory=dict)
+    """Number of a # of the kind -> the words that it stands for, where they are no numbers."""
+
+
+def described(source: Path) -> tuple[dict[str, FoundKind], str]:
+    """Return one table of each kind of file in a source, and a description of them.
+
+    Raises:
+        UsageError: If nothing there can be read.
+    """
+    if not source.exists():
+        raise UsageError(f"no file or folder {source}", "measured data", "check the path")
+    paths = [source] if is_one(source) else files_below(source)
+    found: dict[str, FoundKind] = {}
+    refused = []
+    below = [path.relative_to(source) if path != source else Path(path.name) for path in paths]
+    for path, kind in zip(paths, kinds_of(list(below)), strict=True):
+        known = [entry for key, entry in found.items() if key.partition(INSIDE)[0] == kind]
+        for entry in known:
+            entry.count += 1
+        if known or kind in refused:
+            continue
+        try:
+            for name in tables_in(path):
+                key = f"{kind}{INSIDE}{numberless(name)}" if name else kind
+                if key in found:
+                    found[key].count += 1
+                    continue
+                table, options = _read(path, {"table": name} if name else {})
+                found[key] = FoundKind(table, 1, options)
+        except ModuleNotFoundError:
+            raise
+        except Exception as error:  # a README beside the data is no error
+            if is_one(source) and isinstance(error, TacdataError):
+                raise
+            words = error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}"
+            refused.append(words.removeprefix(f"{source}/"))
+    if not found:
+        raise UsageError(
+            f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
+            "CSV, Excel, NPZ, Parquet or MATLAB files, or bags of ROS 2", "check the path, or convert the files",
+        )  # fmt: skip
+    found = _of_same_columns(found)
+    lines = []
+    for key, entry in found.items():
+        kind, _, inside = key.partition(INSIDE)
+        files = f"{entry.count} {'table' if inside and '#' in inside else 'file'}{'s' * (entry.count > 1)}"
+        lines.append(f"{kind} ({files}){f', {inside}' if inside else ''}: {entry.table.rows} rows")
+        lines += _columns(entry.table)
+        lines += [f"    {note}" for note in entry.table.notes]
+    lines += [f"not read: {text}" for text in refused]
+    return found, "\n".join(lines)
+
+
+def _read(path: Path, options: dict[str, Any]) -> tuple[SourceTable, dict[str, Any]]:
+    """Return a file's table and the options that read it: with trials along the axis that loses fewest arrays."""
+    table = read_table(path, options)
+    best, chosen = len(_lost(table)), options
+    for axis in (2, 0, 1) if path.suffix in (".mat", ".npz") and best else ():
+        try:
+            tried = read_table(path, {**options, "trial_axis": axis})
+        except FormatError:
+            break
+        if len(_lost(tried)) < best:
+            table, best, chosen = tried, len(_lost(tried)), {**options, "trial_axis": axis}
+    return table, chosen
+
+
+def _lost(table: SourceTable) -> list[str]:
+    """Return the arrays that were left out because they have other rows."""
+    return [name for note in table.notes if "left out" in note for name in note.split("left out: ")[-1].split(", ")]
+
+
+def _of_same_columns(found: dict[str, FoundKind]) -> dict[str, FoundKind]:
+    """Put kinds together that are whole trials of the same columns: their paths differ by words."""
+    alike: dict[Any, list[str]] = {}
+    for key, entry in found.items():
+        own = key if not is_whole(roles_of(entry.table)) else ""
+        depth = key.partition(INSIDE)[0].count("/")
+        alike.setdefault((own, depth, INSIDE in key, tuple(entry.table.columns)), []).append(key)
+    result = {}
+    for keys in alike.values():
+        whole = merged(keys) if len(keys) > 1 else None
+        if whole is None:
+            result |= {key: found[key] for key in keys}
+            continue
+        first = found[keys[0]]
+        result[whole] = replace(first, count=sum(found[key].count for key in keys), words=_words(keys, whole))
+    return result
+
+
+def _words(keys: list[str], whole: str) -> dict[int, list[str]]:
+    """Return what stands in each folder that was put together, by the number of its #."""
+    words: dict[int, list[str]] = {}
+    steps = whole.partition(INSIDE)[0].split("/")
+    for level, step in enumerate(steps[:-1]):
+        names = list(dict.fromkeys(key.split("/")[level] for key in keys))
+        if len(names) > 1 and step.count("#") == 1:
+            words["/".join(steps[:level]).count("#")] = names
+    return words
+
+
+def _columns(table: SourceTable) -> list[str]:
+    names = list(table.columns)
+    if len(names) == 1 and 0 < table.inner(names[0]) <= SHOWN:
+        # An array without names: a person tells its columns by what they hold.
+        names = [f"{names[0]}[{k}]" for k in range(table.inner(names[0]))]
+    lines = [_line(table, name) for name in names[:SHOWN]]
+    return lines + ([f"    and {len(names) - SHOWN} more columns"] if len(names) > SHOWN else [])
+
+
+def _line(table: SourceTable, name: str) -> str:
+    values = table.column(name)
+    unit = f" [{table.units[name]}]" if table.units.get(name) and not _says(name, table.units[name]) else ""
+    if values.dtype == object:
+        known = sorted({str(value) for value in values.tolist() if value is not None})
+        return f"    {name}{unit}: text, {len(known)} different, for example {', '.join(known[:3])}"
+    numbers = values.astype(float)
+    missing = np.isnan(numbers).mean()
+    shape = f" x {values.shape[1]}" if values.ndim > 1 else ""
+    if missing == 1:
+        return f"    {name}{unit}{shape}: no value"
+    low, high = np.nanmin(numbers) + 0.0, np.nanmax(numbers) + 0.0  # no "-0"
+    remark = f", {100 * missing:.0f} % missing" * bool(missing) + _sentinel(numbers)
+    return f"    {name}{unit}{shape}: {low:.9g} to {high:.9g}{remark}"
+
+
+def _says(name: str, unit: str) -> bool:
+    """Return whether a column's name says its unit already."""
+    return any(f"{left}{unit}{right}" in name for left, right in ("[]", "()", "{}"))
+
+
+def _sentinel(numbers: np.ndarray) -> str:
+    """Return a remark on a number that may stand for no value: frequent, and far from all others.
+
+    A stage at rest at 0 is none: it leaves 0 in small steps.
+    """
+    known, times = np.unique(numbers[np.isfinite(numbers)], return_counts=True)
+    often = times.max() / numbers.size
+    value = known[times.argmax()]
+    others = known[known != value]
+    if often <= 0.2 or len(known) <= 10 or value not in SENTINELS:
+        return ""
+    if np.abs(others - value).min() < 0.1 * np.ptp(others):
+        return ""
+    return f", {100 * often:.0f} % are {value:g}: missing?"

@@ -1,0 +1,234 @@
+"""Proposes a mapping for foreign files, and asks a person what the files do not say."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import schemas
+from tacdata.errors import FormatError
+from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.proposing.description import FoundKind
+from tacdata.importing.proposing.file_kinds import INSIDE, pattern
+from tacdata.importing.proposing.roles import roles_of
+from tacdata.importing.proposing.strokes import PressingAxis, pressing_axis
+from tacdata.importing.times import layouts_of, times
+from tacdata.importing.units import plain
+
+SHORT = ("s", "ms", "us", "ns", "min", "h", "d")
+"""Units of time that a mapping may name; others stand in the header and are read from there."""
+SPECIMEN = re.compile(r"(?:specimen|spec|sample|material|coupon|probe)[-_ ]?$", re.IGNORECASE)
+"""What stands in a path before the number or the name of a specimen."""
+MATERIAL = re.compile(
+    r"ecoflex|dragon|pdms|sylgard|silicon|rubber|latex|vhb|tpu|foam|gel|agilus|ninja|elast|neopren|solaris|smooth",
+    re.IGNORECASE,
+)
+"""Words of folders that name what soft sensors are made of."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A mapping to start from."""
+
+    mapping: dict[str, Any]
+    questions: tuple[str, ...]
+    """What a person has to say or to look at, as sentences."""
+
+
+def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
+    """Return a mapping for the kinds of files, as far as names and values allow, and what to ask."""
+    aliases: dict[str, str] = {}
+    for kind in kinds:
+        path, _, inside = kind.partition(INSIDE)
+        alias = re.sub(r"\W+", "_", (inside or Path(path).stem).lower()).strip("_") or "data"
+        while alias in aliases:
+            alias += "_"
+        aliases[alias] = kind
+    tables = {alias: kinds[kind].table for alias, kind in aliases.items()}
+    roles = {alias: roles_of(table) for alias, table in tables.items()}
+    if not any(found["channels"] for found in roles.values()):
+        # Nothing else was read: the load cell is the sensor.
+        for found in roles.values():
+            found["channels"] = found.pop("force", [])
+    wide = max(aliases, key=lambda alias: len(roles[alias]["channels"]))
+    asked: list[str] = []
+    document: dict[str, Any] = {
+        "version": schemas.version("import_mapping"), "name": source.stem, "source": "say where the data come from",
+        "files": {alias: _file(kind, kinds[kind], roles[alias], asked) for alias, kind in aliases.items()},
+        "sensor": {"name": source.stem},
+        "taxels": {"file": wide, "columns": _short(roles[wide]["channels"]) or [0]},
+    }  # fmt: skip
+    units = {plain(tables[wide].units.get(name, "")) for name in roles[wide]["channels"]}
+    if len(units) == 1 and units != {""}:
+        document["taxels"]["unit"] = units.pop()
+    _place(document, tables, roles, asked)
+    for alias, found in roles.items():
+        if "trial" in found:
+            document["trials"] = {"column": found["trial"][0]}
+        if specimen := _specimen(alias, aliases[alias], kinds[aliases[alias]], found, asked):
+            document.setdefault("press", {"specimen": specimen})
+    _unnamed(tables[wide], roles[wide], asked)
+    return Proposal(document, tuple(asked))
+
+
+def _place(
+    document: dict[str, Any], tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]], asked: list[str]
+) -> None:
+    """Add position, gauge, force and temperature; cut trials where one file holds several."""
+    for alias, found in roles.items():
+        table = tables[alias]
+        if "position" not in document and ("depth" in found or "z" in found):
+            chosen = ("x", "y", "depth") if "depth" in found else ("x", "y", "z")
+            entry = {key: _axis(table, found[key][0]) for key in chosen if key in found}
+            document["position"] = {"file": alias} | entry
+            unsaid = [found[key][0] for key in chosen if key in found and "unit" in entry[key]]
+            if unsaid:
+                asked.append(f"{_and(unsaid)}: no unit is given; mm is a guess")
+            _motion(document, table, found, roles[document["taxels"]["file"]]["channels"], asked)
+        lengths = found.get("depth", [])
+        if len(lengths) > 1 and "displacement" not in document.get("measured", {}):
+            # A second length is a gauge beside the drive; it separates compliance from the skin's deformation.
+            told = {"file": alias, "columns": lengths[1:2], "unit": plain(table.units.get(lengths[1], "")) or "mm"}
+            document.setdefault("measured", {})["displacement"] = told
+        for key in ("force", "temperature"):
+            if key in found and key not in document.get("measured", {}):
+                unit = table.units.get(found[key][0])
+                entry = {"file": alias, "columns": found[key], **({"unit": plain(unit)} if unit else {})}
+                document.setdefault("measured", {})[key] = entry
+    if "position" not in document:
+        asked.append("no column is named as a position or a depth: give position, or schedule")
+
+
+def _motion(
+    document: dict[str, Any], table: SourceTable, found: dict[str, list[str]], channels: list[str], asked: list[str]
+) -> None:
+    """Set the sign of the pressing axis, tell a machine's height from a depth, and cut trials by pauses or presses."""
+    name, position = found.get("depth", found.get("z", []))[0], document["position"]
+    clock = document["files"][position["file"]]["time"]
+    try:
+        time_ns, _ = times(table, clock, "")
+        motion = pressing_axis(time_ns, table.column(name).astype(float), _deviation(table, channels))
+    except (FormatError, ValueError):
+        return  # said where the clock was read
+    is_depth = "depth" in found
+    if is_depth and motion.lifted:
+        position["z"], is_depth = position.pop("depth"), False
+    elif not is_depth and motion.sign > 0 and motion.at_zero and set(position) == {"file", "z"}:
+        position["depth"], is_depth = position.pop("z"), True
+    if motion.sign * (1 if is_depth else -1) < 0:
+        position["depth" if is_depth else "z"]["scale"] = -1.0
+        way = "falls" if motion.sign < 0 else "grows"
+        asked.append(f"{name}: it {way} into the skin, so its sign is turned (scale: -1)")
+    if not is_depth and motion.at_zero:
+        document["contact"] = {"z": 0.0, "known_from": "the zero of the machine"}
+        asked.append(f"{name}: its zero is taken for the height at which the skin is touched (contact: {{z: 0}})")
+    elif not is_depth:
+        asked.append(
+            f"{name}: a machine's height; where does it touch the skin? Give contact: {{z: ...}}, else depth is "
+            "counted from the highest position of each trial"
+        )
+    if "trial" not in found and "trials" not in document:
+        _cut(document, motion, is_depth, asked)
+
+
+def _cut(document: dict[str, Any], motion: PressingAxis, is_depth: bool, asked: list[str]) -> None:
+    if motion.pause:
+        document["trials"] = {"gap": motion.pause}
+        asked.append(f"{motion.pauses} pauses of more than {motion.pause:g} s: each is taken for the end of a trial")
+    elif motion.strokes > 1 and is_depth:
+        document["trials"] = {"press_above": motion.above}
+        asked.append(
+            f"{motion.strokes} presses without a pause: each stretch deeper than {motion.above:g} is taken for a trial"
+        )
+
+
+def _deviation(table: SourceTable, channels: list[str]) -> np.ndarray | None:
+    """Return how far the readings are from their first rows, each by its own range, shape (rows,); None if unknown."""
+    parts = [table.column(name) for name in channels if name in table.columns]
+    if not parts:
+        return None
+    values = np.column_stack(parts).astype(float)
+    spread = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
+    first = np.nanmedian(values[: max(len(values) // 50, 1)], axis=0)
+    return np.nanmean(np.abs(values - first) / np.where(spread > 0, spread, 1.0), axis=1)
+
+
+def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
+    """Return where a file says which specimen was pressed: in a column, or in its path; {} if nowhere."""
+    for name in roles.get("specimen", []):
+        if len({str(value) for value in entry.table.columns[name].tolist() if value is not None}) > 1:
+            return {"file": alias, "column": name}
+    before = kind.partition(INSIDE)[0].split("#")[:-1]
+    if found := next(({"part": f"part{k}"} for k, text in enumerate(before) if SPECIMEN.search(text)), None):
+        return found
+    for number, words in entry.words.items():
+        if 2 * sum(bool(MATERIAL.search(word)) for word in words) >= len(words):
+            asked.append(f"the folders {_and(words)} are taken for specimens")
+            return {"part": f"part{number}"}
+        asked.append(f"are the folders {_and(words)} specimens? Then write press: {{specimen: {{part: part{number}}}}}")
+    return {}
+
+
+def _unnamed(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) -> None:
+    if len(table.columns) == 1 and table.inner(next(iter(table.columns))):
+        asked.append(
+            f"the columns of {table.path.name} have no names: which are position, force and channels? "
+            f"All but the time stand as channels, {', '.join(_short(roles['channels']))}"
+        )
+
+
+def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
+    table = entry.table
+    outer, _, inside = kind.partition(INSIDE)
+    path, parts = pattern(outer)
+    found: dict[str, Any] = {"path": path, **entry.options}
+    if "#" in inside:
+        found["table"] = pattern(inside, parts)[0]
+    if not roles.get("time"):
+        asked.append(f"{Path(outer).name}: no column of times; 100 rows a second is a guess, give time: {{rate: ...}}")
+        return found | {"time": {"rate": 100.0}}
+    if [table.column(name).dtype for name in roles["time"]] == [object, object]:
+        # A date and a time of day.
+        clock: dict[str, Any] = {"column": roles["time"]}
+    else:
+        unit = plain(table.units.get(roles["time"][0], ""))
+        clock = {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}
+    try:
+        times(table, clock, Path(outer).name)
+    except FormatError as error:
+        clock |= _american(table, roles["time"][0], asked)
+        if "format" not in clock:
+            asked.append(f"{error.given}: {error.remedy}")
+    return found | {"time": clock}
+
+
+def _american(table: SourceTable, name: str, asked: list[str]) -> dict[str, str]:
+    """Return the format of dates with AM and PM, where month and day could change places: the month comes first."""
+    values = table.column(name)
+    known = [str(text).strip() for text in values.tolist() if text is not None] if values.dtype == object else []
+    layout = next((layout for layout in layouts_of(known) if layout.startswith("%m/") and "%p" in layout), None)
+    if layout is None:
+        return {}
+    asked.append(f"{name}: {known[0]!r} is read with the month first (format: {layout!r}); is it?")
+    return {"format": layout}
+
+
+def _axis(table: SourceTable, name: str) -> dict[str, Any]:
+    return {"column": name, **({} if name in table.units else {"unit": "mm"})}
+
+
+def _short(names: list[str]) -> list[str]:
+    """Return columns of one array that follow one another as one range: array[1-12]."""
+    inner = [re.fullmatch(r"(.+)\[(\d+)\]", name) for name in names]
+    numbers = [int(match[2]) for match in inner if match]
+    if len(numbers) < max(len(names), 2) or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
+        return names
+    return [f"{names[0].rpartition('[')[0]}[{numbers[0]}-{numbers[-1]}]"]
+
+
+def _and(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

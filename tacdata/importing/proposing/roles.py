@@ -1,0 +1,136 @@
+"""What each column of a foreign table is, by its name, its unit and its values."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.times import times
+from tacdata.importing.units import OTHERS, plain, quantity_of, split_unit
+
+GUESSES = {
+    "time": r"(time|t|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed)([_ ]?(time|zeit|uhrzeit))?",
+    "depth": (
+        r"(depth|indentation|displacement|disp|travel|stroke|extension|crosshead|pos(ition)?"
+        r"|(traversen|verfahr)?weg|eindringtiefe|d)"
+    ),
+    "x": r"(x|pos_?x|x_?pos(ition)?|stage_?x)",
+    "y": r"(y|pos_?y|y_?pos(ition)?|stage_?y)",
+    "z": r"(z|pos_?z|z_?pos(ition)?|stage_?z|height)",
+    "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy])",
+    "temperature": r"(temp(erature)?(_?\w{1,4})?|t_?amb)",
+    "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|zyklus|element)(_?(id|no|nr|number))?",
+    "specimen": (
+        r"(specimen|material|coupon|silicone|elastomer|werkstoff|probe)(_?(id|no|nr|number|name))?"
+        r"|sample_?(id|no|nr|number|name)"
+    ),
+    "counter": r"(counter|frame|seq(uence)?|sample|index|n)",
+    "setting": r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))|(set|target|cmd)_\w+",
+}
+"""Meaning of a column by its name without the unit."""
+PLACE = r"(tip|tcp|pos(ition)?s?|pose|xyz|probe|indenter|stage|ee(_?pos)?|end_?effector|robot(_?pos)?)"
+"""Name of an array whose first three columns are a place."""
+GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
+"""Words that mark a length as measured beside the commanded one."""
+DEGREES = ("degc", "c", "k", "degf")
+ROWS = 50
+"""Rows of a text column that are tried as times."""
+
+
+def roles_of(table: SourceTable) -> dict[str, list[str]]:
+    """Return the columns of each role; ``channels`` are those of no other."""
+    roles: dict[str, list[str]] = {"channels": []}
+    for name, values in table.columns.items():
+        role = _role(table, name, values)
+        if role == "place":
+            for axis, number in zip("xyz", range(3), strict=True):
+                roles.setdefault(axis, []).append(f"{name}[{number}]")
+        elif role is None and values.dtype != object:
+            roles["channels"].append(name)
+        elif role:
+            roles.setdefault(role, []).append(name)
+    roles["depth"] = sorted(roles.get("depth", []), key=lambda name: bool(re.search(GAUGE, name.lower())))
+    if not roles["depth"]:
+        del roles["depth"]
+        if "x" in roles and not {"y", "z"} & set(roles):
+            # One axis only: it is the one that presses.
+            roles["depth"] = roles.pop("x")
+    if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
+        # Without a header, the first increasing column is most likely the time.
+        _first_rising(table, roles)
+    if not roles.get("time") and len(table.columns) == 1 and table.inner(next(iter(table.columns))):
+        _first_rising_inside(table, roles)
+    _set_for_each_trial(table, roles)
+    return roles
+
+
+def is_whole(roles: dict[str, list[str]]) -> bool:
+    """Return whether a file holds its own position and readings, so that it is a trial by itself."""
+    return ("depth" in roles or "z" in roles) and bool(roles["channels"] or "force" in roles)
+
+
+def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
+    bare, inside = split_unit(name.rsplit(".", 1)[-1])
+    bare = re.sub(r"\s+", "_", bare.lower())
+    if values.ndim == 2 and values.shape[1] in (3, 6, 7) and re.fullmatch(PLACE, bare):
+        return "place"
+    role = next((role for role, pattern in GUESSES.items() if re.fullmatch(pattern, bare)), None)
+    given = plain(table.units.get(name) or inside)
+    unit = quantity_of(given)
+    if given.lower() in DEGREES:
+        return "temperature"
+    if role == "time" and values.dtype != object and unit != "s" and given.lower() in OTHERS:
+        role = None
+    role = {"N": "force", "s": "time"}.get(unit or "", role)
+    if role is None and len(bare) > 1 and quantity_of(bare) == "s":
+        return "time"  # "ms", "seconds"
+    if role is None and values.dtype == object and _are_times(table, name):
+        return "time"
+    return "depth" if role is None and unit == "mm" else role
+
+
+def _are_times(table: SourceTable, name: str) -> bool:
+    """Return whether a column of text holds dates or times of day, in one way or in several."""
+    first = SourceTable(table.path, {name: table.columns[name][:ROWS]}, table.units)
+    try:
+        times(first, {"column": name}, "")
+    except FormatError as error:
+        return "can be read as" in error.given
+    return True
+
+
+def _first_rising(table: SourceTable, roles: dict[str, list[str]]) -> None:
+    for name in list(roles["channels"]):
+        if (np.diff(table.columns[name]) >= 0).all():
+            roles["time"] = [name]
+            roles["channels"].remove(name)
+            return
+
+
+def _first_rising_inside(table: SourceTable, roles: dict[str, list[str]]) -> None:
+    """Tell the time of an array without names: its first column that only rises."""
+    (name,) = table.columns
+    columns = [f"{name}[{k}]" for k in range(table.inner(name))]
+    steps = [np.diff(table.column(column)) for column in columns]
+    rising = next((k for k, step in enumerate(steps) if (step >= 0).all() and (step > 0).mean() > 0.5), None)
+    if rising is not None:
+        roles["time"] = [columns.pop(rising)]
+        roles["channels"] = columns
+
+
+def _set_for_each_trial(table: SourceTable, roles: dict[str, list[str]]) -> None:
+    """Take columns that stand still in each trial, and differ between trials, from the channels: they are set."""
+    if not roles.get("trial"):
+        return
+    _, trial = np.unique(table.column(roles["trial"][0]).astype(str), return_inverse=True)
+    order = np.argsort(trial, kind="stable")
+    same = np.diff(trial[order]) == 0
+    for name in list(roles["channels"]):
+        values = table.column(name)[order]
+        steps = np.diff(values, axis=0)
+        if values.ndim == 1 and not steps[same].any() and steps[~same].any():
+            roles["channels"].remove(name)
+            roles.setdefault("setting", []).append(name)

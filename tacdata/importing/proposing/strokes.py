@@ -1,0 +1,71 @@
+"""How the pressing axis moves: its sign, its pauses and its strokes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tacdata.importing.press_path import strokes
+from tacdata.importing.times import NEVER
+
+PAUSE, TIMES = 1.0, 10.0
+"""A pause is longer than this [s], and than this many steps between rows."""
+SURE = 0.5
+"""Correlation of position and readings from which the sign is told."""
+LIFTED, CLEAR = 0.2, 0.05
+"""A length that never comes nearer to 0 than this share of its range is a height; presses are cut at this share."""
+
+
+@dataclass(frozen=True)
+class PressingAxis:
+    """What the path says."""
+
+    sign: int
+    """1 where the axis grows into the skin, -1 where it falls."""
+    at_zero: bool
+    """Whether 0 is among its values, or just beside them."""
+    lifted: bool
+    """Whether it never comes near zero, as a machine's height and no depth does."""
+    pause: float
+    """A time between the longest step within trials and the shortest pause between them [s]; 0 without pauses."""
+    pauses: int
+    strokes: int
+    """How often it goes down and comes back between two pauses, at most."""
+    above: float
+    """Depth that cuts strokes apart [as in the file]."""
+
+
+def pressing_axis(time_ns: np.ndarray, axis: np.ndarray, deviation: np.ndarray | None) -> PressingAxis:
+    """Return how an axis moves.
+
+    Args:
+        time_ns: Time of each row [ns], shape (rows,).
+        axis: Its position [as in the file], shape (rows,).
+        deviation: How far the readings are from rest (any scale), shape (rows,); None if not known.
+
+    Raises:
+        ValueError: If fewer than three rows have both.
+    """
+    known = np.isfinite(axis) & (time_ns != NEVER)
+    if known.sum() < 3:
+        raise ValueError("fewer than three rows with a time and a position")
+    time_ns, axis = time_ns[known], axis[known]
+    sign = 1 if axis.mean() >= axis[0] else -1  # a trial begins away from the skin
+    if deviation is not None and np.ptp(axis) > 0 and np.nanstd(deviation[known]) > 0:
+        both = np.isfinite(deviation[known])
+        correlation = float(np.corrcoef(axis[both], deviation[known][both])[0, 1])
+        sign = sign if abs(correlation) < SURE else int(np.sign(correlation))
+    low, high = np.sort(np.abs([axis.min(), axis.max()]))
+    beside = CLEAR * np.ptp(axis)
+    at_zero = bool(axis.min() <= beside and axis.max() >= -beside)
+    lifted = bool(axis.min() * axis.max() > 0 and low > LIFTED * (high - low))
+    steps = np.diff(time_ns) / 1e9
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    long = np.sort(steps[(steps > PAUSE) & (steps > TIMES * usual)])
+    pause = float(f"{(long[0] + max(steps[steps < long[0]], default=0.0)) / 2:.2g}") if len(long) else 0.0
+    down = sign * axis - (sign * axis).min()
+    edges = [0, *(np.flatnonzero(steps > pause) + 1).tolist(), len(down)] if pause else [0, len(down)]
+    most = max(strokes(down[a:b], CLEAR * down.max()) for a, b in pairwise(edges))
+    return PressingAxis(sign, at_zero, lifted, pause, len(long), most, float(f"{2 * CLEAR * np.ptp(axis):.2g}"))

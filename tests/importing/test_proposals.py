@@ -1,0 +1,208 @@
+"""Files as labs keep them are recognized by names, units and values; what they do not say is asked."""
+
+import numpy as np
+import openpyxl
+import pytest
+import scipy.io
+
+from tacdata import documents
+from tacdata.importing.imported_session import import_session
+from tacdata.importing.proposing.description import described
+from tacdata.importing.proposing.proposal import proposed_mapping
+from tacdata.importing.proposing.trial_run import tried
+from tacdata.recording import read_session
+from tacdata.recording.files.reader import read_episode
+
+STROKE = np.concatenate([np.zeros(10), np.linspace(0, 1, 20), np.ones(10), np.linspace(1, 0, 20), np.zeros(10)])
+"""A press, one row every 0.05 s; as a share of its depth."""
+T = 0.05 * np.arange(len(STROKE))
+
+
+def proposed(folder):
+    kinds, text = described(folder)
+    return proposed_mapping(folder, kinds), text
+
+
+def imported(folder, mapping, tmp_path):
+    """Return the presses that a proposal makes as it stands."""
+    path = tmp_path / "mapping.yaml"
+    documents.write(path, mapping, "import_mapping")
+    import_session(folder, path, tmp_path / "session")
+    return [read_episode(path) for path in read_session(tmp_path / "session").episodes]
+
+
+def written(path, header, *columns, between=","):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [between.join(f"{value}" for value in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+
+
+def test_folders_of_materials_are_one_kind_of_file_and_specimens(tmp_path):
+    source = tmp_path / "source"
+    for load, material in enumerate(("Ecoflex 00-30", "Dragon Skin 10", "PDMS"), 3):
+        for run in (1, 2):
+            written(
+                source / material / f"run_{run}.csv", "Time (s),Depth (mm),Load (N)", T, 2 * STROKE, load * run * STROKE
+            )
+    found, text = proposed(source)
+    assert "#/run_#.csv (6 files)" in text
+    assert [entry["path"] for entry in found.mapping["files"].values()] == ["{part0}/run_{part1}.csv"]
+    assert found.mapping["press"] == {"specimen": {"part": "part0"}}
+    assert any("Dragon Skin #" in question for question in found.questions)
+    assert len(imported(source, found.mapping, tmp_path)) == 6
+
+
+def test_folders_whose_words_are_no_materials_are_asked_about(tmp_path):
+    for name in ("slow", "fast"):
+        written(tmp_path / name / "run_1.csv", "Time (s),Depth (mm),Load (N)", T, 2 * STROKE, 3 * STROKE)
+    found, _ = proposed(tmp_path)
+    assert "press" not in found.mapping
+    assert "are the folders fast and slow specimens? Then write press: {specimen: {part: part0}}" in found.questions
+
+
+def test_streams_of_one_trial_stay_apart(tmp_path):
+    """Two boards write the same columns and no position: neither is a trial by itself."""
+    for name in ("left", "right"):
+        written(tmp_path / f"{name}.csv", "t_s,cap0,cap1", T, STROKE, STROKE)
+    written(tmp_path / "stage.csv", "t_s,depth_mm", T, STROKE)
+    found, _ = proposed(tmp_path)
+    assert sorted(entry["path"] for entry in found.mapping["files"].values()) == ["left.csv", "right.csv", "stage.csv"]
+
+
+def test_signs_in_names_belong_to_their_numbers(tmp_path):
+    for place in ("x+2.0_y-1.5", "x-2.0_y+1.5", "x+0.0_y+0.0"):
+        written(tmp_path / f"gel_{place}.csv", "ms,z_um,s0,s1", (1000 * T).astype(int), -900 * STROKE, STROKE, STROKE)
+    found, _ = proposed(tmp_path)
+    (entry,) = found.mapping["files"].values()
+    assert entry == {"path": "gel_x{part0}_y{part1}.csv", "time": {"column": "ms"}}, "ms is no channel"
+    assert found.mapping["taxels"]["columns"] == ["s0", "s1"]
+
+
+def test_sheets_of_the_same_columns_are_trials(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["Foam, 3 mm"])
+    for number in (1, 2, 3):
+        sheet = book.create_sheet(f"Run {number}")
+        for row in (["Time", "Displacement", "Capacitance"], ["(s)", "(mm)", "(pF)"]):
+            sheet.append(row)
+        for row in zip(T, number * STROKE, 2 + STROKE, strict=True):
+            sheet.append([float(value) for value in row])
+    source = tmp_path / "foam.xlsx"
+    book.save(source)
+    found, _ = proposed(source)
+    assert found.mapping["files"]["run"]["table"] == "Run {part0}"
+    assert [press.press.depth for press in imported(source, found.mapping, tmp_path)] == [1, 2, 3]
+
+
+def test_trials_along_an_axis_are_found_and_what_is_set_is_no_channel(tmp_path):
+    readings = np.stack([np.outer(STROKE, np.arange(1, 5)) * k for k in (1, 2, 3)], axis=2)
+    inside = {"t": T[:, None], "V": readings, "disp": np.outer(STROKE, [1, 2, 3]), "rig_speed": np.array([1.0, 2, 5])}
+    source = tmp_path / "finger.mat"
+    scipy.io.savemat(source, {"S": inside})
+    found, _ = proposed(source)
+    assert found.mapping["files"]["finger"]["trial_axis"] == 2
+    assert found.mapping["trials"] == {"column": "trial"}
+    assert found.mapping["taxels"]["columns"] == ["V"]
+    presses = imported(source, found.mapping, tmp_path)
+    assert [press.press.depth for press in presses] == [1, 2, 3]
+
+
+def test_a_place_as_one_array_is_a_position_and_its_numbers_are_no_unit(tmp_path):
+    source = tmp_path / "skin.npz"
+    np.savez(source, time=T, tip=np.column_stack([0 * T, 0 * T + 2, -STROKE]), cap=np.outer(STROKE, [1, 2, 3]))
+    found, _ = proposed(source)
+    assert found.mapping["taxels"]["columns"] == ["cap"]
+    assert found.mapping["position"]["z"]["column"] == "tip[2]"
+    assert found.mapping["contact"]["z"] == 0
+    del found.mapping["position"]["z"]["unit"]
+    assert imported(source, found.mapping, tmp_path)[0].press.depth == 1
+
+
+def test_an_array_without_names_is_shown_by_column_and_asked_about(tmp_path):
+    source = tmp_path / "log.npy"
+    np.save(source, np.column_stack([T, 3 + 0 * T, 12 - STROKE, STROKE]))
+    found, text = proposed(source)
+    assert "array[2]: 11 to 12" in text
+    assert found.mapping["files"]["log"]["time"] == {"column": "array[0]"}
+    assert found.mapping["taxels"]["columns"] == ["array[1-3]"]
+    assert any("no names" in question for question in found.questions)
+    assert "as it stands, it imports nothing: neither a position" in tried(source, found.mapping, tmp_path)
+
+
+def test_a_serial_monitors_times_stand_apart_and_its_presses_are_cut(tmp_path):
+    rows = [(k, f"{value:.3f},{100 * value + 5:.1f}") for k, value in enumerate(np.tile(STROKE, 3))]
+    lines = ["Booting", "13:58:01.000 -> Sensor ok", "13:58:01.100 -> z_mm,p1_Pa"]
+    lines += [f"13:58:{2 + 0.05 * k:06.3f} -> {text}" for k, text in rows]
+    source = tmp_path / "monitor.txt"
+    source.write_text("\n".join(lines))
+    found, _ = proposed(source)
+    assert found.mapping["files"]["monitor"]["time"] == {"column": "received"}
+    assert found.mapping["position"]["depth"]["column"] == "z_mm", "it grows from 0 into the skin"
+    presses = imported(source, found.mapping, tmp_path)
+    assert [press.press.depth for press in presses] == [1, 1, 1]
+    assert tried(source, found.mapping, tmp_path).startswith("tried: the source holds 3 recordings of 70 rows")
+
+
+def test_pauses_end_trials_and_german_times_are_read(tmp_path):
+    clock = np.concatenate([T + pause for pause in (0, 30, 70)])
+    stamps = [f"04.11.2023 09:{int(t) // 60:02d}:{t % 60:06.3f}".replace(".", ",").replace(",", ".", 2) for t in clock]
+    depth = [f"{value:.3f}".replace(".", ",") for value in np.tile(8 * STROKE, 3)]
+    source = tmp_path / "kolben.txt"
+    written(source, "Datum Uhrzeit\tWeg [mm]\tKraft [N]", stamps, depth, depth, between="\t")
+    found, text = proposed(source)
+    assert stamps[0] == "04.11.2023 09:00:00,000"
+    assert "missing?" not in text, "a stage at rest at 0 is no missing value"
+    assert found.mapping["files"]["kolben"]["time"] == {"column": "Datum Uhrzeit"}
+    assert 0.05 < found.mapping["trials"]["gap"] < 26
+    assert len(imported(source, found.mapping, tmp_path)) == 3
+
+
+def test_dates_with_am_and_pm_have_the_month_first_and_it_is_asked(tmp_path):
+    stamps = [f"11/4/2023 11:42:{2 + t:06.3f} AM" for t in T]
+    written(tmp_path / "log.csv", "Timestamp,Z (mm),B1", stamps, -STROKE, STROKE)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["files"]["log"]["time"]["format"] == "%m/%d/%Y %I:%M:%S.%f %p"
+    assert any("month first" in question for question in found.questions)
+
+
+@pytest.mark.parametrize(("name", "values", "entry"), [
+    ("Extension (mm)", 2.6 + STROKE, {"z": {"column": "Extension (mm)", "scale": -1.0}}),
+    ("depth (mm)", -STROKE, {"depth": {"column": "depth (mm)", "scale": -1.0}}),
+    ("depth (mm)", STROKE, {"depth": {"column": "depth (mm)"}}),
+    ("z (mm)", 12.4 - STROKE, {"z": {"column": "z (mm)"}}),
+])  # fmt: skip
+def test_the_pressing_axis_is_told_from_where_a_trial_begins(tmp_path, name, values, entry):
+    written(tmp_path / "log.csv", f"t (s),{name},cap1,cap2", T, values, STROKE, 2 * STROKE)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["position"] == {"file": "log", **entry}
+    asked = any("Give contact" in question for question in found.questions)
+    assert asked == (values.min() > 0), "a height needs the height of the skin"
+    press = imported(tmp_path, found.mapping, tmp_path / "made")[0].press
+    assert press.depth == pytest.approx(1)
+
+
+def test_a_temperature_is_no_time(tmp_path):
+    written(tmp_path / "log.csv", "t_s,z_mm,p1_Pa,T_degC", T, STROKE, STROKE, 24 + T)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["measured"]["temperature"]["columns"] == ["T_degC"]
+    assert found.mapping["files"]["log"]["time"]["column"] == "t_s"
+
+
+def test_a_file_without_times_is_asked_about(tmp_path):
+    written(tmp_path / "log.csv", "depth (mm),cap1", STROKE, 2 * STROKE)
+    found, _ = proposed(tmp_path)
+    assert any("no column of times" in question for question in found.questions)
+
+
+def test_a_copied_file_is_no_second_measurement(tmp_path):
+    source = tmp_path / "source"
+    for name, depth in (("run_1", 1.0), ("run_2", 2.0)):
+        written(source / f"{name}.csv", "t_s,depth_mm,cap1", T, depth * STROKE, STROKE)
+    (source / "run_2 - Copy.csv").write_bytes((source / "run_2.csv").read_bytes())
+    found, _ = proposed(source)
+    path = tmp_path / "mapping.yaml"
+    documents.write(path, found.mapping, "import_mapping")
+    made = import_session(source, path, tmp_path / "session")
+    assert made.recordings == 2
+    assert "run_2.csv is the same, byte by byte, as run_2 - Copy.csv and is left out" in made.notes
+    assert not made.refused
