@@ -204,5 +204,5 @@ def test_a_copied_file_is_no_second_measurement(tmp_path):
     documents.write(path, found.mapping, "import_mapping")
     made = import_session(source, path, tmp_path / "session")
     assert made.recordings == 2
-    assert "run_2.csv is the same, byte by byte, as run_2 - Copy.csv and is left out" in made.notes
+    assert "run_2 - Copy.csv is the same, byte by byte, as run_2.csv and is left out" in made.notes
     assert not made.refused
