@@ -19,7 +19,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.nuisances import pose_errors
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.regressors.candidates import build
-from tacdata.discrepancy.regressors.model_error import model_error_columns
+from tacdata.discrepancy.regressors.model_error import model_errors
 from tacdata.discrepancy.search.find import find
 from tacdata.discrepancy.search.findings import FoundEffect
 from tacdata.discrepancy.search.j_test import j_statistic
@@ -283,7 +283,7 @@ def test_a_fitted_response_takes_up_nothing_of_one_that_differs_between_channels
 @pytest.mark.parametrize(("traits", "wrong"), [(("form_error = 0.0",), False), ((), True)])
 def test_an_equation_may_be_as_wrong_as_it_says(newcomer, traits, wrong):
     placed = [Placed(newcomer(*traits), {"k": np.array(0.1)})]
-    columns = model_error_columns(pressed(), Springs(), placed)
+    columns = model_errors(pressed(), Springs(), placed).values
     assert columns.shape[2] > 0 and np.any(columns) == wrong
 
 

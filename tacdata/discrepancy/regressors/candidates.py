@@ -22,6 +22,10 @@ ALIKE = 0.95
 """...if their column there differs: cosine to that at the larger size [1]."""
 
 
+Form = tuple[str, tuple[float, ...]]
+"""An effect's name, and its shapes."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect at one choice of its shapes."""
@@ -39,6 +43,11 @@ class Candidate:
     def called(self) -> str:
         """The mechanism's name."""
         return self.effect.called
+
+    @property
+    def form(self) -> Form:
+        """The effect's name and its shapes: the same whatever else is placed."""
+        return self.effect.name, tuple(self.shapes.values())
 
     def placed(self, coefficients: np.ndarray, channels: int) -> Placed:
         """Return the effect with the parameters that coefficients stand for."""
@@ -72,6 +81,7 @@ def build(
     placed: Sequence[Placed],
     effects: Sequence[Effect],
     absorbed: Collection[str] = (),
+    among: Collection[Form] | None = None,
 ) -> CandidateColumns:
     """Predict, and differentiate the chain by every effect at its typical size.
 
@@ -81,6 +91,7 @@ def build(
         placed: Effects that the model has already.
         effects: Effects to try.
         absorbed: Names of effects that calibration takes up.
+        among: Effects and shapes that are tried; all, unless given.
     """
     streams = Streams.of(course)
     chain = Chain(course, response, placed)
@@ -95,6 +106,8 @@ def build(
             continue
         shares = SMALL_SHARES
         for shapes in _shapes(effect):
+            if among is not None and (effect.name, tuple(shapes.values())) not in among:
+                continue
             made, low, high = _columns(effect, shapes, course, chain, placed, streams, now)
             sizes = [made]
             for share in shares:

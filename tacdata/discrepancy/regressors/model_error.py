@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -21,18 +22,32 @@ NEGLIGIBLE = 1e-9
 """A form that changes less than this share of the effect is left out [1]."""
 
 
-def model_error_columns(
+@dataclass(frozen=True)
+class ModelErrors:
+    """What the equations of placed effects may be off about, beside what they say."""
+
+    values: np.ndarray
+    """Columns at one standard deviation [each stream's unit], shape (n, streams, k), float32."""
+    at: np.ndarray
+    """Which placed effect each is of, shape (k,), int64."""
+    parts: np.ndarray
+    """What each placed effect adds to all others [each stream's unit], shape (n, streams, placed), float32."""
+
+
+def model_errors(
     course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()
-) -> np.ndarray:  # fmt: skip
-    """Return columns at one standard deviation, shape (n, streams, k), float32; k is 0 without placed effects.
+) -> ModelErrors:  # fmt: skip
+    """Return what may be off; no columns without placed effects.
 
     A large effect whose equation is a little wrong leaves what small effects explain: what lies along these columns is
     no evidence of another one.
     """
     streams, every = Streams.of(course), list(given)
+    none = np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
     if not placed:
-        return np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
+        return ModelErrors(none, np.zeros(0, dtype=np.int64), none)
     columns: list[np.ndarray] = []
+    of, parts = [], []
     for at, one in enumerate(placed):
         rest = [*every, *(p for k, p in enumerate(placed) if k != at)]
         chain = Chain(course, response, rest)
@@ -47,7 +62,11 @@ def model_error_columns(
             large = float(np.linalg.norm(change))
             if large > NEGLIGIBLE * size:
                 columns.append(OTHER_FORMS * one.effect.form_error * size / large * change)
-    return np.stack(columns, axis=-1).astype(np.float32)
+        parts.append(own)
+        of += [at] * (len(columns) - len(of))
+    return ModelErrors(
+        np.stack(columns, axis=-1).astype(np.float32), np.array(of), np.stack(parts, axis=-1).astype(np.float32)
+    )
 
 
 def variants(one: Placed, channels: int) -> list[Placed]:

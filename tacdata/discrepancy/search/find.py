@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.detection_limits import detection_limits
@@ -11,7 +9,6 @@ from tacdata.discrepancy.search.elimination import Answer, eliminate
 from tacdata.discrepancy.search.findings import STEPS, Findings, FoundEffect
 from tacdata.discrepancy.search.fits import channel_gains, gains_of_halves
 from tacdata.discrepancy.search.gate import Gate, gate
-from tacdata.discrepancy.search.gauss_newton import Refined
 from tacdata.discrepancy.search.leftovers import Leftovers, leftovers
 from tacdata.discrepancy.search.problem import Problem, prepare
 from tacdata.discrepancy.search.race import Note, Selection, race, start
@@ -35,44 +32,37 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
     if given.gap and until in STEPS[2:]:
         selection = race(setting, selection, note)
     if until != "decide":
-        return _findings(given, selection, given.problem, selection.problem, _fitted(selection), until)
+        return _findings(given, selection, given.problem, _fitted(selection), until)
     note("rivals and leftovers")
-    problem = prepare(setting, selection.null, tested=False) if selection.model.placed else given.problem
-    answer, final = eliminate(setting, selection, problem), selection.problem
-    if answer.findings and _names(answer.model) != _names(selection.model):
-        final = prepare(replace(setting, response=answer.model.response), selection.null, answer.model.placed)
-    return _findings(given, selection, problem, final, answer, until)
+    # Beside the answer's noise only what is left is looked at: nothing is tried there.
+    problem = prepare(setting, selection.null, tested=False, among=()) if selection.model.placed else given.problem
+    return _findings(given, selection, problem, eliminate(setting, selection), until)
 
 
 def _fitted(selection: Selection) -> Answer:
     """Return the effects that fit best, without necessity and rivals."""
     model = selection.model
-    return Answer(tuple(FoundEffect(p, *model.errors(k), (), {}, 0.0) for k, p in enumerate(model.placed)), model)
+    found = tuple(FoundEffect(p, *model.errors(k), (), {}, 0.0) for k, p in enumerate(model.placed))
+    return Answer(found, model, selection.problem)
 
 
-def _findings(
-    given: Gate, selection: Selection, problem: Problem, final: Problem, answer: Answer, until: str
-) -> Findings:  # fmt: skip
+def _findings(given: Gate, selection: Selection, problem: Problem, answer: Answer, until: str) -> Findings:
     """Put together what was found.
 
     Args:
         given: The model as it was given, with its own noise.
         selection: With the noise of the answer.
         problem: The model as it was given, beside that noise.
-        final: The model with the answer.
         answer: The effects.
         until: The last step.
     """
-    nothing, model = selection.nothing, answer.model
+    nothing, model, final = selection.nothing, answer.model, answer.problem
     return Findings(
         gap=given.gap, tests=given.tests, effects=answer.findings,
         left=leftovers(final) if until == "decide" else Leftovers(0.0, 0.0), explained=nothing.loss - model.loss,
-        energy=(nothing.energy, model.energy), values=problem.grams.rows, problem=problem, final=final,
+        energy=(nothing.energy, model.energy), values=problem.grams.rows, given=given.problem, problem=problem,
+        final=final,
         limits=detection_limits(final), gains=channel_gains(final),
         halves=gains_of_halves(final), until=until,
         comparisons=answer.comparisons, path=tuple(effect.name for effect, _ in selection.explained),
     )  # fmt: skip
-
-
-def _names(model: Refined) -> list[str]:
-    return [p.effect.name for p in model.placed]

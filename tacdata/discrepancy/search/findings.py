@@ -96,8 +96,10 @@ class Findings:
     """Half the whitened sum of squares of each episode before and after [1], each of shape (episodes,)."""
     values: np.ndarray
     """Whitened values behind each episode [1], shape (episodes,)."""
+    given: Problem
+    """The model as it was given, beside its own noise, with all that was tried."""
     problem: Problem
-    """The model as it was given."""
+    """The same beside the noise that the answer leaves; where there is an answer, nothing is tried beside it."""
     final: Problem
     """The model with the effects in place."""
     limits: dict[str, float]

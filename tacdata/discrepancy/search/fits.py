@@ -50,14 +50,17 @@ def best_shapes(problem: Problem, among: np.ndarray | None = None) -> dict[str, 
     """Return each effect's candidate with the largest gain in a fit with its bounds."""
     everything = np.arange(len(problem.folds)) if among is None else among
     best: dict[str, tuple[float, Candidate]] = {}
-    total = problem.grams.of(everything)[None]
-    for candidate in problem.candidates:
-        columns, values = fitted(problem, [candidate], everything)
-        gain = float(gains(total, columns, values)[0])
+    for candidate, gain in zip(problem.candidates, shape_gains(problem, everything), strict=True):
         name = candidate.effect.name
         if name not in best or gain > best[name][0]:
             best[name] = gain, candidate
     return {name: candidate for name, (_, candidate) in best.items()}
+
+
+def shape_gains(problem: Problem, among: np.ndarray) -> list[float]:
+    """Return by how much each candidate lowers half the sum of squares of some episodes, in a fit with its bounds."""
+    total = problem.grams.of(among)[None]
+    return [float(gains(total, *fitted(problem, [candidate], among))[0]) for candidate in problem.candidates]
 
 
 def channel_gains(problem: Problem, among: np.ndarray | None = None) -> np.ndarray:

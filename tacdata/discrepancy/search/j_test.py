@@ -26,7 +26,7 @@ from tacdata.chain import Course
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.gram import episode_grams
 from tacdata.discrepancy.noise.null_model import NullModel
-from tacdata.discrepancy.regressors.model_error import model_error_columns
+from tacdata.discrepancy.regressors.model_error import model_errors
 from tacdata.discrepancy.search.gauss_newton import Refined
 from tacdata.discrepancy.statistics.cluster_robust import PooledExcess, clustered_score
 from tacdata.discrepancy.statistics.gram_fit import eliminated
@@ -57,7 +57,7 @@ class ModelError:
         """Return the model error of a model's effect number ``at``; of all its effects, unless given."""
         own = [p for k, p in enumerate(model.placed) if at is None or k == at]
         others = [p for p in model.placed if p not in own]
-        columns = model_error_columns(setting.course, model.response, own, [*setting.given, *others])
+        columns = model_errors(setting.course, model.response, own, [*setting.given, *others]).values
         whitener = null.whitener_for(replace(setting, response=model.response), [*setting.given, *model.placed])
         return cls(whitener.whitened(columns), setting.course.reduced, null)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,8 +12,8 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.gram import EpisodeGrams
 from tacdata.discrepancy.noise.null_model import NullModel
-from tacdata.discrepancy.regressors.candidates import Candidate, CandidateColumns, build
-from tacdata.discrepancy.regressors.model_error import model_error_columns
+from tacdata.discrepancy.regressors.candidates import Candidate, CandidateColumns, Form, build
+from tacdata.discrepancy.regressors.model_error import model_errors
 from tacdata.discrepancy.regressors.stack import apart, side_by_side
 from tacdata.discrepancy.regressors.tangent import Tangent, tangents
 from tacdata.effects import Placed
@@ -38,6 +38,10 @@ class Problem:
     """Columns that belong to no effect, from 0, shape (k,), int64."""
     rise: float
     """What presses add to all readings, root of the sum of squares in noise scales [1]."""
+    parts: np.ndarray
+    """Columns of what each effect that is placed adds to the others, from 0, shape (placed,), int64."""
+    of_errors: np.ndarray
+    """Which placed effect each of the model errors is of, shape (k,), int64."""
     numerics: int | None = None
     """Column of what the response itself is off about, from 0; None if it has no numerics."""
 
@@ -65,8 +69,30 @@ class Problem:
         """Fold of each episode, shape (episodes,)."""
         return self.null.folds
 
+    def without(self, at: int) -> Problem:
+        """Return the same without one placed effect, to first order: candidates stay as they are beside it."""
+        gram, own = self.grams.gram.copy(), int(self.parts[at]) + 1
+        gram[:, 0] += gram[:, own]
+        gram[:, :, 0] += gram[:, :, own]
+        kept = [k for k, knob in enumerate(self.tangent.knobs) if knob.at != at]
+        knobs = [self.tangent.knobs[k] for k in kept]
+        others = self.of_errors != at
+        return replace(
+            self, placed=tuple(p for k, p in enumerate(self.placed) if k != at),
+            grams=EpisodeGrams(gram, self.grams.rows),
+            tangent=Tangent(
+                [replace(knob, at=knob.at - (knob.at > at)) for knob in knobs], self.tangent.values[:, :, kept],
+                self.tangent.columns[kept],
+            ),
+            model_errors=self.model_errors[others], of_errors=self.of_errors[others] - (self.of_errors[others] > at),
+            parts=np.delete(self.parts, at),
+        )  # fmt: skip
 
-def prepare(setting: Setting, null: NullModel, placed: Sequence[Placed] = (), tested: bool = True) -> Problem:
+
+def prepare(
+    setting: Setting, null: NullModel, placed: Sequence[Placed] = (), tested: bool = True,
+    among: Collection[Form] | None = None,
+) -> Problem:  # fmt: skip
     """Build columns beside what is placed and reduce them.
 
     Args:
@@ -74,26 +100,28 @@ def prepare(setting: Setting, null: NullModel, placed: Sequence[Placed] = (), te
         null: Its nuisances and noise.
         placed: Effects that the model has.
         tested: Whether it will be tested: what belongs to no effect and the response's own error are for tests alone.
+        among: Effects and shapes that are tried; all, unless given.
     """
     course, response = setting.course, setting.response
-    board = build(course, response, [*setting.given, *placed], setting.effects, setting.absorbed)
+    board = build(course, response, [*setting.given, *placed], setting.effects, setting.absorbed, among)
     moving = tangents(course, response, placed, setting.given)
-    errors = model_error_columns(course, response, placed, setting.given)
+    errors = model_errors(course, response, placed, setting.given)
     count = len(board.columns) - 1
     numerics = _numerics(setting, placed) if tested else None
     beside = null.beside if tested else null.nuisances
     slack = count + moving.values.shape[2]
-    last = slack + errors.shape[2]
+    said = slack + errors.values.shape[2]
+    last = said + len(placed)
     first = last + (numerics is not None)
-    more = [moving.values, errors, *([] if numerics is None else [numerics])]
+    more = [moving.values, errors.values, errors.parts, *([] if numerics is None else [numerics])]
     values = side_by_side([*board.columns, *(column for each in more for column in apart(each))])
     found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, beside)
     second = first + len(null.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + beside.shape[2])
     board = replace(board, columns=board.columns[:1])
     return Problem(
-        setting, null, tuple(placed), board, found, moving.at(count), np.arange(slack, last), nuisances, rich,
-        _rise(setting, null), None if numerics is None else last,
+        setting, null, tuple(placed), board, found, moving.at(count), np.arange(slack, said), nuisances, rich,
+        _rise(setting, null), np.arange(said, last), errors.at, None if numerics is None else last,
     )  # fmt: skip
 
 

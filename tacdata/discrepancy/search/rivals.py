@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.regressors.candidates import Candidate
+from tacdata.discrepancy.regressors.candidates import Candidate, Form
 from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
-from tacdata.discrepancy.search.fits import best_shapes, fitted
+from tacdata.discrepancy.search.fits import best_shapes, fitted, shape_gains
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
-from tacdata.discrepancy.search.j_test import NEEDED_Z, ModelError, Pooled, j_statistic, necessity
+from tacdata.discrepancy.search.j_test import NEEDED_Z, ModelError, Pooled, j_statistic
 from tacdata.discrepancy.search.problem import Problem, prepare
 from tacdata.discrepancy.search.shortlist import RIVAL_Z, TOP
 from tacdata.discrepancy.statistics.gram_fit import clipped_t, gains
@@ -30,6 +29,9 @@ SIMPLER = RIVAL_Z**2 / 2
 """Rivals: one with more numbers is out if half its BIC is larger by so much; as sure as `RIVAL_Z` [1]."""
 OTHER_FORMS = 2
 """Other forms of the effect's own mechanism that are tried, the best to first order."""
+PREPARED, PREPARED_SHAPE = 0.25, 0.7
+"""Rivals: prepared afresh with this share of the largest gain told beside the answer; each shape with this share of its
+effect's [1]."""
 BOOTSTRAPS = 200
 """Resamplings of the episodes by which selection is judged."""
 
@@ -46,34 +48,36 @@ class Tried:
 
 
 def try_rivals(
-    setting: Setting, current: Refined, without: Refined, at: int, problem: Problem, pooled: Pooled,
+    current: Refined, without: Refined, at: int, beside: Problem, need: float, pooled: Pooled,
     late: Sequence[Placed] = (),
 ) -> Tried:  # fmt: skip
     """Try other effects in the place of one.
 
     Args:
-        setting: What is judged.
         current: The model with all effects.
         without: The model without the one.
         at: Its number.
-        problem: The model without any effect, the same noise.
+        beside: What may be missing beside all effects: it tells which rivals are worth preparing without the one.
+        need: The one's necessity.
         pooled: Shrinkage priors.
         late: Delays and filters to begin with: to first order long ones are not seen.
     """
-    begin = replace(setting, response=without.response)
-    bare = prepare(begin, problem.null, without.placed, tested=False) if without.placed else problem
-    mine, best = current.placed[at], best_shapes(bare)
+    begin, mine, null = replace(beside.setting, response=without.response), current.placed[at], beside.null
+    told = beside.without(at)
+    names = {p.effect.name for p in late}
+    forms_wanted = _worth_preparing(told, lambda e: e.called == mine.effect.called or e.name in names)
+    bare = prepare(begin, null, without.placed, tested=False, among=forms_wanted)
+    best = best_shapes(bare)
     each = _first_order_gains(bare, best)
-    need = necessity(setting, current, without, problem.null, pooled)
     everything = np.arange(len(bare.folds))
     margins, losses, rivals, models = {}, {}, [], {}
     better: Refined | None = None
 
     def in_its_place(name: str) -> Refined:
         _, values = fitted(bare, [best[name]], everything)
-        first = best[name].placed(values[: len(best[name].columns)], setting.course.channels)
+        first = best[name].placed(values[: len(best[name].columns)], begin.course.channels)
         starts = [first, *(p for p in late if p.effect.name == name)]
-        made = [refine(begin, [*without.placed, start], problem.null) for start in starts]
+        made = [refine(begin, [*without.placed, start], null) for start in starts]
         return min(made, key=lambda model: model.half_bic)
 
     taken = {p.effect.called for p in current.placed}
@@ -84,7 +88,7 @@ def try_rivals(
         margins[name] = j_statistic(current, other, pooled)
         if margins[name] >= level:
             # Its equation may be wrong by a little: what that explains is nothing against it.
-            error = ModelError.of(begin, other, problem.null, len(without.placed))
+            error = ModelError.of(begin, other, null, len(without.placed))
             margins[name] = j_statistic(current, other, pooled, error)
         if (
             margins[name] < -AHEAD
@@ -107,7 +111,8 @@ def try_rivals(
         if better is None and ahead and not _unphysical(other, current):
             better = other
     error, bounds = current.errors(at)
-    chosen = _chosen(bare, best, each)
+    rest = {name: c for name, c in best_shapes(told).items() if name not in best}
+    chosen = _chosen(bare, best | rest, each | _first_order_gains(told, rest))
     found = FoundEffect(
         mine, error, (*bounds, *current.narrowest(at)), tuple(dict.fromkeys(rivals)), margins, need, losses,
         _share(chosen, lambda e: e.called == mine.effect.called),
@@ -157,6 +162,24 @@ def _bound(model: Refined) -> bool:
     return any(
         set(model.errors(k)[1]) - {p.name for p in placed.effect.shapes} for k, placed in enumerate(model.placed)
     )
+
+
+def _worth_preparing(told: Problem, always: Callable[[Effect], bool]) -> set[Form]:
+    """Return the effects and shapes that may explain much in the place of one.
+
+    Args:
+        told: Without the one to first order: columns are those beside it.
+        always: Effects that are prepared whatever they explain.
+    """
+    gain = shape_gains(told, np.arange(len(told.folds)))
+    most: dict[str, float] = {}
+    for candidate, own in zip(told.candidates, gain, strict=True):
+        most[candidate.effect.name] = max(most.get(candidate.effect.name, 0.0), own)
+    least = PREPARED * max(most.values(), default=0.0)
+    return {
+        c.form for c, own in zip(told.candidates, gain, strict=True)
+        if own >= PREPARED_SHAPE * most[c.effect.name] and (most[c.effect.name] >= least or always(c.effect))
+    }  # fmt: skip
 
 
 def _first_order_gains(problem: Problem, best: dict[str, Candidate]) -> dict[str, np.ndarray]:

@@ -153,7 +153,7 @@ def decide(
     elif checks.too_few:
         status, reason = "unknown", Reason.TOO_FEW
     made = zip(answer, levels, strict=True)
-    lone = lone_press(found.problem) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
+    lone = lone_press(found.given) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
     return Decision(
         status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name), shown)
                               for f, level in made), lone,
@@ -286,7 +286,7 @@ def _untried_kin(found: Findings, finding: FoundEffect) -> set[str]:
     They look alike but for their exact form, and what is left may lend it.
     """
     mine, tried = finding.placed.effect, {load(name).called for name in finding.margins}
-    every = {c.effect.called: c.effect for c in found.problem.candidates}
+    every = {c.effect.called: c.effect for c in found.given.candidates}
     kin = {
         called for called, e in every.items()
         if mine.at_rest is not None and (e.family, e.group, e.at_rest) == (mine.family, mine.group, mine.at_rest)

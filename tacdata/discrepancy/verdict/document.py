@@ -61,7 +61,7 @@ def document(
         "located": located(sliced[0], found) if sliced[0] else [], "slices": beside(*sliced),
         "located_after": in_words(sliced[1]) if decision.status == INCOMPLETE else [],
         "path": _path(found),
-        "unjudgeable": found.problem.board.unjudgeable,
+        "unjudgeable": found.given.board.unjudgeable,
         "limits": {k: (round(v, 4) if v < LARGEST_LIMIT else None) for k, v in found.limits.items()},
         "untested": untested([e.finding for e in decision.effects]),
         "data": {**data(course), "sealed": list(shown.names) if shown else []},

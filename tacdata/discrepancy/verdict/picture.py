@@ -79,7 +79,7 @@ def _slices(axis: Any, before: list[Slice], after: list[Slice], added: bool) -> 
 
 def _rivals(axis: Any, found: Findings) -> None:
     best: dict[str, float] = {}
-    for candidate, gain in zip(found.problem.candidates, found.tests.gain, strict=True):
+    for candidate, gain in zip(found.given.candidates, found.tests.gain, strict=True):
         best[candidate.effect.name] = max(best.get(candidate.effect.name, 0.0), float(gain))
     order = sorted(best, key=lambda name: -best[name])[:12]
     chosen = {m.placed.effect.name for m in found.effects}

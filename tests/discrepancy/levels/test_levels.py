@@ -150,8 +150,8 @@ def test_the_effect_that_explains_most_leads():
 
 def leaving(gain, *names):
     """Findings that leave much, of a search that tried some effects."""
-    problem = SimpleNamespace(candidates=[SimpleNamespace(effect=load(name)) for name in names])
-    return cast(Any, SimpleNamespace(left=SimpleNamespace(gain=gain), problem=problem))
+    given = SimpleNamespace(candidates=[SimpleNamespace(effect=load(name)) for name in names])
+    return cast(Any, SimpleNamespace(left=SimpleNamespace(gain=gain), given=given))
 
 
 def parts(sizes, episodes=30, noise=1.0):

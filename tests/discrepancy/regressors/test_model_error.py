@@ -11,7 +11,7 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
-from tacdata.discrepancy.regressors.model_error import model_error_columns, modulations, variants
+from tacdata.discrepancy.regressors.model_error import model_errors, modulations, variants
 from tacdata.discrepancy.search.problem import prepare
 from tacdata.discrepancy.search.score_tests import score_tests
 from tacdata.effects import Placed, load
@@ -36,10 +36,10 @@ def test_modulations_are_of_size_one_and_leave_the_contribution_itself(pressed):
 
 def test_columns_are_a_share_of_each_effect(pressed):
     made, response, late = pressed
-    assert model_error_columns(made, response, []).shape[2] == 0
-    one = model_error_columns(made, response, [late])
+    assert model_errors(made, response, []).values.shape[2] == 0
+    one = model_errors(made, response, [late]).values
     assert one.shape == (len(made.read), 3, 5 + 4 + 2), "modulations, delays of other sizes, and one either way"
-    twice = model_error_columns(made, response, [replace(late, values={"L": np.array(0.1)})])
+    twice = model_errors(made, response, [replace(late, values={"L": np.array(0.1)})]).values
     size = np.linalg.norm(twice, axis=(0, 1)) / np.linalg.norm(one, axis=(0, 1))
     assert np.all((size > 1.7) & (size < 2.1))
 
@@ -52,7 +52,7 @@ def test_a_clock_is_known_better_than_a_law_of_a_material(pressed):
         given = {p.name: np.array(p.default + p.typical) for p in effect.parameters} | value
         placed = Placed(effect, given)
         own = streams.predicted(predict(made, response, [placed])) - streams.predicted(predict(made, response, []))
-        by = np.linalg.norm(model_error_columns(made, response, [placed])[:, :, :5], axis=(0, 1)) / np.linalg.norm(own)
+        by = np.linalg.norm(model_errors(made, response, [placed]).values[:, :, :5], axis=(0, 1)) / np.linalg.norm(own)
         assert by == pytest.approx(np.full(5, share), rel=1e-3)
 
 
