@@ -69,7 +69,7 @@ def judge(
     checks = check(setting)
     found = find(setting, note, until)
     beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
-    note("the gap on sealed episodes")
+    note("the gap on sealed presses")
     shown = gap(course, found, sealed)
     decision = decide(found, checks, beside, shown)
     before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))

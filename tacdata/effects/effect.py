@@ -159,6 +159,8 @@ class Effect(ABC):
     there is a physical reason."""
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
+    word: ClassVar[str] = ""
+    """What a person calls the mechanism, where its name with blanks is no such word; the same for all forms."""
     at_rest: ClassVar[AtRest | None] = None
     """For memory of the rate, which needs two rates of pressing, or a hold; the same for all forms."""
     grows_with: ClassVar[Growth | None] = None
@@ -185,6 +187,11 @@ class Effect(ABC):
     def called(self) -> str:
         """The name that a verdict gives: the mechanism."""
         return self.mechanism or self.name
+
+    @property
+    def spoken(self) -> str:
+        """The mechanism in words."""
+        return self.word or self.called.replace("_", " ")
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:

@@ -23,6 +23,7 @@ class Latency(Effect):
     moves = ("signal",)
     group = "lag"
     family = Family.DELAY_AND_FILTER
+    word = "delay"
     equation = "s(t) = s_e(t - L)"
     source = "standard form"
     experiment = "three rates: constant in time, and edges keep their shape"

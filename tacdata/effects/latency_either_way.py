@@ -21,6 +21,7 @@ class LatencyEitherWay(Effect):
     moves = ("signal",)
     group = "lag"
     family = Family.DELAY_AND_FILTER
+    word = "delay"
     equation = "s(t) = s_e(t - L_in) while load rises, s_e(t - L_out) while it falls"
     source = "standard form; two times, as rise and fall times of a channel are given"
     experiment = "three rates: each edge is late by its own constant time"

@@ -20,6 +20,7 @@ class LowPassFilter(Effect):
     moves = ("signal",)
     group = "lag"
     family = Family.DELAY_AND_FILTER
+    word = "low-pass filter"
     equation = "tau s' + s = s_e"
     source = "standard form"
     experiment = "edges: a filter rounds them, a delay keeps their shape; spectrum of noise without contact"

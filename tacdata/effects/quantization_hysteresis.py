@@ -20,6 +20,7 @@ class QuantizationHysteresis(Effect):
     moves = ("signal",)
     group = "loading and unloading"
     family = Family.FRICTION_AND_PLAY
+    word = "dead band of the readings"
     equation = "s = play_w(s) + w: the reading follows through a dead band of fixed width in counts"
     source = "play operator; comparators with hysteresis"
     experiment = "histogram of first differences; loops of any size have the same width in counts"

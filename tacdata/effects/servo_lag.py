@@ -20,6 +20,7 @@ class ServoLag(Effect):
     moves = ("tag", "label", "signal", "force")
     group = "lag"
     family = Family.DELAY_AND_FILTER
+    word = "lag of the drive"
     equation = "(tau / 2)^2 d'' + tau d' + d = z: critically damped"
     source = "standard form"
     experiment = "other accelerations at the same speed; a tag sees it"

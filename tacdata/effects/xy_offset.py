@@ -19,6 +19,7 @@ class XyOffset(Effect):
     moves = ("label", "signal")
     group = "lateral"
     family = Family.KINEMATICS
+    word = "offset in x and y"
     equation = "(x, y) -> (x + dx, y + dy)"
     source = "standard form"
     experiment = (

@@ -133,7 +133,7 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[St
         names = select(table, entry["columns"], "taxels: columns")
     unit = entry.get("unit") or next((table.units[n] for n in names if n in table.units), "") or "as in the source"
     values = numbers(table, names, _missing(mapping, entry), "taxels") * entry.get("scale", 1.0)
-    labels = [n for n in names for _ in range(max(table.inner(n), 1))]
+    labels = [f"{n}[{k}]" if width else n for n in names for width in (table.inner(n),) for k in range(max(width, 1))]
     if counted := "counter" in entry:
         name = single(table, entry["counter"], "taxels: counter")
         values = np.concatenate([values, numbers(table, [name], [], "taxels: counter")], axis=1)

@@ -124,11 +124,11 @@ def in_source(recordings: Sequence[Recording], channels: int) -> list[str]:
     """Return in words which columns of the source the channels are; nothing where names say no more than numbers."""
     known = {tuple(recording.board.get("names", ()))[:channels] for recording in recordings}
     names = list(next(iter(known))) if len(known) == 1 else []
-    parts = [re.fullmatch(r"(.*?)(\d+)", name) for name in names]
+    parts = [re.fullmatch(r"(.*?)(\d+)\]?", name) for name in names]
     if len(names) != channels or all(p and int(p[2]) == k for k, p in enumerate(parts)):
         return []
     if len({(p[1], int(p[2]) - k) for k, p in enumerate(parts) if p}) == 1 and all(parts) and channels > 2:
         return [f"channels 0 to {channels - 1} are the source's {names[0]} to {names[-1]}, in this order"]
     listed = ", ".join(f"{k} {name}" for k, name in enumerate(names[:MOST_NAMES]))
     more = ", ..." if channels > MOST_NAMES else ""
-    return [f"channels by the names that their source gives them: {listed}{more}"]
+    return [f"channels and their names in the source: {listed}{more}"]

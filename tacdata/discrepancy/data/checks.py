@@ -13,8 +13,8 @@ from tacdata.discrepancy.model.response_curve import response_curve
 from tacdata.discrepancy.model.setting import Setting
 
 FITTED = (
-    "the base was fitted to these recordings and takes up all that has no memory (stiffness, gain, thickness, offsets, "
-    "compliance): such effects need a model of the sensor (--spec, --fem), or for compliance a gauge at the tip"
+    "the base was fitted to these recordings: what depends on the pose alone (stiffness, gain, thickness, offsets, "
+    "compliance) is in it; to judge that, give a model of the sensor (--spec, --fem), for compliance a gauge at the tip"
 )
 
 

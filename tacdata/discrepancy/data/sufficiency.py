@@ -64,14 +64,17 @@ def _varies(rates: np.ndarray) -> bool:
     return bool(low > 0 and high >= RATE_RATIO * low)
 
 
-STROKE, RATE, RADIUS, EVERY = (0.02, 60.0), 500.0, 200.0, (2e-5, 5.0)
-"""Strokes [mm], rates [mm/s], radii [mm] and intervals of readings [s] beyond these are hardly of their unit."""
+STROKE, RATE, RADIUS, EVERY = 0.02, 500.0, 200.0, (2e-5, 5.0)
+"""Shorter strokes [mm], and rates [mm/s], radii [mm] and intervals of readings [s] beyond, are hardly of their unit.
+
+A long stroke is no reason to doubt: strips are stretched by tens of mm, and an import refuses what is beyond any press.
+"""
 
 
 def units(course: Course) -> list[str]:
     """Return in words what is of another size than its unit lets expect."""
     remarks = []
-    if not STROKE[0] < course.stroke < STROKE[1]:
+    if course.stroke < STROKE:
         remarks.append(f"strokes of {course.stroke:.3g} mm: is the depth in mm? Say its unit in the import mapping")
     if float(np.abs(course.speed).max()) > RATE:
         remarks.append(f"presses of {np.abs(course.speed).max():.3g} mm/s: are times in s and lengths in mm?")

@@ -49,8 +49,8 @@ class ResponseCurve:
         """Return it in words."""
         better = "" if self.worse else ", no better"
         return (
-            f"of the contact laws, {self.law.said(*self.numbers)} follows best: held out, it leaves "
-            f"{_percent(self.left)} of the readings' change (splines, the base: {_percent(self.splines)}{better})"
+            f"the contact law is closest to {self.law.said(*self.numbers)}: in presses left out it misses "
+            f"{_percent(self.left)} of the readings' change (the splines of the base: {_percent(self.splines)}{better})"
         )
 
 

@@ -58,7 +58,7 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
     tiles = [(str(data["episodes"]), "presses"), (str(data["channels"]), "channels")]
     for e in verdict["effects"]:
         if e["status"] == "named" and e["confidence"] is not None:
-            tiles.append((f"{100 * e['confidence']:.0f} %", f"sure of {e['mechanism']}"))
+            tiles.append((f"{100 * e['confidence']:.0f} %", f"sure of {load(e['effect']).spoken}"))
     if sealed["episodes"] and verdict["effects"]:
         words = f"residual of {sealed['episodes']} sealed presses, mean square over the noise (1 is noise alone)"
         tiles.append((f"{sealed['before']:.3g} → {sealed['after']:.3g}", words))
@@ -108,7 +108,7 @@ def _shares(verdict: dict[str, Any]) -> Part:
         return Part("")
     named = [(name, share) for name, share in sealed["shares"].items() if share > 0]
     rest = max(1 - sealed["closed"], 0.0)
-    kinds = [(f"share{k % 4}", load(name).called, share) for k, (name, share) in enumerate(named)]
+    kinds = [(f"share{k % 4}", load(name).spoken, share) for k, (name, share) in enumerate(named)]
     every = [*kinds, ("rest", REST, rest)]
     legend = tuple((kind, f"{name} {100 * share:.0f} %") for kind, name, share in every)
     return Part("The gap on sealed presses", (charts.shares_bar(every),), legend=legend)
@@ -138,17 +138,18 @@ def _rivals(verdict: dict[str, Any]) -> Part:
     """Return one line a rival: why it is not the name, or why it may be."""
     lines = []
     for e in verdict["effects"]:
-        near, least = set(e["alternatives"]), {}
+        mine, near, least = load(e["effect"]).spoken, set(e["alternatives"]), {}
         for name, by in sorted(e["margins"].items(), key=lambda item: item[1]):
             least.setdefault(load(name).called, by)
         for called, by in list(least.items())[:MOST_RIVALS]:
+            other = load(called).spoken
             if called in e.get("unphysical", ()):
-                lines.append(f"not {called}: it would need an unphysical size")
+                lines.append(f"not {other}: it would need an unphysical size")
             elif called in near:
                 form = ", but another form of it may not" if by > 0 else ""
-                lines.append(f"{called} may stand in for {e['mechanism']}: {_apart(by)}{form}")
+                lines.append(f"{other} may stand in for {mine}: {_apart(by)}{form}")
             else:
-                lines.append(f"not {called}: {_apart(by)} than {e['mechanism']}")
+                lines.append(f"not {other}: {_apart(by)} than {mine}")
     return Part("Why not the others", lines=tuple(dict.fromkeys(lines)))
 
 
@@ -162,7 +163,7 @@ def _folded(verdict: dict[str, Any]) -> list[Part]:
     """Return what cannot be judged, by reason, and what is known and not modelled."""
     reasons: dict[str, list[str]] = {}
     for name, reason in verdict["unjudgeable"].items():
-        reasons.setdefault(reason, []).append(name)
+        reasons.setdefault(reason, []).append(name.replace("_", " "))
     lines = [f"{reason}: {', '.join(sorted(names))}" for reason, names in reasons.items()]
     untested = "; ".join(words.split(": ", 1)[-1] for words in verdict["untested"])
     return [

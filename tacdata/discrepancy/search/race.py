@@ -72,12 +72,13 @@ def race(setting: Setting, selection: Selection, note: Note) -> Selection:
         chosen = shortlist(selection.problem, selection.tests)
         if not chosen:
             break
-        note(f"fit: {', '.join(' with '.join(c.effect.name for c in one) for one in chosen)}")
+        tried = dict.fromkeys(" with ".join(c.effect.spoken for c in one) for one in chosen)
+        note(f"fit: {', '.join(tried)}")
         best = _winner(selection, chosen)
         if best is None or _is_minor(selection, best):
             break
         selection = _added(setting, selection, best)
-        note(f"so far: {' and '.join(p.effect.title for p in selection.model.placed)}")
+        note(f"so far: {', '.join(dict.fromkeys(p.effect.spoken for p in selection.model.placed))}")
     return selection
 
 

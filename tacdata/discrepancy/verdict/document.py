@@ -66,7 +66,8 @@ def document(
         "untested": untested([e.finding for e in decision.effects]),
         "data": {**data(course), "sealed": list(shown.names) if shown else []},
         "sealed": shown.document() if shown else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
-        "remarks": [words for words in remarks if words], "next": following(decision, course, bool(checks.watched)),
+        "remarks": [words for words in remarks if words],
+        "next": following(decision, course, bool(checks.watched), bool(checks.base)),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": DRAWS}),
     }  # fmt: skip
 
@@ -84,7 +85,8 @@ def _path(found: Findings) -> list[dict[str, Any]]:
 def located(before: list[Slice], found: Findings) -> list[str]:
     """Return in words where the residual lives: single episodes, then parts of all."""
     alone = outstanding(found.problem.setting.course.names, found.energy[1], found.values)
-    return in_words(before, alone)
+    whole = 2 * float(found.energy[0].sum()) / max(float(found.values.sum()), 1.0)
+    return in_words(before, alone, whole)
 
 
 def _effect(decided: Decided) -> dict[str, Any]:
@@ -131,35 +133,37 @@ def untested(answer: list[FoundEffect]) -> list[str]:
     return [f"{e['id']}: {e['title']}" for e in listed if not groups or e["group"] in groups]
 
 
-def following(decision: Decision, course: Course, watched: bool = False) -> list[str]:
+def following(decision: Decision, course: Course, watched: bool = False, fitted: bool = False) -> list[str]:
     """Return what to do next, the most useful first.
 
     Args:
         decision: What may be said.
         course: The recordings.
         watched: Whether single channels show what no effect does.
+        fitted: Whether the base was fitted to the recordings.
     """
     if decision.reason is Reason.TOO_FEW:
         return [DIAGNOSTIC]
     if decision.reason is Reason.QUIET and watched:
         return ["mend what the remarks say of single channels, and record again"]
     if decision.reason is Reason.QUIET:
-        return ["nothing: below the limits in verdict.json an effect shows only in more or deeper presses"]
+        words = ["nothing: below the limits in verdict.json an effect shows only in more or deeper presses"]
+        return words + ["for stiffness, gain and compliance: judge again with a model (--fem or --spec)"] * fitted
     if decision.status == "named":
         return [f"give it to the model, and see what that changes: {REVISE}"]
     answer = [e.finding for e in decision.effects]
-    words = [f"{f.placed.effect.called}: {f.placed.effect.experiment}" for f in answer if f.rivals or f.at_bound]
+    words = [f"{f.placed.effect.spoken}: {f.placed.effect.experiment}" for f in answer if f.rivals or f.at_bound]
     if any(f.placed.effect.at_rest is not None and f.rivals for f in answer) and one_rate(course):
         words.insert(0, "the same presses at three rates over a decade: one rate splits no delay from play or memory")
     if decision.status == "ambiguous":
         words.append(f"the presses that split them soonest: {REVISE} writes them as next.yaml")
     if (lone := decision.lone) is not None:
         words.append(
-            f"{lone.effect.called}: repeat that press, best on three more places or specimens that nobody pressed "
+            f"{lone.effect.spoken}: repeat that press, best on three more places or specimens that nobody pressed "
             f"before; {lone.effect.experiment}"
         )
     if decision.status in ("unknown", INCOMPLETE):
-        words += [f"{f.placed.effect.called}: {f.placed.effect.experiment}" for f in answer]
+        words += [f"{f.placed.effect.spoken}: {f.placed.effect.experiment}" for f in answer]
         words.append(DIAGNOSTIC)
     return list(dict.fromkeys(words))
 

@@ -84,12 +84,11 @@ def _rivals(axis: Any, found: Findings) -> None:
     order = sorted(best, key=lambda name: -best[name])[:12]
     chosen = {m.placed.effect.name for m in found.effects}
     colors = ["tab:blue" if name in chosen else "0.6" for name in order]
-    axis.barh(order, [best[name] for name in order], color=colors)
+    top = max(best.values(), default=1.0) or 1.0
+    axis.barh([name.replace("_", " ") for name in order], [best[name] / top for name in order], color=colors)
     axis.invert_yaxis()
     axis.tick_params(axis="y", labelsize=7)
-    axis.set(xlabel="fall of half the squared residual by each effect alone, to first order", title="candidates")
-    axis.locator_params(axis="x", nbins=5)
-    axis.ticklabel_format(axis="x", style="sci", scilimits=(-1, 4))
+    axis.set(xlabel="what each effect alone explains at first sight, over the most", title="candidates")
 
 
 def _episodes(axis: Any, found: Findings, added: bool) -> None:

@@ -30,24 +30,30 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         shown: The gap on episodes that were sealed before.
     """
     answer = [e.finding for e in decision.effects]
-    names = " and ".join(f.placed.effect.title.lower() for f in answer)
+    names = _listed([f.placed.effect.spoken for f in answer], "and") if answer else ""
     match decision.reason:
         case Reason.CONTRADICTION:
             return "; ".join(checks.contradictions)
         case Reason.TOO_FEW:
             best = f"; so far {_best(answer)}" if answer else ""
-            return f"{checks.episodes} episodes cannot carry a verdict{best}"
+            return f"{checks.episodes} presses cannot carry a verdict{best}"
         case Reason.STOPPED:
-            fits = f"; {names} fits best, rivals were not tried" if answer else ""
+            fits = f"; {names} {'fits' if len(answer) == 1 else 'fit'} best, rivals were not tried" if answer else ""
             return f"stopped after {found.until}: {'a gap' if found.gap else 'no gap'}{fits}"
         case Reason.QUIET:
             if checks.watched:
                 return f"no effect of the library shows, but {'; '.join(checks.watched)}"
+            if checks.base:
+                return (
+                    "no effect of time, rate or path shows; what depends on the pose alone, as stiffness and "
+                    "compliance, cannot be judged without a model of the sensor"
+                )
             return "nothing is missing that these recordings would show; see the detection limits"
         case Reason.NAMED:
             little = found.left.t < LEFT_T or found.share_left < SPEAKS_FROM
-            more = "" if little else f"; {100 * found.share_left:.1f} % of it follows another law than this one"
-            return f"{names}. Nothing else explains the presses as well{more}"
+            law = "its law is" if len(answer) == 1 else "their laws are"
+            more = "" if little else f". {100 * found.share_left:.1f} % is left: {law} a little different"
+            return f"{_there(names, len(answer), decision, shown)}. Nothing else explains the presses as well{more}"
         case Reason.RIVALS:
             closed = _closed(decision, shown)
             either_way = f"; either way {closed} is closed" if closed else ""
@@ -55,9 +61,10 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         case Reason.INCOMPLETE:
             return _incomplete(decision, shown) + _nameless(found, 0.0)
         case Reason.SEALED:
-            return f"{names} fits the presses that were judged; {_against(shown)}: not the name"
+            fits = f"{names} {'fits' if len(answer) == 1 else 'fit'} the presses that were judged"
+            return f"{fits}; {_against(shown)}: not the name"
         case Reason.LEFTOVERS:
-            return f"something is missing; {_closest(answer, found.share_left, shown)}"
+            return f"something is missing that has no name yet; {_closest(answer, found.share_left, shown)}"
         case Reason.ODD:
             odd = _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
             return odd + _lone(decision, found, "; ")
@@ -82,7 +89,7 @@ def _lone(decision: Decision, found: Findings, before: str) -> str:
         return ""
     press = found.problem.setting.course.names[lone.episode]
     return (
-        f"{before}{lone.effect.called} would explain {100 * lone.share:.0f} % of it, but {press} alone holds "
+        f"{before}{lone.effect.spoken} would explain {100 * lone.share:.0f} % of it, but {press} alone holds "
         f"{100 * lone.leverage:.0f} % of what shows it, and one press carries no name"
     )
 
@@ -91,16 +98,21 @@ def _incomplete(decision: Decision, shown: Gap | None) -> str:
     """Return what has a name, how fine it is, and what it closes."""
     sure = [e for e in decision.effects if e.level is not None]
     words = list(dict.fromkeys(_called(e) for e in sure))
-    open_ones = list(dict.fromkeys(e.finding.placed.effect.called for e in decision.effects if e.level is None))
-    said, closed = f"{_listed(words, 'and')} {'is' if len(words) == 1 else 'are'} there", _closed(decision, shown)
-    said += f" and {'closes' if len(words) == 1 else 'close'} {closed}" if closed else ""
+    open_ones = list(dict.fromkeys(e.finding.placed.effect.spoken for e in decision.effects if e.level is None))
+    said = _there(_listed(words, "and"), len(words), decision, shown)
     return said + (f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else "")
+
+
+def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str:
+    """Return that so many effects are there, and what they close on sealed presses."""
+    said, closed = f"{names} {'is' if count == 1 else 'are'} there", _closed(decision, shown)
+    return f"{said} and {'closes' if count == 1 else 'close'} {closed}" if closed else said
 
 
 def _called(decided: Decided) -> str:
     """Return an effect by the level at which it is named; a family with what fits best."""
     effect = decided.finding.placed.effect
-    return f"{effect.family.value} ({effect.called} fits best)" if decided.level is Level.FAMILY else effect.called
+    return f"{effect.family.value} ({effect.spoken} fits best)" if decided.level is Level.FAMILY else effect.spoken
 
 
 def _closed(decision: Decision, shown: Gap | None) -> str:
@@ -117,22 +129,23 @@ def _nameless(found: Findings, least: float) -> str:
     """Return how much has no name, from a least share on [1]."""
     if found.left.t < LEFT_T or found.share_left < least:
         return ""
-    return f"; {100 * found.share_left:.0f} % of what could be explained has no name yet"
+    much = f"{100 * found.share_left:.0f} %" if found.share_left >= SPEAKS_FROM else "less than 1 %"
+    return f"; {much} of what could be explained has no name yet"
 
 
 def _undecided(decision: Decision) -> str:
     """Return what is open: rivals, bounds, episodes that are too few; and what is not: a family that all share."""
     answer = [e.finding for e in decision.effects]
     shapes = [{p.name for p in f.placed.effect.shapes} & set(f.at_bound) for f in answer]
-    bounds = [f.placed.effect.called for f, own in zip(answer, shapes, strict=True) if set(f.at_bound) - own]
-    formed = [f.placed.effect.called for f, own in zip(answer, shapes, strict=True) if own]
-    weak = [f.placed.effect.called for f in answer if f.necessity < f.needed]
+    bounds = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if set(f.at_bound) - own]
+    formed = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if own]
+    weak = [f.placed.effect.spoken for f in answer if f.necessity < f.needed]
     words = _best(answer)
     shared = [e.finding.placed.effect.family.value for e in decision.effects if e.level is Level.FAMILY]
     words += f"; either way it is {_listed(list(dict.fromkeys(shared)), 'and')}" if shared else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     words += f"; {', '.join(formed)} fits best where its equation ends: the form is another one" if formed else ""
-    return words + (f"; more episodes must say whether {', '.join(weak)} is needed" if weak else "")
+    return words + (f"; more presses must say whether {', '.join(weak)} is needed" if weak else "")
 
 
 def _odd(names: list[str]) -> str:
@@ -148,7 +161,7 @@ def _odd(names: list[str]) -> str:
 
 def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
     """Return what comes closest without being the name: what it leaves, and how it fails on sealed episodes if so."""
-    names = list(dict.fromkeys(m.placed.effect.called for m in answer))
+    names = list(dict.fromkeys(m.placed.effect.spoken for m in answer))
     alone, words = len(names) == 1, _listed(names, "and")
     words += " comes closest and leaves" if alone else " together come closest and leave"
     words += f" {100 * share:.0f} % of what could be explained"
@@ -158,15 +171,18 @@ def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
         against = shown.ratio is None or shown.ratio.observed < 0
         if against and (worse := worsened(before, after)):
             return (
-                f"{words}, but sealed episodes fit {worse} with {it} (mean square {before:.3g} times the noise "
+                f"{words}, but sealed presses fit {worse} with {it} (mean square {before:.3g} times the noise "
                 f"without, {after:.3g} with): {name}"
             )
+    if instead := list(dict.fromkeys(load(r).spoken for m in answer for r in m.rivals)):
+        few = _listed(instead, "or") if len(instead) <= MOST_STAND_INS else f"{len(instead)} others"
+        return f"{words}, and {few} may stand in for {it}"
     return f"{words}, so {name}, or not all of it"
 
 
 def _best(answer: list[FoundEffect]) -> str:
     """Return what is found, and where that is open what fits best and what may stand in for it."""
-    clear = list(dict.fromkeys(m.placed.effect.called for m in answer if not m.rivals))
+    clear = list(dict.fromkeys(m.placed.effect.spoken for m in answer if not m.rivals))
     groups: dict[frozenset[str], list[FoundEffect]] = {}
     for m in answer:
         if m.rivals:
@@ -180,13 +196,15 @@ def _best(answer: list[FoundEffect]) -> str:
 
 def _open(own: list[FoundEffect]) -> str:
     """Return effects of the answer with the same rivals, and those."""
-    names = list(dict.fromkeys(m.placed.effect.called for m in own))
-    others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in names]
+    called = {m.placed.effect.called for m in own}
+    names = list(dict.fromkeys(m.placed.effect.spoken for m in own))
+    others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in called]
     words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
     if others:
         families = list(dict.fromkeys(load(name).family.value for name in others))
-        few = len(others) <= MOST_STAND_INS
-        instead = _listed(others, "or") if few else f"{len(others)} others ({_listed(families, 'or')})"
+        instead = _listed([load(name).spoken for name in others], "or")
+        if len(others) > MOST_STAND_INS:
+            instead = f"{len(others)} others ({_listed(families, 'or')})"
         return f"{words}, but {instead} may stand in for {'it' if len(names) == 1 else 'any of them'}"
     return f"{words}, but one may stand in for another"
 

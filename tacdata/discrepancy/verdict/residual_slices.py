@@ -17,6 +17,7 @@ NOTABLE = 1.3
 NOTABLE_T = 3.0
 """...and from so many standard errors over episodes on [1]."""
 NOWHERE = "nowhere does the residual stand out from the noise"
+SPREAD = "no part stands out in most presses; over all of them the residual is {:.2f} times the noise"
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,13 @@ def slices(problem: Problem) -> list[Slice]:
     parts = [("phase", name, phase == k) for k, name in enumerate(PHASES)]
     edges = np.quantile(depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
     for name, low, high in zip(("shallow", "middle", "deep"), edges[:-1], edges[1:], strict=True):
-        parts.append(("depth", f"{name} ({low:.2g} to {high:.2g} mm)", inside & (depth >= low) & (depth <= high)))
+        parts.append(("depth", f"{name} ({_range(low, high)} mm)", inside & (depth >= low) & (depth <= high)))
     moving = inside & ~still
     if moving.any():
         rates = np.quantile(np.abs(speed[moving]), [0, 1 / 3, 2 / 3, 1])
         for name, low, high in zip(("slow", "medium", "fast"), rates[:-1], rates[1:], strict=True):
             within = moving & (np.abs(speed) >= low) & (np.abs(speed) <= high)
-            parts.append(("rate", f"{name} ({low:.2g} to {high:.2g} mm/s)", within))
+            parts.append(("rate", f"{name} ({_range(low, high)} mm/s)", within))
     clock = course.time / max(float(course.time[-1]), 1e-9)
     parts += [
         ("clock", n, (clock >= k / 3) & (clock <= (k + 1) / 3)) for k, n in enumerate(("first", "second", "last"))
@@ -75,6 +76,16 @@ def slices(problem: Problem) -> list[Slice]:
     for k, name in enumerate(kinds[: square.shape[1]]):
         made.append(_slice("stream", name, square[:, k], course.episode, np.ones(len(each), dtype=bool)))
     return made
+
+
+def figure(value: float) -> str:
+    """Return a number with three digits, and no power of ten."""
+    return f"{value:.0f}" if value >= 100 else f"{value:#.3g}"
+
+
+def _range(low: float, high: float) -> str:
+    """Return two numbers as a range, as one where they round to the same."""
+    return " to ".join(dict.fromkeys(f"{value:.2g}" if value < 100 else f"{value:.0f}" for value in (low, high)))
 
 
 def _slice(by: str, name: str, each: np.ndarray, episode: np.ndarray, rows: np.ndarray) -> Slice:
@@ -121,8 +132,14 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
     ]
 
 
-def in_words(found: list[Slice], alone: list[str] | None = None) -> list[str]:
-    """Return sentences on what stands out: ``alone`` first, then the slices, each kind of slice by itself."""
+def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 1.0) -> list[str]:
+    """Return sentences on what stands out: ``alone`` first, then the slices, each kind of slice by itself.
+
+    Args:
+        found: The slices.
+        alone: Sentences on single episodes.
+        whole: The mean square of all [noise floor].
+    """
     words, alike = list(alone or []), []
     for by in dict.fromkeys(s.by for s in found):
         own = [s for s in found if s.by == by]
@@ -133,10 +150,10 @@ def in_words(found: list[Slice], alone: list[str] | None = None) -> list[str]:
             alike.append((by, float(np.median([s.mean_square for s in high]))))
         else:
             high.sort(key=lambda s: -s.mean_square)
-            each = ", ".join(f"{s.name} at {s.mean_square:.3g}" for s in high[:4])
+            each = ", ".join(f"{s.name} at {figure(s.mean_square)}" for s in high[:4])
             words.append(f"{by}: {each} times the noise")
     if alike:
         usual = [level for _, level in alike]
-        much = f"{min(usual):.3g}" if len(usual) == 1 else f"{min(usual):.3g} to {max(usual):.3g}"
+        much = _range(min(usual), max(usual))
         words.append(f"{', '.join(by for by, _ in alike)}: everywhere alike, {much} times the noise")
-    return words or [NOWHERE]
+    return words or [SPREAD.format(whole) if whole > NOTABLE else NOWHERE]

@@ -5,12 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from tacdata.discrepancy.search.gate import GATE
+from tacdata.discrepancy.verdict.residual_slices import figure
 from tacdata.effects import library, load
 
 MOST_RIVALS = 6
 """Most rivals that are listed."""
 MOST_UNJUDGED = 6
 """Effects that cannot be judged are listed up to so many; of more, only their number is given."""
+LOW = 0.7
+"""A residual below this [noise] is said to be so."""
+BEST = 0.9
+"""A regression on the path's history is worth a word if it leaves less than this share of the residual [1]."""
 WEAK_LIMIT = 3.0
 """Effects with a larger detection limit are listed [typical sizes]."""
 
@@ -23,8 +28,8 @@ def in_text(verdict: dict[str, Any]) -> str:
     gate = verdict["gate"]
     lines += [""] if verdict["effects"] else []
     lines.append(
-        f"could it be chance? p = {gate['p']:.3f} over all effects, {gate['p_generic']:.3f} for patterns of no effect; "
-        f"a gap from {GATE:g} down"
+        f"could chance do it? p = {gate['p']:.3f} by the known effects, {gate['p_generic']:.3f} by patterns of none of "
+        f"them; from {GATE:g} down there is a gap"
     )
     lines += _sizes(verdict)
     if verdict["located"]:
@@ -37,16 +42,21 @@ def in_text(verdict: dict[str, Any]) -> str:
         lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
     spoken = answered(verdict)
     if hidden := sorted(set(verdict["unjudgeable"]) - spoken):
-        few = ", ".join(hidden) if len(hidden) <= MOST_UNJUDGED else f"{len(hidden)} effects; verdict.html says why"
+        few = _plain(hidden) if len(hidden) <= MOST_UNJUDGED else f"{len(hidden)} effects; verdict.html says why"
         lines.append(f"cannot be judged here: {few}")
     weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in spoken]
     if weak:
-        lines.append("would be seen only at more than three times their usual size: " + ", ".join(sorted(weak)))
+        lines.append("would be seen only at more than three times their usual size: " + _plain(sorted(weak)))
     if verdict["untested"]:
         titles = [words.split(": ", 1)[-1] for words in verdict["untested"]]
         few = "; ".join(titles) if len(titles) <= MOST_UNJUDGED else f"{len(titles)} effects; verdict.html lists them"
         lines.append(f"known, not modelled: {few}")
     return "\n".join(lines) + "\n"
+
+
+def _plain(names: list[str]) -> str:
+    """Return names of effects without the signs that stand for blanks."""
+    return ", ".join(name.replace("_", " ") for name in names)
 
 
 def answered(verdict: dict[str, Any]) -> set[str]:
@@ -60,31 +70,36 @@ def answered(verdict: dict[str, Any]) -> set[str]:
 
 def _effect(entry: dict[str, Any]) -> list[str]:
     effect = load(entry["effect"])
-    lines = [f"  {entry['mechanism']}: {_standing(entry)}", f"    {effect.title}"]
+    lines = [f"  {effect.spoken}: {_standing(entry)}", f"    {effect.title}"]
     meanings = {p.name: p.meaning for p in effect.parameters}
     for name, p in entry["parameters"].items():
         unit = "" if p["unit"] == "1" else f" {p['unit']}"
         meaning = f" ({meanings[name]})" if name in meanings else ""
         if isinstance(p["value"], list):
-            each = f"{min(p['value']):.4g} to {max(p['value']):.4g}{unit} over the channels"
-            lines.append(f"    {name}: {each}{meaning}")
+            ends = dict.fromkeys(f"{value:.4g}" for value in (min(p["value"]), max(p["value"])))
+            over = " over the channels" if len(ends) > 1 else ""
+            lines.append(f"    {name}: {' to '.join(ends)}{unit}{over}{meaning}")
         else:
             spread = f" +- {p['error']:.2g}" if p["error"] is not None else ""
             lines.append(f"    {name} = {p['value']:.4g}{spread}{unit}{meaning}")
     if entry["alternatives"]:
-        lines.append(f"    these presses leave open whether it is: {', '.join(entry['alternatives'])}")
+        others = ", ".join(load(name).spoken for name in entry["alternatives"])
+        lines.append(f"    these presses leave open whether it is: {others}")
     unphysical = entry.get("unphysical", [])
     if unphysical:
-        lines.append(f"    does as well only with an unphysical size: {', '.join(unphysical)}")
+        others = ", ".join(load(name).spoken for name in unphysical)
+        lines.append(f"    does as well only with an unphysical size: {others}")
     spoken = {*entry["alternatives"], *unphysical}
-    rivals = sorted(entry["margins"].items(), key=lambda item: item[1])
-    rivals = [(name, by) for name, by in rivals if load(name).called not in spoken]
-    worse = [(name, by) for name, by in rivals if by > 0][:MOST_RIVALS]
-    better = [(name, -by) for name, by in rivals if by <= 0][:MOST_RIVALS]
+    rivals: dict[str, float] = {}
+    for name, by in sorted(entry["margins"].items(), key=lambda item: item[1]):
+        if load(name).called not in spoken:
+            rivals.setdefault(load(name).spoken, by)  # of several forms the nearest
+    worse = [(name, by) for name, by in rivals.items() if by > 0][:MOST_RIVALS]
+    better = [(name, abs(by)) for name, by in rivals.items() if by <= 0][:MOST_RIVALS]
     if worse:
-        lines.append(f"    better, in standard errors over episodes, than: {_by(worse)}")
+        lines.append(f"    fits better, by so many standard errors over presses, than: {_by(worse)}")
     if better:
-        lines.append(f"    worse, in standard errors over episodes, than: {_by(better)}")
+        lines.append(f"    fits worse, by so many standard errors over presses, than: {_by(better)}")
     return lines
 
 
@@ -104,22 +119,23 @@ def _by(rivals: list[tuple[str, float]]) -> str:
 def _sizes(verdict: dict[str, Any]) -> list[str]:
     """Return how large the residual is, with what each number is; before and after only where something was added."""
     left, sealed, none = verdict["left"], verdict["sealed"], not verdict["effects"]
-    if none:
-        lines = [f"residual: {left['before']:.3f}; 1 is the noise floor"]
-    else:
-        lines = [f"residual: {left['before']:.3f} before, {left['after']:.3f} after; 1 is the noise floor"]
-        lines.append(f"left of what could be explained: {100 * left['share']:.1f} % ({left['t']:.1f} standard errors)")
-    unit = "mean squares over the noise; the residual leaves out what differs from press to press"
-    if not sealed["episodes"]:
-        return [*lines, f"  ({unit})"]
-    head = f"{sealed['episodes']} sealed episodes: "
-    if none:
-        by_path = f"; {sealed['ceiling']:.3f} after a regression on the path's history"
-        lines.append(f"{head}{sealed['before']:.3f}{by_path if sealed['ceiling'] < 0.9 * sealed['before'] else ''}")
-    else:
-        lines.append(f"{head}{sealed['before']:.3f} before, {sealed['after']:.3f} after{_closed(sealed)}")
-        lines += [] if sealed["certain"] else _borne_out(sealed.get("ratio"))
-    return [*lines, f"  ({unit}, the sealed episodes do not: they do not compare)"]
+    lines = ["residual, as a mean square over the noise (1 is noise alone):"]
+    own = "without what differs from press to press (pose, gain)"
+    after = "" if none else f" before, {figure(left['after'])} after"
+    over = "" if none or left["after"] > LOW else "; below 1, since part of it had been taken for noise"
+    lines.append(f"  presses that were fitted, {own}: {figure(left['before'])}{after}{over}")
+    if sealed["episodes"]:
+        head = f"  {sealed['episodes']} sealed presses, with it: {figure(sealed['before'])}"
+        lines.append(f"{head}{'' if none else _closed(sealed)}")
+        if sealed["ceiling"] < BEST * sealed["before" if none else "after"]:
+            lines.append(
+                f"  a regression on the path's history would bring the sealed ones to {figure(sealed['ceiling'])}"
+            )
+        lines += [] if none or sealed["certain"] else _borne_out(sealed.get("ratio"))
+    if not none:
+        much = f"{_percent(left['share'])} of what could be explained ({left['t']:.1f} standard errors)"
+        lines.append(f"left without an explanation: {much}")
+    return lines
 
 
 def _borne_out(ratio: dict[str, Any] | None) -> list[str]:
@@ -134,17 +150,23 @@ def _borne_out(ratio: dict[str, Any] | None) -> list[str]:
 
 def _closed(sealed: dict[str, Any]) -> str:
     """Return how far the gap on sealed episodes is closed, in words that follow its numbers."""
-    best = f", {sealed['ceiling']:.3f} at best"
-    ratio = sealed.get("ratio")
+    after, ratio = f" before, {figure(sealed['after'])} after", sealed.get("ratio")
     if (ratio is None or ratio["observed"] < 0) and (worse := worsened(sealed["before"], sealed["after"])):
-        return f": {worse}{best}"
+        return f"{after}, {worse}"
     if not sealed["certain"]:
-        return f" (90 %: {sealed['after_interval'][0]:.3g} to {sealed['after_interval'][1]:.3g}){best}"
+        return f"{after} (90 %: {figure(sealed['after_interval'][0])} to {figure(sealed['after_interval'][1])})"
     low, high = sealed["interval"]
-    each = {load(name).called: share for name, share in sealed.get("shares", {}).items() if share > 0}
-    parts = ", ".join(f"{name} {100 * share:.0f}" for name, share in each.items()) if len(each) > 1 else ""
-    closed = f"{best}; {100 * sealed['closed']:.0f} % of the gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
-    return f"{closed}: {parts}" if parts else closed
+    each = {load(name).spoken: share for name, share in sealed.get("shares", {}).items() if share > 0}
+    parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in each.items()) if len(each) > 1 else ""
+    much = f"{100 * sealed['closed']:.0f} % of the gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
+    return f"{after}, {much}: {parts}" if parts else f"{after}, {much}"
+
+
+def _percent(share: float) -> str:
+    """Return a share [1] in percent, with a digit behind the point where it is small."""
+    if share < 0.0005:
+        return "less than 0.1 %"
+    return f"{100 * share:.1f} %" if share < 0.1 else f"{100 * share:.0f} %"
 
 
 def worsened(before: float, after: float) -> str:

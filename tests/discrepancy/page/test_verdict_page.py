@@ -19,7 +19,7 @@ from tacdata.discrepancy.page.verdict_page import verdict_page
 from tacdata.discrepancy.verdict.before_and_after import beside_model
 from tacdata.discrepancy.verdict.sealed import chosen
 from tacdata.discrepancy.verdict.text import in_text
-from tacdata.effects import library
+from tacdata.effects import library, load
 
 FEW = ("latency", "relaxation", "backlash")
 
@@ -62,7 +62,7 @@ def test_the_page_the_document_and_the_text_are_of_one_mind(judged):
     page, text = verdict_page(verdict, residuals), in_text(verdict)
     assert f'class="badge">{verdict["status"]}<' in page and text.startswith(verdict["status"].upper())
     for e in verdict["effects"]:
-        assert e["mechanism"] in page and e["mechanism"] in text
+        assert load(e["effect"]).spoken in page and load(e["effect"]).spoken in text
     sealed = verdict["sealed"]
     shown = f"{sealed['before']:.3g} → {sealed['after']:.3g}"
     assert (shown in page) == bool(verdict["effects"])

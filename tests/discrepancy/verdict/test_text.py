@@ -49,11 +49,12 @@ def line(text, beginning):
 def test_where_nothing_is_missing_no_share_of_it_is_left_and_each_number_says_what_it_is():
     text = in_text(document("none", share=1.0, sealed={"before": 42.429, "after": 42.429, "ceiling": 12.478}))
     assert "could be explained" not in text and "before" not in text and "closed" not in text
-    assert line(text, "residual") == "residual: 3.316; 1 is the noise floor"
-    assert line(text, "4 sealed") == "4 sealed episodes: 42.429; 12.478 after a regression on the path's history"
-    assert "do not compare" in text and "mean squares over the noise" in text
+    assert line(text, "presses that were").endswith("without what differs from press to press (pose, gain): 3.32")
+    assert line(text, "4 sealed") == "  4 sealed presses, with it: 42.4"
+    assert line(text, "a regression").endswith("would bring the sealed ones to 12.5")
+    assert line(text, "residual").endswith("as a mean square over the noise (1 is noise alone):")
     same = in_text(document("none", sealed={"before": 57.954, "after": 57.954, "ceiling": 57.954}))
-    assert line(same, "4 sealed") == "4 sealed episodes: 57.954"
+    assert line(same, "4 sealed") == "  4 sealed presses, with it: 58.0" and "a regression" not in same
 
 
 def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
@@ -70,19 +71,19 @@ def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
 def test_what_is_worse_is_not_called_better():
     margins = {"power_creep": -2.7, "relaxation": -2.2, "backlash": 3.9}
     text = in_text(document("unknown", [effect("bouc_wen", margins=margins, status="suspected")]))
-    assert line(text, "better, in") == "    better, in standard errors over episodes, than: backlash 3.9"
-    assert line(text, "worse, in").endswith("than: power_creep 2.7, relaxation 2.2")
+    assert line(text, "fits better").endswith("standard errors over presses, than: backlash 3.9")
+    assert line(text, "fits worse").endswith("than: relaxation 2.7"), "of two forms the nearest"
 
 
 def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
     worse = line(in_text(document("unknown", [effect("power_creep")])), "4 sealed")
-    assert worse == "4 sealed episodes: 18.489 before, 20.374 after: worse by 10 %, 1.286 at best"
+    assert worse == "  4 sealed presses, with it: 18.5 before, 20.4 after, worse by 10 %"
     closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.94, "interval": [0.9, 1.0], "certain": True}
     better = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
-    assert better.endswith("1.286 at best; 94 % of the gap closed (90 %: 90 to 100 %)")
+    assert "2.00 after, 94 % of the gap closed (90 %: 90 to 100 %)" in better
     wide = {"after": 2.0, "interval": [-0.3, 1.4], "after_interval": [1.1, 3.4]}
     vague = line(in_text(document("named", [effect("power_creep")], sealed=wide)), "4 sealed")
-    assert vague.endswith("2.000 after (90 %: 1.1 to 3.4), 1.286 at best"), "four presses carry no share"
+    assert "2.00 after (90 %: 1.10 to 3.40)" in vague, "four presses carry no share"
 
 
 def finding(name, *rivals):
@@ -104,10 +105,10 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
     answer = [finding(n, *(r for r in rates if r != load(n).called)) for n in ("power_creep", "backlash", "bouc_wen")]
     assert said("ambiguous", answer) == (
         "these recordings do not say which effect it is: relaxation, backlash and hysteresis together fit best, but "
-        "latency or creep may stand in for any of them"
+        "delay or creep may stand in for any of them"
     )
     assert said("ambiguous", [finding("low_pass_filter", "latency", "creep")]).endswith(
-        "low_pass_filter fits best, but latency or creep may stand in for it"
+        "low-pass filter fits best, but delay or creep may stand in for it"
     )
     assert said("ambiguous", [finding("drift"), finding("backlash", "creep")]).startswith(
         "drift, and something else: these recordings do not say which effect it is: backlash fits best, but creep may"
@@ -119,18 +120,20 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
 def test_many_that_may_stand_in_are_told_by_family_and_listed_below():
     rates = ("low_pass_filter", "viscosity", "backlash", "hysteresis", "creep")
     assert said("ambiguous", [finding("latency", *rates)]).endswith(
-        "latency fits best, but 5 others (delay and filtering, memory of the skin or friction and play) may stand in "
+        "delay fits best, but 5 others (delay and filtering, memory of the skin or friction and play) may stand in "
         "for it"
     )
     text = in_text(document("ambiguous", [effect("latency", rates) | {"parameters": {}}]))
-    assert line(text, "these presses leave open") == f"    these presses leave open whether it is: {', '.join(rates)}"
+    assert line(text, "these presses leave open") == (
+        "    these presses leave open whether it is: low-pass filter, viscosity, backlash, hysteresis, creep"
+    )
 
 
 def test_what_may_stand_in_is_not_called_worse_in_the_same_breath():
     """It is behind, but what is left may turn that around; and a size that cannot be is said to be that."""
     entry = effect("low_pass_filter", ("creep",), {"creep": 4.5, "backlash": 9.0, "nonlinear_relaxation": -2.9})
     text = in_text(document("ambiguous", [entry | {"parameters": {}, "unphysical": ["relaxation"]}]))
-    assert line(text, "better, in").endswith("than: backlash 9.0") and "worse, in" not in text
+    assert line(text, "fits better").endswith("than: backlash 9.0") and "fits worse" not in text
     assert line(text, "does as well").endswith("only with an unphysical size: relaxation")
 
 
@@ -152,19 +155,23 @@ def test_where_two_effects_close_the_gap_each_has_its_share():
     shares = {"power_creep": 0.6, "bouc_wen": 0.3}
     closed = {"after": 2.0, "closed": 0.9, "interval": [0.8, 1.0], "certain": True, "shares": shares}
     told = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
-    assert told.endswith("90 % of the gap closed (90 %: 80 to 100 %): relaxation 60, hysteresis 30")
+    assert "90 % of the gap closed (90 %: 80 to 100 %): relaxation 60 %, hysteresis 30 %" in told
 
 
 def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
     assert said("unknown", [finding("power_creep")], 18.489, 20.374) == (
-        "something is missing; relaxation comes closest and leaves 10 % of what could be explained, but sealed "
-        "episodes fit worse by 10 % with it (mean square 18.5 times the noise without, 20.4 with): it is not the name"
+        "something is missing that has no name yet; relaxation comes closest and leaves 10 % of what could be "
+        "explained, but sealed presses fit worse by 10 % with it (mean square 18.5 times the noise without, 20.4 "
+        "with): it is not the name"
     )
     assert "fit no better" in said("unknown", [finding("power_creep")], 20.128, 20.130)
     both = said("unknown", [finding("latency"), finding("power_creep")], 95.0, 6.0)
     assert both == (
-        "something is missing; latency and relaxation together come closest and leave 10 % of what could be explained, "
-        "so they are not the names, or not all of it"
+        "something is missing that has no name yet; delay and relaxation together come closest and leave 10 % of what "
+        "could be explained, so they are not the names, or not all of it"
+    )
+    assert said("unknown", [finding("thermal_growth", "lost_steps")]).endswith(
+        "thermal growth comes closest and leaves 10 % of what could be explained, and lost steps may stand in for it"
     )
 
 
