@@ -160,7 +160,7 @@ class Effect(ABC):
     mechanism: ClassVar[str] = ""
     """The name it shares with other functional forms of the same thing; empty: its own."""
     word: ClassVar[str] = ""
-    """What a person calls the mechanism, where its name with blanks is no such word; the same for all forms."""
+    """The mechanism as a person calls it; empty: its name with blanks. The same for all forms."""
     at_rest: ClassVar[AtRest | None] = None
     """For memory of the rate, which needs two rates of pressing, or a hold; the same for all forms."""
     grows_with: ClassVar[Growth | None] = None

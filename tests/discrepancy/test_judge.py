@@ -138,7 +138,7 @@ def test_a_verdict_fits_its_schema_and_says_what_cannot_be_judged():
     documents.check(written, "verdict", "verdict")
     assert "gain" in written["unjudgeable"]
     assert written["limits"]["latency"] is not None
-    assert "latency" in in_text(written)
+    assert "delay" in in_text(written)
 
 
 def test_two_presses_unlike_all_others_are_no_effect_and_not_nothing():
@@ -247,7 +247,7 @@ def test_few_episodes_carry_no_verdict():
     answer = judged(effects=("latency", "backlash"), episodes=5, delay=0.05)
     written = answer.written
     assert written["status"] == "unknown"
-    assert "5 episodes" in written["why"]
+    assert "5 presses" in written["why"]
     assert {e["status"] for e in written["effects"]} <= {"suspected"}, "no name by the back door"
 
 

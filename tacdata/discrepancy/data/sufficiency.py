@@ -65,9 +65,9 @@ def _varies(rates: np.ndarray) -> bool:
 
 
 STROKE, RATE, RADIUS, EVERY = 0.02, 500.0, 200.0, (2e-5, 5.0)
-"""Shorter strokes [mm], and rates [mm/s], radii [mm] and intervals of readings [s] beyond, are hardly of their unit.
+"""Strokes [mm] below, rates [mm/s], radii [mm] and intervals [s] beyond are hardly of their unit.
 
-A long stroke is no reason to doubt: strips are stretched by tens of mm, and an import refuses what is beyond any press.
+A long stroke is no reason to doubt: strips are stretched by tens of mm. An import refuses what no press can be.
 """
 
 

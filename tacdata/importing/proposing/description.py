@@ -30,7 +30,7 @@ class FoundKind:
     options: dict[str, Any] = field(default_factory=dict)
     """What a mapping has to say under the file to read it so."""
     words: dict[int, list[str]] = field(default_factory=dict)
-    """Number of a # of the kind -> the words that it stands for, where they are no numbers."""
+    """Number of a # of the kind -> the words that it stands for."""
 
 
 def described(source: Path) -> tuple[dict[str, FoundKind], str]:

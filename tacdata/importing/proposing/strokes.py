@@ -15,7 +15,7 @@ PAUSE, TIMES = 1.0, 10.0
 SURE = 0.5
 """Correlation of position and readings from which the sign is told."""
 LIFTED, CLEAR = 0.2, 0.05
-"""A length that never comes nearer to 0 than this share of its range is a height; presses are cut at this share."""
+"""A length that stays farther from 0 than this share of its range is a height. Presses are cut at the second."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class PressingAxis:
     lifted: bool
     """Whether it never comes near zero, as a machine's height and no depth does."""
     pause: float
-    """A time between the longest step within trials and the shortest pause between them [s]; 0 without pauses."""
+    """Longer than any step within trials, shorter than any pause between them [s]; 0 without pauses."""
     pauses: int
     strokes: int
     """How often it goes down and comes back between two pauses, at most."""
