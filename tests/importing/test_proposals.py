@@ -6,6 +6,7 @@ import pytest
 import scipy.io
 
 from tacdata import documents
+from tacdata.errors import FormatError
 from tacdata.importing.imported_session import import_session
 from tacdata.importing.proposing.description import described
 from tacdata.importing.proposing.proposal import proposed_mapping
@@ -206,3 +207,53 @@ def test_a_copied_file_is_no_second_measurement(tmp_path):
     assert made.recordings == 2
     assert "run_2 - Copy.csv is the same, byte by byte, as run_2.csv and is left out" in made.notes
     assert not made.refused
+
+
+def test_a_robots_file_beside_the_skins_is_its_position_in_m(tmp_path):
+    """Lengths without a unit are in m where a press would else be a thousandth of a mm."""
+    for run in (1, 2):
+        trial = tmp_path / f"trial_{run}"
+        written(trial / "skin.csv", "timestamp,taxel_0,taxel_1", T, run * STROKE, STROKE)
+        written(trial / "robot.csv", "timestamp,tcp_x,tcp_y,tcp_z,fz", T, 0 * T, 0 * T, 0.2 - 0.001 * STROKE, STROKE)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["taxels"]["columns"] == ["taxel_0", "taxel_1"]
+    assert found.mapping["position"]["z"] == {"column": "tcp_z", "unit": "m"}
+    assert any("m is a guess" in question for question in found.questions)
+    assert "pressed 1 mm deep" in tried(tmp_path, found.mapping, tmp_path)
+
+
+def test_a_file_with_a_channel_a_row_is_long(tmp_path):
+    columns = np.repeat(T, 2), np.repeat(STROKE, 2), np.tile([0, 1], len(T)), np.repeat(STROKE, 2)
+    written(tmp_path / "log.csv", "time,depth_mm,channel,value", *columns)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["taxels"] == {"file": "log", "long": {"channel": "channel", "value": "value"}}
+
+
+def test_a_number_of_a_place_keeps_its_sign_and_a_place_in_the_path_is_read(tmp_path):
+    for x in (-2, -4):
+        written(tmp_path / f"x{x}_y1" / "rep1.csv", "time_ms,indent_um,ch1", 1000 * T, 800 * STROKE, x * STROKE)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["press"] == {"x": {"part": "part0"}, "y": {"part": "part1"}}
+    assert sorted(press.press.x for press in imported(tmp_path, found.mapping, tmp_path / "made")) == [-4, -2]
+
+
+def test_variables_whose_names_differ_by_a_number_are_trials(tmp_path):
+    source = tmp_path / "runs.mat"
+    trials = {f"Trial{k}": {"t": T, "depth": k * STROKE, "cap": np.outer(STROKE, [k, 1])} for k in (1, 2, 3)}
+    scipy.io.savemat(source, trials)
+    found, _ = proposed(source)
+    assert found.mapping["files"]["trial"]["table"] == "Trial{part0}"
+    assert [press.press.depth for press in imported(source, found.mapping, tmp_path)] == [1, 2, 3]
+
+
+def test_blocks_side_by_side_are_asked_about_and_are_no_channels(tmp_path):
+    written(tmp_path / "b.csv", "Time (s),Disp (mm),C (pF),Time (s),Disp (mm),C (pF)", T, STROKE, STROKE, T, T, T)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["taxels"]["columns"] == ["C (pF)"]
+    assert any("side by side" in question for question in found.questions)
+
+
+def test_objects_of_python_are_refused_with_the_way_out(tmp_path):
+    np.save(tmp_path / "d.npy", {"t": T}, allow_pickle=True)
+    with pytest.raises(FormatError, match=r"objects of Python[\s\S]*np.savez"):
+        described(tmp_path / "d.npy")

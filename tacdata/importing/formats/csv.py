@@ -35,7 +35,7 @@ MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf
 class Csv(SourceFormat):
     """Columns of text."""
 
-    endings = (".csv", ".tsv", ".txt", ".dat", ".asc", ".csv.gz", ".txt.gz", ".tsv.gz")
+    endings = (".csv", ".tsv", ".txt", ".dat", ".asc", ".log", ".lvm", ".prn", ".csv.gz", ".txt.gz", ".tsv.gz")
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the file by Arrow's reader, with the layout of `text_layout`; see the base class."""

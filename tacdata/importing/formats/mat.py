@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,19 @@ class Mat(SourceFormat):
     """
 
     endings = (".mat",)
+
+    def tables(self, path: Path) -> tuple[str, ...]:
+        """Return the variables if they are trials: tables or structures, named alike but for a number; see the base."""
+        from scipy.io import loadmat
+
+        try:
+            loaded = loadmat(path, simplify_cells=True)
+        except NotImplementedError:
+            return ("",)  # `read` says what to do
+        names = [name for name in loaded if not name.startswith("__")]
+        whole = all(isinstance(loaded[name], dict) or (np.ndim(loaded[name]) == 2) for name in names)
+        alike = len({re.sub(r"\d+", "#", name) for name in names}) == 1
+        return tuple(names) if whole and alike and len(names) > 1 else ("",)
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the variables; ``table`` in the options selects one. See the base class."""

@@ -25,7 +25,16 @@ class Npz(SourceFormat):
         """Read the arrays; nothing pickled is ever loaded. See the base."""
         # numpy leaves a damaged archive open that it opened itself.
         with path.open("rb") as stream:
-            loaded = np.load(stream, allow_pickle=False)
+            try:
+                loaded = np.load(stream, allow_pickle=False)
+            except ValueError as error:
+                if "Object arrays" not in str(error):
+                    raise
+                raise FormatError(
+                    f"{path} holds objects of Python, as a dict or lists, and no array of numbers",
+                    "arrays of numbers",
+                    "in Python: d = np.load(name, allow_pickle=True).item(); np.savez(new_name, **d)",
+                ) from None
             if isinstance(loaded, np.ndarray):
                 return rows_of(path, {WHOLE: loaded}, options)
             return rows_of(path, {name: loaded[name] for name in loaded.files}, options)

@@ -26,6 +26,8 @@ class FoundKind:
 
     table: SourceTable
     """The first one's."""
+    path: str = ""
+    """Of the first one, below the source."""
     count: int = 1
     options: dict[str, Any] = field(default_factory=dict)
     """What a mapping has to say under the file to read it so."""
@@ -45,7 +47,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     found: dict[str, FoundKind] = {}
     refused = []
     below = [path.relative_to(source) if path != source else Path(path.name) for path in paths]
-    for path, kind in zip(paths, kinds_of(list(below)), strict=True):
+    for path, name_below, kind in zip(paths, (p.as_posix() for p in below), kinds_of(list(below)), strict=True):
         known = [entry for key, entry in found.items() if key.partition(INSIDE)[0] == kind]
         for entry in known:
             entry.count += 1
@@ -58,7 +60,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
                     found[key].count += 1
                     continue
                 table, options = _read(path, {"table": name} if name else {})
-                found[key] = FoundKind(table, 1, options)
+                found[key] = FoundKind(table, name_below, 1, options)
         except ModuleNotFoundError:
             raise
         except Exception as error:  # a README beside the data is no error

@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 """A number in a file's name: "run_0.2" and "run_1" are two runs of one kind."""
-SIGNED = re.compile(r"[-+]#")
+SIGNED, PLACED = re.compile(r"[-+]#"), re.compile(r"(?<![A-Za-z])([xyzXYZ])[-+]#")
 PART = "#"
 """Stands for what differs."""
 INSIDE = "::"
@@ -18,6 +18,7 @@ INSIDE = "::"
 def kinds_of(paths: list[PurePath]) -> list[str]:
     """Return the paths with # in place of numbers. A sign is part of the number where others have another, or none."""
     kinds = [numberless(path.with_suffix("").as_posix()) + path.suffix for path in paths]  # the 3 of .db3 stays
+    kinds = [PLACED.sub(rf"\1{PART}", kind) for kind in kinds]  # the minus of x-2 is no hyphen
     spellings: dict[str, set[str]] = {}
     for kind in kinds:
         spellings.setdefault(SIGNED.sub(PART, kind), set()).add(kind)

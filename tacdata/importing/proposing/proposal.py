@@ -23,6 +23,10 @@ SHORT = ("s", "ms", "us", "ns", "min", "h", "d")
 """Units of time that a mapping may name; others stand in the header and are read from there."""
 SPECIMEN = re.compile(r"(?:specimen|spec|sample|material|coupon|probe)[-_ ]?$", re.IGNORECASE)
 """What stands in a path before the number or the name of a specimen."""
+PLACE = re.compile(r"(?<![A-Za-z])([xyXY])[-_=]?$")
+"""What stands in a path before a place."""
+SHORTEST = 0.02
+"""Strokes below are hardly in mm [mm]."""
 MATERIAL = re.compile(
     r"ecoflex|dragon|pdms|sylgard|silicon|rubber|latex|vhb|tpu|foam|gel|agilus|ninja|elast|neopren|solaris|smooth",
     re.IGNORECASE,
@@ -54,7 +58,7 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         # Nothing else was read: the load cell is the sensor.
         for found in roles.values():
             found["channels"] = found.pop("force", [])
-    wide = max(aliases, key=lambda alias: len(roles[alias]["channels"]))
+    wide = max(aliases, key=lambda alias: (len(roles[alias]["channels"]), "value" in roles[alias]))
     asked: list[str] = []
     document: dict[str, Any] = {
         "version": schemas.version("import_mapping"), "name": source.stem, "source": "say where the data come from",
@@ -62,6 +66,11 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         "sensor": {"name": source.stem},
         "taxels": {"file": wide, "columns": _short(roles[wide]["channels"]) or [0]},
     }  # fmt: skip
+    if "value" in roles[wide]:
+        document["taxels"] = {
+            "file": wide,
+            "long": {"channel": roles[wide]["number"][0], "value": roles[wide]["value"][0]},
+        }
     units = {plain(tables[wide].units.get(name, "")) for name in roles[wide]["channels"]}
     if len(units) == 1 and units != {""}:
         document["taxels"]["unit"] = units.pop()
@@ -71,6 +80,9 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
             document["trials"] = {"column": found["trial"][0]}
         if specimen := _specimen(alias, aliases[alias], kinds[aliases[alias]], found, asked):
             document.setdefault("press", {"specimen": specimen})
+    for key, part in _place_in_path(aliases[wide]).items():
+        if key not in document.get("position", {}):
+            document.setdefault("press", {})[key] = {"part": part}
     _unnamed(tables[wide], roles[wide], asked)
     return Proposal(document, tuple(asked))
 
@@ -87,7 +99,8 @@ def _place(
             document["position"] = {"file": alias} | entry
             unsaid = [found[key][0] for key in chosen if key in found and "unit" in entry[key]]
             if unsaid:
-                asked.append(f"{_and(unsaid)}: no unit is given; mm is a guess")
+                unit = _length(table, entry, found[chosen[-1]][0])
+                asked.append(f"{_and(unsaid)}: no unit is given; {unit} is a guess")
             _motion(document, table, found, roles[document["taxels"]["file"]]["channels"], asked)
         lengths = found.get("depth", [])
         if len(lengths) > 1 and "displacement" not in document.get("measured", {}):
@@ -173,8 +186,20 @@ def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str
     return {}
 
 
+def _place_in_path(kind: str) -> dict[str, str]:
+    """Return which parts of a path are x and y, as in "x2.0_y-1.5"."""
+    before = kind.partition(INSIDE)[0].split("#")[:-1]
+    found = {k: PLACE.search(text) for k, text in enumerate(before)}
+    return {match[1].lower(): f"part{k}" for k, match in found.items() if match}
+
+
 def _unnamed(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) -> None:
-    if len(table.columns) == 1 and table.inner(next(iter(table.columns))):
+    if any(name.endswith("'") for name in table.columns) and not any(name.endswith("'") for name in roles["channels"]):
+        asked.append(
+            f"{table.path.name}: each name comes again, as in trials side by side; only the first is read. Put the "
+            "others below it with a column that numbers them, into sheets or into files"
+        )
+    if (len(table.columns) == 1 and table.inner(next(iter(table.columns)))) or all(map(str.isdigit, table.columns)):
         asked.append(
             f"the columns of {table.path.name} have no names: which are position, force and channels? "
             f"All but the time stand as channels, {', '.join(_short(roles['channels']))}"
@@ -184,7 +209,7 @@ def _unnamed(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) 
 def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
     table = entry.table
     outer, _, inside = kind.partition(INSIDE)
-    path, parts = pattern(outer)
+    path, parts = pattern(outer) if entry.count > 1 or "#" in inside else (entry.path, 0)
     found: dict[str, Any] = {"path": path, **entry.options}
     if "#" in inside:
         found["table"] = pattern(inside, parts)[0]
@@ -219,6 +244,15 @@ def _american(table: SourceTable, name: str, asked: list[str]) -> dict[str, str]
 
 def _axis(table: SourceTable, name: str) -> dict[str, Any]:
     return {"column": name, **({} if name in table.units else {"unit": "mm"})}
+
+
+def _length(table: SourceTable, entry: dict[str, Any], pressing: str) -> str:
+    """Set the unit of lengths without one: m where no press would be so short in mm; return it."""
+    unit = "m" if float(np.nanmax(table.column(pressing)) - np.nanmin(table.column(pressing))) < SHORTEST else "mm"
+    for given in entry.values():
+        if "unit" in given:
+            given["unit"] = unit
+    return unit
 
 
 def _short(names: list[str]) -> list[str]:

@@ -11,15 +11,20 @@ from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.times import times
 from tacdata.importing.units import OTHERS, plain, quantity_of, split_unit
 
+BODY = r"(pos(ition)?|stage|tcp|tip|tool|ee|robot|probe|indenter|actual)"
+"""What a coordinate in a column's name is one of."""
 GUESSES = {
-    "time": r"(time|t|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed)([_ ]?(time|zeit|uhrzeit))?",
+    "time": (
+        r"(x_value|time|t|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed)"
+        r"([_ ]?(time|zeit|uhrzeit))?"
+    ),
     "depth": (
         r"(depth|indentation|displacement|disp|travel|stroke|extension|crosshead|pos(ition)?"
         r"|(traversen|verfahr)?weg|eindringtiefe|d)"
     ),
-    "x": r"(x|pos_?x|x_?pos(ition)?|stage_?x)",
-    "y": r"(y|pos_?y|y_?pos(ition)?|stage_?y)",
-    "z": r"(z|pos_?z|z_?pos(ition)?|stage_?z|height)",
+    "x": rf"({BODY}[_.]?)?x|p_?x|x_{BODY}",
+    "y": rf"({BODY}[_.]?)?y|p_?y|y_{BODY}",
+    "z": rf"({BODY}[_.]?)?z|p_?z|z_{BODY}|height",
     "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy])",
     "temperature": r"(temp(erature)?(_?\w{1,4})?|t_?amb)",
     "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|zyklus|element)(_?(id|no|nr|number))?",
@@ -28,6 +33,8 @@ GUESSES = {
         r"|sample_?(id|no|nr|number|name)"
     ),
     "counter": r"(counter|frame|seq(uence)?|sample|index|n)",
+    "number": r"(channel|ch|taxel|sensor)(_?(id|no|nr|number|index))?",
+    "value": r"(value|val|reading|wert)",
     "setting": r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))|(set|target|cmd)_\w+",
 }
 """Meaning of a column by its name without the unit."""
@@ -64,6 +71,12 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     if not roles.get("time") and len(table.columns) == 1 and table.inner(next(iter(table.columns))):
         _first_rising_inside(table, roles)
     _set_for_each_trial(table, roles)
+    if not ("number" in roles and "value" in roles):
+        # Without a column that numbers channels a value is a channel, and the other way round.
+        roles["channels"] += roles.pop("value", []) + roles.pop("number", [])
+    if "time" in roles and f"{roles['time'][0]}'" in table.columns:
+        # Blocks of several trials stand beside each other: each name comes again.
+        roles = {role: [name for name in names if not name.endswith("'")] for role, names in roles.items()}
     return roles
 
 
