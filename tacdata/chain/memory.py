@@ -119,4 +119,8 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
     right = np.maximum(right, 1)
     gap = np.maximum(time[right] - time[right - 1], 1e-12)
     share = np.clip((wanted - time[right - 1]) / gap, 0.0, 1.0)[:, None]
-    return (1 - share) * values[right - 1] + share * values[right]
+    result, after = values.take(right - 1, axis=0), values.take(right, axis=0)
+    after -= result
+    after *= share
+    result += after
+    return result

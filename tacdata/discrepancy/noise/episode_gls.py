@@ -41,7 +41,7 @@ class FactoredErrors:
     """What the episodes of one place err by, factored: takes it out of any columns."""
 
     def __init__(
-        self, spans: Sequence[np.ndarray], own: EpisodeErrorModel, like: FactoredErrors | None = None
+        self, spans: Sequence[slice], own: EpisodeErrorModel, like: FactoredErrors | None = None
     ) -> None:  # fmt: skip
         """Factor what episodes, each given by its rows, err by.
 
@@ -56,14 +56,14 @@ class FactoredErrors:
         edges = np.cumsum([value.shape[2] for value in given.values()])[:-1]
         stacked = np.concatenate([*given.values()], axis=2) if given else None
         self._free = None if own.features is None else _Free(len(own.offset), own.features.shape[2])
-        self._episodes: list[tuple[np.ndarray, _Offsets, _Errors]] = []
+        self._episodes: list[tuple[slice, _Offsets, _Errors]] = []
         known = [None] * len(spans) if like is None else [offsets for _, offsets, _ in like._episodes]
         for rows, prior, before in zip(spans, own.prior, known, strict=True):
             modes = None if own.random_walk is None else own.random_walk[:, rows]
             offsets, rest = before or _Offsets(own.offset[:, rows, None], float(prior), modes), {}
             if stacked is not None:
                 rest = dict(zip(given, np.split(offsets.rooted(stacked[:, rows]), edges, axis=2), strict=True))
-            errors = _Errors(len(own.offset), len(rows), rest.get("pose"), rest.get("gain"))
+            errors = _Errors(len(own.offset), rows.stop - rows.start, rest.get("pose"), rest.get("gain"))
             self._episodes.append((rows, offsets, errors))
             if self._free is not None:
                 self._free.take(np.ascontiguousarray(rest["free"]), errors)
@@ -75,30 +75,25 @@ class FactoredErrors:
         """Degrees of freedom of the features, all streams together [1]."""
         return 0.0 if self._free is None else self._free.freedom
 
-    def without(self, columns: np.ndarray) -> np.ndarray:
-        """Return columns as generalized least squares sees them.
+    def take_out(self, columns: np.ndarray) -> None:
+        """Make columns, in place, what generalized least squares sees of them.
 
         Args:
             columns: Whitened, shape (streams, n, k).
         """
-        result = np.empty_like(columns)
         for rows, offsets, errors in self._episodes:
-            result[:, rows] = errors.rooted(offsets.rooted(columns[:, rows]))
-        if self._free is not None:
-            weights = self._free.weights([result[:, rows] for rows, _, _ in self._episodes])
-            for k, (rows, _, _) in enumerate(self._episodes):
-                result[:, rows] -= self._free.fitted(k, weights)
-        return result
+            own = columns[:, rows]
+            own -= offsets.part(own)
+            own -= errors.part(own)
+        self.project(columns)
 
-    def projected(self, white: np.ndarray) -> np.ndarray:
-        """Return what features leave of noise as generalized least squares sees it: white, shape (streams, n, k)."""
+    def project(self, white: np.ndarray) -> None:
+        """Leave, in place, what features leave of noise as generalized least squares sees it: white (streams, n, k)."""
         if self._free is None:
-            return white
-        result = white.copy()
+            return
         weights = self._free.weights([white[:, rows] for rows, _, _ in self._episodes])
         for k, (rows, _, _) in enumerate(self._episodes):
-            result[:, rows] -= self._free.fitted(k, weights)
-        return result
+            white[:, rows] -= self._free.fitted(k, weights)
 
     def episode_scores(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return scores and information of columns, each episode by itself.
@@ -166,9 +161,13 @@ class _Offsets:
             root[:, 0, 0] = 1.0
         self._pull = (root @ turned).astype(np.float32)
 
+    def part(self, block: np.ndarray) -> np.ndarray:
+        """Return what to take off columns (streams, m, k) so that it is accounted for."""
+        return self._columns @ (self._pull @ block)
+
     def rooted(self, block: np.ndarray) -> np.ndarray:
         """Return columns (streams, m, k) with it accounted for."""
-        return block - self._columns @ (self._pull @ block)
+        return block - self.part(block)
 
 
 def _root(gram: np.ndarray) -> np.ndarray:
@@ -182,54 +181,52 @@ class _Errors:
     """One episode's errors of pose and gain, T: kinds of pose, then a gain a stream."""
 
     def __init__(self, streams: int, rows: int, pose: np.ndarray | None, gain_error: np.ndarray | None) -> None:
-        self._shape = streams, rows
-        kinds = 0 if pose is None else pose.shape[2]
-        flat = np.zeros((streams * rows, 0), dtype=np.float32) if pose is None else pose.reshape(-1, kinds)
-        self._pose = np.ascontiguousarray(flat)
-        self._gain = None if gain_error is None else np.ascontiguousarray(gain_error)
-        if self._gain is not None:
-            power = np.square(self._gain).sum(axis=(1, 2)).astype(np.float64)
+        given = [part for part in (pose, gain_error) if part is not None]
+        # What a stream does in each of T's columns that are not another stream's: pose, then its own gain.
+        self._own = np.concatenate([np.zeros((streams, rows, 0), dtype=np.float32), *given], axis=2)
+        self._kinds = 0 if pose is None else pose.shape[2]
+        self._mean = None
+        every = self._own[:, :, : self._kinds]
+        if gain_error is not None:
+            power = np.square(gain_error).sum(axis=(1, 2)).astype(np.float64)
             self._mean = power / max(float(power.sum()), 1e-12)
-        every = [self._pose.reshape(streams, rows, kinds)]
-        if self._gain is not None:
-            every.append(self._gains(np.eye(streams)))
-        self.gram = self.inner(np.concatenate(every, axis=2).astype(np.float32))
+            gains = gain_error * (np.eye(streams) - self._mean)[:, None, :].astype(np.float32)
+            every = np.concatenate([every, gains], axis=2)
+        self.gram = self.inner(every)
         self.root = _root(0.5 * (self.gram + self.gram.T))
 
     def inner(self, block: np.ndarray) -> np.ndarray:
         """Return T' of columns (streams, m, k), shape (kinds + streams, k)."""
-        flat = block.reshape(len(self._pose), block.shape[2])
-        parts = [(self._pose.T @ flat).astype(np.float64)]
-        if self._gain is not None:
-            each = (self._gain.transpose(0, 2, 1) @ block)[:, 0].astype(np.float64)
-            parts.append(each - self._mean[:, None] * each.sum(axis=0))
-        return np.concatenate(parts)
+        each = (self._own.transpose(0, 2, 1) @ block).astype(np.float64)
+        pose = each[:, : self._kinds].sum(axis=0)
+        if self._mean is None:
+            return pose
+        gain = each[:, self._kinds]
+        return np.concatenate([pose, gain - self._mean[:, None] * gain.sum(axis=0)])
 
     def of_each(self, own: np.ndarray) -> np.ndarray:
         """Return T' of columns that each stand in one stream alone, shape (streams, m): shape (streams, kinds)."""
-        return np.einsum("smk,sm->sk", self._pose.reshape(*self._shape, self._pose.shape[1]), own, dtype=np.float64)
+        return np.einsum("smk,sm->sk", self._own[:, :, : self._kinds], own, dtype=np.float64)
 
     def joint(self, shared: np.ndarray) -> np.ndarray:
         """Return T' of columns (streams, m, p), each in one stream alone, shape (streams, p, kinds + streams)."""
-        turned = shared.transpose(0, 2, 1)
-        parts = [turned @ self._pose.reshape(*self._shape, self._pose.shape[1])]
-        if self._gain is not None:
-            parts.append((turned @ self._gain) * (np.eye(len(shared)) - self._mean)[:, None, :])
-        return np.concatenate(parts, axis=2).astype(np.float64)
+        each = shared.transpose(0, 2, 1) @ self._own
+        if self._mean is None:
+            return each.astype(np.float64)
+        gain = each[:, :, self._kinds :] * (np.eye(len(shared)) - self._mean)[:, None, :]
+        return np.concatenate([each[:, :, : self._kinds], gain], axis=2).astype(np.float64)
 
     def times(self, weights: np.ndarray) -> np.ndarray:
         """Return T weights, shape (streams, m, k), for weights of shape (kinds + streams, k)."""
-        kinds = self._pose.shape[1]
-        result = (self._pose @ weights[:kinds].astype(np.float32)).reshape(*self._shape, weights.shape[1])
-        return result if self._gain is None else result + self._gains(weights[kinds:])
+        own = np.repeat(weights[None, : self._kinds], len(self._own), axis=0)
+        if self._mean is not None:
+            gain = weights[self._kinds :]
+            own = np.concatenate([own, (gain - self._mean @ gain)[:, None]], axis=1)
+        return self._own @ own.astype(np.float32)
 
-    def _gains(self, weights: np.ndarray) -> np.ndarray:
-        own = weights - self._mean @ weights
-        return self._gain * own[:, None, :].astype(np.float32)
-
-    def rooted(self, block: np.ndarray) -> np.ndarray:
-        """Return columns (streams, m, k) times the root of the inverse of 1 + T T'."""
-        return block - self.times(self.root @ self.inner(block))
+    def part(self, block: np.ndarray) -> np.ndarray:
+        """Return what to take off columns (streams, m, k) to have them times the root of the inverse of 1 + T T'."""
+        return self.times(self.root @ self.inner(block))
 
 
 class _Free:

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import minimize
+from scipy.sparse import csr_array
 
 from tacdata.chain import Course
 
@@ -153,16 +154,15 @@ def _means(
     values: np.ndarray, rows: np.ndarray, episode: np.ndarray, episodes: int, missing: np.ndarray | None
 ) -> np.ndarray:
     """Return the means of some rows of each episode, shape (episodes, ...), 0 where there are none."""
-    own, of = values[rows], episode[rows]
-    gone = ~np.isfinite(own[..., 0]) if missing is None else missing[rows]
-    own[gone] = 0.0
-    sums = np.zeros((episodes, *values.shape[1:]))
-    count = np.zeros((episodes, values.shape[1], 1))
-    edges = np.flatnonzero(np.diff(of, prepend=-1))
-    if len(edges):
-        sums[of[edges]] = np.add.reduceat(own, edges, axis=0)
-        count[of[edges]] = np.add.reduceat(~gone, edges, axis=0)[:, :, None]
-    return sums / np.maximum(count, 1)
+    gone = ~np.isfinite(values[..., 0]) if missing is None else missing
+    if gone[rows].any():
+        values = np.where(gone[:, :, None], 0.0, values)
+    flat, chosen = values.reshape(len(values), -1), np.flatnonzero(rows)
+    each = csr_array(
+        (np.ones(len(chosen), dtype=values.dtype), (episode[chosen], chosen)), shape=(episodes, len(values))
+    )
+    count = (each @ (~gone).astype(float))[:, :, None]
+    return (each @ flat).astype(float).reshape(episodes, *values.shape[1:]) / np.maximum(count, 1)
 
 
 def _reml(

@@ -14,43 +14,55 @@ from tacdata.discrepancy.noise.gram import EpisodeGrams
 from tacdata.discrepancy.noise.noise_model import Noise
 
 
-def whiten(values: np.ndarray, course: Course, noise: Noise, rows: np.ndarray | None = None) -> np.ndarray:
-    """Divide by the relative scale, filter by e_i - phi^(dt / median dt) e_{i-1} within episodes, divide by the scale.
+@dataclass(frozen=True)
+class Colour:
+    """The scale and the memory of noise, by which readings are whitened."""
 
-    Args:
-        values: Shape (n, streams, columns).
-        course: Whose rows.
-        noise: Scales and memory.
-        rows: Rows of the course, of whole episodes, that ``values`` are of; all, unless given.
-    """
-    some = slice(None) if rows is None else rows
-    decay, spread = _filter(course, noise)
-    decay, spread = decay[some], spread[some]
-    if noise.relative_scale is None:
-        result = values.astype(np.float32)
-    else:
-        result = values.astype(np.float32, copy=False) / noise.relative_scale[some][:, :, None]
-    if noise.missing is not None:
-        missing = noise.missing[some]
-        result[missing] = 0.0
-        result[1:] -= decay[1:, None, None].astype(np.float32) * result[:-1]
-        gone = missing.copy()
-        gone[1:] |= missing[:-1] & ~course.first[some][1:, None]
-        result[gone] = 0.0
-    else:
-        result[1:] -= decay[1:, None, None].astype(np.float32) * result[:-1]
-    result /= (spread[:, None] * noise.scale[None]).astype(np.float32)[:, :, None]
-    return result
+    own: np.ndarray
+    """What a reading is multiplied by, shape (n, streams), float32; 0 where nothing is known of its innovation."""
+    before: np.ndarray
+    """What the reading before is multiplied by and taken off, shape (n, streams), float32; 0 in first rows."""
+    unknown: np.ndarray | None
+    """Where nothing is known, as it or the one before is missing, shape (n, streams), bool; None: nowhere."""
+
+    @classmethod
+    def of(cls, course: Course, noise: Noise) -> Colour:
+        """Divide by the relative scale, take phi^(dt / median dt) of the one before off in episodes, divide by the scale."""
+        inside = course.step[~course.first]
+        median = float(np.median(inside)) if len(inside) else 1.0
+        decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
+        decay = np.where(course.first, 0.0, decay)
+        spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
+        own = 1 / ((spread / np.sqrt(np.minimum(course.averaged, 4.0)))[:, None] * noise.scale)
+        before = decay[:, None] * own
+        if noise.relative_scale is not None:
+            own, before = own / noise.relative_scale, before / np.roll(noise.relative_scale, 1, axis=0)
+        gone = None
+        if noise.missing is not None:
+            gone = noise.missing.copy()
+            gone[1:] |= noise.missing[:-1] & ~course.first[1:, None]
+            own, before = np.where(gone, 0.0, own), np.where(gone, 0.0, before)
+        return cls(own.astype(np.float32), before.astype(np.float32), gone)
+
+    def white(self, values: np.ndarray, rows: slice | np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Return columns whitened, shape (m, streams, columns), float32.
+
+        Args:
+            values: Of some rows, shape (m, streams, columns).
+            rows: Which, of whole episodes.
+            out: Where they are written, of their shape, if anywhere.
+        """
+        values = values.astype(np.float32, copy=False)
+        result = np.multiply(values, self.own[rows][:, :, None], out=out)
+        result[1:] -= values[:-1] * self.before[rows][1:, :, None]
+        if self.unknown is not None:
+            result[self.unknown[rows]] = 0.0
+        return result
 
 
-def _filter(course: Course, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
-    """Return how much of the reading before each row keeps [1], and its innovation over the scale [1], shape (n,)."""
-    inside = course.step[~course.first]
-    median = float(np.median(inside)) if len(inside) else 1.0
-    decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
-    decay = np.where(course.first, 0.0, decay)
-    spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
-    return decay, spread / np.sqrt(np.minimum(course.averaged, 4.0))
+def whiten(values: np.ndarray, course: Course, noise: Noise) -> np.ndarray:
+    """Return columns of all rows of a course whitened, shape (n, streams, columns)."""
+    return Colour.of(course, noise).white(values, slice(None))
 
 
 @dataclass(frozen=True)
@@ -58,8 +70,13 @@ class _Place:
     """Rows of the episodes of one place, with what they err by."""
 
     rows: np.ndarray
-    episode: np.ndarray
+    """Shape (m,), int64."""
+    episodes: np.ndarray
+    """Their numbers, in order, shape (k,), int64."""
+    spans: list[tuple[slice, slice]]
+    """Of each episode: its rows in the course, and where they stand in `rows`."""
     offset: np.ndarray
+    """A whitened constant, 0 where nothing was read, shape (streams, m)."""
     seen: FactoredErrors
     tag: FactoredErrors | None
 
@@ -85,15 +102,18 @@ class Whitener:
         self._course, self._noise, offsets = course, noise, noise.offsets
         streams = len(noise.scale)
         self._seen = seen = streams - (3 if noise.tag is not None else 0)
+        self._colour = Colour.of(course, noise)
         flat = replace(noise, scale=np.ones(1))
-        one = replace(flat, missing=None)
+        one = Colour.of(course, replace(flat, missing=None))
         offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
-        moved = whiten(pose_errors, course, noise)
+        moved = self._colour.white(pose_errors, slice(None))
         random_walk = None
         if noise.random_walk is not None and like is None:
             each = np.broadcast_to(noise.random_walk[:, None, :], (course.rows, streams, noise.random_walk.shape[1]))
             random_walk = whiten(each, course, flat)
-        swung = None if noise.gain_error is None else whiten(noise.gain_error[:, :, None], course, noise)[:, :, 0]
+        swung = None
+        if noise.gain_error is not None:
+            swung = self._colour.white(noise.gain_error[:, :, None], slice(None))[:, :, 0]
         ahead = None
         if offsets is not None and features is not None:
             ahead = offsets.expected(features[:, None, :]).astype(np.float32)
@@ -101,21 +121,22 @@ class Whitener:
         self._places: list[_Place] = []
         # A place at a time: columns of all rows together would not stay in a processor's cache.
         for number, group in enumerate(np.split(order, np.flatnonzero(np.diff(context[order])) + 1)):
-            local = course.episode[group]
-            rows = np.argsort(local, kind="stable")
-            spans = np.split(rows, np.flatnonzero(np.diff(local[rows])) + 1)
+            spans = _spans(group, course)
+            episodes = course.episode[[span[0].start for span in spans]]
             free = np.full(len(spans), np.inf)
             shared = None
             if features is not None:
                 used = np.abs(features[group]).max(axis=0) > 1e-9
                 # Where noise is not alike in all streams, whitened features are not.
-                shared = whiten(features[group][:, None, used], course, one, group)
+                shared = _turned(one.white(features[group][:, None, used], group))
                 if ahead is not None:
-                    ones = whiten(np.ones((len(group), 1, 1)), course, one, group)[:, :, 0]
-                    _follow(shared, ones, local, ahead[:, :, used])
+                    ones = _turned(one.white(np.ones((len(group), 1, 1)), group)[:, :, 0])
+                    for episode, (_, at) in zip(episodes, spans, strict=True):
+                        _follow(shared[:, at], ones[:, at], ahead[episode][:, used])
+            inside = [at for _, at in spans]
             own = EpisodeErrorModel(
                 _turned(offset[group, :seen]),
-                free if offsets is None else offsets.spread[[local[span[0]] for span in spans]],
+                free if offsets is None else offsets.spread[episodes],
                 None if swung is None else _turned(swung[group, :seen]),
                 _turned(moved[group, :seen]),
                 None if shared is None else _features(shared, offset[group, :seen]),
@@ -127,17 +148,18 @@ class Whitener:
                 prior = np.full(len(spans), float(noise.tag or 1.0))
                 free_offset = _turned(offset[group, seen:, None])
                 tag_errors = EpisodeErrorModel(_turned(offset[group, seen:]), prior, features=free_offset)
-                tag = FactoredErrors(spans, tag_errors)
+                tag = FactoredErrors(inside, tag_errors)
             before = None if like is None else like._places[number].seen
-            self._places.append(_Place(group, local, offset[group], FactoredErrors(spans, own, before), tag))
+            factored = FactoredErrors(inside, own, before)
+            self._places.append(_Place(group, episodes, spans, _turned(offset[group]), factored, tag))
 
     @property
     def freedom(self) -> float:
         """Degrees of freedom of the features, at all places and of all streams [1]."""
         return sum(place.seen.freedom for place in self._places)
 
-    def parts(self, columns: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Give the rows of each place, and columns there whitened and without nuisances, shape (m, streams, k).
+    def _parts(self, columns: np.ndarray) -> Iterator[tuple[_Place, np.ndarray]]:
+        """Give each place with columns there whitened and without nuisances, shape (streams, m, k).
 
         Args:
             columns: Shape (n, streams, k).
@@ -148,14 +170,15 @@ class Whitener:
             expected = noise.offsets.expected(columns[:, :seen], gone)
             expected = (expected / noise.scale[:seen, None]).astype(np.float32)
         for place in self._places:
-            white = whiten(columns[place.rows], self._course, noise, place.rows)
-            if expected is not None:
-                _follow(white[:, :seen], place.offset, place.episode, expected)
-            part = np.empty_like(white)
-            part[:, :seen] = _turned(place.seen.without(_turned(white[:, :seen])))
+            part = np.empty((columns.shape[1], len(place.rows), columns.shape[2]), dtype=np.float32)
+            for number, (rows, at) in zip(place.episodes, place.spans, strict=True):
+                self._colour.white(columns[rows], rows, part[:, at].swapaxes(0, 1))
+                if expected is not None:
+                    _follow(part[:seen, at], place.offset[:, at], expected[number])
+            place.seen.take_out(part[:seen])
             if place.tag is not None:
-                part[:, seen:] = _turned(place.tag.without(_turned(white[:, seen:])))
-            yield place.rows, part
+                place.tag.take_out(part[seen:])
+            yield place, part
 
     def stream_scores(self, residual: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return scores and information of columns that each stand in one stream of one episode.
@@ -169,10 +192,9 @@ class Whitener:
         """
         score, known = np.zeros((2, self._course.episodes, residual.shape[1]))
         white = whiten(alone[:, : self._seen, None], self._course, self._of_seen())[:, :, 0]
-        for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
-            episodes = np.unique(place.episode)
-            own = place.seen.stream_scores(_turned(part[:, : self._seen, 0]), _turned(white[rows]))
-            score[episodes, : self._seen], known[episodes, : self._seen] = own
+        for place, part in self._parts(residual[:, :, None]):
+            own = place.seen.stream_scores(part[: self._seen, :, 0], _turned(white[place.rows]))
+            score[place.episodes, : self._seen], known[place.episodes, : self._seen] = own
         return score, np.maximum(known, 0.0)
 
     def episode_scores(self, residual: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -187,14 +209,12 @@ class Whitener:
         """
         count = columns.shape[2]
         score, known = np.zeros((self._course.episodes, count)), np.zeros((self._course.episodes, count, count))
-        white = whiten(columns, self._course, self._noise)
-        for place, (rows, part) in zip(self._places, self.parts(residual[:, :, None]), strict=True):
-            episodes, own = np.unique(place.episode), white[rows]
-            score[episodes], known[episodes] = place.seen.episode_scores(
-                _turned(part[:, : self._seen, 0]), _turned(own[:, : self._seen])
-            )
+        white = self._colour.white(columns, slice(None))
+        for place, part in self._parts(residual[:, :, None]):
+            episodes, own = place.episodes, _turned(white[place.rows])
+            score[episodes], known[episodes] = place.seen.episode_scores(part[: self._seen, :, 0], own[: self._seen])
             if place.tag is not None:
-                more = place.tag.episode_scores(_turned(part[:, self._seen :, 0]), _turned(own[:, self._seen :]))
+                more = place.tag.episode_scores(part[self._seen :, :, 0], own[self._seen :])
                 score[episodes] += more[0]
                 known[episodes] += more[1]
         return score, known
@@ -207,20 +227,21 @@ class Whitener:
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         """Return columns whitened and without nuisances, shape (n, streams, k)."""
-        result = np.zeros(columns.shape, dtype=np.float32)
-        for rows, part in self.parts(columns):
-            result[rows] = part
+        result = np.empty(columns.shape, dtype=np.float32)
+        for place, part in self._parts(columns):
+            for rows, at in place.spans:
+                result[rows] = part[:, at].swapaxes(0, 1)
         return result
 
     def projected(self, white: np.ndarray) -> np.ndarray:
         """Return what is left of noise, drawn white, shape (n, streams, draws): features take up some of it."""
         result = np.zeros(white.shape, dtype=np.float32)
         for place in self._places:
-            own = white[place.rows].astype(np.float32) * (place.offset != 0)[:, :, None]
-            own[:, : self._seen] = _turned(place.seen.projected(_turned(own[:, : self._seen])))
+            own = _turned(white[place.rows].astype(np.float32)) * (place.offset != 0)[:, :, None]
+            place.seen.project(own[: self._seen])
             if place.tag is not None:
-                own[:, self._seen :] = _turned(place.tag.projected(_turned(own[:, self._seen :])))
-            result[place.rows] = own
+                place.tag.project(own[self._seen :])
+            result[place.rows] = own.swapaxes(0, 1)
         return result
 
     def episode_grams(self, columns: np.ndarray, beside: np.ndarray | None = None) -> EpisodeGrams:
@@ -233,29 +254,35 @@ class Whitener:
         course = self._course
         width = columns.shape[2] + (0 if beside is None else beside.shape[2])
         gram, rows = np.zeros((course.episodes, width, width)), np.zeros(course.episodes)
-        for group, part in self.parts(columns):
-            whole = part if beside is None else np.concatenate([part, beside[group]], axis=2)
-            edges = np.flatnonzero(np.diff(course.episode[group], prepend=-1))
-            for begin, end in pairwise([*edges, len(group)]):
-                flat = whole[begin:end].reshape(-1, width)
-                number = course.episode[group[begin]]
-                gram[number] = flat.T @ flat
-                rows[number] = flat.shape[0]
+        few = columns.shape[2]
+        for place, part in self._parts(columns):
+            for number, (own, at) in zip(place.episodes, place.spans, strict=True):
+                flat = part[:, at].reshape(-1, few)
+                gram[number, :few, :few], rows[number] = flat.T @ flat, len(flat)
+                if beside is not None:
+                    other = _turned(beside[own]).reshape(len(flat), width - few)
+                    both = flat.T @ other
+                    gram[number, :few, few:], gram[number, few:, :few] = both, both.T
+                    gram[number, few:, few:] = other.T @ other
         return EpisodeGrams(gram, rows)
 
 
-def _follow(white: np.ndarray, offset: np.ndarray, episode: np.ndarray, expected: np.ndarray) -> None:
-    """Take off whitened columns, in place, what the offsets of the episodes before let one expect.
+def _spans(group: np.ndarray, course: Course) -> list[tuple[slice, slice]]:
+    """Return each episode's rows in the course, and where they stand among a place's rows, which are in order."""
+    edges = np.flatnonzero(np.diff(course.episode[group], prepend=-1))
+    pairs = pairwise([*edges.tolist(), len(group)])
+    return [(slice(int(group[a]), int(group[b - 1]) + 1), slice(a, b)) for a, b in pairs]
+
+
+def _follow(white: np.ndarray, offset: np.ndarray, expected: np.ndarray) -> None:
+    """Take off an episode's columns, in place, what the offsets of the episodes before let one expect.
 
     Args:
-        white: Shape (n, streams, columns).
-        offset: Whitened constants, shape (n, streams or more).
-        episode: Of each row, shape (n,).
-        expected: In noise scales, shape (episodes, streams, columns).
+        white: Whitened, shape (streams, n, columns).
+        offset: Whitened constants, shape (streams or more, n).
+        expected: In noise scales, shape (streams, columns).
     """
-    edges = np.flatnonzero(np.diff(episode, prepend=-1))
-    for begin, end in zip(edges, [*edges[1:], len(episode)], strict=True):
-        white[begin:end] -= offset[begin:end, : white.shape[1], None] * expected[episode[begin]]
+    white -= offset[: len(white), :, None] * expected[:, None, :]
 
 
 def _turned(values: np.ndarray) -> np.ndarray:
@@ -267,8 +294,8 @@ def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
     """Return features of each stream, shape (streams, n, p), 0 where nothing was read.
 
     Args:
-        shared: Whitened features, shape (n, streams or 1, p).
+        shared: Whitened features, shape (streams or 1, n, p).
         offset: Whitened constants, 0 where nothing was read, shape (n, streams).
     """
     there = (offset != 0).T.astype(np.float32)
-    return there[:, :, None] * np.swapaxes(shared[:, : len(there)], 0, 1)
+    return there[:, :, None] * shared[: len(there)]

@@ -22,6 +22,18 @@ def made(rng):
     }
 
 
+def within(lengths):
+    """Return each episode's rows."""
+    return [slice(a, b) for a, b in pairwise(np.cumsum((0, *lengths)).tolist())]
+
+
+def taken_out(factored, columns):
+    """Return columns as generalized least squares sees them."""
+    left = columns.astype(np.float32)
+    factored.take_out(left)
+    return left
+
+
 def dense(columns, spans, prior, offset, gain_error, moved, features, random_walk):
     """Return the products of columns under the covariance written out, free directions taken out."""
     streams, count, width = columns.shape
@@ -71,8 +83,7 @@ def dense(columns, spans, prior, offset, gain_error, moved, features, random_wal
 def test_products_are_those_of_generalized_least_squares(prior, features, modes):
     given = made(np.random.default_rng(3))
     given["features"], given["random_walk"] = given["features"][:, :, :features], given["random_walk"][:, :, :modes]
-    edges = np.cumsum((0, *LENGTHS))
-    spans = [np.arange(a, b) for a, b in pairwise(edges)]
+    spans = within(LENGTHS)
     parts = (given[name] for name in ("offset", "gain_error", "pose_errors", "features", "random_walk"))
     expected = dense(given["columns"], spans, prior, *parts)
     own = EpisodeErrorModel(
@@ -81,20 +92,19 @@ def test_products_are_those_of_generalized_least_squares(prior, features, modes)
         given["features"].astype(np.float32) if features else None,
         given["random_walk"].astype(np.float32) if modes else None,
     )  # fmt: skip
-    left = FactoredErrors(spans, own).without(given["columns"].astype(np.float32)).reshape(-1, WIDTH)
+    left = taken_out(FactoredErrors(spans, own), given["columns"]).reshape(-1, WIDTH)
     assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())
 
 
 def test_freedom_is_what_features_take_of_noise():
     rng = np.random.default_rng(4)
-    given, edges = made(rng), np.cumsum((0, *LENGTHS))
-    spans, count = [np.arange(a, b) for a, b in pairwise(edges)], sum(LENGTHS)
+    given, spans, count = made(rng), within(LENGTHS), sum(LENGTHS)
     twice = np.concatenate([given["features"], given["features"][:, :, :1]], axis=2).astype(np.float32)
     offset, free = given["offset"].astype(np.float32), np.full(len(spans), np.inf)
     white = rng.normal(size=(STREAMS, count, 4000)).astype(np.float32)
     without = FactoredErrors(spans, EpisodeErrorModel(offset, free))
     beside = FactoredErrors(spans, EpisodeErrorModel(offset, free, features=twice))
-    taken = np.square(without.without(white)).sum(axis=(0, 1)) - np.square(beside.without(white)).sum(axis=(0, 1))
+    taken = np.subtract(*(np.square(taken_out(factored, white)).sum(axis=(0, 1)) for factored in (without, beside)))
     assert without.freedom == 0.0
     # What is there twice takes no more than once.
     assert beside.freedom == pytest.approx(STREAMS * FEATURES, abs=0.01)
@@ -109,7 +119,7 @@ def test_freedom_is_the_rank_of_splines_that_are_nearly_alike():
     for k in range(4):
         features[0, :, k] = features[0, :, 11 - k] + 2e-5 * rng.normal(size=rows)
     features = np.repeat(features, 24, axis=0).astype(np.float32)
-    spans = np.split(np.arange(rows), 8)
+    spans = within([rows // 8] * 8)
     own = EpisodeErrorModel(np.ones((24, rows), dtype=np.float32), np.full(8, np.inf), features=features)
     freedom = FactoredErrors(spans, own).freedom
     assert 24 * (width - 4) <= freedom <= 24 * (width - 4) + 2
@@ -120,25 +130,25 @@ def test_columns_in_one_stream_of_an_episode_are_told_like_any_others(free):
     """Scores and information of all of them at once, against products with each made by itself."""
     rng = np.random.default_rng(0)
     parts = made(rng)
-    spans = np.split(np.arange(sum(LENGTHS)), np.cumsum(LENGTHS)[:-1])
+    spans = within(LENGTHS)
     own = EpisodeErrorModel(
         parts["offset"], np.array([np.inf, 0.5, np.inf]), pose_errors=parts["pose_errors"],
         features=parts["features"] if free else None,
     )  # fmt: skip
     factored, alone = FactoredErrors(spans, own), parts["gain_error"]
-    left = factored.without(parts["columns"])[:, :, 0]
+    left = taken_out(factored, parts["columns"])[:, :, 0]
     score, information = factored.stream_scores(left, alone)
     joint = factored.episode_scores(left, parts["columns"][:, :, :2])
     for e, rows in enumerate(spans):
         of_all = np.zeros((STREAMS, sum(LENGTHS), 2))
         of_all[:, rows] = parts["columns"][:, rows, :2]
-        white = factored.without(of_all)
+        white = taken_out(factored, of_all)
         assert joint[0][e] == pytest.approx(np.einsum("snk,sn->k", white, left), rel=1e-4, abs=1e-6)
         assert joint[1][e] == pytest.approx(np.einsum("snk,snl->kl", white, white), rel=1e-4, abs=1e-3)
         for s in range(STREAMS):
             column = np.zeros((*alone.shape, 1))
             column[s, rows, 0] = alone[s, rows]
-            white = factored.without(column)[:, :, 0]
+            white = taken_out(factored, column)[:, :, 0]
             assert score[e, s] == pytest.approx(np.sum(white * left), rel=1e-4, abs=1e-6)
             assert information[e, s] == pytest.approx(np.sum(white * white), rel=1e-4)
 
@@ -147,7 +157,7 @@ def test_what_features_leave_of_noise_that_is_white_to_it():
     """White noise projected is noise of the whole covariance, drawn and cleaned: the same mean products."""
     rng = np.random.default_rng(6)
     parts = made(rng)
-    spans = np.split(np.arange(sum(LENGTHS)), np.cumsum(LENGTHS)[:-1])
+    spans = within(LENGTHS)
     named = {name: parts[name] for name in ("pose_errors", "features", "random_walk")}
     own = EpisodeErrorModel(parts["offset"], np.full(3, 0.7), **named)
     factored, count, draws = FactoredErrors(spans, own), sum(LENGTHS), 20000
@@ -157,7 +167,9 @@ def test_what_features_leave_of_noise_that_is_white_to_it():
         projected_draws[:, rows] += 0.7 * parts["offset"][:, rows, None] * rng.normal(size=(STREAMS, 1, draws))
         projected_draws[:, rows] += parts["random_walk"][:, rows] @ rng.normal(size=(STREAMS, 2, draws))
         projected_draws[:, rows] += parts["pose_errors"][:, rows] @ rng.normal(size=(KINDS, draws))
-    projected, cleaned = (v.reshape(-1, draws) for v in (factored.projected(white), factored.without(projected_draws)))
+    cleaned = taken_out(factored, projected_draws).reshape(-1, draws)
+    factored.project(white)
+    projected = white.reshape(-1, draws)
     products = projected @ projected.T / draws
     assert cleaned @ cleaned.T / draws == pytest.approx(products, abs=0.06)
     assert np.trace(products) == pytest.approx(STREAMS * (count - FEATURES), rel=0.01)
