@@ -137,7 +137,8 @@ def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -
         both = (power[1:] > 1.0) & (power[:-1] > 1.0)
         gaps.append(np.diff(gain, axis=0)[both])
         known.append((1 / np.maximum(power[1:], 1e-9) + 1 / np.maximum(power[:-1], 1e-9))[both])
-    return spread_of(np.concatenate(gaps), np.concatenate(known))
+    none = np.zeros(0)  # a single press: what its splines follow says nothing of gains
+    return spread_of(np.concatenate([none, *gaps]), np.concatenate([none, *known]))
 
 
 MEDIAN_CHI2 = 0.4549

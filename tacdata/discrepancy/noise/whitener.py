@@ -27,7 +27,7 @@ class Colour:
 
     @classmethod
     def of(cls, course: Course, noise: Noise) -> Colour:
-        """Divide by the relative scale, take phi^(dt / median dt) of the one before off in episodes, divide by the scale."""
+        """Return an AR(1) filter in episodes, phi^(dt / median dt) by time, between divisions by both scales."""
         inside = course.step[~course.first]
         median = float(np.median(inside)) if len(inside) else 1.0
         decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
