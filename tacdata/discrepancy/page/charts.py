@@ -59,10 +59,12 @@ def shares_bar(parts: Sequence[tuple[str, str, float]]) -> str:
     return f'<svg class="bar" viewBox="0 0 720 26" role="img">{"".join(made)}</svg>'
 
 
-def map_of(title: str, rows: Sequence[str], columns: Sequence[str], values: np.ndarray) -> str:
-    """Return a heat map of mean squares over the noise, shape (rows, columns); NaN where nothing was read."""
+def map_of(title: str, rows: Sequence[str], columns: Sequence[str], values: np.ndarray, most: float) -> str:
+    """Return a heat map of mean squares over the noise, shape (rows, columns); NaN where nothing was read.
+
+    The deepest colour stands for ``most``: maps beside one another have the same.
+    """
     wide, high, first = 104, 24, 150
-    most = max(float(np.nanmax(values)) if np.isfinite(values).any() else 1.0, 2.0)
     parts = [
         f'<text x="{first + wide * (k + 0.5):.0f}" y="14" class="middle">{escape(name)}</text>'
         for k, name in enumerate(columns)
@@ -78,7 +80,7 @@ def map_of(title: str, rows: Sequence[str], columns: Sequence[str], values: np.n
             parts.append(
                 f'<rect x="{x}" y="{y}" width="{wide - 2}" height="{high - 2}" class="heat" '
                 f'style="fill-opacity:{0.08 + 0.8 * strength:.2f}"/>'
-                f'<text x="{x + wide / 2:.0f}" y="{y + 15}" class="middle" style="fill:{ink}">{value:.3g}</text>'
+                f'<text x="{x + wide / 2:.0f}" y="{y + 15}" class="middle" style="fill:{ink}">{_number(value)}</text>'
             )
     size = f"0 0 {first + wide * len(columns)} {24 + high * len(rows)}"
     return _figure(title, size, "".join(parts))

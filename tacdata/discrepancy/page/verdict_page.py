@@ -116,9 +116,10 @@ def _shares(verdict: dict[str, Any]) -> Part:
 
 def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     made = heat_map(found)
-    pictures = [charts.map_of("before, mean square over the noise", made.rows, made.columns, made.before)]
+    most = max(float(np.nanmax(made.before, initial=1.0)), 2.0)
+    pictures = [charts.map_of("before, mean square over the noise", made.rows, made.columns, made.before, most)]
     if verdict["effects"]:
-        pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after))
+        pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after, most))
     rest = [f"without a name yet: {words}" for words in verdict.get("located_after", ())]
     beside = "the map holds what differs from press to press, too; the figures below leave that out"
     located = (beside, *verdict["located"]) if verdict["located"] else ()

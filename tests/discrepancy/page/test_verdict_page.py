@@ -112,3 +112,11 @@ def test_a_rival_that_fits_worse_is_said_to_have_other_forms(judged):
     page = verdict_page(verdict, judged[1])
     assert "drift may stand in" in page and "4.0 standard errors, but another form of it may not" in page
     assert "not creep: it explains the presses worse by 9.0 standard errors than" in page
+
+
+def test_maps_side_by_side_have_one_scale_of_colour():
+    """A map of what is left would else be as red as the one before."""
+    maps = [charts.map_of("", ["hold"], ["0 to 1 mm"], np.array([[value]]), 1000.0) for value in (1000.0, 1.5)]
+    before, after = (float(m.split("fill-opacity:")[1].split('"')[0]) for m in maps)
+    assert before > 0.8 and after < 0.15
+    assert "1000<" in maps[0] and "e+" not in maps[0]
