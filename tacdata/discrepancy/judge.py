@@ -8,11 +8,12 @@ from typing import Any
 
 from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks, check
+from tacdata.discrepancy.levels.lack_of_fit import lack_of_fit
 from tacdata.discrepancy.levels.margins import beside_remainder
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.search.findings import Findings
+from tacdata.discrepancy.search.findings import STEPS, Findings
 from tacdata.discrepancy.verdict.decide import Decision, adequate, answer_of, decide
 from tacdata.discrepancy.verdict.document import document
 from tacdata.discrepancy.verdict.residual_slices import Slice, slices
@@ -47,10 +48,11 @@ def judge(
     1. Seal some episodes: their readings are not looked at.
     2. Check the data: wiring, units, what is missing.
     3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
-    4. Open the sealed episodes: how much smaller is their gap?
-    5. Decide: named (all of it, or some beside a remainder), ambiguous, unknown or none. Sealed episodes can take a
+    4. Hold the answer against the saturated model of each family: is its law borne out?
+    5. Open the sealed episodes: how much smaller is their gap?
+    6. Decide: named (all of it, or some beside a remainder), ambiguous, unknown or none. Sealed episodes can take a
        name away; they never give one.
-    6. Write it all down.
+    7. Write it all down.
 
     Args:
         course: The recordings.
@@ -69,9 +71,10 @@ def judge(
     checks = check(setting)
     found = find(setting, note, until)
     beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
+    lacking = lack_of_fit(found.final) if found.effects and until == STEPS[-1] else {}
     note("the gap on sealed presses")
     shown = gap(course, found, sealed)
-    decision = decide(found, checks, beside, shown)
+    decision = decide(found, checks, beside, shown, lacking)
     before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))
     written = document(decision, found, checks, (before, after), parents or {}, shown)
     return Verdict(written, checks, found, decision, before, after)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
+from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
@@ -103,10 +105,13 @@ class Decision:
     effects: tuple[Decided, ...] = field(default=())
     lone: LonePress | None = None
     """What one press alone shows, where nothing else has a name."""
+    lacking: Mapping[Family, Lack] = field(default_factory=dict)
+    """What each family's saturated model still explains."""
 
 
 def decide(
-    found: Findings, checks: DataChecks, beside: tuple[BesideRemainder, ...] = (), shown: Gap | None = None
+    found: Findings, checks: DataChecks, beside: tuple[BesideRemainder, ...] = (), shown: Gap | None = None,
+    lacking: Mapping[Family, Lack] | None = None,
 ) -> Decision:  # fmt: skip
     """Decide what may be said of findings.
 
@@ -115,7 +120,9 @@ def decide(
         checks: What the recordings can carry.
         beside: The evidence of each effect that was found beside a remainder, where something is left.
         shown: The gap on sealed episodes: it can take a name away, and never gives one.
+        lacking: What each family's saturated model explains beside the answer.
     """
+    lacking = lacking or {}
     answer = answer_of(found)
     status, reason = _status(found, answer)
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
@@ -143,6 +150,12 @@ def decide(
         # One of several names may stand in for a part of what has none: only the others are sure.
         levels = [None if doubt else level for doubt, level in zip(open_ones, levels, strict=True)]
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
+    if status in ("named", INCOMPLETE):
+        rough = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
+        if any(rough):
+            # Another law of the family is there, too, or in its place: the family alone is sure.
+            levels = [Level.FAMILY if own else level for own, level in zip(rough, levels, strict=True)]
+            status, reason = INCOMPLETE, Reason.INCOMPLETE
     if status in ("named", INCOMPLETE) and refuted(shown):
         status, reason = "unknown", Reason.SEALED
     if status == "named" and not found.gap and not borne_out(shown):
@@ -156,7 +169,7 @@ def decide(
     lone = lone_press(found.given) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
     return Decision(
         status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name), shown)
-                              for f, level in made), lone,
+                              for f, level in made), lone, lacking,
     )  # fmt: skip
 
 

@@ -57,7 +57,8 @@ def document(
                  "noise": [float(v) for v in noise.scale], "memory": noise.memory},
         "left": {"share": float(found.share_left), "t": float(np.clip(found.left.t, -99, 99)),
                  "before": float(2 * found.energy[0].sum() / values),
-                 "after": float(2 * found.energy[1].sum() / values), "floor": 1.0},
+                 "after": float(2 * found.energy[1].sum() / values), "floor": 1.0,
+                 "families": _families(decision)},
         "located": located(sliced[0], found) if sliced[0] else [], "slices": beside(*sliced),
         "located_after": in_words(sliced[1]) if decision.status == INCOMPLETE else [],
         "path": _path(found),
@@ -69,6 +70,16 @@ def document(
         "remarks": [words for words in remarks if words],
         "next": following(decision, course, bool(checks.watched), bool(checks.base)),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": DRAWS}),
+    }  # fmt: skip
+
+
+def _families(decision: Decision) -> dict[str, dict[str, float]]:
+    """Return what each family's saturated model still explains."""
+    return {
+        family.value: {
+            "size": round(own.size, 2), "held_out": round(own.gain, 2), "t": round(float(np.clip(own.t, -99, 99)), 2),
+        }
+        for family, own in decision.lacking.items()
     }  # fmt: skip
 
 

@@ -1,0 +1,117 @@
+"""Lack of fit: does an answer leave what another law of a family would still explain?
+
+A mechanism is held against the saturated model of its family (`tacdata.discrepancy.regressors.saturated`), which
+contains it but for its form: the nested test of goodness of fit. What the answer leaves is regressed on those columns.
+
+- Held-out gain (folds of presses, ridge) says whether anything is there.
+- Its size is what the columns explain, less half a unit of the sum of squares for each: that is what noise explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.chain import predict
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.noise.gram import episode_grams
+from tacdata.discrepancy.regressors.saturated import saturated
+from tacdata.discrepancy.search.findings import FoundEffect
+from tacdata.discrepancy.search.problem import Problem
+from tacdata.discrepancy.statistics.gram_fit import eliminated, t_value
+from tacdata.effects import Family
+
+STRENGTHS = (1e-3, 1e-2, 1e-1, 1.0)
+"""Ridge weights that are tried [mean information of a column]."""
+EXCITED = 1e-6
+"""Columns with less information are left out [largest]."""
+SURE_T = 2.0
+"""Something is there from so many standard errors over episodes on [1]."""
+ANOTHER_FORM = 0.15
+"""A law of which its family explains this share more is another one [what the effect explains]."""
+MODEL = {Family.CONTACT: Family.KINEMATICS}
+"""Families that share a saturated model: where the tip is, and where it meets the skin."""
+
+
+@dataclass(frozen=True)
+class Lack:
+    """What a family's saturated model still explains beside an answer."""
+
+    gain: float
+    """Fall of half the whitened sum of squares, held out, summed over episodes [1]; 0 or more."""
+    t: float
+    """Its mean over episodes, in standard errors [1]."""
+    size: float
+    """The same of all episodes together, what noise explains taken off [1]; 0 or more."""
+
+
+def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
+    """Return whether an effect's family explains clearly more than its law does: the mechanism is not borne out."""
+    family = finding.placed.effect.family
+    own = lacking.get(MODEL.get(family, family))
+    return own is not None and own.t >= SURE_T and own.size >= ANOTHER_FORM * max(finding.bought, 0.0)
+
+
+def lack_of_fit(final: Problem) -> dict[Family, Lack]:
+    """Return what each family's saturated model explains of what an answer leaves.
+
+    Args:
+        final: The model with the answer in place.
+    """
+    setting, placed = final.setting, [*final.setting.given, *final.placed]
+    course, streams = setting.course, Streams.of(setting.course)
+    residual = streams.measured(course) - streams.predicted(predict(course, setting.response, placed))
+    made = saturated(course, setting.response, placed)
+    moving = final.tangent.values
+    columns = np.concatenate([residual[:, :, None].astype(np.float32), *made.values(), moving], axis=2)
+    white = final.null.whitener_for(setting, placed).whitened(columns)
+    gram = episode_grams(white, course.reduced, final.null.nuisances, final.null.inner).gram
+    last = columns.shape[2] - moving.shape[2]
+    fixed = np.arange(last - 1, gram.shape[1] - 1)
+    gram = eliminated(gram, fixed, np.concatenate([np.full(moving.shape[2], 1e-6), final.null.ridge]))
+    result, first = {}, 1
+    for family, own in made.items():
+        index = np.arange(first, first + own.shape[2])
+        result[family] = lack(gram[:, np.r_[0, index]][:, :, np.r_[0, index]], final.folds)
+        first += own.shape[2]
+    return result
+
+
+def lack(gram: np.ndarray, folds: np.ndarray) -> Lack:
+    """Return what columns explain.
+
+    Args:
+        gram: Residual first, shape (episodes, 1 + k, 1 + k).
+        folds: Fold of each episode, shape (episodes,).
+    """
+    whole = gram.sum(axis=0)
+    known = np.diag(whole)[1:]
+    kept = np.concatenate([[True], known > EXCITED * max(float(known.max(initial=0.0)), 1e-12)])
+    gram, whole = gram[:, kept][:, :, kept], whole[np.ix_(kept, kept)]
+    if gram.shape[1] < 2:
+        return Lack(0.0, 0.0, 0.0)
+    best = Lack(0.0, 0.0, _size(whole))
+    mean = float(np.trace(whole[1:, 1:])) / (len(whole) - 1)
+    for strength in STRENGTHS:
+        each = np.zeros(len(folds))
+        for fold in np.unique(folds):
+            train, rest = folds != fold, folds == fold
+            total = gram[train].sum(axis=0)
+            weights = np.linalg.solve(total[1:, 1:] + strength * mean * np.eye(len(total) - 1), total[1:, 0])
+            inside = np.einsum("i,eij,j->e", weights, gram[rest][:, 1:, 1:], weights, optimize=True)
+            each[rest] = gram[rest][:, 0, 1:] @ weights - 0.5 * inside
+        if each.sum() > best.gain:
+            best = Lack(float(each.sum()), t_value(each), best.size)
+    return best
+
+
+def _size(whole: np.ndarray) -> float:
+    """Return half the sum of squares that columns explain, less that of noise [1]."""
+    root = np.sqrt(np.diag(whole)[1:])
+    information, score = whole[1:, 1:] / np.outer(root, root), whole[1:, 0] / root
+    power, axes = np.linalg.eigh(information)
+    good = power > 1e-3 * power[-1]
+    explained = np.square(axes[:, good].T @ score) / power[good]
+    return max(0.5 * float(np.sum(explained) - np.count_nonzero(good)), 0.0)
