@@ -47,10 +47,15 @@ class Lack:
     """The same of all episodes together, what noise explains taken off [1]; 0 or more."""
 
 
+def of_family(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> Lack | None:
+    """Return what the saturated model of an effect's family explains; None if it has none."""
+    family = finding.placed.effect.family
+    return lacking.get(MODEL.get(family, family))
+
+
 def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     """Return whether an effect's family explains clearly more than its law does: the mechanism is not borne out."""
-    family = finding.placed.effect.family
-    own = lacking.get(MODEL.get(family, family))
+    own = of_family(finding, lacking)
     return own is not None and own.t >= SURE_T and own.size >= ANOTHER_FORM * max(finding.bought, 0.0)
 
 

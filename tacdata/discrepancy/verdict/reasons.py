@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.levels.lack_of_fit import another_form, of_family
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import LEFT_T, SHARE_LEFT_ALONE, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import worsened
-from tacdata.effects import load
+from tacdata.effects import Family, load
 
 SPEAKS_FROM = 0.005
 """Share of what could be explained from which on a form is worth a word [1]."""
 LEAST_CLOSED = 0.01
 """Share of the gap on sealed presses from which on it is worth a word [1]."""
+SIGNS = {
+    Family.DRIFT: "gains that each part of the sensor changes by itself",
+    Family.KINEMATICS: "depths and places that go with place, side, order or direction",
+    Family.CONTACT: "depths and places that go with place, side, order or direction",
+    Family.SKIN_MEMORY: "readings that follow by other times, or come back",
+    Family.FRICTION_AND_PLAY: "loading against unloading",
+    Family.DELAY_AND_FILTER: "readings that go with the rate",
+    Family.RESPONSE_CURVE: "how readings grow with depth",
+    Family.CROSSTALK: "what other channels read",
+}
+"""Where another law of a family shows."""
 MOST_LISTED = 6
 """Episodes that are listed by name."""
 MOST_STAND_INS = 3
@@ -59,7 +71,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             either_way = f"; either way {closed} is closed" if closed else ""
             return _undecided(decision) + either_way + _nameless(found, SHARE_LEFT_ALONE)
         case Reason.INCOMPLETE:
-            return _incomplete(decision, shown) + _nameless(found, 0.0)
+            return _incomplete(decision, shown) + _other_laws(decision) + _nameless(found, 0.0)
         case Reason.SEALED:
             fits = f"{names} {'fits' if len(answer) == 1 else 'fit'} the presses that were judged"
             return f"{fits}; {_against(shown)}: not the name"
@@ -107,6 +119,17 @@ def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str
     """Return that so many effects are there, and what they close on sealed presses."""
     said, closed = f"{names} {'is' if count == 1 else 'are'} there", _closed(decision, shown)
     return f"{said} and {'closes' if count == 1 else 'close'} {closed}" if closed else said
+
+
+def _other_laws(decision: Decision) -> str:
+    """Return what of a family its law leaves, and by which signs."""
+    words = []
+    for e in decision.effects:
+        family, own = e.finding.placed.effect.family, of_family(e.finding, decision.lacking)
+        if e.level is not None and own is not None and another_form(e.finding, decision.lacking):
+            share = min(100 * own.size / max(e.finding.bought, 1e-9), 100.0)
+            words.append(f"{family.value}: another law of it would explain {share:.0f} % more, in {SIGNS[family]}")
+    return "".join(f"; {one}" for one in dict.fromkeys(words))
 
 
 def _called(decided: Decided) -> str:

@@ -1,0 +1,101 @@
+"""A law is held against all that its family might do: of a stand-in from the same family, the family is sure."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from pressing import course
+
+from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, lack, lack_of_fit
+from tacdata.discrepancy.levels.margins import Level
+from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import null_model
+from tacdata.discrepancy.search.findings import FoundEffect
+from tacdata.discrepancy.search.gauss_newton import refine
+from tacdata.discrepancy.search.problem import prepare
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, decide
+from tacdata.discrepancy.verdict.reasons import reason_in_words
+from tacdata.effects import Family, Placed, load
+
+
+def one_after_another(clock, channel):
+    """A front that reaches the channels in turn."""
+    return 1 / (1 + np.exp(-(clock - 0.2 - 0.3 * channel) / 0.03))
+
+
+def all_at_once(clock, channel):
+    """A drift of all channels, by no law of the library."""
+    return 1 / (1 + np.exp(-(clock - 0.5) / 0.12))
+
+
+def as_drift(gain):
+    """Return an effect that was fitted to presses whose gains grow by 8 %, with what its family still explains."""
+    made = course(episodes=32)
+    clock = made.time / made.time[-1]
+    grown = 1 + 0.08 * np.stack([gain(clock, channel) for channel in range(3)], axis=1)
+    made = replace(made, readings=np.round(5000 + grown * (made.readings - 5000)))
+    setting = Setting(made, FittedResponse(made), [load("gain_drift")])
+    null = null_model(setting)
+    first = Placed(load("gain_drift"), {"k": np.array(0.02)})
+    bare, model = refine(setting, [], null), refine(setting, [first], null)
+    final = prepare(replace(setting, response=model.response), null, model.placed)
+    found = FoundEffect(model.placed[0], {}, (), (), {}, 9.0, bought=bare.loss - model.loss)
+    return found, lack_of_fit(final)
+
+
+def test_a_front_over_the_channels_is_no_drift_of_the_gain():
+    found, lacking = as_drift(one_after_another)
+    assert found.bought > 30 and another_form(found, lacking)
+    others = {family: own for family, own in lacking.items() if family is not Family.DRIFT}
+    assert not another_form(found, others), "no other family's model speaks of it"
+
+
+def test_a_drift_of_the_gain_by_another_law_is_one():
+    found, lacking = as_drift(all_at_once)
+    assert found.bought > 30 and lacking[Family.DRIFT].t > 2, "the law is another one, and that is seen"
+    assert not another_form(found, lacking)
+
+
+@pytest.mark.parametrize("planted", [0.0, 40.0])
+def test_the_size_is_what_columns_explain_beyond_noise(planted):
+    rng, sizes, seen = np.random.default_rng(5), [], []
+    folds = np.arange(40) % 5
+    for _ in range(100):
+        columns = rng.normal(size=(40, 50, 30))
+        flat = columns.reshape(-1, 30)
+        signal = flat @ rng.normal(size=30)
+        residual = rng.normal(size=2000) + signal * np.sqrt(2 * planted / max(float(signal @ signal), 1e-12))
+        every = np.concatenate([residual.reshape(40, 50, 1), columns], axis=2)
+        found = lack(np.einsum("emi,emj->eij", every, every), folds)
+        sizes.append(found.size)
+        seen.append(found.t >= 2)
+    assert np.mean(sizes) == pytest.approx(planted, abs=3.0)
+    assert np.mean(seen) > 0.9 if planted else np.mean(seen) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("family", "lacking", "other"),
+    [(Family.SKIN_MEMORY, Lack(30.0, 4.0, 40.0), True), (Family.SKIN_MEMORY, Lack(30.0, 1.0, 40.0), False),
+     (Family.SKIN_MEMORY, Lack(5.0, 4.0, 10.0), False), (Family.FRICTION_AND_PLAY, Lack(30.0, 4.0, 40.0), False)],
+)  # fmt: skip
+def test_a_mechanism_falls_to_its_family_by_what_that_explains_of_its_own(family, lacking, other):
+    mine = FoundEffect(Placed(load("relaxation"), {}), {}, (), (), {}, 9.0, corrected_p=0.001, bought=100.0)
+    made = course(episodes=8)
+    setting = SimpleNamespace(course=made, channel_gain=None, response=FittedResponse(made), nuisance={})
+    fields = {
+        "effects": (mine,), "until": "decide", "gap": True, "tests": SimpleNamespace(p_generic=0.001),
+        "left": SimpleNamespace(t=0.0, gain=0.0), "share_left": 0.0, "loudness": 2.0, "explained": 400.0,
+        "values": np.ones(40), "gains": np.zeros(3), "energy": (np.ones(40),) * 2,
+        "problem": SimpleNamespace(setting=setting, null=SimpleNamespace(odd=())),
+    }  # fmt: skip
+    found, checks = cast(Any, SimpleNamespace(**fields)), DataChecks(44)
+    decision = decide(found, checks, lacking={family: lacking})
+    assert (decision.status, decision.effects[0].level) == (
+        (INCOMPLETE, Level.FAMILY) if other else ("named", Level.FORM)
+    )
+    words = reason_in_words(decision, found, checks)
+    assert ("another law" in words and "40 %" in words) is other, words
