@@ -8,7 +8,7 @@ from typing import Any
 
 from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks, check
-from tacdata.discrepancy.levels.lack_of_fit import lack_of_fit
+from tacdata.discrepancy.levels.lack_of_fit import lack_of_fit, with_families
 from tacdata.discrepancy.levels.margins import beside_remainder
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
@@ -70,8 +70,9 @@ def judge(
     setting = _setting(without_readings(course, sealed), spec, without, correct_p)
     checks = check(setting)
     found = find(setting, note, until)
-    beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
     lacking = lack_of_fit(found.final) if found.effects and until == STEPS[-1] else {}
+    found = with_families(found, lacking)
+    beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
     note("the gap on sealed presses")
     shown = gap(course, found, sealed)
     decision = decide(found, checks, beside, shown, lacking)

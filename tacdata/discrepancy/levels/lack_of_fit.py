@@ -10,7 +10,7 @@ contains it but for its form: the nested test of goodness of fit. What the answe
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from tacdata.chain import predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.noise.gram import episode_grams
 from tacdata.discrepancy.regressors.saturated import saturated
-from tacdata.discrepancy.search.findings import FoundEffect
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
+from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.statistics.gram_fit import eliminated, t_value
 from tacdata.effects import Family
@@ -31,6 +32,12 @@ SURE_T = 2.0
 """Something is there from so many standard errors over episodes on [1]."""
 ANOTHER_FORM = 0.15
 """A law of which its family explains this share more is another one [what the effect explains]."""
+MUCH = 0.15
+"""What other families explain of what is left counts as left over from this share of the whole on [1]."""
+SURE_GAIN = 5.0
+"""Another family is there, too, if it lowers half the sum of squares of held-out episodes by so much [1]..."""
+SURE_SHARE = 0.03
+"""...and explains this share of what the answer does: its laws may be off by less [1]."""
 MODEL = {Family.CONTACT: Family.KINEMATICS}
 """Families that share a saturated model: where the tip is, and where it meets the skin."""
 
@@ -57,6 +64,27 @@ def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     """Return whether an effect's family explains clearly more than its law does: the mechanism is not borne out."""
     own = of_family(finding, lacking)
     return own is not None and own.t >= SURE_T and own.size >= ANOTHER_FORM * max(finding.bought, 0.0)
+
+
+def with_families(found: Findings, lacking: Mapping[Family, Lack]) -> Findings:
+    """Return findings that leave what the families beside the answer explain, where that is much."""
+    sure = [own for own in _elsewhere(found, lacking) if own.t >= SURE_T]
+    most = max(sure, key=lambda own: own.gain, default=None)
+    if most is None or most.gain < max(found.left.gain, MUCH * (most.gain + max(found.explained, 0.0))):
+        return found
+    return replace(found, left=Leftovers(most.gain, most.t))
+
+
+def elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> bool:
+    """Return whether something of a family that the answer has nothing of is surely there, too."""
+    least = SURE_SHARE * max(found.explained, 0.0)
+    return any(own.t >= SURE_T and own.gain >= SURE_GAIN and own.size >= least for own in _elsewhere(found, lacking))
+
+
+def _elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Lack]:
+    taken = {f.placed.effect.family for f in found.effects}
+    taken |= {MODEL.get(family, family) for family in taken}
+    return [own for family, own in lacking.items() if family not in taken]
 
 
 def lack_of_fit(final: Problem) -> dict[Family, Lack]:

@@ -8,7 +8,7 @@ from enum import Enum, auto
 
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
-from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form
+from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, elsewhere
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
@@ -152,9 +152,9 @@ def decide(
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
     if status in ("named", INCOMPLETE):
         rough = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
-        if any(rough):
-            # Another law of the family is there, too, or in its place: the family alone is sure.
-            levels = [Level.FAMILY if own else level for own, level in zip(rough, levels, strict=True)]
+        # Another law of the family is there, too, or in its place: the family alone is sure.
+        levels = [Level.FAMILY if own else level for own, level in zip(rough, levels, strict=True)]
+        if any(rough) or elsewhere(found, lacking):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
     if status in ("named", INCOMPLETE) and refuted(shown):
         status, reason = "unknown", Reason.SEALED

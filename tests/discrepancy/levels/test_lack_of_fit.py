@@ -2,20 +2,21 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 from pressing import course
 
 from tacdata.discrepancy.data.checks import DataChecks
-from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, lack, lack_of_fit
+from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, lack, lack_of_fit, with_families
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
-from tacdata.discrepancy.search.findings import FoundEffect
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gauss_newton import refine
+from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.problem import prepare
 from tacdata.discrepancy.verdict.decide import INCOMPLETE, decide
 from tacdata.discrepancy.verdict.reasons import reason_in_words
@@ -80,22 +81,58 @@ def test_the_size_is_what_columns_explain_beyond_noise(planted):
 @pytest.mark.parametrize(
     ("family", "lacking", "other"),
     [(Family.SKIN_MEMORY, Lack(30.0, 4.0, 40.0), True), (Family.SKIN_MEMORY, Lack(30.0, 1.0, 40.0), False),
-     (Family.SKIN_MEMORY, Lack(5.0, 4.0, 10.0), False), (Family.FRICTION_AND_PLAY, Lack(30.0, 4.0, 40.0), False)],
+     (Family.SKIN_MEMORY, Lack(5.0, 4.0, 10.0), False)],
 )  # fmt: skip
 def test_a_mechanism_falls_to_its_family_by_what_that_explains_of_its_own(family, lacking, other):
+    decision, words = decided(family, lacking)
+    said = decision.status, decision.effects[0].level
+    assert said == ((INCOMPLETE, Level.FAMILY) if other else ("named", Level.FORM))
+    assert ("another law" in words and "40 %" in words) is other, words
+
+
+@pytest.mark.parametrize(
+    ("lacking", "there"),
+    [
+        (Lack(8.0, 3.0, 8.0), True),
+        (Lack(8.0, 1.0, 8.0), False),
+        (Lack(3.0, 3.0, 8.0), False),
+        (Lack(8.0, 3.0, 2.0), False),
+    ],
+)
+def test_what_another_family_surely_explains_makes_a_verdict_incomplete(lacking, there):
+    """The name stands. What explains hardly a hundredth may be its own law's error."""
+    decision, _ = decided(Family.FRICTION_AND_PLAY, lacking)
+    assert (decision.status, decision.effects[0].level) == (INCOMPLETE if there else "named", Level.FORM)
+
+
+@pytest.mark.parametrize(
+    ("family", "gain", "t", "left"),
+    [(Family.FRICTION_AND_PLAY, 60.0, 3.0, 60.0), (Family.FRICTION_AND_PLAY, 60.0, 1.0, 1.0),
+     (Family.FRICTION_AND_PLAY, 10.0, 3.0, 1.0), (Family.SKIN_MEMORY, 60.0, 3.0, 1.0)],
+)  # fmt: skip
+def test_much_that_another_family_explains_is_left_over(family, gain, t, left):
+    """A stand-in fits a part: what its own family explains besides is another form of it, and no such sign."""
+    found = findings()
+    assert with_families(found, {family: Lack(gain, t, gain)}).left.gain == left
+    alone = replace(found, effects=(replace(found.effects[0], placed=Placed(load("bulge"), {})),))
+    assert with_families(alone, {Family.SKIN_MEMORY: Lack(60.0, 3.0, 60.0)}).left.gain == 60.0
+
+
+def decided(family, lacking):
+    """Return what is decided of a relaxation beside what a family still explains, and its words."""
+    found, checks = findings(), DataChecks(44)
+    decision = decide(found, checks, lacking={family: lacking})
+    return decision, reason_in_words(decision, found, checks)
+
+
+def findings():
     mine = FoundEffect(Placed(load("relaxation"), {}), {}, (), (), {}, 9.0, corrected_p=0.001, bought=100.0)
     made = course(episodes=8)
     setting = SimpleNamespace(course=made, channel_gain=None, response=FittedResponse(made), nuisance={})
-    fields = {
-        "effects": (mine,), "until": "decide", "gap": True, "tests": SimpleNamespace(p_generic=0.001),
-        "left": SimpleNamespace(t=0.0, gain=0.0), "share_left": 0.0, "loudness": 2.0, "explained": 400.0,
-        "values": np.ones(40), "gains": np.zeros(3), "energy": (np.ones(40),) * 2,
-        "problem": SimpleNamespace(setting=setting, null=SimpleNamespace(odd=())),
-    }  # fmt: skip
-    found, checks = cast(Any, SimpleNamespace(**fields)), DataChecks(44)
-    decision = decide(found, checks, lacking={family: lacking})
-    assert (decision.status, decision.effects[0].level) == (
-        (INCOMPLETE, Level.FAMILY) if other else ("named", Level.FORM)
-    )
-    words = reason_in_words(decision, found, checks)
-    assert ("another law" in words and "40 %" in words) is other, words
+    problem: Any = SimpleNamespace(setting=setting, null=SimpleNamespace(odd=()))
+    tests: Any = SimpleNamespace(p_generic=0.001)
+    ones, zeros = np.ones(40), np.zeros(3)
+    return Findings(
+        True, tests, (mine,), Leftovers(1.0, 0.0), 100.0, (ones, ones), ones, problem, problem, {}, zeros,
+        np.stack([zeros, zeros]),
+    )  # fmt: skip
