@@ -68,23 +68,29 @@ def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
 
 def with_families(found: Findings, lacking: Mapping[Family, Lack]) -> Findings:
     """Return findings that leave what the families beside the answer explain, where that is much."""
-    sure = [own for own in _elsewhere(found, lacking) if own.t >= SURE_T]
+    sure = [lacking[family] for family in _others(found, lacking) if lacking[family].t >= SURE_T]
     most = max(sure, key=lambda own: own.gain, default=None)
     if most is None or most.gain < max(found.left.gain, MUCH * (most.gain + max(found.explained, 0.0))):
         return found
     return replace(found, left=Leftovers(most.gain, most.t))
 
 
-def elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> bool:
-    """Return whether something of a family that the answer has nothing of is surely there, too."""
+def elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
+    """Return families that the answer has nothing of, and that are surely there, too, the largest first."""
+    if not lacking:
+        return []
     least = SURE_SHARE * max(found.explained, 0.0)
-    return any(own.t >= SURE_T and own.gain >= SURE_GAIN and own.size >= least for own in _elsewhere(found, lacking))
+    sure = [
+        family for family in _others(found, lacking)
+        if lacking[family].t >= SURE_T and lacking[family].gain >= SURE_GAIN and lacking[family].size >= least
+    ]  # fmt: skip
+    return sorted(sure, key=lambda family: -lacking[family].size)
 
 
-def _elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Lack]:
+def _others(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
     taken = {f.placed.effect.family for f in found.effects}
     taken |= {MODEL.get(family, family) for family in taken}
-    return [own for family, own in lacking.items() if family not in taken]
+    return [family for family in lacking if family not in taken]
 
 
 def lack_of_fit(final: Problem) -> dict[Family, Lack]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tacdata.discrepancy.data.checks import DataChecks
-from tacdata.discrepancy.levels.lack_of_fit import another_form, of_family
+from tacdata.discrepancy.levels.lack_of_fit import another_form, elsewhere, of_family
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import LEFT_T, SHARE_LEFT_ALONE, Decided, Decision, Reason
@@ -71,7 +71,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             either_way = f"; either way {closed} is closed" if closed else ""
             return _undecided(decision) + either_way + _nameless(found, SHARE_LEFT_ALONE)
         case Reason.INCOMPLETE:
-            return _incomplete(decision, shown) + _other_laws(decision) + _nameless(found, 0.0)
+            return _incomplete(decision, shown) + _other_laws(decision, found) + _nameless(found, 0.0)
         case Reason.SEALED:
             fits = f"{names} {'fits' if len(answer) == 1 else 'fit'} the presses that were judged"
             return f"{fits}; {_against(shown)}: not the name"
@@ -121,14 +121,16 @@ def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str
     return f"{said} and {'closes' if count == 1 else 'close'} {closed}" if closed else said
 
 
-def _other_laws(decision: Decision) -> str:
-    """Return what of a family its law leaves, and by which signs."""
+def _other_laws(decision: Decision, found: Findings) -> str:
+    """Return where other laws show: of a family that has a name, then of one that has none."""
     words = []
     for e in decision.effects:
         family, own = e.finding.placed.effect.family, of_family(e.finding, decision.lacking)
         if e.level is not None and own is not None and another_form(e.finding, decision.lacking):
             share = min(100 * own.size / max(e.finding.bought, 1e-9), 100.0)
-            words.append(f"{family.value}: another law of it would explain {share:.0f} % more, in {SIGNS[family]}")
+            words.append(f"another law of {family.value} would explain {share:.0f} % more, in {SIGNS[family]}")
+    if others := elsewhere(found, decision.lacking)[:1]:
+        words.append(f"something of {others[0].value} shows, too, in {SIGNS[others[0]]}")
     return "".join(f"; {one}" for one in dict.fromkeys(words))
 
 

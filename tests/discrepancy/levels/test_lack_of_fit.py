@@ -101,8 +101,9 @@ def test_a_mechanism_falls_to_its_family_by_what_that_explains_of_its_own(family
 )
 def test_what_another_family_surely_explains_makes_a_verdict_incomplete(lacking, there):
     """The name stands. What explains hardly a hundredth may be its own law's error."""
-    decision, _ = decided(Family.FRICTION_AND_PLAY, lacking)
+    decision, words = decided(Family.FRICTION_AND_PLAY, lacking)
     assert (decision.status, decision.effects[0].level) == (INCOMPLETE if there else "named", Level.FORM)
+    assert ("something of friction and play shows, too, in loading against unloading" in words) is there, words
 
 
 @pytest.mark.parametrize(
@@ -133,6 +134,7 @@ def findings():
     tests: Any = SimpleNamespace(p_generic=0.001)
     ones, zeros = np.ones(40), np.zeros(3)
     return Findings(
-        True, tests, (mine,), Leftovers(1.0, 0.0), 100.0, (ones, ones), ones, problem, problem, {}, zeros,
-        np.stack([zeros, zeros]),
+        gap=True, tests=tests, effects=(mine,), left=Leftovers(1.0, 0.0), explained=100.0, energy=(ones, ones),
+        values=ones, given=problem, problem=problem, final=problem, limits={}, gains=zeros,
+        halves=np.stack([zeros, zeros]),
     )  # fmt: skip
