@@ -16,6 +16,8 @@ JUMP_Z, WANDER_Z = 6.0, 8.0
 """...from so many times the scatter from press to press on [1]."""
 SHARED = 0.4
 """A change of which the other channels show so much is no single channel's [1]."""
+CLEAR = 10.0
+"""A reading has a sign from so many times its noise on [1]."""
 RUN = 3
 """Successive presses of a jump, or of a change of places, at least."""
 SWAPPED = 0.3
@@ -38,13 +40,37 @@ def odd_channels(course: Course, response: Response) -> list[str]:
     measured = [_level(reduced.readings[r]) for r in rows]
     expected = [_level(predicted[r]) for r in rows]
     swapped = _swaps(course, episodes, measured, expected)
-    taken, places = {c for pair in swapped for c in pair}, list(swapped.values())
+    turned = _turned(course, episodes, measured)
+    taken, places = {*turned, *(c for pair in swapped for c in pair)}, [*turned.values(), *swapped.values()]
     gains = _gains(measured, expected)
     return [*places, *_jumps_and_wanders(course, episodes, gains, taken)][:MOST_LISTED]
 
 
 def _level(values: np.ndarray) -> np.ndarray:
     return values - np.nanmedian(values[: max(len(values) // 10, 1)], axis=0)
+
+
+def _turned(course: Course, episodes: np.ndarray, measured: list[np.ndarray]) -> dict[int, str]:
+    """Return which channels have the other sign from a press on, each with words.
+
+    A fitted response is of no help: it follows the mean of both signs. Presses of one place are compared.
+    """
+    known = [np.nan_to_num(m) for m in measured]
+    peak = np.array([m[np.abs(m).argmax(axis=0), np.arange(m.shape[1])] for m in known])
+    place, steps = course.site[episodes], np.concatenate([np.abs(np.diff(m, axis=0)) for m in known])
+    noise = 1.4826 * np.median(steps, axis=0) / np.sqrt(2)
+    words = {}
+    for channel, heights in enumerate(peak.T):
+        strong = np.flatnonzero(np.abs(heights) >= max(STRONG * np.abs(heights).max(), CLEAR * noise[channel]))
+        first = {p: np.sign(heights[k]) for k, p in reversed([(k, place[k]) for k in strong])}
+        same = np.array([np.sign(heights[k]) == first[place[k]] for k in strong])
+        change = int(np.argmin(same)) if not same.all() else len(same)
+        if change >= RUN and len(same) - change >= RUN and not same[change:].any():
+            words[channel] = (
+                f"{course.channel_names[channel]}: reads with the other sign from "
+                f"{course.names[int(episodes[strong[change]])]} on: was its lead turned, or a setting changed?"
+            )
+    return words
 
 
 def _gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:

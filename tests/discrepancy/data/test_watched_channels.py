@@ -58,3 +58,20 @@ def test_channels_that_change_places_are_told_of():
     swapped = with_readings(made, lambda t, e, r: np.where(e >= 17, r[:, [2, 1, 0]], r))
     words = odd_channels(swapped, FittedResponse(made))
     assert any("channel 0 and channel 2 read as one another from press 17" in said for said in words)
+
+
+@pytest.mark.parametrize("begin", [12, 17])
+def test_a_lead_that_was_turned_is_told_of_and_nothing_else(begin):
+    """Half way, too, where a response that is fitted to both halves is none."""
+    turned = with_readings(course(), lambda t, e, r: np.where(e >= begin, r * [1, -1, 1], r))
+    [words] = odd_channels(turned, FittedResponse(turned))
+    assert words.startswith(f"channel 1: reads with the other sign from press {begin} on")
+
+
+def test_what_is_hardly_more_than_noise_has_no_sign():
+    made = course()
+    rise = made.readings[:, 1:2] - IDLE[1]
+    small = np.column_stack([made.readings[:, 0], IDLE[1] + 0.035 * rise[:, 0], made.readings[:, 2]])
+    weak = replace(made, readings=small + np.random.default_rng(1).normal(0, 3, small.shape))
+    turned = with_readings(weak, lambda t, e, r: np.where(e >= 12, r * [1, -1, 1], r))
+    assert not any("other sign" in words for words in odd_channels(turned, FittedResponse(turned)))
