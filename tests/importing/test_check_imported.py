@@ -67,3 +67,12 @@ def test_channels_and_recordings_are_counted_in_whole_numbers():
     for axis, low, high in ((axes.xaxis, -0.5, 2.5), (axes.yaxis, -0.5, 1.5)):
         shown = [tick for tick in axis.get_ticklocs() if low <= tick <= high]
         assert len(shown) >= 2 and all(tick == round(tick) for tick in shown)
+
+
+def test_a_depth_that_rests_at_zero_has_a_rest(tmp_path):
+    """Depths of other labs begin at touch: without contact they are 0, not above it."""
+    time, depth, force, signals = several(4)
+    assert "readings answer contact" not in told(tmp_path, (time, np.maximum(depth, 0), force, signals)).text
+    flat = np.round(20 + np.random.default_rng(1).normal(0, 0.01, signals.shape), 4)
+    (tmp_path / "flat").mkdir()
+    assert "no channel answers" in told(tmp_path / "flat", (time, np.maximum(depth, 0), force, flat)).text

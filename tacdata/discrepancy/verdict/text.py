@@ -73,7 +73,7 @@ def _effect(entry: dict[str, Any]) -> list[str]:
     lines = [f"  {effect.spoken}: {_standing(entry)}", f"    {effect.title}"]
     meanings = {p.name: p.meaning for p in effect.parameters}
     for name, p in entry["parameters"].items():
-        unit = "" if p["unit"] == "1" else f" {p['unit']}"
+        unit = "" if p["unit"] == "1" else f" {'of the ' * p['unit'].startswith('largest')}{p['unit']}"
         meaning = f" ({meanings[name]})" if name in meanings else ""
         if isinstance(p["value"], list):
             ends = dict.fromkeys(f"{value:.4g}" for value in (min(p["value"]), max(p["value"])))
@@ -158,7 +158,8 @@ def _closed(sealed: dict[str, Any]) -> str:
     low, high = sealed["interval"]
     each = {load(name).spoken: share for name, share in sealed.get("shares", {}).items() if share > 0}
     parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in each.items()) if len(each) > 1 else ""
-    much = f"{100 * sealed['closed']:.0f} % of the gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
+    closed, low, high = (round(100 * part) for part in (sealed["closed"], low, high))
+    much = f"{closed} % of the gap closed (90 %: {low} to {high} %)"
     return f"{after}, {much}: {parts}" if parts else f"{after}, {much}"
 
 

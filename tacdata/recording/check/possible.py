@@ -101,7 +101,7 @@ def answer(figures: RecordingFigures) -> float | None:
         return None
     depth = episode.tip_at(episode.taxels.sample_ns)[:, 2]
     noise = np.array([np.nan if v is None else v for v in figures.document["taxels"]["idle_noise"]], float)
-    away, inside = depth < 0, depth > max(0.8 * float(depth.max()), CONTACT)
+    away, inside = depth <= 0, depth > max(0.8 * float(depth.max()), CONTACT)
     if not away.any() or not inside.any():
         return None
     counts = episode.taxels.counts
