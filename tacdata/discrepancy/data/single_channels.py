@@ -85,6 +85,8 @@ def _gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray
 
 def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, left_out: set[int]) -> list[str]:
     words: list[tuple[float, str]] = []
+    if gains.shape[1] < 2:
+        return []  # a channel without others is unlike none: what goes with the session may be an effect
     for channel in range(gains.shape[1]):
         known = np.flatnonzero(np.isfinite(gains[:, channel]))
         if len(known) < FEWEST or channel in left_out:

@@ -75,3 +75,9 @@ def test_what_is_hardly_more_than_noise_has_no_sign():
     weak = replace(made, readings=small + np.random.default_rng(1).normal(0, 3, small.shape))
     turned = with_readings(weak, lambda t, e, r: np.where(e >= 12, r * [1, -1, 1], r))
     assert not any("other sign" in words for words in odd_channels(turned, FittedResponse(turned)))
+
+
+def test_a_channel_without_others_is_unlike_none():
+    moved = with_readings(course(noise=0.5), lambda t, e, r: r * (1 + np.array([0, 0, 0.08]) * np.sin(e / 4)))
+    alone = replace(moved, readings=moved.readings[:, 2:], numbers=())
+    assert odd_channels(alone, FittedResponse(alone)) == []
