@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-BLOCK_ROWS = 64
-"""Rows laid out at once: some hundred columns of them stay in a processor's cache."""
+BLOCK_BYTES = 2**19
+"""Laid out at once: so much of all columns stays in a processor's cache."""
 
 
 def side_by_side(columns: Iterable[np.ndarray]) -> np.ndarray:
@@ -19,10 +19,11 @@ def side_by_side(columns: Iterable[np.ndarray]) -> np.ndarray:
     given = list(columns)
     rows, streams = given[0].shape
     result = np.empty((rows, streams, len(given)), dtype=np.float32)
-    for begin in range(0, rows, BLOCK_ROWS):
-        block = result[begin : begin + BLOCK_ROWS]
+    step = max(BLOCK_BYTES // max(result[:1].nbytes, 1), 1)
+    for begin in range(0, rows, step):
+        block = result[begin : begin + step]
         for k, column in enumerate(given):
-            block[:, :, k] = column[begin : begin + BLOCK_ROWS]
+            block[:, :, k] = column[begin : begin + step]
     return result
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tacdata.discrepancy.regressors.candidates import Candidate, Form
+from tacdata.discrepancy.regressors.tangent import Tangent
 from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.fits import best_shapes, fitted, shape_gains
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
@@ -29,9 +30,10 @@ SIMPLER = RIVAL_Z**2 / 2
 """Rivals: one with more numbers is out if half its BIC is larger by so much; as sure as `RIVAL_Z` [1]."""
 OTHER_FORMS = 2
 """Other forms of the effect's own mechanism that are tried, the best to first order."""
-PREPARED, PREPARED_SHAPE = 0.25, 0.7
-"""Rivals: prepared afresh with this share of the largest gain told beside the answer; each shape with this share of its
-effect's [1]."""
+SLACK, PREPARED = 0.8, 12
+"""Rivals: told beside the whole answer, so many are prepared afresh; `CLOSE`, `BEHIND`, `FAR_Z` have this slack [1]."""
+ALIKE = 0.7
+"""Rivals: shapes are prepared that explain this share of what the effect's best one does [1]."""
 BOOTSTRAPS = 200
 """Resamplings of the episodes by which selection is judged."""
 
@@ -63,13 +65,12 @@ def try_rivals(
         late: Delays and filters to begin with: to first order long ones are not seen.
     """
     begin, mine, null = replace(beside.setting, response=without.response), current.placed[at], beside.null
-    told = beside.without(at)
-    names = {p.effect.name for p in late}
-    forms_wanted = _worth_preparing(told, lambda e: e.called == mine.effect.called or e.name in names)
-    bare = prepare(begin, null, without.placed, tested=False, among=forms_wanted)
-    best = best_shapes(bare)
+    told, taken = beside.without(at), {p.effect.called for p in current.placed}
+    late_ones = {p.effect.name for p in late}
+    wanted = _worth_preparing(told, taken, lambda e: e.called == mine.effect.called or e.name in late_ones)
+    bare = prepare(begin, null, without.placed, tested=False, among=wanted)
+    best, everything = best_shapes(bare), np.arange(len(bare.folds))
     each = _first_order_gains(bare, best)
-    everything = np.arange(len(bare.folds))
     margins, losses, rivals, models = {}, {}, [], {}
     better: Refined | None = None
 
@@ -80,9 +81,8 @@ def try_rivals(
         made = [refine(begin, [*without.placed, start], null) for start in starts]
         return min(made, key=lambda model: model.half_bic)
 
-    taken = {p.effect.called for p in current.placed}
     long = [p.effect.name for p in late if p.effect.called not in taken and p.effect.name in best]
-    for name in dict.fromkeys([*_close(current, best, each), *long]):
+    for name in dict.fromkeys([*_close(taken, best, each), *long]):
         other = models[name] = in_its_place(name)
         level = required_margin(mine.effect, best[name].effect)
         margins[name] = j_statistic(current, other, pooled)
@@ -112,7 +112,8 @@ def try_rivals(
             better = other
     error, bounds = current.errors(at)
     rest = {name: c for name, c in best_shapes(told).items() if name not in best}
-    chosen = _chosen(bare, best | rest, each | _first_order_gains(told, rest))
+    apart = _still(bare) - _still(told)
+    chosen = _chosen(bare, best | rest, each | {n: g + apart for n, g in _first_order_gains(told, rest).items()})
     found = FoundEffect(
         mine, error, (*bounds, *current.narrowest(at)), tuple(dict.fromkeys(rivals)), margins, need, losses,
         _share(chosen, lambda e: e.called == mine.effect.called),
@@ -164,21 +165,25 @@ def _bound(model: Refined) -> bool:
     )
 
 
-def _worth_preparing(told: Problem, always: Callable[[Effect], bool]) -> set[Form]:
-    """Return the effects and shapes that may explain much in the place of one.
+def _worth_preparing(told: Problem, taken: set[str], always: Callable[[Effect], bool]) -> set[Form]:
+    """Return the effects and shapes that may be close in the place of one.
 
     Args:
         told: Without the one to first order: columns are those beside it.
+        taken: Mechanisms of the whole answer.
         always: Effects that are prepared whatever they explain.
     """
-    gain = shape_gains(told, np.arange(len(told.folds)))
-    most: dict[str, float] = {}
-    for candidate, own in zip(told.candidates, gain, strict=True):
-        most[candidate.effect.name] = max(most.get(candidate.effect.name, 0.0), own)
-    least = PREPARED * max(most.values(), default=0.0)
+    gain, still = shape_gains(told, np.arange(len(told.folds))), _still(told)
+    best = best_shapes(told)
+    # The others are not at their optimum without the one: what their numbers explain is no rival's.
+    bare = replace(told, model_errors=told.model_errors[:0])
+    moved = _still(bare) - _still(replace(bare, tangent=Tangent([], told.tangent.values, told.tangent.columns[:0])))
+    each = {name: own - moved for name, own in _first_order_gains(told, best).items()}
+    near = _close(taken, best, each, SLACK, PREPARED)
+    most = {name: float((own + moved - still).sum()) for name, own in each.items()}
     return {
         c.form for c, own in zip(told.candidates, gain, strict=True)
-        if own >= PREPARED_SHAPE * most[c.effect.name] and (most[c.effect.name] >= least or always(c.effect))
+        if (c.effect.name in near or always(c.effect)) and own - still.sum() >= ALIKE * most[c.effect.name]
     }  # fmt: skip
 
 
@@ -191,15 +196,29 @@ def _first_order_gains(problem: Problem, best: dict[str, Candidate]) -> dict[str
     return each
 
 
-def _close(current: Refined, best: dict[str, Candidate], each: dict[str, np.ndarray]) -> list[str]:
-    """Return the effects worth trying, the best first."""
+def _still(problem: Problem) -> np.ndarray:
+    """Return by how much half the sum of squares of each episode falls without any effect, shape (episodes,)."""
+    return gains(problem.grams.gram, *fitted(problem, [], np.arange(len(problem.folds))))
+
+
+def _close(
+    taken: set[str], best: dict[str, Candidate], each: dict[str, np.ndarray], slack: float = 1.0, most: int = TOP
+) -> list[str]:  # fmt: skip
+    """Return the effects worth trying, the best first.
+
+    Args:
+        taken: Mechanisms that the answer has.
+        best: Effect -> its best shapes.
+        each: Effect -> by how much it alone lowers half the sum of squares of each episode.
+        slack: Below 1 others count that are farther behind [1].
+        most: How many are returned.
+    """
     score = {name: float(gain.sum()) for name, gain in each.items()}
     top = max(score.values(), default=0.0)
     first = each[max(score, key=lambda n: score[n])] if score else np.zeros(1)
-    taken = {p.effect.called for p in current.placed}
-    close = [n for n, s in score.items() if s >= CLOSE * top and best[n].called not in taken]
-    close = [n for n in close if score[n] > BEHIND * top or clipped_t(first - each[n]) < FAR_Z]
-    return sorted(close, key=lambda n: -score[n])[:TOP]
+    close = [n for n, s in score.items() if s >= slack * CLOSE * top and best[n].called not in taken]
+    close = [n for n in close if score[n] > slack * BEHIND * top or clipped_t(first - each[n]) < FAR_Z / slack]
+    return sorted(close, key=lambda n: -score[n])[:most]
 
 
 def _forms(mine: Effect, best: dict[str, Candidate], each: dict[str, np.ndarray]) -> list[str]:

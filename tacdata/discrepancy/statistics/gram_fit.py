@@ -63,10 +63,11 @@ def eliminated(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.n
     total = gram.sum(axis=0)
     matrix = total[np.ix_(index, index)] + np.diag(ridge)
     matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / len(index), 1e-12)
-    change = np.eye(gram.shape[1])
-    change[index] = -np.linalg.solve(matrix, total[index])
-    change[:, index] = 0.0
-    return np.einsum("ji,ejk,kl->eil", change, gram, change, optimize=True)
+    through = np.linalg.solve(matrix, total[index])
+    half = gram - gram[:, :, index] @ through
+    result = half - through.T @ half[:, index]
+    result[:, index], result[:, :, index] = 0.0, 0.0
+    return result
 
 
 def t_value(values: np.ndarray) -> float:
