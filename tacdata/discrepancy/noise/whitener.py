@@ -21,7 +21,7 @@ class Colour:
     own: np.ndarray
     """What a reading is multiplied by [1 / its unit], shape (n, streams), float32; 0 where nothing is known."""
     before: np.ndarray
-    """What the one before is multiplied by and taken off [1 / its unit], shape (n, streams), float32; 0 in first rows."""
+    """What the one before is multiplied by and taken off [1 / unit], shape (n, streams), float32; 0 in first rows."""
     unknown: np.ndarray | None
     """Where nothing is known, as it or the one before is missing, shape (n, streams), bool; None: nowhere."""
 
