@@ -173,6 +173,8 @@ class Effect(ABC):
     """For what needs a force reading to be separated from a common gain."""
     scale: ClassVar[Scale | None] = None
     """For a scale of lengths."""
+    in_series: ClassVar[bool] = False
+    """Whether it gives way in series with what is pressed, alike under all specimens: those of other stiffness tell."""
     changes_skin: ClassVar[bool] = False
     """Whether labels are solved anew with another skin (`thickness_factor`)."""
     each_episode: ClassVar[bool] = False

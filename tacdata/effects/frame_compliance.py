@@ -36,6 +36,7 @@ class FrameCompliance(Effect):
     moves = ("label", "signal", "force")
     group = "depth curvature"
     family = Family.KINEMATICS
+    in_series = True
     equation = "d = z - c F(d) / max F(d), by fixed-point steps"
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564: h = z - F C_f"
     experiment = (

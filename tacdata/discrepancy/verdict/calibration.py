@@ -1,9 +1,10 @@
-"""Calibration: what it leaves open of gains and scales, and what is beyond that."""
+"""Calibration: what it leaves open of gains and scales, what is beyond that, and what known specimens calibrate."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from tacdata.discrepancy.model.series_compliance import series_compliance
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.effects import Effect, GainKind, Placed, Scale, library
 
@@ -45,6 +46,20 @@ def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
     return made
 
 
+def compliance_of_specimens(found: Findings) -> list[FoundEffect]:
+    """Return the compliance in series that specimens of other stiffness share; empty where they show none.
+
+    Each may have a law of its own, by chance in the order of their stiffness: that stays beside it.
+    """
+    shown = series_compliance(found.problem.setting.course) if found.problem.setting.response.fitted else None
+    if shown is None:
+        return []
+    effect = next(e for e in library() if e.in_series)
+    rivals = tuple(e.called for e in library() if e.group == effect.group and e.stage == "mechanics")
+    value, error = shown.compliance * shown.largest, shown.error * shown.largest
+    return [_finding(effect, np.array(value), error, rivals, shown.compliance / shown.error)]
+
+
 def _steady(halves: np.ndarray, whole: np.ndarray | float) -> np.ndarray:
     """Return whether a gain is the same in both halves of the session; those that one half does not show pass."""
     apart = np.abs(np.nan_to_num(halves[1] - halves[0]))
@@ -52,7 +67,7 @@ def _steady(halves: np.ndarray, whole: np.ndarray | float) -> np.ndarray:
 
 
 def _finding(effect: Effect, value: np.ndarray, error: float, rivals: tuple[str, ...], necessity: float) -> FoundEffect:
-    """Return a gain of a value as a finding; it did not race."""
+    """Return an effect of a size as a finding; it did not race."""
     name = effect.amplitudes[0].name
     return FoundEffect(Placed(effect, {name: value}), {name: error}, (), rivals, {}, necessity, needed=BEYOND)
 

@@ -14,7 +14,11 @@ from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gate import GATE
 from tacdata.discrepancy.search.shortlist import RIVAL_Z
-from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
+from tacdata.discrepancy.verdict.calibration import (
+    calibration_error,
+    compliance_of_specimens,
+    gains_beyond_calibration,
+)
 from tacdata.discrepancy.verdict.confidence import confidence, features
 from tacdata.discrepancy.verdict.lone_press import LonePress, lone_press
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -125,6 +129,8 @@ def decide(
     lacking = lacking or {}
     answer = answer_of(found)
     status, reason = _status(found, answer)
+    if reason is Reason.QUIET and (given := compliance_of_specimens(found)):
+        answer, status, reason = given, "ambiguous", Reason.RIVALS
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
     levels = [finest(f) for f in answer]
     sealed = shown is not None and bool(len(shown.names))

@@ -132,7 +132,7 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
                 f"  a regression on the path's history would bring the sealed ones to {figure(sealed['ceiling'])}"
             )
         lines += [] if none or sealed["certain"] else _borne_out(sealed.get("ratio"))
-    if not none:
+    if not none and left["after"] < left["before"]:
         much = f"{_percent(left['share'])} of what could be explained ({left['t']:.1f} standard errors)"
         lines.append(f"left without an explanation: {much}")
     return lines
