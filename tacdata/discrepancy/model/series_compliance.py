@@ -57,7 +57,8 @@ class SeriesCompliance:
         return (
             f"if the frame gives way by {self.compliance:.3g} +- {self.error:.1g} mm per unit of the load "
             f"({self.compliance * self.largest:.2g} mm at most), one law (depth to the power {self.power:.2g}) follows "
-            f"all {self.specimens} specimens: of the one that shows most it misses {after} of the depth, {before} without"
+            f"all {self.specimens} specimens: of the one that shows it most it misses {after} of the depth, "
+            f"{before} without"
         )
 
 
