@@ -15,7 +15,7 @@ from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.formats.source_format import SourceTable, read_table
-from tacdata.importing.presses import presses_of
+from tacdata.importing.presses import centre_of, presses_of
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
 from tacdata.importing.trials import split_tables
@@ -94,6 +94,7 @@ class _Import:
         self.failures: list[tuple[str, TacdataError]] = []
         self.notes: list[str] = []
         self.seen: dict[tuple[Any, ...], str] = {}
+        self.centre: tuple[float, float] | None = None
 
     def add(self, files: FileSet) -> None:
         """Import one set of files."""
@@ -146,7 +147,9 @@ class _Import:
             ],
             "mapping": self.mapping, "mapping_hash": self.hash, "code_version": provenance.code_version(),
         }  # fmt: skip
-        yield from presses_of(self.mapping, self.beside, rows, files.parts, record)
+        if self.centre is None:
+            self.centre = centre_of(self.mapping, whole)
+        yield from presses_of(self.mapping, self.beside, rows, files.parts, record, self.centre)
 
     def _write(self, imported: ImportedPress) -> None:
         number = len(self.presses)

@@ -46,8 +46,9 @@ UNITS = {
 
 
 def presses_of(
-    mapping: dict[str, Any], beside: Path, tables: dict[str, SourceTable], parts: dict[str, str], record: dict[str, Any]
-) -> Iterator[ImportedPress]:
+    mapping: dict[str, Any], beside: Path, tables: dict[str, SourceTable], parts: dict[str, str],
+    record: dict[str, Any], centre: tuple[float, float] = (0.0, 0.0),
+) -> Iterator[ImportedPress]:  # fmt: skip
     """Yield the recordings that the rows of a trial hold.
 
     Args:
@@ -56,6 +57,7 @@ def presses_of(
         tables: Name under ``files`` -> rows.
         parts: {part} of the paths -> its text.
         record: The import record so far.
+        centre: x and y of the array's centre [mm] where the mapping does not say them: one for all trials.
 
     Raises:
         FormatError: If columns, units or clocks are wrong, or there is neither position nor schedule.
@@ -76,7 +78,7 @@ def presses_of(
         )  # fmt: skip
     shift = max(-min(int(stream.time_ns[0]) for stream in streams.all if len(stream.time_ns)), 0)
     streams, scheduled = _shifted(streams, shift), [replace(s, start_ns=s.start_ns + shift) for s in scheduled]
-    place, unsaid = _registration(mapping, streams)
+    place, unsaid = _registration(mapping, streams, centre)
     cuts, short = _cuts(mapping, streams, scheduled, place), 0
     for number, (begin, end, planned) in enumerate(cuts):
         trial = record["trial"] + (f" #{number}" if len(cuts) > 1 else "")
@@ -171,15 +173,28 @@ def _indenter(mapping: dict[str, Any]) -> tuple[Indenter, str]:
     return from_document(mapping["indenter"], "indenter"), mapping["indenter"]["shape"]
 
 
-def _registration(mapping: dict[str, Any], streams: ImportedStreams) -> tuple[Registration, list[str]]:
+def centre_of(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[float, float]:
+    """Return the median place [mm] of a machine over whole tables, before trials are cut; 0 where no column says it.
+
+    The median of each trial would put all presses at one place.
+    """
+    entry = mapping.get("position", {})
+    table = tables.get(entry.get("file", ""))
+    columns = [entry[name] if isinstance(entry.get(name), dict) else 0.0 for name in ("x", "y")]
+    x, y = (float(np.nanmedian(axis(table, column, "mm", [], "position"))) for column in columns)
+    return x, y
+
+
+def _registration(
+    mapping: dict[str, Any], streams: ImportedStreams, centre: tuple[float, float]
+) -> tuple[Registration, list[str]]:
     """Return the skin's pose in the machine's frame, and which of its values are stand-ins."""
     contact, position = mapping.get("contact", {}), streams.position
     if position is None or streams.depth_given:
         return Registration((0.0, 0.0, 0.0), contact.get("yaw", 0.0)), []
     values = position.values
     origin = (
-        contact.get("x", float(np.median(values[:, 0]))), contact.get("y", float(np.median(values[:, 1]))),
-        contact.get("z", float(values[:, 2].max())),
+        contact.get("x", centre[0]), contact.get("y", centre[1]), contact.get("z", float(values[:, 2].max())),
     )  # fmt: skip
     unsaid = []
     if "z" not in contact:

@@ -257,3 +257,27 @@ def test_objects_of_python_are_refused_with_the_way_out(tmp_path):
     np.save(tmp_path / "d.npy", {"t": T}, allow_pickle=True)
     with pytest.raises(FormatError, match=r"objects of Python[\s\S]*np.savez"):
         described(tmp_path / "d.npy")
+
+
+def test_places_stay_apart_where_nobody_says_the_centre(tmp_path):
+    """The median of each trial is that trial's own place: all presses would lie at 0."""
+    source = tmp_path / "skin.npz"
+    x = np.repeat([-6.0, 0, 6, 0], len(T))
+    tip = np.column_stack([x, 3 + 0 * x, -np.tile(STROKE, 4)])
+    cap = np.outer(np.tile(STROKE, 4), [1, 2, 3])
+    time = np.concatenate([T + 10 * k for k in range(4)])
+    np.savez(source, time=time, trial=np.repeat(range(4), len(T)), tip=tip, cap=cap)
+    found, _ = proposed(source)
+    presses = imported(source, found.mapping, tmp_path)
+    assert [press.press.x for press in presses] == [-6, 0, 6, 0]
+    assert [press.tip[0, 0] for press in presses] == [-6, 0, 6, 0]
+    assert {press.press.y for press in presses} == {0}, "the centre of all"
+
+
+def test_a_place_in_the_path_moves_the_tip(tmp_path):
+    source = tmp_path / "source"
+    for x in (-2, 3):
+        written(source / f"x{x}_y1.csv", "time_ms,z_um,ch1", 1000 * T, -800 * STROKE, x * STROKE)
+    found, _ = proposed(source)
+    presses = imported(source, found.mapping, tmp_path)
+    assert sorted(press.tip[0, 0] for press in presses) == [-2, 3]

@@ -9,7 +9,7 @@ import numpy as np
 
 from tacdata.errors import TacdataError
 from tacdata.importing.formats.source_format import read_table
-from tacdata.importing.presses import presses_of
+from tacdata.importing.presses import centre_of, presses_of
 from tacdata.importing.source_files import file_sets
 from tacdata.importing.trials import split_tables
 
@@ -29,10 +29,11 @@ def tried(source: Path, mapping: dict[str, Any], beside: Path) -> str:
         if first.fault:
             raise first.fault
         tables = {name: read_table(path, first.options(name, mapping)) for name, path in first.paths.items()}
+        centre = centre_of(mapping, tables)
         presses = [
             press
             for label, rows in split_tables(tables, mapping.get("trials", {}))
-            for press in presses_of(mapping, beside, rows, first.parts, {**record, "trial": label})
+            for press in presses_of(mapping, beside, rows, first.parts, {**record, "trial": label}, centre)
         ]
     except TacdataError as error:
         return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
