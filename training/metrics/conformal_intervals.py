@@ -1,14 +1,15 @@
 """Conformal intervals of each predicted pixel, calibrated on the validation episodes, for any network.
 
 The error of a depth map is largest at the contact's edge and where it is deep. So each pixel falls into a cell, by its
-predicted depth and by the depth's slope there. Split conformal prediction (Angelopoulos and Bates, 2023, section 1.1)
-then takes two steps:
+predicted depth and by the depth's slope there. Conformal prediction (Angelopoulos and Bates, 2023) takes two steps:
 
-1. One half of the validation episodes gives each cell its standard deviation, the root mean square error. A cell with
-   few pixels takes that of all cells of its depth.
-2. The other half gives the factor of this deviation within which a share of the errors lies.
+1. The validation episodes give each cell its standard deviation, the root mean square error. A cell with few pixels
+   takes that of all cells of its depth.
+2. The errors of each episode are divided by deviations that the other episodes give (cross-conformal prediction;
+   V. Vovk, Annals of Mathematics and Artificial Intelligence 74 (2015) 9). The factor of a level is the quotient below
+   which such a share of them lies.
 
-Whole episodes are divided, because frames of one press have correlated errors. The intervals hold for presses like
+Whole episodes are left out, because frames of one press have correlated errors. The intervals hold for presses like
 those of validation. `reliability` measures what share of the errors lies inside on the scored episodes; on unseen
 shapes it is less. `training.pretraining.unseen_shapes` calibrates on shapes left out of training instead.
 """
@@ -41,6 +42,8 @@ NOT_KNOWN = 1e9
 """Factor where nothing is known: an interval that holds everything."""
 FLOOR = 1e-4
 """Smallest deviation [mm]."""
+_PARTS = 40
+"""Into so many parts episodes are dealt where there are more: one is left out at a time [count]."""
 
 
 @dataclass(frozen=True)
@@ -122,24 +125,31 @@ def calibrate(
     """
     if len(maps) < 2:
         raise UsageError(f"{len(maps)} validation episodes", "two or more, to calibrate intervals", "record more")
-    shape = (len(DEPTHS) + 1, len(SLOPES) + 1)
-    square, count = np.zeros(shape), np.zeros(shape)
-    for depth, label in zip(maps[::2], labels[::2], strict=True):
-        place = np.ravel_multi_index(cells(depth, pitch), shape).reshape(-1)
-        error = (depth - label).astype(np.float64).reshape(-1)
-        square += np.bincount(place, error**2, minlength=square.size).reshape(shape)
-        count += np.bincount(place, minlength=square.size).reshape(shape)
-    deviation = _filled(square, count)
-    draft = ConformalIntervals(deviation, (1.0,) * len(LEVELS), checkpoint)
-    ratios = [
-        np.abs(depth - label)[_interesting(depth, label)] / draft.sigma(depth, pitch)[_interesting(depth, label)]
-        for depth, label in zip(maps[1::2], labels[1::2], strict=True)
+    parts = np.arange(len(maps)) % min(len(maps), _PARTS)
+    own = [_sums(depth, label, pitch) for depth, label in zip(maps, labels, strict=True)]
+    sums = [
+        np.sum([one for one, at in zip(own, parts, strict=True) if at == part], axis=0)
+        for part in range(parts.max() + 1)
     ]
-    together = np.concatenate(ratios)
+    whole = np.sum(sums, axis=0)
+    deviation, quotients = _filled(*whole), []
+    for depth, label, part in zip(maps, labels, parts, strict=True):
+        others = ConformalIntervals(_filled(*(whole - sums[part])), (), checkpoint)
+        chosen = _interesting(depth, label)
+        quotients.append(np.abs(depth - label)[chosen] / others.sigma(depth, pitch)[chosen])
+    together = np.concatenate(quotients)
     if not len(together):
         # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
         return ConformalIntervals(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint, source)
     return ConformalIntervals(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint, source)
+
+
+def _sums(depth: np.ndarray, label: np.ndarray, pitch: float) -> np.ndarray:
+    """Return the squared errors [mm^2] and the number of pixels of each cell, shape (2, depths, slopes)."""
+    shape = (len(DEPTHS) + 1, len(SLOPES) + 1)
+    place = np.ravel_multi_index(cells(depth, pitch), shape).reshape(-1)
+    error = (depth - label).astype(np.float64).reshape(-1)
+    return np.stack([np.bincount(place, w, minlength=shape[0] * shape[1]).reshape(shape) for w in (error**2, None)])
 
 
 def reliability(

@@ -1,6 +1,6 @@
 """Intervals that hold on shapes that a network never saw: each shape's errors come from a network without it.
 
-Split conformal prediction takes the errors of validation episodes. These have the shapes of the training episodes, so
+By default the errors are those of validation episodes. These have the shapes of the training episodes, so
 a shape unlike all others lies outside too often. Here the shapes are dealt into groups. For each group a network is
 trained on the others by the same recipe, and predicts what it did not learn (cross-conformal prediction; V. Vovk,
 Annals of Mathematics and Artificial Intelligence 74 (2015) 9). The errors of all groups together make the intervals.
@@ -69,14 +69,8 @@ def calibrate_on_unseen_shapes(
                 chosen = frames.indices((episode,))
                 maps.append(predict(other.network, windows, chosen, top))
                 labels.append(np.clip(frames.depth[chosen], 0.0, top))
-    # Shuffled, so that both halves hold all shapes: one gives the deviations, the other the factors.
-    order = np.random.default_rng(_SEED).permutation(len(maps))
     found = conformal_intervals.calibrate(
-        [maps[k] for k in order],
-        [labels[k] for k in order],
-        frames.sensor.map.pixel_pitch,
-        trained.content_hash,
-        "presses of shapes left out of training",
+        maps, labels, frames.sensor.map.pixel_pitch, trained.content_hash, "presses of shapes left out of training"
     )
     conformal_intervals.write(trained.path.parent, found)
     return found

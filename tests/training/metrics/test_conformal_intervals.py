@@ -31,6 +31,21 @@ def test_intervals_hold_the_share_that_they_should():
         assert entry["pixels"] > 1000
 
 
+def test_intervals_of_four_presses_that_scatter_hold_their_share_on_average():
+    scales = np.exp(0.6 * np.random.default_rng(7).normal(size=(80, 4)))
+    fresh = [
+        episodes(1, 900 + k, scale) for k, scale in enumerate(np.exp(0.6 * np.random.default_rng(8).normal(size=24)))
+    ]
+    maps, labels = ([part[side][0] for part in fresh] for side in (0, 1))
+    inside = []
+    for draw, row in enumerate(scales):
+        presses = [episodes(1, 10 * draw + k, scale) for k, scale in enumerate(row)]
+        known = calibrate(*([part[side][0] for part in presses] for side in (0, 1)), PITCH, "a" * 64)
+        inside.append([entry["inside"] for entry in reliability(known, maps, labels, PITCH)])
+    for level, share in zip(LEVELS, np.mean(inside, axis=0), strict=True):
+        assert share == pytest.approx(level, abs=0.025)
+
+
 def test_larger_errors_than_calibrated_are_told():
     known = calibrate(*episodes(20, 0), PITCH, "a" * 64)
     inside = {e["level"]: e["inside"] for e in reliability(known, *episodes(20, 1, scale=3.0), PITCH)}
