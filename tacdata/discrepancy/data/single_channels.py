@@ -17,7 +17,7 @@ JUMP_Z, WANDER_Z = 6.0, 8.0
 SHARED = 0.4
 """A change of which the other channels show so much is no single channel's [1]."""
 CLEAR = 10.0
-"""A reading has a sign from so many times its noise on [1]."""
+"""A slope over depth has a sign from so many times its noise on [1]."""
 RUN = 3
 """Successive presses of a jump, or of a change of places, at least."""
 SWAPPED = 0.3
@@ -40,7 +40,7 @@ def odd_channels(course: Course, response: Response) -> list[str]:
     measured = [_level(reduced.readings[r]) for r in rows]
     expected = [_level(predicted[r]) for r in rows]
     swapped = _swaps(course, episodes, measured, expected)
-    turned = _turned(course, episodes, measured)
+    turned = _turned(course, episodes, rows, measured)
     taken, places = {*turned, *(c for pair in swapped for c in pair)}, [*turned.values(), *swapped.values()]
     gains = _gains(measured, expected)
     return [*places, *_jumps_and_wanders(course, episodes, gains, taken)][:MOST_LISTED]
@@ -50,13 +50,14 @@ def _level(values: np.ndarray) -> np.ndarray:
     return values - np.nanmedian(values[: max(len(values) // 10, 1)], axis=0)
 
 
-def _turned(course: Course, episodes: np.ndarray, measured: list[np.ndarray]) -> dict[int, str]:
+def _turned(course: Course, episodes: np.ndarray, rows: list[np.ndarray], measured: list[np.ndarray]) -> dict[int, str]:
     """Return which channels have the other sign from a press on, each with words.
 
-    A fitted response is of no help: it follows the mean of both signs. Presses of one place are compared.
+    A fitted response is of no help: it follows the mean of both signs. Slopes over depth are compared at each place.
     """
-    known = [np.nan_to_num(m) for m in measured]
-    peak = np.array([m[np.abs(m).argmax(axis=0), np.arange(m.shape[1])] for m in known])
+    known, depth = [np.nan_to_num(m) for m in measured], course.reduced.tip[:, 2]
+    ways = [depth[r] - depth[r].min() for r in rows]
+    peak = np.array([m.T @ way / max(float(np.linalg.norm(way)), 1e-9) for m, way in zip(known, ways, strict=True)])
     place, steps = course.site[episodes], np.concatenate([np.abs(np.diff(m, axis=0)) for m in known])
     noise = 1.4826 * np.median(steps, axis=0) / np.sqrt(2)
     words = {}

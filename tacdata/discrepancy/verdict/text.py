@@ -12,6 +12,8 @@ MOST_RIVALS = 6
 """Most rivals that are listed."""
 MOST_UNJUDGED = 6
 """Effects that cannot be judged are listed up to so many; of more, only their number is given."""
+EVEN = 0.05
+"""A rival by which an effect is behind by less fits as well [standard errors]."""
 LOW = 0.7
 """A residual below this [noise] is said to be so."""
 BEST = 0.9
@@ -95,9 +97,12 @@ def _effect(entry: dict[str, Any]) -> list[str]:
         if load(name).called not in spoken:
             rivals.setdefault(load(name).spoken, by)  # of several forms the nearest
     worse = [(name, by) for name, by in rivals.items() if by > 0][:MOST_RIVALS]
-    better = [(name, abs(by)) for name, by in rivals.items() if by <= 0][:MOST_RIVALS]
+    even = [name for name, by in rivals.items() if -EVEN < by <= 0][:MOST_RIVALS]
+    better = [(name, -by) for name, by in rivals.items() if by <= -EVEN][:MOST_RIVALS]
     if worse:
         lines.append(f"    fits better, by so many standard errors over presses, than: {_by(worse)}")
+    if even:
+        lines.append(f"    fits as well, with more numbers: {', '.join(even)}")
     if better:
         lines.append(f"    fits worse, by so many standard errors over presses, than: {_by(better)}")
     return lines

@@ -71,7 +71,7 @@ def test_a_lead_that_was_turned_is_told_of_and_nothing_else(begin):
 def test_what_is_hardly_more_than_noise_has_no_sign():
     made = course()
     rise = made.readings[:, 1:2] - IDLE[1]
-    small = np.column_stack([made.readings[:, 0], IDLE[1] + 0.035 * rise[:, 0], made.readings[:, 2]])
+    small = np.column_stack([made.readings[:, 0], IDLE[1] + 0.008 * rise[:, 0], made.readings[:, 2]])
     weak = replace(made, readings=small + np.random.default_rng(1).normal(0, 3, small.shape))
     turned = with_readings(weak, lambda t, e, r: np.where(e >= 12, r * [1, -1, 1], r))
     assert not any("other sign" in words for words in odd_channels(turned, FittedResponse(turned)))

@@ -235,3 +235,10 @@ def test_a_family_that_is_named_is_told_from_a_mechanism_that_is():
     assert line(open_one, "relaxation:") == "  relaxation: ambiguous; either way it is memory of the skin"
     sure = in_text(document("named", [effect("softening") | {"confidence": 0.931}]))
     assert line(sure, "softening:") == "  softening: named, 93 % sure"
+
+
+def test_a_rival_that_fits_as_well_is_not_said_to_fit_better():
+    """It is out because it needs more numbers."""
+    text = in_text(document("named", [effect("permanent_set", margins={"thermal_growth": 0.0, "lost_steps": -1.2})]))
+    assert line(text, "fits as well") == "    fits as well, with more numbers: thermal growth"
+    assert line(text, "fits worse").endswith("than: lost steps 1.2")
