@@ -73,6 +73,8 @@ class Reason(Enum):
     """The best answer leaves too much."""
     ODD = auto()
     """Some episodes are unlike all others, and no effect explains them."""
+    ALARM = auto()
+    """No effect shows, but the residual is not noise: it has no form of the library."""
     LOUD = auto()
     """The residual is far above the noise, but no effect is supported by several episodes."""
     SEALED = auto()
@@ -332,7 +334,7 @@ def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
             return "unknown", Reason.ODD
         if found.loudness > LOUD:
             return "unknown", Reason.UNEXPLAINED if found.gap else Reason.LOUD
-        return "none", Reason.QUIET
+        return ("unknown", Reason.ALARM) if found.alarms else ("none", Reason.QUIET)
     if not answer:
         return "unknown", Reason.ODD if len(found.problem.null.odd) else Reason.UNEXPLAINED
     if not adequate(found, answer):

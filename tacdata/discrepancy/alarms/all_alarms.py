@@ -1,0 +1,19 @@
+"""All alarms of what a model leaves."""
+
+from __future__ import annotations
+
+from tacdata.discrepancy.alarms.alarm import Alarm
+from tacdata.discrepancy.alarms.channel_histories import channel_histories
+from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.alarms.motor_lines import motor_lines
+from tacdata.discrepancy.alarms.press_depths import press_depths
+from tacdata.discrepancy.alarms.swings import swings
+from tacdata.discrepancy.search.problem import Problem
+
+
+def alarms(problem: Problem) -> tuple[Alarm, ...]:
+    """Return what the residual of a problem's model shows without any form."""
+    cleaned = Cleaned.of(problem)
+    # What channels do by themselves is a part of what they do together.
+    moving = channel_histories(cleaned) or swings(cleaned)
+    return (*moving, *motor_lines(cleaned), *press_depths(cleaned))

@@ -1,0 +1,173 @@
+"""Channels that follow the path each in its own way: a cable that moves along, a torn protrusion, an order of reading.
+
+The gate asks for patterns that all channels share. Here each channel has a weight of its own, of either sign, for a
+history of the path: the sum over channels of the squared scores. Its null distribution: signs of whole presses are
+flipped, of scores from which the fit was taken off (a wild cluster bootstrap, with leverage as in HC3). Channels keep
+their correlation, and presses their scatter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.chain import Course
+from tacdata.chain.memory import low_pass, play, running_max
+from tacdata.discrepancy.alarms.alarm import Alarm
+from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.statistics.gram_fit import flips
+
+FEWEST = 12
+"""Presses, at least."""
+DRAWS = 2000
+"""Flips of sign."""
+CHANCE = 0.0025
+"""Level of the test, over all histories [1]."""
+LEAST_Z = 4.2
+"""The flips' own tail is short of draws: beyond it a normal one decides, after Wilson & Hilferty [1]."""
+MOST_LEVERAGE = 0.5
+"""A channel of which one press holds a larger share of the information does not count [1]."""
+STIRRED = 0.02
+"""Nor does one with less of it, over the best channel's [1]."""
+FEWEST_CHANNELS = 2
+MOST_NAMED = 4
+USUAL = 0.95
+"""A size is told where the history has this quantile [1]."""
+
+TIME_CONSTANTS = (0.1, 0.4, 1.5, 6.0, 25.0)
+"""Of leaky means of depth [s]."""
+OFFSET, RISE, LATE = "offset", "rise", "late"
+"""What a channel's weight moves: its reading whatever presses it, its rise, its time."""
+
+
+@dataclass(frozen=True)
+class Best:
+    """The history that channels follow most."""
+
+    kind: str
+    history: str
+    over: str
+    """What its size goes with: "", the time or the temperature."""
+    z: float
+    p: float
+    weight: np.ndarray
+    """Weight of each channel [its unit, 1 or s, over the history], shape (channels,); 0 where it does not count."""
+    size: np.ndarray
+    """How far its readings move [their unit], shape (channels,)."""
+
+
+def channel_histories(cleaned: Cleaned) -> list[Alarm]:
+    """Return the alarm of channels that follow the path each in its own way, or none."""
+    if len(cleaned.begins) < FEWEST or cleaned.course.channels < FEWEST_CHANNELS:
+        return []
+    best = strongest(cleaned)
+    return [] if best is None or best.p > CHANCE or best.z < LEAST_Z else [_told(cleaned, best)]
+
+
+def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
+    """Return the history that channels follow most, with its p-value over all of them."""
+    found, drawn = [], []
+    signs: np.ndarray | None = None
+    for kind, history, over, column in _columns(cleaned):
+        white = cleaned.whitened(column)
+        score, known = cleaned.sums(white * cleaned.residual), cleaned.sums(white * white)
+        if signs is None:
+            signs = flips(len(score), DRAWS + 1, seed)[1:]
+        total = known.sum(axis=0)
+        leverage = known / np.maximum(total, 1e-30)
+        counts = (leverage.max(axis=0) < MOST_LEVERAGE) & (total > STIRRED * total.max(initial=0.0))
+        if counts.sum() < FEWEST_CHANNELS:
+            continue
+        score, total, leverage = score[:, counts], total[counts], leverage[:, counts]
+        weight = score.sum(axis=0) / total
+        rest = (score - known[:, counts] * weight) / (1 - leverage) / np.sqrt(total)
+        null = np.square(signs @ rest).sum(axis=1)
+        seen = float(np.sum(score.sum(axis=0) ** 2 / total))
+        root = np.cbrt(null)
+        middle, spread = float(root.mean()), float(root.std()) + 1e-12
+        z = (np.cbrt(seen) - middle) / spread
+        if seen - null.mean() < cleaned.least:
+            z = min(z, 0.0)
+        drawn.append((root - middle) / spread)
+        every = np.zeros(len(counts))
+        every[counts] = weight
+        size = np.abs(every) * np.quantile(np.abs(column), USUAL, axis=0)
+        found.append(Best(kind, history, over, float(z), 1.0, every, size))
+    if not found:
+        return None
+    first = max(found, key=lambda one: one.z)
+    most = np.max(drawn, axis=0)
+    p = float((1 + (most >= first.z).sum()) / (DRAWS + 1))
+    return Best(first.kind, first.history, first.over, first.z, p, first.weight, first.size)
+
+
+def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:
+    """Give what a channel may follow: kind, history, what it goes with, and the column (m, channels)."""
+    course, rise = cleaned.problem.setting.course, cleaned.rise
+    reduced, read = course.reduced, course.read
+    step = np.maximum(reduced.step, 1e-9)[:, None]
+    rate = np.where(reduced.first[:, None], 0.0, np.diff(rise, axis=0, prepend=rise[:1]) / step)
+    whole = max(float(np.ptp(course.time)), 1e-9)
+    over = [("", np.ones(len(read))), ("the time", 2 * (reduced.time - reduced.time.mean()) / whole)]
+    if course.temperature is not None:
+        warm = course.temperature[read]
+        over.append(("the temperature", (warm - warm.mean()) / max(float(np.std(warm)), 1e-9)))
+    flat = np.ones_like(rise)
+    own = [(name, values[read][:, None]) for name, values in _histories(course).items()]
+    leaving = np.sign(cleaned.speed)[:, None]
+    for goes, by in over:
+        for name, values in own:
+            yield RISE, name, goes, values * rise * by[:, None]
+            if not goes:  # what an offset does over a session is drift
+                yield OFFSET, name, goes, values * flat
+        yield LATE, "", goes, -rate * by[:, None]
+        if goes:
+            yield LATE, "between loading and unloading", goes, -rate * leaving * by[:, None]
+
+
+def _histories(course: Course) -> dict[str, np.ndarray]:
+    """Return what a path remembers, by what it is called, each (n,) of size about 1."""
+    depth = np.maximum(course.tip[:, 2], 0.0)
+    if depth.max() <= 0:
+        depth = course.tip[:, 2] - course.tip[:, 2].min()
+    share = depth / max(float(depth.max()), 1e-9)
+    speed = course.speed
+    fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)
+    late = {f"what was pressed {tau:g} s before": low_pass(share, course.step, tau) for tau in TIME_CONSTANTS}
+    turned = {f"turning back by {100 * r:.0f} % of the depth": play(share, r) - share for r in (0.03, 0.1, 0.3)}
+    return {
+        "loading or unloading": np.sign(speed),
+        "loading or unloading, and how fast": np.sign(speed) * fast,
+        "the speed": fast,
+        "how deep its place was pressed before": running_max(share, course.row_site) - share,
+        "how deep this press has been": running_max(share, course.episode) - share,
+        "unloading": share * (speed < 0),
+        **late, **turned,
+    }  # fmt: skip
+
+
+def _told(cleaned: Cleaned, best: Best) -> Alarm:
+    order = np.argsort(-best.size)[:MOST_NAMED]
+    order = order[best.size[order] > 0]
+    names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
+    most = float(best.size[order[0]])
+    large = f"by up to about {most:.2g} in readings, {100 * most / cleaned.largest:.2g} % of the largest rise"
+    changes = f", and that goes with {best.over}" if best.over else ""
+    if best.kind == LATE:
+        late = 1e3 * float(np.abs(best.weight).max())
+        where = f" {best.history}" if best.history else ""
+        seen = f"channels are late by times of their own{where}{changes}: {large} (some {late:.2g} ms)"
+        following = "look at the order and the times at which channels are read; press at three speeds"
+    elif best.kind == OFFSET:
+        seen = f"channels move with the path whatever presses them, each its own way ({best.history}{changes}): {large}"
+        following = "make the same paths beside the skin, in the air: what stays is of a cable or a plug that moves"
+    else:
+        seen = f"channels read more or less of a press by {best.history}, each its own way{changes}: {large}"
+        following = "look at what lies over these channels (torn, loose, dirty), and press there slowly, down and up"
+    if best.over == "the time":
+        following = "make the same presses at the begin and the end of a session; say what was changed in between"
+    elif best.over:
+        following = "make the same presses cold and warm"
+    return Alarm(f"{seen}; most on {names}", following)

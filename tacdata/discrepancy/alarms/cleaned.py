@@ -1,0 +1,85 @@
+"""What a model leaves of each press: the whitened residual, without nuisances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.chain import Course, predict
+from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.noise.noise_model import Noise
+from tacdata.discrepancy.noise.whitener import whiten
+from tacdata.discrepancy.search.fits import fitted
+from tacdata.discrepancy.search.problem import Problem
+from tacdata.discrepancy.search.score_tests import SPLINE_ERROR, TABLE_ERROR
+
+MOST_CLUSTERS = 200
+"""Of more presses, successive ones are taken together."""
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """What a model leaves, of the rows read."""
+
+    problem: Problem
+    residual: np.ndarray
+    """Whitened, without nuisances, of channels alone [noise scales], shape (m, channels), float64."""
+    rise: np.ndarray
+    """What presses add to each channel [its unit], shape (m, channels)."""
+    speed: np.ndarray
+    """Rate of depth [mm/s], shape (m,)."""
+    begins: np.ndarray
+    """First row of each press that was read, shape (presses,), int64."""
+    episodes: np.ndarray
+    """Its episode, shape (presses,), int64."""
+    noise: Noise
+    """Of channels alone."""
+
+    @classmethod
+    def of(cls, problem: Problem) -> Cleaned:
+        """Return what a problem's model leaves."""
+        null, setting = problem.null, problem.setting
+        course, placed = setting.course, [*setting.given, *problem.placed]
+        whitener = null.whitener_for(setting, placed)
+        left = whitener.whitened(problem.board.columns[0][:, :, None])[:, :, 0]
+        if len(problem.nuisances):
+            _, values = fitted(problem, [], np.arange(len(problem.folds)))
+            left = left - null.nuisances @ values[-len(problem.nuisances) :].astype(np.float32)
+        channels, noise, streams = course.channels, null.noise, Streams.of(course)
+        rise = streams.rise(predict(course, setting.response, placed), setting.response)[:, :channels]
+        episode = course.reduced.episode
+        begins = np.flatnonzero(np.diff(episode, prepend=-1))
+        relative = None if noise.relative_scale is None else noise.relative_scale[:, :channels]
+        missing = None if noise.missing is None else noise.missing[:, :channels]
+        own = Noise(noise.scale[:channels], noise.memory, relative_scale=relative, missing=missing)
+        return cls(problem, left[:, :channels].astype(float), rise, course.speed[course.read], begins,
+                   episode[begins], own)  # fmt: skip
+
+    @property
+    def course(self) -> Course:
+        """With the rows read alone."""
+        return self.problem.setting.course.reduced
+
+    @property
+    def largest(self) -> float:
+        """Largest rise of a channel [its unit]."""
+        return max(float(np.abs(self.rise).max(initial=0.0)), 1e-12)
+
+    @property
+    def least(self) -> float:
+        """What the response may be off about by itself, as a sum of squares [1]: less is no alarm."""
+        share = SPLINE_ERROR if self.problem.setting.response.fitted else TABLE_ERROR
+        return float((share * self.problem.rise) ** 2)
+
+    def whitened(self, column: np.ndarray) -> np.ndarray:
+        """Return a column of each channel (m, channels) as noise is whitened, but for what a press errs by."""
+        return whiten(column[:, :, None], self.course, self.noise)[:, :, 0].astype(float)
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """Return sums over presses, successive ones together where they are many, shape (clusters, channels)."""
+        each = np.add.reduceat(values, self.begins, axis=0)
+        count = len(each)
+        if count <= MOST_CLUSTERS:
+            return each
+        return np.add.reduceat(each, np.arange(MOST_CLUSTERS) * count // MOST_CLUSTERS, axis=0)

@@ -1,0 +1,135 @@
+"""Swings of all channels together that differ from press to press: stick-slip, a shaking press.
+
+Their mean over presses is zero: no score test sees them. In each press the readings are projected on the rise times
+waves along the path, and in time. Their energy is held against that of the same channels with signs flipped at random
+in each press: noise of single channels keeps its spectrum, its tails and its growth with load, and only what channels
+share makes a difference. A press's own errors of pose and gain are projected out before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.discrepancy.alarms.alarm import Alarm
+from tacdata.discrepancy.alarms.cleaned import Cleaned
+
+FEWEST = 12
+"""Presses, at least."""
+MOST_PRESSES = 200
+"""Of more presses, as many are taken, evenly over the session."""
+FEWEST_ROWS = 20
+"""Rows in contact of a press, at least."""
+FEWEST_CHANNELS = 3
+WAVES = np.arange(1.5, 20.1, 0.5)
+"""Waves along the path [over the stroke]."""
+HERTZ = np.array([0.2, 0.35, 0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0])
+"""Swings in time [Hz]."""
+FEWEST_WAVES = 2.0
+"""Waves that fit into a press, at least."""
+ALIAS = 0.12
+"""Waves that nearly fit into the way between two readings look like none [their length]."""
+MOVES = 0.05
+"""Rows move from this share of the usual largest rate of depth on [1]."""
+USUAL_RATE = 0.95
+"""Quantile of the rates of depth that counts as the usual largest [1]."""
+DRAWS = 2000
+"""Draws of signs."""
+CHANCE = 0.0025
+"""Level of the test, over all waves [1]."""
+LEAST_Z = 4.0
+"""The draws' own tail is short: beyond it a normal one decides, after Wilson & Hilferty [1]."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """The wave with the most energy beyond chance."""
+
+    wave: int
+    """Its number: `WAVES`, then `HERTZ`."""
+    z: float
+    p: float
+    share: float
+    """Its amplitude over the rise [1]."""
+
+
+def swings(cleaned: Cleaned) -> list[Alarm]:
+    """Return the alarm of swings that differ from press to press, or none."""
+    found = strongest(cleaned)
+    if found is None or found.p > CHANCE or found.z < LEAST_Z:
+        return []
+    size = f"by about {100 * found.share:.2g} % of the rise, up to {found.share * cleaned.largest:.2g} in readings"
+    if found.wave < len(WAVES):
+        every = cleaned.problem.setting.course.stroke / WAVES[found.wave]
+        return [Alarm(
+            f"in each press all channels swing together along the path, every {every:.2g} mm or a part of it, {size}, "
+            "each time with another beginning: as friction does that lets go in jumps (stick-slip)",
+            "press slower and faster, and with a drop of oil or some powder between tool and skin; look at the guide",
+        )]  # fmt: skip
+    hertz = HERTZ[found.wave - len(WAVES)]
+    return [Alarm(
+        f"in each press all channels swing together at about {hertz:.2g} Hz, {size}, each time with another beginning: "
+        "as a press does that shakes",
+        "measure force or height while the tool stands still in contact; look at the drive's regulator and its footing",
+    )]  # fmt: skip
+
+
+def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
+    """Return the wave with the most energy beyond chance, with its p-value over all of them; None if untestable."""
+    made = [one for one in (_projected(cleaned, press) for press in _presses(cleaned)) if one is not None]
+    if len(made) < FEWEST or cleaned.course.channels < FEWEST_CHANNELS:
+        return None
+    parts, power = (np.array(each) for each in zip(*made, strict=True))  # (presses, channels, waves), (presses, waves)
+    alone = np.square(np.abs(parts)).sum(axis=1)
+    weight = 1 / np.sqrt(np.where(alone > 0, alone, np.inf))
+    energy = np.zeros((DRAWS + 1, parts.shape[2]))
+    rng = np.random.default_rng([seed, 29])
+    for own, by in zip(parts, weight, strict=True):
+        signs = rng.integers(0, 2, (DRAWS + 1, len(own))) * 2.0 - 1.0
+        signs[0] = 1.0
+        energy += by * (np.square(signs @ own.real) + np.square(signs @ own.imag))
+    root = np.cbrt(energy)
+    middle, spread = root[1:].mean(axis=0), root[1:].std(axis=0)
+    z = np.where(spread > 1e-9, (root - middle) / np.maximum(spread, 1e-9), 0.0)
+    beyond = np.square(np.abs(parts.sum(axis=1))) - alone
+    size = 4 * beyond.sum(axis=0) / np.maximum(np.square(power).sum(axis=0), 1e-30)
+    explained = (2 * beyond / np.maximum(power, 1e-30)).sum(axis=0)
+    z[0] = np.where(explained >= cleaned.least, z[0], np.minimum(z[0], 0.0))
+    best = int(np.argmax(z[0]))
+    p = float((1 + (z[1:].max(axis=1) >= z[0, best]).sum()) / (DRAWS + 1))
+    return Swing(best, float(z[0, best]), p, float(np.sqrt(max(size[best], 0.0))))
+
+
+def _presses(cleaned: Cleaned) -> list[np.ndarray]:
+    """Return the rows in contact of each press."""
+    inside = cleaned.course.tip[:, 2] > 0
+    edges = [*cleaned.begins, len(inside)]
+    chosen = np.unique(np.linspace(0, len(cleaned.begins) - 1, min(len(cleaned.begins), MOST_PRESSES)).astype(int))
+    each = [np.arange(edges[k], edges[k + 1]) for k in chosen]
+    return [rows[inside[rows]] for rows in each]
+
+
+def _projected(cleaned: Cleaned, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return what channels (channels, waves) of a press hold of each wave, and its information; None if too short."""
+    if len(rows) < FEWEST_ROWS:
+        return None
+    course, noise, stroke = cleaned.course, cleaned.noise, cleaned.problem.setting.course.stroke
+    shape = cleaned.rise[rows] / noise.scale
+    if noise.relative_scale is not None:
+        shape = shape / noise.relative_scale[rows]
+    time = course.time[rows] - course.time[rows[0]]
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(course.tip[rows, 2])))]) / stroke
+    rate = np.abs(cleaned.speed)
+    moving = rate[rows] > MOVES * np.quantile(rate, USUAL_RATE)
+    if not moving.any():
+        return None
+    every = max(float(np.median(np.diff(time))), 1e-9)
+    apart = WAVES * float(np.median(rate[rows][moving])) * every / stroke
+    along = (WAVES * way[-1] >= FEWEST_WAVES) & ((apart < 0.5) | (np.abs(apart - np.round(apart)) >= ALIAS))
+    in_time = (HERTZ * time[-1] >= FEWEST_WAVES) & (HERTZ * every <= 0.45)
+    waves = np.exp(2j * np.pi * np.concatenate([way[:, None] * WAVES, time[:, None] * HERTZ], axis=1))
+    waves[:, : len(WAVES)] *= moving[:, None]
+    waves[:, ~np.concatenate([along, in_time])] = 0.0
+    power = np.square(np.abs(waves)).T @ np.square(shape).sum(axis=1)
+    return (shape * cleaned.residual[rows]).T @ waves, power
