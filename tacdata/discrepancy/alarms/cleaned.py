@@ -76,6 +76,12 @@ class Cleaned:
         """Return a column of each channel (m, channels) as noise is whitened, but for what a press errs by."""
         return whiten(column[:, :, None], self.course, self.noise)[:, :, 0].astype(float)
 
+    def without_mean(self, values: np.ndarray) -> np.ndarray:
+        """Return values (m, k) without the mean over each press: its own offset is free."""
+        count = np.diff(self.begins, append=len(values))
+        mean = np.add.reduceat(values, self.begins, axis=0) / count[:, None]
+        return values - np.repeat(mean, count, axis=0)
+
     def sums(self, values: np.ndarray) -> np.ndarray:
         """Return sums over presses, successive ones together where they are many, shape (clusters, channels)."""
         each = np.add.reduceat(values, self.begins, axis=0)

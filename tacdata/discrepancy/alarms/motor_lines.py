@@ -10,12 +10,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import gamma
 
+from tacdata.chain import Course
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
 
 CHANCE = 1e-4
 """Probability that noise makes one of all lines as large [1]."""
-STANDS = 0.05
+STANDS = 0.01
 """A line that stands still, too, is hum: it is told from idle readings [the same]."""
 BESIDE = 1.0
 """A line that stands so near counts [Hz]; also the width over which the level is told."""
@@ -42,18 +43,15 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
     inside = ~course.first
     if not inside.any() or _even(cleaned):
         return []
-    every = float(np.median(course.step[inside]))
-    speed = np.linalg.norm(np.diff(course.tip, axis=0, prepend=course.tip[:1]), axis=1) / np.maximum(course.step, 1e-9)
-    speed[course.first] = 0.0
-    moving = speed > MOVES * np.quantile(speed, 0.95)
+    every, moving = float(np.median(course.step[inside])), _moving(course)
     moved, stood = _periodogram(cleaned, moving, every), _periodogram(cleaned, ~moving, every)
-    if moved is None:
+    if moved is None or stood is None:
         return []
     frequency, power, values = moved
     chance = _chance(frequency, power)
     best = int(np.argmin(chance))
     near = np.abs(frequency - frequency[best]) < BESIDE
-    if chance[best] > CHANCE or (stood is not None and _chance(frequency, stood[1])[near].min() < STANDS):
+    if chance[best] > CHANCE or _chance(frequency, stood[1])[near].min() < STANDS:
         return []
     # Power of a channel's line over its sum of squares, n a^2 / 4 over n.
     share = np.maximum(power[:, best] - 1.0, 0.0) / values
@@ -68,6 +66,23 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
         f"it, {large}; most on {names}: a motor's drive is heard",
         "move the rig beside the skin, in the air, with motors on and off; look at the ground and at cables near them",
     )]  # fmt: skip
+
+
+def hums(cleaned: Cleaned) -> bool:
+    """Return whether readings have a line while the path stands: channels hum together, each with its own phase."""
+    course = cleaned.course
+    inside = ~course.first
+    if not inside.any():
+        return False
+    stood = _periodogram(cleaned, ~_moving(course), float(np.median(course.step[inside])))
+    return stood is not None and bool(_chance(stood[0], stood[1]).min() < STANDS)
+
+
+def _moving(course: Course) -> np.ndarray:
+    """Return rows where the path moves, shape (m,), bool."""
+    speed = np.linalg.norm(np.diff(course.tip, axis=0, prepend=course.tip[:1]), axis=1) / np.maximum(course.step, 1e-9)
+    speed[course.first] = 0.0
+    return speed > MOVES * np.quantile(speed, 0.95)
 
 
 def _even(cleaned: Cleaned) -> bool:

@@ -9,11 +9,13 @@ share makes a difference. A press's own errors of pose and gain are projected ou
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.alarms.motor_lines import hums
 
 FEWEST = 12
 """Presses, at least."""
@@ -22,12 +24,12 @@ MOST_PRESSES = 200
 FEWEST_ROWS = 20
 """Rows in contact of a press, at least."""
 FEWEST_CHANNELS = 3
-WAVES = np.arange(1.5, 20.1, 0.5)
+WAVES = np.arange(4.0, 20.1, 0.5)
 """Waves along the path [over the stroke]."""
-HERTZ = np.array([0.2, 0.35, 0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0])
+HERTZ = np.array([0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0])
 """Swings in time [Hz]."""
-FEWEST_WAVES = 2.0
-"""Waves that fit into a press, at least."""
+FEWEST_WAVES = 4.0
+"""Waves that fit into a press, at least: a press's own errors, which are slower, are no swing."""
 ALIAS = 0.12
 """Waves that nearly fit into the way between two readings look like none [their length]."""
 MOVES = 0.05
@@ -38,7 +40,7 @@ DRAWS = 2000
 """Draws of signs."""
 CHANCE = 0.0025
 """Level of the test, over all waves [1]."""
-LEAST_Z = 4.0
+LEAST_Z = 3.7
 """The draws' own tail is short: beyond it a normal one decides, after Wilson & Hilferty [1]."""
 
 
@@ -77,18 +79,29 @@ def swings(cleaned: Cleaned) -> list[Alarm]:
 
 def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
     """Return the wave with the most energy beyond chance, with its p-value over all of them; None if untestable."""
-    made = [one for one in (_projected(cleaned, press) for press in _presses(cleaned)) if one is not None]
-    if len(made) < FEWEST or cleaned.course.channels < FEWEST_CHANNELS:
+    made = [(_projected(cleaned, rows), cleaned.course.episode[rows[:1]]) for rows in _presses(cleaned)]
+    there = [(*one, of[0]) for one, of in made if one is not None]
+    if len(there) < FEWEST or cleaned.course.channels < FEWEST_CHANNELS:
         return None
-    parts, power = (np.array(each) for each in zip(*made, strict=True))  # (presses, channels, waves), (presses, waves)
+    # Of shapes (presses, channels, waves), (presses, waves), (presses,).
+    parts, power, episodes = (np.array(each) for each in zip(*there, strict=True))
     alone = np.square(np.abs(parts)).sum(axis=1)
     weight = 1 / np.sqrt(np.where(alone > 0, alone, np.inf))
     energy = np.zeros((DRAWS + 1, parts.shape[2]))
     rng = np.random.default_rng([seed, 29])
-    for own, by in zip(parts, weight, strict=True):
-        signs = rng.integers(0, 2, (DRAWS + 1, len(own))) * 2.0 - 1.0
-        signs[0] = 1.0
-        energy += by * (np.square(signs @ own.real) + np.square(signs @ own.imag))
+    together = episodes
+    if hums(cleaned):
+        # Channels that hum have fixed phases: at one place they add up alike in each press.
+        place = np.zeros(cleaned.problem.setting.course.episodes, dtype=np.int64)
+        place[cleaned.course.episode] = cleaned.problem.null.context
+        together = place[episodes]
+    signs: dict[int, np.ndarray] = {}
+    for own, by, at in zip(parts, weight, together.tolist(), strict=True):
+        if at not in signs:
+            signs[at] = rng.integers(0, 2, (DRAWS + 1, len(own))) * 2.0 - 1.0
+            signs[at][0] = 1.0
+        energy += by * (np.square(signs[at] @ own.real) + np.square(signs[at] @ own.imag))
+    energy[1:] *= 1 + _shared_in_air(cleaned)
     root = np.cbrt(energy)
     middle, spread = root[1:].mean(axis=0), root[1:].std(axis=0)
     z = np.where(spread > 1e-9, (root - middle) / np.maximum(spread, 1e-9), 0.0)
@@ -99,6 +112,23 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
     best = int(np.argmax(z[0]))
     p = float((1 + (z[1:].max(axis=1) >= z[0, best]).sum()) / (DRAWS + 1))
     return Swing(best, float(z[0, best]), p, float(np.sqrt(max(size[best], 0.0))))
+
+
+def _shared_in_air(cleaned: Cleaned) -> float:
+    """Return by how much channels add up in the air, where the noise is all they share, beyond chance [1], 0 or more.
+
+    Weighted as in each press: by its largest rise.
+    """
+    inside = cleaned.course.tip[:, 2] > 0
+    edges = [*cleaned.begins, len(inside)]
+    together = alone = 0.0
+    for first, last in pairwise(edges):
+        rows = np.arange(first, last)
+        air = rows[~inside[rows]]
+        weighted = cleaned.residual[air] * (np.abs(cleaned.rise[rows]).max(axis=0) / cleaned.noise.scale)
+        together += float(np.sum(np.square(weighted.sum(axis=1))))
+        alone += float(np.sum(np.square(weighted)))
+    return max(together / alone - 1.0, 0.0) if alone > 0 else 0.0
 
 
 def _presses(cleaned: Cleaned) -> list[np.ndarray]:
