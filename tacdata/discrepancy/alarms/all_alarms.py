@@ -14,6 +14,6 @@ from tacdata.discrepancy.search.problem import Problem
 def alarms(problem: Problem) -> tuple[Alarm, ...]:
     """Return what the residual of a problem's model shows without any form."""
     cleaned = Cleaned.of(problem)
-    # What channels do by themselves is a part of what they do together.
-    moving = channel_histories(cleaned) or swings(cleaned)
-    return (*moving, *motor_lines(cleaned), *press_depths(cleaned))
+    # What moves readings while the path moves shows in more than one test: the finest that sees it speaks.
+    moving = channel_histories(cleaned) or swings(cleaned) or motor_lines(cleaned)
+    return (*moving, *press_depths(cleaned))

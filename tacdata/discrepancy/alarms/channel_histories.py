@@ -23,7 +23,7 @@ FEWEST = 12
 """Presses, at least."""
 DRAWS = 2000
 """Flips of sign."""
-CHANCE = 0.0025
+CHANCE = 0.001
 """Level of the test, over all histories [1]."""
 LEAST_Z = 3.7
 """The flips' own tail is short of draws: beyond it a normal one decides, after Wilson & Hilferty [1]."""
@@ -83,7 +83,7 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
         score, total, leverage = score[:, counts], total[counts], leverage[:, counts]
         weight = score.sum(axis=0) / total
         rest = (score - known[:, counts] * weight) / (1 - leverage) / np.sqrt(total)
-        null = np.square(signs @ rest).sum(axis=1) * (1 + 2 * _lagged(rest))
+        null = np.square(signs @ rest).sum(axis=1) * _scatter(rest)
         seen = float(np.sum(score.sum(axis=0) ** 2 / total))
         root = np.cbrt(null)
         middle, spread = float(root.mean()), float(root.std()) + 1e-12
@@ -103,14 +103,17 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
     return Best(first.kind, first.history, first.over, first.z, p, first.weight, first.size)
 
 
-def _lagged(rest: np.ndarray) -> float:
-    """Return the correlation of the scores of successive presses, all channels together [1], 0 or more.
+def _scatter(rest: np.ndarray) -> float:
+    """Return by how much scores, shape (presses, channels), scatter beyond what flips of them do [1], 1 or more.
 
-    The flips take presses as independent: where noise is slower than a press, means scatter by more.
+    Flips take presses as independent: where noise is slower than a press, sums scatter by more. Few presses scatter by
+    chance by less than the noise model says: that is the least.
     """
     later, earlier = rest[1:], rest[:-1]
     size = float(np.sqrt(np.sum(np.square(later)) * np.sum(np.square(earlier))))
-    return max(float(np.sum(later * earlier)) / max(size, 1e-30), 0.0)
+    lagged = max(float(np.sum(later * earlier)) / max(size, 1e-30), 0.0)
+    mean = float(np.square(rest).sum(axis=0).mean())
+    return (1 + 2 * lagged) * max(1.0, 1 / max(mean, 1e-30))
 
 
 def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:

@@ -23,7 +23,7 @@ MOST_EDGES = 60
 """Stretches begin and end at so many presses, at most."""
 DRAWS = 1000
 """Permutations of presses."""
-CHANCE = 0.0025
+CHANCE = 0.001
 """Level of the permutation test, over all stretches [1]."""
 LEAST_Z = 5.0
 """A stretch differs by so many standard errors, at least [1]."""
@@ -54,9 +54,10 @@ def press_depths(cleaned: Cleaned) -> list[Alarm]:
         begin, end, by = found
         first, last = (course.names[int(episodes[k])] for k in (begin, end - 1))
         way = "deeper" if by > 0 else "less deep"
+        least = "at least " if problem.setting.response.fitted else ""  # which takes up a part of it
         back = ", and the depth comes back" if end < len(depth) and begin > 0 else ""
         return [Alarm(
-            f"from {first} to {last} presses go {abs(by) * unit:.2g} mm {way} than the others of their places{back}: "
+            f"from {first} to {last} presses go {least}{abs(by) * unit:.2g} mm {way} than others of their places{back}: "
             "as if steps were lost and found, or something lay under the sensor",
             "measure the height of a fixed point at every tenth press; look at the guide and at what holds the sensor",
         )]  # fmt: skip

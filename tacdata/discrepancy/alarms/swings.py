@@ -38,7 +38,7 @@ USUAL_RATE = 0.95
 """Quantile of the rates of depth that counts as the usual largest [1]."""
 DRAWS = 2000
 """Draws of signs."""
-CHANCE = 0.0025
+CHANCE = 0.001
 """Level of the test, over all waves [1]."""
 LEAST_Z = 3.7
 """The draws' own tail is short: beyond it a normal one decides, after Wilson & Hilferty [1]."""
