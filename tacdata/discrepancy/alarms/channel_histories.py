@@ -1,9 +1,8 @@
-"""Channels that follow the path each in its own way: a cable that moves along, a torn protrusion, an order of reading.
+"""Channels that follow the path each in its own way: a cable that moves along, a torn protrusion.
 
-The gate asks for patterns that all channels share. Here each channel has a weight of its own, of either sign, for a
-history of the path: the sum over channels of the squared scores. Its null distribution: signs of whole presses are
-flipped, of scores from which the fit was taken off (a wild cluster bootstrap, with leverage as in HC3). Channels keep
-their correlation, and presses their scatter.
+The gate asks for patterns that all channels share. Here each channel has a weight of its own. Squared scores are
+summed over channels. For the null distribution, whole presses change sign (wild cluster bootstrap). The fit is taken
+off before, with leverage as in HC3. So channels keep their correlation.
 """
 
 from __future__ import annotations
@@ -104,10 +103,10 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
 
 
 def _scatter(rest: np.ndarray) -> float:
-    """Return by how much scores, shape (presses, channels), scatter beyond what flips of them do [1], 1 or more.
+    """Return by how much scores, shape (presses, channels), scatter beyond their flips [1], 1 or more.
 
-    Flips take presses as independent: where noise is slower than a press, sums scatter by more. Few presses scatter by
-    chance by less than the noise model says: that is the least.
+    Flips take presses as independent. Slow noise makes sums scatter by more. Few presses may scatter by chance by
+    less than the noise model says. That is the least.
     """
     later, earlier = rest[1:], rest[:-1]
     size = float(np.sqrt(np.sum(np.square(later)) * np.sum(np.square(earlier))))

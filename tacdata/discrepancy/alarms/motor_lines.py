@@ -1,8 +1,7 @@
-"""Lines in the spectrum of what is left while the path moves, and not while it stands: a motor's drive is heard.
+"""Lines in the spectrum while the path moves, and not while it stands: a motor's drive is heard.
 
-Periodograms of a whole session, of every channel by itself, whatever its phase, summed over channels. Without a line
-their sum is a gamma variable around what stands beside it. Its shape is told from its quartiles, so channels that share
-noise make no lines.
+Periodograms of a whole session are summed over channels, whatever their phases. Without a line the sum is a gamma
+variable. Its level is told beside, its shape from quartiles. So channels that share noise make no lines.
 """
 
 from __future__ import annotations

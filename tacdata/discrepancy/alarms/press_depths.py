@@ -1,7 +1,7 @@
-"""Depths that presses miss: a stretch of the session that is deeper or shallower, or two groups without a reason.
+"""Depths that presses miss: a stretch that is deeper or shallower, or two groups without a reason.
 
-An error of depth of each press is estimated by generalized least squares, as if it were free. Its spread is a nuisance
-of the null model; how it is distributed over presses is tested here.
+Each press's error of depth is estimated by generalized least squares. Its spread is a nuisance of the null model. Its
+distribution over presses is tested here.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def press_depths(cleaned: Cleaned) -> list[Alarm]:
         least = "at least " if problem.setting.response.fitted else ""  # which takes up a part of it
         back = ", and the depth comes back" if end < len(depth) and begin > 0 else ""
         return [Alarm(
-            f"from {first} to {last} presses go {least}{abs(by) * unit:.2g} mm {way} than others of their places{back}: "
+            f"from {first} to {last} presses go {least}{abs(by) * unit:.2g} mm {way} than others of a place{back}: "
             "as if steps were lost and found, or something lay under the sensor",
             "measure the height of a fixed point at every tenth press; look at the guide and at what holds the sensor",
         )]  # fmt: skip

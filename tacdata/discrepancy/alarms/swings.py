@@ -1,9 +1,9 @@
 """Swings of all channels together that differ from press to press: stick-slip, a shaking press.
 
-Their mean over presses is zero: no score test sees them. In each press the readings are projected on the rise times
-waves along the path, and in time. Their energy is held against that of the same channels with signs flipped at random
-in each press: noise of single channels keeps its spectrum, its tails and its growth with load, and only what channels
-share makes a difference. A press's own errors of pose and gain are projected out before.
+Their mean over presses is zero: no score test sees them. Readings are projected on the rise times waves, along the
+path and in time. For the null distribution, channels change sign in each press. Single channels' noise keeps its
+spectrum, its tails and its growth. Only what channels share makes a difference. A press's own errors are projected out
+before.
 """
 
 from __future__ import annotations
@@ -115,9 +115,9 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
 
 
 def _shared_in_air(cleaned: Cleaned) -> float:
-    """Return by how much channels add up in the air, where the noise is all they share, beyond chance [1], 0 or more.
+    """Return by how much channels add up in the air beyond chance [1], 0 or more.
 
-    Weighted as in each press: by its largest rise.
+    There, noise is all they share. They weigh as in each press, by its largest rise.
     """
     inside = cleaned.course.tip[:, 2] > 0
     edges = [*cleaned.begins, len(inside)]

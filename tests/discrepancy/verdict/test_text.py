@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from pressing import course
 
+from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
-from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason, decide
 from tacdata.discrepancy.verdict.document import following
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -149,6 +150,29 @@ def test_every_status_says_what_to_do_next(status, reason, begins):
     answer = [] if status in ("none", "unknown") else [finding("latency", *(["backlash"] * (status == "ambiguous")))]
     decision = Decision(status, reason, tuple(Decided(f, status, {}, None) for f in answer))
     assert following(decision, course(rates=(1.0,), episodes=4))[0].startswith(begins)
+
+
+def quiet(alarms=(), odd=()):
+    """Return findings without an effect, behind a closed gate."""
+    tests, null = SimpleNamespace(p_generic=0.5, p=np.ones(1)), SimpleNamespace(odd=odd)
+    setting = SimpleNamespace(course=course(episodes=4), channel_gain=None)
+    made = SimpleNamespace(
+        until="decide", effects=(), gap=False, tests=tests, left=SimpleNamespace(t=0.0, gain=0.0), share_left=0.0,
+        loudness=1.0, problem=SimpleNamespace(null=null, setting=setting),
+        gains=np.zeros(3), halves=np.zeros((2, 3)), alarms=alarms,
+    )  # fmt: skip
+    return cast(Findings, made)
+
+
+def test_an_alarm_is_no_reassurance_and_no_name():
+    """Without one the same findings are `none`."""
+    seen = Alarm("channels are late by times of their own", "look at the order of reading")
+    assert decide(quiet(), DataChecks(20)).status == "none"
+    decision = decide(quiet((seen,)), DataChecks(20))
+    assert (decision.status, decision.reason, decision.effects) == ("unknown", Reason.ALARM, ())
+    words = reason_in_words(decision, quiet((seen,)), DataChecks(20))
+    assert words == "no effect of the library shows, but channels are late by times of their own"
+    assert following(decision, course(episodes=4), alarms=(seen,)) == ["look at the order of reading"]
 
 
 def test_where_two_effects_close_the_gap_each_has_its_share():
