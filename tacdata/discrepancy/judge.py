@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tacdata.chain import Course
+from tacdata.discrepancy.alarms.all_alarms import alarms
 from tacdata.discrepancy.data.checks import DataChecks, check
 from tacdata.discrepancy.levels.lack_of_fit import lack_of_fit, with_families
 from tacdata.discrepancy.levels.margins import beside_remainder
@@ -49,10 +50,11 @@ def judge(
     2. Check the data: wiring, units, what is missing.
     3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
     4. Hold the answer against the saturated model of each family: is its law borne out?
-    5. Open the sealed episodes: how much smaller is their gap?
-    6. Decide: named (all of it, or some beside a remainder), ambiguous, unknown or none. Sealed episodes can take a
+    5. Look for what has no form of the library: alarms.
+    6. Open the sealed episodes: how much smaller is their gap?
+    7. Decide: named (all of it, or some beside a remainder), ambiguous, unknown or none. Sealed episodes can take a
        name away; they never give one.
-    7. Write it all down.
+    8. Write it all down.
 
     Args:
         course: The recordings.
@@ -75,7 +77,8 @@ def judge(
     beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
     note("the gap on sealed presses")
     shown = gap(course, found, sealed)
-    decision = decide(found, checks, beside, shown, lacking)
+    seen = alarms(found.final) if until == STEPS[-1] else ()
+    decision = decide(found, checks, beside, shown, lacking, seen)
     before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))
     written = document(decision, found, checks, (before, after), parents or {}, shown)
     return Verdict(written, checks, found, decision, before, after)

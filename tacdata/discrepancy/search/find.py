@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tacdata.discrepancy.alarms.all_alarms import alarms
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.search.detection_limits import detection_limits
@@ -18,8 +17,7 @@ from tacdata.discrepancy.search.race import Note, Selection, race, start
 def find(setting: Setting, note: Note = lambda text: None, until: str = "decide") -> Findings:
     """Find which effects a model lacks.
 
-    Noise and nuisances, regressors, gate, race (forward selection), backward elimination with rivals, leftovers and
-    alarms.
+    Noise and nuisances, regressors, gate, race (forward selection), backward elimination with rivals, leftovers.
 
     Args:
         setting: Recordings, response, library.
@@ -67,5 +65,4 @@ def _findings(given: Gate, selection: Selection, problem: Problem, answer: Answe
         limits=detection_limits(final), gains=channel_gains(final),
         halves=gains_of_halves(final), until=until,
         comparisons=answer.comparisons, path=tuple(effect.name for effect, _ in selection.explained),
-        alarms=alarms(final) if until == "decide" else (),
     )  # fmt: skip

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.gauss_newton import Refined
 from tacdata.discrepancy.search.j_test import Pooled
@@ -116,8 +115,6 @@ class Findings:
     """Of each effect of the answer; empty where rivals were not tried."""
     path: tuple[str, ...] = ()
     """Effects in the order in which forward selection added them."""
-    alarms: tuple[Alarm, ...] = ()
-    """What the residual beside the answer shows without any form."""
 
     @property
     def share_left(self) -> float:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
+from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, elsewhere
@@ -14,11 +15,7 @@ from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gate import GATE
 from tacdata.discrepancy.search.shortlist import RIVAL_Z
-from tacdata.discrepancy.verdict.calibration import (
-    calibration_error,
-    compliance_of_specimens,
-    gains_beyond_calibration,
-)
+from tacdata.discrepancy.verdict.calibration import calibration_error, compliance_of_specimens, gains_beyond_calibration
 from tacdata.discrepancy.verdict.confidence import confidence, features
 from tacdata.discrepancy.verdict.lone_press import LonePress, lone_press
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -46,8 +43,6 @@ LOUD = 2.0
 """Residual: a mean square of so many noise floors is unknown, not none, even if no test rejects [1]."""
 RARE_P = 0.003
 """Score test: with so small a corrected p-value `NEEDED_Z` standard errors of necessity are enough [1]."""
-
-
 INCOMPLETE = "named, incomplete"
 """Status: some of what is missing has a name, the rest has not."""
 
@@ -113,11 +108,13 @@ class Decision:
     """What one press alone shows, where nothing else has a name."""
     lacking: Mapping[Family, Lack] = field(default_factory=dict)
     """What each family's saturated model still explains."""
+    alarms: tuple[Alarm, ...] = ()
+    """What the residual shows without a form."""
 
 
 def decide(
     found: Findings, checks: DataChecks, beside: tuple[BesideRemainder, ...] = (), shown: Gap | None = None,
-    lacking: Mapping[Family, Lack] | None = None,
+    lacking: Mapping[Family, Lack] | None = None, seen: tuple[Alarm, ...] = (),
 ) -> Decision:  # fmt: skip
     """Decide what may be said of findings.
 
@@ -127,12 +124,15 @@ def decide(
         beside: The evidence of each effect that was found beside a remainder, where something is left.
         shown: The gap on sealed episodes: it can take a name away, and never gives one.
         lacking: What each family's saturated model explains beside the answer.
+        seen: What the residual shows without a form: where no effect shows, it is no reassurance.
     """
     lacking = lacking or {}
     answer = answer_of(found)
     status, reason = _status(found, answer)
     if reason is Reason.QUIET and (given := compliance_of_specimens(found)):
         answer, status, reason = given, "ambiguous", Reason.RIVALS
+    if reason is Reason.QUIET and seen:
+        status, reason = "unknown", Reason.ALARM
     own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
     levels = [finest(f) for f in answer]
     sealed = shown is not None and bool(len(shown.names))
@@ -177,7 +177,7 @@ def decide(
     lone = lone_press(found.given) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
     return Decision(
         status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name), shown)
-                              for f, level in made), lone, lacking,
+                              for f, level in made), lone, lacking, seen,
     )  # fmt: skip
 
 
@@ -334,7 +334,7 @@ def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
             return "unknown", Reason.ODD
         if found.loudness > LOUD:
             return "unknown", Reason.UNEXPLAINED if found.gap else Reason.LOUD
-        return ("unknown", Reason.ALARM) if found.alarms else ("none", Reason.QUIET)
+        return "none", Reason.QUIET
     if not answer:
         return "unknown", Reason.ODD if len(found.problem.null.odd) else Reason.UNEXPLAINED
     if not adequate(found, answer):

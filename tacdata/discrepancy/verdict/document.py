@@ -11,7 +11,6 @@ import yaml
 import schemas
 from tacdata import provenance
 from tacdata.chain import Course
-from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.sufficiency import one_rate
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
@@ -48,7 +47,7 @@ def document(
     told = [p.effect.remark(p.values) for p in placed]
     late = any(p.effect.family is Family.DELAY_AND_FILTER for p in placed)
     clocks = () if late else checks.clocks
-    alarms = () if decision.reason is Reason.ALARM else found.alarms
+    alarms = () if decision.reason is Reason.ALARM else decision.alarms
     seen = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]
     remarks = [*checks.wiring, *checks.watched, *seen, *checks.shortcomings, *clocks, *told, *checks.base]
     tests, noise, values = found.tests, found.problem.null.noise, max(float(found.values.sum()), 1.0)
@@ -71,7 +70,7 @@ def document(
         "data": {**data(course), "sealed": list(shown.names) if shown else []},
         "sealed": shown.document() if shown else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
         "remarks": [words for words in remarks if words],
-        "next": following(decision, course, bool(checks.watched), bool(checks.base), found.alarms),
+        "next": following(decision, course, bool(checks.watched), bool(checks.base)),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": DRAWS}),
     }  # fmt: skip
 
@@ -147,9 +146,7 @@ def untested(answer: list[FoundEffect]) -> list[str]:
     return [f"{e['id']}: {e['title']}" for e in listed if not groups or e["group"] in groups]
 
 
-def following(
-    decision: Decision, course: Course, watched: bool = False, fitted: bool = False, alarms: tuple[Alarm, ...] = ()
-) -> list[str]:  # fmt: skip
+def following(decision: Decision, course: Course, watched: bool = False, fitted: bool = False) -> list[str]:
     """Return what to do next, the most useful first.
 
     Args:
@@ -157,12 +154,11 @@ def following(
         course: The recordings.
         watched: Whether single channels show what no effect does.
         fitted: Whether the base was fitted to the recordings.
-        alarms: What the residual shows without any form.
     """
     if decision.reason is Reason.TOO_FEW:
         return [DIAGNOSTIC]
     if decision.reason is Reason.ALARM:
-        return [alarm.next for alarm in alarms]
+        return [alarm.next for alarm in decision.alarms]
     if decision.reason is Reason.QUIET and watched:
         return ["mend what the remarks say of single channels, and record again"]
     if decision.reason is Reason.QUIET:

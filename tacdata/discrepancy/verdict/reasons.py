@@ -81,7 +81,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             odd = _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
             return odd + _lone(decision, found, "; ")
         case Reason.ALARM:
-            return f"no effect of the library shows, but {'; '.join(alarm.seen for alarm in found.alarms)}"
+            return f"no effect of the library shows, but {'; '.join(alarm.seen for alarm in decision.alarms)}"
         case Reason.LOUD:
             off = f"readings are off by {found.loudness:.1f} times the noise, but no effect shows in several presses"
             return off + (_lone(decision, found, ": ") or ": look at where it lives")

@@ -152,14 +152,14 @@ def test_every_status_says_what_to_do_next(status, reason, begins):
     assert following(decision, course(rates=(1.0,), episodes=4))[0].startswith(begins)
 
 
-def quiet(alarms=(), odd=()):
+def quiet():
     """Return findings without an effect, behind a closed gate."""
-    tests, null = SimpleNamespace(p_generic=0.5, p=np.ones(1)), SimpleNamespace(odd=odd)
-    setting = SimpleNamespace(course=course(episodes=4), channel_gain=None)
+    tests, null = SimpleNamespace(p_generic=0.5, p=np.ones(1)), SimpleNamespace(odd=())
+    setting = SimpleNamespace(course=course(episodes=4), channel_gain=None, response=SimpleNamespace(fitted=False))
     made = SimpleNamespace(
         until="decide", effects=(), gap=False, tests=tests, left=SimpleNamespace(t=0.0, gain=0.0), share_left=0.0,
         loudness=1.0, problem=SimpleNamespace(null=null, setting=setting),
-        gains=np.zeros(3), halves=np.zeros((2, 3)), alarms=alarms,
+        gains=np.zeros(3), halves=np.zeros((2, 3)),
     )  # fmt: skip
     return cast(Findings, made)
 
@@ -168,11 +168,11 @@ def test_an_alarm_is_no_reassurance_and_no_name():
     """Without one the same findings are `none`."""
     seen = Alarm("channels are late by times of their own", "look at the order of reading")
     assert decide(quiet(), DataChecks(20)).status == "none"
-    decision = decide(quiet((seen,)), DataChecks(20))
+    decision = decide(quiet(), DataChecks(20), seen=(seen,))
     assert (decision.status, decision.reason, decision.effects) == ("unknown", Reason.ALARM, ())
-    words = reason_in_words(decision, quiet((seen,)), DataChecks(20))
+    words = reason_in_words(decision, quiet(), DataChecks(20))
     assert words == "no effect of the library shows, but channels are late by times of their own"
-    assert following(decision, course(episodes=4), alarms=(seen,)) == ["look at the order of reading"]
+    assert following(decision, course(episodes=4)) == ["look at the order of reading"]
 
 
 def test_where_two_effects_close_the_gap_each_has_its_share():
