@@ -15,6 +15,8 @@ from tacdata.errors import FormatError, UsageError
 
 FIELDS = ("x", "y", "depth", "load", "force", "curve_load", "curve_signal", "gain", "offset", "tools")
 
+BEYOND = 1e4
+"""So far the curve from load to reading goes on straight beyond its ends [its range]."""
 KEPT = 12
 """Evaluations remembered: most candidates leave the pose alone."""
 
@@ -41,7 +43,7 @@ class TableResponse(Response):
             tools: Name of each tool.
         """
         self.x, self.y, self.depth, self.tools = x, y, depth, tools
-        self._curve = curve_load, curve_signal
+        self._curve = _straight_beyond(curve_load, curve_signal)
         self.gain, self.offset = gain, offset
         self._rough = False
         both = np.concatenate([load, force[..., None]], axis=-1)
@@ -114,13 +116,7 @@ class TableResponse(Response):
         known = next((answer for answer in self._kept.values() if answer.load is load), None)
         if known is not None and known.signal is not None:
             return known.signal
-        at, value = self._curve
-        low, high = (value[1] - value[0]) / (at[1] - at[0]), (value[-1] - value[-2]) / (at[-1] - at[-2])
-        result = np.interp(load, at, value)
-        if load.min(initial=at[0]) < at[0]:
-            result += low * np.minimum(load - at[0], 0.0)
-        if load.max(initial=at[-1]) > at[-1]:
-            result += high * np.maximum(load - at[-1], 0.0)
+        result = np.interp(load, *self._curve)
         result *= self.gain
         result += self.offset
         if known is not None:
@@ -218,6 +214,16 @@ def _continued(values: np.ndarray) -> np.ndarray:
         beyond.append(following)
         last = np.concatenate([last[:, :, 1:], following], axis=2)
     return np.concatenate([values[:, :, 1:2], values, *beyond], axis=2)
+
+
+def _straight_beyond(at: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a curve with a point far beyond each end, on the straight line through the last two."""
+    far = BEYOND * (at[-1] - at[0])
+    low, high = (value[1] - value[0]) / (at[1] - at[0]), (value[-1] - value[-2]) / (at[-1] - at[-2])
+    return (
+        np.concatenate([[at[0] - far], at, [at[-1] + far]]),
+        np.concatenate([[value[0] - low * far], value, [value[-1] + high * far]]),
+    )
 
 
 def _key(pose: np.ndarray, tool: np.ndarray) -> int:

@@ -74,3 +74,12 @@ def test_the_deepest_presses_of_a_table_are_as_right_as_the_others():
     pose = np.column_stack([0 * depth, 0 * depth, depth])
     wrong = made.load(pose, np.zeros(50, dtype=int))[:, 0] / truth(pose) - 1
     assert np.abs(wrong).max() < 1e-4, "mirrored there, they are off by 7.6 %"
+
+
+def test_the_curve_goes_on_straight_beyond_its_ends():
+    x = np.linspace(-3, 3, 5)
+    load, at = np.zeros((1, 5, 5, 5, 2)), np.array([0.0, 1.0, 2.0])
+    made = TableResponse(x, x, np.linspace(0, 1, 5) ** 2, load, load[..., 0], at, np.array([0.0, 3.0, 4.0]),
+                         np.array([1.0, 10.0]), np.array([5.0, 0.0]), ("ball",))  # fmt: skip
+    read = made.signal(np.array([[-0.5, 0.5], [3.0, 2.0], [200.0, -100.0]]))
+    assert read == pytest.approx(np.array([[3.5, 15.0], [10.0, 40.0], [207.0, -3000.0]]), rel=1e-12)
