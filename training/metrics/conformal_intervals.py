@@ -43,7 +43,7 @@ NOT_KNOWN = 1e9
 FLOOR = 1e-4
 """Smallest deviation [mm]."""
 _PARTS = 40
-"""Into so many parts episodes are dealt where there are more: one is left out at a time [count]."""
+"""Parts of the episodes at most; each is left out once [count]."""
 
 
 @dataclass(frozen=True)
