@@ -174,7 +174,7 @@ class Effect(ABC):
     scale: ClassVar[Scale | None] = None
     """For a scale of lengths."""
     in_series: ClassVar[bool] = False
-    """Whether it gives way in series with what is pressed, alike under all specimens: those of other stiffness tell."""
+    """Whether it gives way in series with what is pressed. Specimens of other stiffness tell."""
     changes_skin: ClassVar[bool] = False
     """Whether labels are solved anew with another skin (`thickness_factor`)."""
     each_episode: ClassVar[bool] = False

@@ -14,6 +14,9 @@ from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, plain, quantity_of, split_unit
 
+COARSE = 0.2
+"""A clock is too coarse where more rows than this share repeat a time [1]."""
+
 
 @dataclass(frozen=True)
 class Stream:
@@ -119,7 +122,29 @@ def _timed(
         notes.append(f"{name}: time runs backwards {back} times; rows are put in the order of time")
         order = np.argsort(time_ns, kind="stable")
         time_ns, values = time_ns[order], values[order]
+    time_ns, shared = _apart(time_ns)
+    if shared:
+        notes.append(
+            f"{name}: {shared} of {len(time_ns)} rows have the time of the row before; they are spread evenly up to "
+            "the next time"
+        )
     return Stream(name, time_ns, values, names, unit, zero, (*table.notes, *notes))
+
+
+def _apart(time_ns: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return times [ns] in order with rows of one time spread evenly up to the next, and how many there were.
+
+    So does a clock that counts whole seconds. Few rows of one time are left as they are: a logger wrote them twice.
+    """
+    steps = np.diff(time_ns)
+    shared = int((steps == 0).sum())
+    if shared <= COARSE * len(time_ns) or not (steps > 0).any():
+        return time_ns, 0
+    begins = np.flatnonzero(np.concatenate([[True], steps > 0]))
+    counts = np.diff(np.append(begins, len(time_ns)))
+    widths = np.append(np.diff(time_ns[begins]), int(np.median(np.diff(time_ns[begins]))))
+    inside = np.arange(len(time_ns)) - np.repeat(begins, counts)
+    return time_ns + np.rint(inside * np.repeat(widths / counts, counts)).astype(np.int64), shared
 
 
 def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[Stream, bool]:

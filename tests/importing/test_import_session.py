@@ -673,3 +673,20 @@ def test_recordings_joined_into_one_file_are_told_apart_in_words(tmp_path):
     joined.write_bytes(2 * file.read_bytes())
     with pytest.raises(FormatError, match=f"another one begins at byte {file.stat().st_size}"):
         read_episode(joined)
+
+
+def test_rows_of_a_clock_of_whole_seconds_are_spread(tmp_path):
+    """Depth is looked up by time: rows of one time would all have the depth of one of them."""
+    depth = np.concatenate([np.zeros(20), np.linspace(0, 2, 40), np.linspace(2, 0, 40), np.zeros(20)])
+    rows = [f"12:00:{k // 10:02d},{z:.3f},{100 * z:.2f}" for k, z in enumerate(depth)]
+    (tmp_path / "wide.csv").write_text("\n".join(["time,depth_mm,cap0", *rows]))
+    entry = {"file": "data", "depth": {"column": "depth_mm"}}
+    path = mapping(
+        tmp_path, files={"data": {"path": "wide.csv", "time": {"column": "time"}}}, position=entry, measured=None
+    )
+    made = import_session(tmp_path, path, tmp_path / "session")
+    [episode] = [read_episode(p) for p in read_session(made.folder).episodes]
+    assert np.diff(episode.taxels.sample_ns) == pytest.approx(1e8, rel=1e-6)
+    seen = episode.tip_at(episode.taxels.sample_ns)[:, 2]
+    assert seen == pytest.approx(episode.taxels.counts[:, 0] / 100, abs=1e-3)
+    assert any("spread evenly" in note for note in made.notes)

@@ -65,7 +65,7 @@ def _varies(rates: np.ndarray) -> bool:
 
 
 STROKE, RATE, RADIUS, EVERY = 0.02, 500.0, 200.0, (2e-5, 5.0)
-"""Strokes [mm] below, rates [mm/s], radii [mm] and intervals [s] beyond are hardly of their unit.
+"""Sizes beyond are hardly of their unit: strokes [mm], rates [mm/s], radii [mm], intervals [s].
 
 A long stroke is no reason to doubt: strips are stretched by tens of mm. An import refuses what no press can be.
 """

@@ -33,9 +33,9 @@ SURE_T = 2.0
 ANOTHER_FORM = 0.15
 """A law of which its family explains this share more is another one [what the effect explains]."""
 MUCH = 0.15
-"""What other families explain of what is left counts as left over from this share of the whole on [1]."""
+"""What other families explain of what is left counts as left over from here on [1]."""
 SURE_GAIN = 5.0
-"""Another family is there, too, if it lowers half the sum of squares of held-out episodes by so much [1]..."""
+"""Another family is there, too, if it lowers half the held-out sum of squares by so much [1]..."""
 SURE_SHARE = 0.03
 """...and explains this share of what the answer does: its laws may be off by less [1]."""
 MODEL = {Family.CONTACT: Family.KINEMATICS}

@@ -26,7 +26,7 @@ IDLE = 0.05
 NOISE = 5.0
 """...and so are those below so many standard deviations of the load in the air [1]."""
 SPECIMENS, EACH = 3, 3
-"""Fewer specimens, or presses of each, say nothing: a power and a compliance fit two curves whatever they are."""
+"""Fewer specimens, or presses of each, say nothing. A power and a compliance fit any two curves."""
 STIFFER = 3.0
 """The stiffest is so many times as stiff as the softest, or they bend the frame alike [1]."""
 CLOSES = 0.5
@@ -49,7 +49,7 @@ class SeriesCompliance:
     """The common law's power of depth [1]."""
     specimens: int
     left: tuple[float, float]
-    """Share of its depths that the common law leaves of the specimen that shows most: without and with it [1]."""
+    """Share of depths that the common law leaves of the clearest specimen: without and with it [1]."""
 
     def __str__(self) -> str:
         """Return it in words."""

@@ -17,7 +17,7 @@ EVEN = 0.05
 LOW = 0.7
 """A residual below this [noise] is said to be so."""
 BEST = 0.9
-"""A regression on the path's history is worth a word if it leaves less than this share of the residual [1]."""
+"""A regression on the path's history is worth a word below this share of the residual [1]."""
 WEAK_LIMIT = 3.0
 """Effects with a larger detection limit are listed [typical sizes]."""
 

@@ -15,7 +15,7 @@ PAUSE, TIMES = 1.0, 10.0
 SURE = 0.5
 """Correlation of position and readings from which the sign is told."""
 LIFTED, CLEAR = 0.2, 0.05
-"""A length that stays farther from 0 than this share of its range is a height. Presses are cut at the second."""
+"""A length that stays farther from 0 than this share of its range is a height. Presses are cut at the other."""
 
 
 @dataclass(frozen=True)
