@@ -29,7 +29,9 @@ STRENGTHS = (1e-3, 1e-2, 1e-1, 1.0)
 EXCITED = 1e-6
 """Columns with less information are left out [largest]."""
 SURE_T = 2.0
-"""Something is there from so many standard errors over episodes on [1]."""
+"""Something is there from so many standard errors over episodes on [1]..."""
+CLEAR_GAIN, CLEAR_T = 8.0, 1.0
+"""...and another form of what has a name also from so much evidence on (nats, held out), if many episodes bear it [1]."""
 ANOTHER_FORM = 0.15
 """A law of which its family explains this share more is another one [what the effect explains]."""
 MUCH = 0.15
@@ -63,7 +65,9 @@ def of_family(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> Lack | No
 def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     """Return whether an effect's family explains clearly more than its law does: the mechanism is not borne out."""
     own = of_family(finding, lacking)
-    return own is not None and own.t >= SURE_T and own.size >= ANOTHER_FORM * max(finding.bought, 0.0)
+    if own is None or own.size < ANOTHER_FORM * max(finding.bought, 0.0):
+        return False
+    return own.t >= SURE_T or (own.gain >= CLEAR_GAIN and own.t >= CLEAR_T)
 
 
 def with_families(found: Findings, lacking: Mapping[Family, Lack]) -> Findings:

@@ -80,7 +80,8 @@ def test_the_size_is_what_columns_explain_beyond_noise(planted):
 
 @pytest.mark.parametrize(
     ("family", "lacking", "other"),
-    [(Family.SKIN_MEMORY, Lack(30.0, 4.0, 40.0), True), (Family.SKIN_MEMORY, Lack(30.0, 1.0, 40.0), False),
+    [(Family.SKIN_MEMORY, Lack(30.0, 4.0, 40.0), True), (Family.SKIN_MEMORY, Lack(30.0, 1.5, 40.0), True),
+     (Family.SKIN_MEMORY, Lack(30.0, 0.9, 40.0), False), (Family.SKIN_MEMORY, Lack(6.0, 1.5, 40.0), False),
      (Family.SKIN_MEMORY, Lack(5.0, 4.0, 10.0), False)],
 )  # fmt: skip
 def test_a_mechanism_falls_to_its_family_by_what_that_explains_of_its_own(family, lacking, other):
