@@ -31,7 +31,7 @@ EXCITED = 1e-6
 SURE_T = 2.0
 """Something is there from so many standard errors over episodes on [1]..."""
 CLEAR_GAIN, CLEAR_T = 8.0, 1.0
-"""...and another form of what has a name also from so much evidence on (nats, held out), if many episodes bear it [1]."""
+"""...and another form of what has a name from so much evidence on (nats, held out), too, if many bear it [1]."""
 ANOTHER_FORM = 0.15
 """A law of which its family explains this share more is another one [what the effect explains]."""
 MUCH = 0.15
@@ -92,9 +92,10 @@ def elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
 
 
 def _others(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
-    taken = {f.placed.effect.family for f in found.effects}
-    taken |= {MODEL.get(family, family) for family in taken}
-    return [family for family in lacking if family not in taken]
+    """Return families beside the answer's that explain more than these: models of families overlap."""
+    taken = {MODEL.get(f.placed.effect.family, f.placed.effect.family) for f in found.effects}
+    own = max((lacking[family].gain for family in taken if family in lacking), default=0.0)
+    return [family for family in lacking if family not in taken and lacking[family].gain > own]
 
 
 def lack_of_fit(final: Problem) -> dict[Family, Lack]:

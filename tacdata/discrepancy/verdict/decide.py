@@ -199,12 +199,17 @@ def stands_in(found: Findings, finding: FoundEffect) -> bool:
     """
     if len(found.effects) < 2 or finding.corrected_p is None:
         return False
-    lent = [f.placed.effect.form_error**2 * f.bought for f in found.effects if f.corrected_p is not None]
-    if finding.bought < max(lent):
+    if lent(found, finding):
         return True
     if found.left.t < LEFT_T:
         return False
     return found.left.gain >= SHARE_LEFT_ALONE * (found.left.gain + max(finding.bought, 0.0))
+
+
+def lent(found: Findings, finding: FoundEffect) -> bool:
+    """Return whether an effect explains no more than another's form may leave."""
+    raced = [f for f in found.effects if f.corrected_p is not None]
+    return finding.bought < max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)
 
 
 def beside_open(found: Findings, answer: list[FoundEffect], levels: list[Level | None]) -> list[Level | None]:
@@ -354,6 +359,8 @@ def answer_of(found: Findings) -> list[FoundEffect]:
         # A size says nothing against what these presses cannot split.
         unphysical = tuple(name for name in f.unphysical if name in rivals and name not in alike)
         own.append(replace(f, rivals=tuple(rivals), unphysical=unphysical))
+    # What is within another's form, and only where its own equation ends, is no sign of more.
+    own = [f for f in own if not (f.at_bound and lent(found, f))]
     return [*(f for f in own if not calibration_error(f)), *gains_beyond_calibration(found)]
 
 

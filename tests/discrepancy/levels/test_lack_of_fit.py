@@ -18,7 +18,7 @@ from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.problem import prepare
-from tacdata.discrepancy.verdict.decide import INCOMPLETE, decide
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, answer_of, decide
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.effects import Family, Placed, load
 
@@ -116,8 +116,19 @@ def test_much_that_another_family_explains_is_left_over(family, gain, t, left):
     """A stand-in fits a part: what its own family explains besides is another form of it, and no such sign."""
     found = findings()
     assert with_families(found, {family: Lack(gain, t, gain)}).left.gain == left
+    both = {family: Lack(gain, t, gain), Family.SKIN_MEMORY: Lack(70.0, 3.0, 70.0)}
+    assert with_families(found, both).left.gain == 1.0, "what the own family explains better is its own"
     alone = replace(found, effects=(replace(found.effects[0], placed=Placed(load("bulge"), {})),))
     assert with_families(alone, {Family.SKIN_MEMORY: Lack(60.0, 3.0, 60.0)}).left.gain == 60.0
+
+
+@pytest.mark.parametrize(("bound", "told"), [((), 2), (("tau",), 1)])
+def test_what_is_within_anothers_form_and_ends_there_is_not_told(bound, told):
+    """A law of a material that is off by a tenth leaves a hundredth: as a suspect it would say that more is missing."""
+    found = findings()
+    small = replace(found.effects[0], placed=Placed(load("creep"), {}), bought=0.5, at_bound=bound)
+    answer = answer_of(replace(found, effects=(*found.effects, small)))
+    assert [f.bought for f in answer] == [100.0, 0.5][:told]
 
 
 def decided(family, lacking):
