@@ -32,7 +32,8 @@ class EpisodeErrorModel:
     pose_errors: np.ndarray | None = None
     """What one standard deviation of each error of pose changes [1], shape (streams, n, kinds)."""
     features: np.ndarray | None = None
-    """What all episodes may take up together, each stream by itself [1], shape (streams, n, p)."""
+    """What all episodes may take up together, each stream by itself [1], shape (streams, n, p); (1, n, p) where they,
+    and the offsets, are alike in all streams."""
     random_walk: np.ndarray | None = None
     """What one standard deviation of each mode of a stream's random walk changes [1], shape (streams, n, modes)."""
 
@@ -51,7 +52,7 @@ class FactoredErrors:
             like: Errors with the same offsets and random walks, which are not factored again.
         """
         gain_error = None if own.gain_error is None else own.gain_error[:, :, None]
-        parts = {"pose": own.pose_errors, "gain": gain_error, "free": own.features}
+        parts = {"pose": own.pose_errors, "gain": gain_error}
         given = {name: value for name, value in parts.items() if value is not None}
         edges = np.cumsum([value.shape[2] for value in given.values()])[:-1]
         stacked = np.concatenate([*given.values()], axis=2) if given else None
@@ -65,8 +66,8 @@ class FactoredErrors:
                 rest = dict(zip(given, np.split(offsets.rooted(stacked[:, rows]), edges, axis=2), strict=True))
             errors = _Errors(len(own.offset), rows.stop - rows.start, rest.get("pose"), rest.get("gain"))
             self._episodes.append((rows, offsets, errors))
-            if self._free is not None:
-                self._free.take(np.ascontiguousarray(rest["free"]), errors)
+            if self._free is not None and own.features is not None:
+                self._free.take(offsets.rooted(own.features[:, rows]), errors)
         if self._free is not None:
             self._free.factor()
 
@@ -163,10 +164,10 @@ class _Offsets:
 
     def part(self, block: np.ndarray) -> np.ndarray:
         """Return what to take off columns (streams, m, k) so that it is accounted for."""
-        return self._columns @ (self._pull @ block)
+        return self._columns[: len(block)] @ (self._pull[: len(block)] @ block)
 
     def rooted(self, block: np.ndarray) -> np.ndarray:
-        """Return columns (streams, m, k) with it accounted for."""
+        """Return columns (streams or the first, m, k) with it accounted for."""
         return block - self.part(block)
 
 
@@ -213,7 +214,7 @@ class _Errors:
         each = shared.transpose(0, 2, 1) @ self._own
         if self._mean is None:
             return each.astype(np.float64)
-        gain = each[:, :, self._kinds :] * (np.eye(len(shared)) - self._mean)[:, None, :]
+        gain = each[:, :, self._kinds :] * (np.eye(len(each)) - self._mean)[:, None, :]
         return np.concatenate([each[:, :, : self._kinds], gain], axis=2).astype(np.float64)
 
     def times(self, weights: np.ndarray) -> np.ndarray:
@@ -233,26 +234,28 @@ class _Free:
     """Features of one place: normal equations, a block a stream, joined by the episodes' own errors."""
 
     def __init__(self, streams: int, width: int) -> None:
-        self._blocks = np.zeros((streams, width, width))
+        self._streams, self._blocks = streams, np.zeros((1, width, width))
         self._shared: list[np.ndarray] = []
         self._joints: list[np.ndarray] = []
         self._errors: list[_Errors] = []
 
     def take(self, shared: np.ndarray, errors: _Errors) -> None:
-        """Take an episode's features (streams, m, p) in."""
+        """Take an episode's features in, shape (streams, m, p), or (1, m, p) where streams are alike."""
         exact = shared.astype(np.float64)  # splines of few rows are nearly alike: single precision loses their rank
-        self._blocks += exact.transpose(0, 2, 1) @ exact
+        self._blocks = self._blocks + exact.transpose(0, 2, 1) @ exact
+        shared = np.broadcast_to(shared, (self._streams, *shared.shape[1:]))
         self._shared.append(shared)
         self._joints.append(errors.joint(shared))
         self._errors.append(errors)
 
     def factor(self) -> None:
         """Invert what is the same for all columns."""
-        streams, width, _ = self._blocks.shape
+        streams, width = self._streams, self._blocks.shape[1]
         mean = np.einsum("spp->s", self._blocks) / width
         floor = RIDGE * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
-        self._inverse = np.linalg.inv(self._blocks + floor)
-        self.freedom = float(np.einsum("sij,sji->", self._inverse, self._blocks))
+        inverse = np.linalg.inv(self._blocks + floor)
+        self.freedom = float(np.einsum("sij,sji->", inverse, self._blocks)) * streams / len(inverse)
+        self._inverse = np.broadcast_to(inverse, (streams, width, width))
         joint = np.concatenate(self._joints, axis=2)
         self._through = self._inverse @ joint
         self._joint = joint.reshape(streams * width, -1)
@@ -266,7 +269,7 @@ class _Free:
 
     def weights(self, left: list[np.ndarray]) -> np.ndarray:
         """Return the weights that fit best, shape (streams, p, k), to the columns of each episode (streams, m, k)."""
-        right = np.zeros((*self._blocks.shape[:2], left[0].shape[2]))
+        right = np.zeros((*self._inverse.shape[:2], left[0].shape[2]))
         for shared, joint, errors, own in zip(self._shared, self._joints, self._errors, left, strict=True):
             right += (shared.transpose(0, 2, 1) @ own).astype(np.float64) - joint @ (errors.root @ errors.inner(own))
         return self._solved(right)

@@ -291,11 +291,13 @@ def _turned(values: np.ndarray) -> np.ndarray:
 
 
 def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """Return features of each stream, shape (streams, n, p), 0 where nothing was read.
+    """Return features of each stream, shape (streams, n, p), or (1, n, p) if they are alike; 0 where nothing was read.
 
     Args:
         shared: Whitened features, shape (streams or 1, n, p).
         offset: Whitened constants, 0 where nothing was read, shape (n, streams).
     """
     there = (offset != 0).T.astype(np.float32)
+    if len(shared) == 1 and np.array_equal(offset, np.broadcast_to(offset[:, :1], offset.shape)):
+        return there[:1, :, None] * shared
     return there[:, :, None] * shared[: len(there)]

@@ -173,3 +173,20 @@ def test_what_features_leave_of_noise_that_is_white_to_it():
     products = projected @ projected.T / draws
     assert cleaned @ cleaned.T / draws == pytest.approx(products, abs=0.06)
     assert np.trace(products) == pytest.approx(STREAMS * (count - FEATURES), rel=0.01)
+
+
+def test_features_that_are_alike_in_all_streams_are_given_once():
+    rng = np.random.default_rng(8)
+    parts, spans = made(rng), within(LENGTHS)
+    named = {name: parts[name].astype(np.float32) for name in ("gain_error", "pose_errors")}
+    shared, offset = parts["features"][:1].astype(np.float32), parts["offset"].astype(np.float32)
+    once, each = (
+        FactoredErrors(spans, EpisodeErrorModel(offset, np.full(3, np.inf), features=features, **named))
+        for features in (shared, np.repeat(shared, STREAMS, axis=0))
+    )
+    assert once.freedom == pytest.approx(each.freedom, rel=1e-9)
+    left = taken_out(each, parts["columns"])
+    assert np.abs(left - parts["columns"]).max() > 0.1
+    assert taken_out(once, parts["columns"]) == pytest.approx(left, abs=1e-5)
+    scores = [factored.episode_scores(left[:, :, 0], parts["columns"]) for factored in (once, each)]
+    assert scores[0][1] == pytest.approx(scores[1][1], rel=1e-4, abs=1e-4)
