@@ -47,7 +47,8 @@ def document(
     told = [p.effect.remark(p.values) for p in placed]
     late = any(p.effect.family is Family.DELAY_AND_FILTER for p in placed)
     clocks = () if late else checks.clocks
-    alarms = () if decision.reason is Reason.ALARM else decision.alarms
+    spoken = decision.reason in (Reason.ALARM, Reason.UNEXPLAINED)
+    alarms = () if spoken else decision.alarms
     seen = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]
     remarks = [*checks.wiring, *checks.watched, *seen, *checks.shortcomings, *clocks, *told, *checks.base]
     tests, noise, values = found.tests, found.problem.null.noise, max(float(found.values.sum()), 1.0)
@@ -177,6 +178,8 @@ def following(decision: Decision, course: Course, watched: bool = False, fitted:
             f"{lone.effect.spoken}: repeat that press, best on three more places or specimens that nobody pressed "
             f"before; {lone.effect.experiment}"
         )
+    if decision.reason is Reason.UNEXPLAINED:
+        words += [alarm.next for alarm in decision.alarms]
     if decision.status in ("unknown", INCOMPLETE):
         words += [f"{f.placed.effect.spoken}: {f.placed.effect.experiment}" for f in answer]
         words.append(DIAGNOSTIC)

@@ -81,12 +81,18 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             odd = _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
             return odd + _lone(decision, found, "; ")
         case Reason.ALARM:
-            return f"no effect of the library shows, but {'; '.join(alarm.seen for alarm in decision.alarms)}"
+            return f"no effect of the library shows, but {_seen(decision)}"
         case Reason.LOUD:
             off = f"readings are off by {found.loudness:.1f} times the noise, but no effect shows in several presses"
             return off + (_lone(decision, found, ": ") or ": look at where it lives")
         case Reason.UNEXPLAINED:
-            return "something is missing that no modelled effect explains" + _lone(decision, found, "; ")
+            seen = f": {_seen(decision)}" if decision.alarms else ""
+            return "something is missing that no modelled effect explains" + seen + _lone(decision, found, "; ")
+
+
+def _seen(decision: Decision) -> str:
+    """Return what was seen without a form."""
+    return "; ".join(alarm.seen for alarm in decision.alarms)
 
 
 def _against(shown: Gap | None) -> str:

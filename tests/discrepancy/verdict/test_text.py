@@ -173,6 +173,10 @@ def test_an_alarm_is_no_reassurance_and_no_name():
     words = reason_in_words(decision, quiet(), DataChecks(20))
     assert words == "no effect of the library shows, but channels are late by times of their own"
     assert following(decision, course(episodes=4)) == ["look at the order of reading"]
+    beside = replace(decision, reason=Reason.UNEXPLAINED)
+    words = reason_in_words(beside, quiet(), DataChecks(20))
+    assert words == "something is missing that no modelled effect explains: channels are late by times of their own"
+    assert following(beside, course(episodes=4))[0] == "look at the order of reading"
 
 
 def test_where_two_effects_close_the_gap_each_has_its_share():
