@@ -25,7 +25,7 @@ DRAWS = 2000
 CHANCE = 0.001
 """Level of the test, over all histories [1]."""
 LEAST_Z = 3.7
-"""The flips' own tail is short of draws: beyond it a normal one decides, after Wilson & Hilferty [1]."""
+"""Least score, as a normal number by Wilson & Hilferty [1]."""
 MOST_LEVERAGE = 0.5
 """A channel of which one press holds a larger share of the information does not count [1]."""
 STIRRED = 0.02

@@ -28,11 +28,11 @@ CHANCE = 0.001
 LEAST_Z = 5.0
 """A stretch differs by so many standard errors, at least [1]."""
 LEAST_RATIO = 13.0
-"""Twice the log-likelihood ratio of two groups against one: noise reaches 10.6 in 1 of 200 draws of 44 presses [1]."""
+"""Twice the log-likelihood ratio of two groups against one [1]. Noise reaches 10.6 in 1 of 200 draws."""
 LEAST_GROUP = 0.2
 """Share of the smaller group, at least [1]."""
 REASON = 0.01
-"""Groups that go with the place, the tool, the depth, the rate or the session have a reason: their p-value [1]."""
+"""P-value by which groups go with place, tool, depth, rate or session: a reason [1]."""
 ROUNDS = 60
 """Steps of the expectation-maximization."""
 LEAST_MM = 0.002

@@ -29,7 +29,7 @@ WAVES = np.arange(4.0, 20.1, 0.5)
 HERTZ = np.array([0.5, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0])
 """Swings in time [Hz]."""
 FEWEST_WAVES = 4.0
-"""Waves that fit into a press, at least: a press's own errors, which are slower, are no swing."""
+"""Waves that fit into a press, at least. A press's own errors are slower."""
 ALIAS = 0.12
 """Waves that nearly fit into the way between two readings look like none [their length]."""
 MOVES = 0.05
@@ -41,7 +41,7 @@ DRAWS = 2000
 CHANCE = 0.001
 """Level of the test, over all waves [1]."""
 LEAST_Z = 3.7
-"""The draws' own tail is short: beyond it a normal one decides, after Wilson & Hilferty [1]."""
+"""Least score, as a normal number by Wilson & Hilferty [1]."""
 
 
 @dataclass(frozen=True)
