@@ -18,7 +18,7 @@ from tacdata.discrepancy.search.shortlist import RIVAL_Z
 from tacdata.discrepancy.verdict.calibration import calibration_error, compliance_of_specimens, gains_beyond_calibration
 from tacdata.discrepancy.verdict.confidence import confidence, features
 from tacdata.discrepancy.verdict.lone_press import LonePress, lone_press
-from tacdata.discrepancy.verdict.sealed import Gap
+from tacdata.discrepancy.verdict.sealed import Gap, borne_out, refuted
 from tacdata.effects import AtRest, Family, load
 
 SHARE_LEFT = 0.05
@@ -238,16 +238,6 @@ def seems_early(finding: FoundEffect, answer: list[FoundEffect]) -> bool:
     """
     memory = any(f.placed.effect.family is Family.SKIN_MEMORY for f in answer)
     return memory and finding.placed.effect.delay(finding.placed.values) < 0
-
-
-def refuted(shown: Gap | None) -> bool:
-    """Return whether sealed episodes take an answer away (`LikelihoodRatio.refutes`)."""
-    return shown is not None and shown.ratio is not None and shown.ratio.refutes
-
-
-def borne_out(shown: Gap | None) -> bool:
-    """Return whether sealed episodes show an answer by themselves (`LikelihoodRatio.bears_out`)."""
-    return shown is not None and shown.ratio is not None and shown.ratio.bears_out
 
 
 def finest(finding: FoundEffect) -> Level | None:

@@ -194,3 +194,13 @@ def _ridge(columns: np.ndarray, target: np.ndarray, strength: float) -> np.ndarr
     gram = columns.T @ columns
     weight = strength * float(np.mean(np.diag(gram)))
     return np.linalg.solve(gram + weight * np.eye(len(gram)), columns.T @ target)
+
+
+def refuted(shown: Gap | None) -> bool:
+    """Return whether sealed episodes take an answer away (`LikelihoodRatio.refutes`)."""
+    return shown is not None and shown.ratio is not None and shown.ratio.refutes
+
+
+def borne_out(shown: Gap | None) -> bool:
+    """Return whether sealed episodes show an answer by themselves (`LikelihoodRatio.bears_out`)."""
+    return shown is not None and shown.ratio is not None and shown.ratio.bears_out
