@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.lack_of_fit import another_form, elsewhere, of_family
 from tacdata.discrepancy.levels.margins import Level
@@ -131,12 +133,15 @@ def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str
 
 def _other_laws(decision: Decision, found: Findings) -> str:
     """Return where other laws show: of a family that has a name, then of one that has none."""
-    words = []
+    shares: dict[Family, float] = {}
     for e in decision.effects:
         family, own = e.finding.placed.effect.family, of_family(e.finding, decision.lacking)
         if e.level is not None and own is not None and another_form(e.finding, decision.lacking):
-            share = min(100 * own.size / max(e.finding.bought, 1e-9), 100.0)
-            words.append(f"another law of {family.value} would explain {share:.0f} % more, in {SIGNS[family]}")
+            shares[family] = min(100 * own.size / max(e.finding.bought, 1e-9), shares.get(family, np.inf))
+    words = [
+        f"another law of {family.value} would explain {share:.0f} % more, in {SIGNS[family]}"
+        for family, share in shares.items()
+    ]
     if others := elsewhere(found, decision.lacking)[:1]:
         words.append(f"something of {others[0].value} shows, too, in {SIGNS[others[0]]}")
     return "".join(f"; {one}" for one in dict.fromkeys(words))
