@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -151,7 +152,7 @@ class FittedResponse(Response):
         for k, basis in enumerate(self._bases):
             rows, count = self._within(k), len(basis.t) - basis.k - 1
             more, _ = self._solve(
-                rows, np.nan_to_num(residual[rows]), features[rows, :count], self._smooth[k], self._weights[k]
+                rows, np.nan_to_num(residual[rows]), features[rows, :count], basis, self._smooth[k], self._weights[k]
             )
             self._weights[k] = self._weights[k] + more
 
@@ -159,7 +160,7 @@ class FittedResponse(Response):
         depth, self._weights, self._smooth = self._course.reduced.tip[:, 2], [], []
         for k, basis in enumerate(self._bases):
             rows = self._within(k)
-            weights, smooth = self._solve(rows, streams[rows], self._design(basis, depth[rows]))
+            weights, smooth = self._solve(rows, streams[rows], self._design(basis, depth[rows]), basis)
             self._weights.append(weights)
             self._smooth.append(smooth)
 
@@ -202,8 +203,8 @@ class FittedResponse(Response):
         return self.context[self._read] == k
 
     def _solve(
-        self, rows: np.ndarray, values: np.ndarray, design: np.ndarray, smooth: np.ndarray | None = None,
-        before: np.ndarray | float = 0.0,
+        self, rows: np.ndarray, values: np.ndarray, design: np.ndarray, basis: BSpline,
+        smooth: np.ndarray | None = None, before: np.ndarray | float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Return spline weights, with an offset for every episode fitted beside and left out, and how smooth they are.
 
@@ -211,6 +212,7 @@ class FittedResponse(Response):
             rows: Which of the rows read, shape (m,), bool.
             values: Of them, shape (k, streams).
             design: Splines there, shape (k, splines).
+            basis: Those splines.
             smooth: Weight of bending, shape (streams,); by restricted maximum likelihood (REML), unless given.
             before: Weights that those returned are added to: together they should bend little.
         """
@@ -222,21 +224,19 @@ class FittedResponse(Response):
         scale = float(np.mean(np.diag(gram)))
         penalty = np.full(len(gram), RIDGE * scale)
         penalty[count:] = 1e-2 * scale  # offsets are small: the spline takes what they share
-        bend = np.zeros((max(count - 2, 0), len(gram)))
-        for k in range(len(bend)):
-            bend[k, k : k + 3] = 1.0, -2.0, 1.0
-        rough = bend.T @ bend
+        rough = np.zeros_like(gram)
+        rough[:count, :count] = _roughness(basis)
         # Both matrices are diagonal in these: one factorization for all weights of bending.
         inner = np.linalg.inv(np.linalg.cholesky(gram + np.diag(penalty) + LEAST_SMOOTHING * scale * rough)).T
         size, turn = np.linalg.eigh(inner.T @ rough @ inner)
-        size, basis = np.maximum(size, 0.0), inner @ turn
-        target = basis.T @ (matrix.T @ values)
+        size, across = np.maximum(size, 0.0), inner @ turn
+        target = across.T @ (matrix.T @ values)
         already = np.zeros((len(gram), values.shape[1]))
         already[:count] = before
-        bent = basis.T @ (rough @ already)
+        bent = across.T @ (rough @ already)
         if smooth is None:
             smooth = _smoothness(size, target, self._shaken**2)
-        weights = basis @ ((target - smooth * bent) / (1 + size[:, None] * smooth))
+        weights = across @ ((target - smooth * bent) / (1 + size[:, None] * smooth))
         return weights[:count], smooth
 
     def _both(self, pose: np.ndarray) -> np.ndarray:
@@ -289,6 +289,22 @@ class FittedResponse(Response):
             near = BSpline.design_matrix(np.full(len(depth), high - step), basis.t, 3).toarray()
             design = design + (design - near) * (beyond / step)[:, None]
         return design
+
+
+def _roughness(basis: BSpline) -> np.ndarray:
+    """Return the quadratic form of weights that is the integral of a spline's squared curvature, shape (k, k).
+
+    Curvature is told by divided differences of the weights (general P-splines: Li & Cao, arXiv 2201.06808, 2022). Plain
+    differences take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit
+    is that of plain differences between evenly spaced knots.
+    """
+    apart = np.diff((basis.t[1:-3] + basis.t[2:-2] + basis.t[3:-1]) / 3)
+    bend = np.zeros((len(apart) - 1, len(apart) + 1))
+    usual = float(np.median(apart))
+    for k, (before, after) in enumerate(pairwise(apart)):
+        scale = usual ** 1.5 / np.sqrt(0.5 * (before + after))
+        bend[k, k : k + 3] = scale / before, -scale / before - scale / after, scale / after
+    return bend.T @ bend
 
 
 def _smoothness(size: np.ndarray, target: np.ndarray, noise: np.ndarray) -> np.ndarray:

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pressing import course
+from scipy.interpolate import BSpline
 
 from tacdata.chain import predict
-from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.fitted_response import FittedResponse, _roughness
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, ErrorSizes
@@ -51,6 +52,38 @@ def test_slopes_are_told_through_the_noise():
         free.append(np.sqrt(np.mean(np.square(slope)[air])) / np.abs(true).max())
     assert np.mean(pressed) < 0.13
     assert np.mean(free) < 0.02
+
+
+def test_slopes_hold_where_all_presses_end():
+    """Most rows stand at the deepest depth. End knots taken for evenly spaced make it 2.5 times as steep there."""
+    made = course(noise=4.0)
+    deepest = made.tip[:, 2].max()
+    tip = made.tip.copy()
+    tip[:, 2] = np.minimum(tip[:, 2], 0.6 * deepest)
+    weights = np.array([[1.0, 0.5, 0.2], [0.2, 0.6, 1.0]])[made.row_site]
+    rise = 800 * weights * np.maximum(tip[:, 2:], 0.0) ** 1.5
+    gain = 1 + 0.01 * np.random.default_rng(3).normal(size=(made.episodes, 3))[made.episode]
+    noise = np.random.default_rng(4).normal(0.0, 4.0, made.readings.shape)
+    made = replace(made, tip=tip, readings=100.0 + gain * rise + noise)
+    response, step = FittedResponse(made), np.array([0.0, 0.0, 0.005])
+    slope = (response.load(made.tip + step, made.tool) - response.load(made.tip - step, made.tool)) / 0.01
+    at = tip[:, 2] > 0.999 * tip[:, 2].max()
+    true = 800 * 1.5 * weights * np.sqrt(np.maximum(tip[:, 2:], 0.0))
+    assert np.sqrt(np.mean(np.square(slope - true)[at]) / np.mean(np.square(true)[at])) < 0.2
+
+
+def test_a_straight_line_bends_nowhere():
+    """However knots lie: a penalty on it would pull its slope to another one."""
+    inner = np.array([0.0, 0.02, 0.05, 0.2, 0.6, 0.7, 1.0])
+    basis = BSpline(np.concatenate([[0.0] * 3, inner, [1.0] * 3]), np.zeros(len(inner) + 2), 3)
+    at = np.linspace(0.0, 1.0, 200)
+    design = BSpline.design_matrix(at, basis.t, 3).toarray()
+    rough = _roughness(basis)
+    bending = []
+    for power in (1.0, 2.0):
+        weights = np.linalg.lstsq(design, at**power, rcond=None)[0]
+        bending.append(float(weights @ rough @ weights))
+    assert bending[0] < 1e-12 * bending[1]
 
 
 def test_how_a_skin_is_first_touched_is_followed():
