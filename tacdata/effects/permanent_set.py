@@ -19,10 +19,13 @@ class PermanentSet(Effect):
     moves = ("label", "signal", "force")
     group = "depth offset"
     family = Family.SKIN_MEMORY
-    equation = "d -> d - e D_k / D (1 - exp(-k / 5)), k presses before at that place, D_k the deepest of them"
+    equation = "d -> d - e D_k / D (1 - exp(-k / n)), k presses before at that place, D_k the deepest of them"
     source = "standard form"
     experiment = "return to a place after a long rest; compare with one never pressed"
-    parameters = (Parameter("e", "mm", "final dent", 0.03, 0.0, 0.5),)
+    parameters = (
+        Parameter("e", "mm", "final dent", 0.03, 0.0, 0.5),
+        Parameter("n", "1", "presses until most of it is there", 3.0, 0.3, 100.0, grid=(1.0, 5.0, 25.0)),
+    )
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
@@ -34,7 +37,7 @@ class PermanentSet(Effect):
         for k in range(course.episodes):
             same = np.flatnonzero(course.site[:k] == course.site[k])
             if len(same):
-                dent[k] = -np.expm1(-len(same) / 5.0) * deepest[same].max() / course.span
+                dent[k] = -np.expm1(-len(same) / values["n"]) * deepest[same].max() / course.span
         shallower = state.pose - np.array([0.0, 0.0, 1.0]) * (values["e"] * dent[course.episode])[:, None]
         response, tool = state.response, course.tool
         load = response.load(shallower, tool) - response.load(state.pose, tool)

@@ -23,8 +23,10 @@ from tacdata.discrepancy.statistics.gram_fit import eliminated
 from tacdata.discrepancy.verdict.calibration import gains_beyond_calibration
 from tacdata.effects import Placed
 
-LEVEL_Z = 1.645
-"""Both tests: one-sided level of 5 % [standard errors]."""
+REFUTED_Z = 2.33
+"""A name is taken away at a one-sided level of 1 % [standard errors]: it has passed every other test."""
+SHOWN_Z = 1.645
+"""What no other test bears out is shown at a one-sided level of 5 % [standard errors]."""
 HALF = 0.5
 """Share of an answer at which sealed episodes are as likely with it as without [1]."""
 
@@ -62,15 +64,15 @@ class LikelihoodRatio:
         """Whether sealed episodes take the answer away.
 
         They are likelier without it. Their ratio is below what it is with the answer, by more than chance: one-sided,
-        5 %. So a model is tested by its likelihood ratio against another (Cox, Proc. 4th Berkeley Symposium 1, 1961,
+        1 %. So a model is tested by its likelihood ratio against another (Cox, Proc. 4th Berkeley Symposium 1, 1961,
         105). The answer's size has an error of its own (Chow, Econometrica 28, 1960, 591).
         """
-        return self.share < HALF and self.share + LEVEL_Z * self.error < 1
+        return self.share < HALF and self.share + REFUTED_Z * self.error < 1
 
     @property
     def bears_out(self) -> bool:
         """Whether sealed episodes show the answer: their ratio is above chance without it, at 5 %."""
-        return self.power > 0 and self.share > LEVEL_Z * float(np.sqrt(self.scatter / self.power))
+        return self.power > 0 and self.share > SHOWN_Z * float(np.sqrt(self.scatter / self.power))
 
     def document(self) -> dict[str, float | None]:
         """Return it as in the verdict."""
