@@ -295,8 +295,8 @@ def _roughness(basis: BSpline) -> np.ndarray:
     """Return the quadratic form of weights that is the integral of a spline's squared curvature, shape (k, k).
 
     Curvature is told by divided differences of the weights (general P-splines: Li & Cao, arXiv 2201.06808, 2022). Plain
-    differences take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit
-    is that of plain differences between evenly spaced knots.
+    ones take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit is
+    that of plain differences between evenly spaced knots.
     """
     apart = np.diff((basis.t[1:-3] + basis.t[2:-2] + basis.t[3:-1]) / 3)
     bend = np.zeros((len(apart) - 1, len(apart) + 1))

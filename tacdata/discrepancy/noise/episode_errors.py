@@ -12,14 +12,14 @@ from tacdata.discrepancy.noise import offset_random_walk, readings
 from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.offset_process import offset_process
 from tacdata.discrepancy.noise.repeats import repeats
-from tacdata.discrepancy.noise.variance_components import positive, spreads
+from tacdata.discrepancy.noise.variance_components import components, one_by_one, together
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.statistics.gram_fit import solve
 
 LEAST_SIZE, MOST_SIZE = 0.1, 10.0
 """Bounds of the estimated size of pose errors [standard deviations of their prior]."""
-UNINFORMED = 1e-4
-"""Information added to an episode's own: what it has no information on is unknown, not zero [1]."""
+TOGETHER = 4
+"""Successive episodes that share a mean where places are not visited again."""
 ODD_Z = 6.0
 """An episode is odd if its errors exceed the estimated spread by so many standard deviations [1]."""
 
@@ -87,42 +87,35 @@ class EpisodeErrors:
         best = self._best(columns, Whitener(self.course, known, self.context, self.features, errors))
         return (self.residual - self.rich @ best.astype(np.float32)).astype(np.float32)
 
-    def poses(self, known: Noise, errors: np.ndarray, sizes: np.ndarray, left: np.ndarray) -> ErrorSizes:
+    def poses(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> ErrorSizes:
         """Return the estimated size of episodes' own errors of pose.
 
-        An episode's errors are estimated by generalized least squares as if they were free, all kinds together. The
-        other episodes' have the sizes estimated so far. Differences of successive episodes that repeat one another
-        give the sizes: what goes with place, depth or rate is no error of an episode's own. Where places are not
-        visited again, any successive episodes do.
+        What goes with place, depth, rate or session is no error of an episode's own: those that repeat one another have
+        a mean of their own. Where places are not visited again, a few successive episodes have one.
 
         Args:
-            known: Noise.
+            known: Noise, with what an episode's gains err by.
             errors: What errors of one standard deviation of their prior change, shape (m, streams, kinds).
-            sizes: Sizes so far [prior's], shape (kinds,).
             left: What an over-rich fit leaves, shape (m, streams).
         """
-        whitener = Whitener(self.course, known, self.context, self.features, errors * sizes)
-        score, information = whitener.episode_scores(left, errors)
-        # Sealed episodes have no information.
-        there = np.flatnonzero(np.diagonal(information, axis1=1, axis2=2).min(axis=1) > 0)
-        place, score, information = self._places()[there], score[there], information[there]
-        if len(_successive(self._repeats[there])) < readings.FEWEST_GAPS:
-            return ErrorSizes(np.ones(len(sizes)), np.zeros(0, dtype=np.int64))
-        unsure = np.linalg.inv(information + UNINFORMED * np.eye(len(sizes)))
-        found = np.einsum("ekl,el->ek", unsure, score)
-        unsure = positive(unsure - np.diag(np.square(sizes)))
-
-        def size(group: np.ndarray) -> np.ndarray:
-            before, after = _successive(group).T
-            return spreads(found[after] - found[before], unsure[after] + unsure[before], LEAST_SIZE, MOST_SIZE)
-
-        estimated = size(self._repeats[there])
-        deviation = found - np.stack([np.median(found[place == p], axis=0) for p in place])
-        # Few pairs repeat one another: an odd episode among them makes the spread that hides it. A place has more.
-        usual = np.minimum(estimated, size(place))
-        spread = unsure + np.diag(np.square(usual))
-        far = np.einsum("ek,ek->e", deviation, np.linalg.solve(spread, deviation[:, :, None])[:, :, 0])
-        return ErrorSizes(estimated, there[far > ODD_Z**2])
+        course, kinds, place = self.course, errors.shape[2], self._places()
+        plain = Whitener(course, known, self.context, self.features, np.zeros_like(errors[:, :, :1]))
+        told = plain.joint_scores(left, errors)
+        there = np.sort(np.concatenate([run.episodes for run in told]))
+        groups, places = [self._repeats, course.session], [place, course.session]
+        if _freedom(there, groups) < readings.FEWEST_GAPS:
+            number = np.zeros(course.episodes, dtype=np.int64)
+            number[there] = np.arange(len(there)) // TOGETHER
+            told, groups, places = one_by_one(told), [number], [number]
+        if _freedom(there, groups) < readings.FEWEST_GAPS:
+            return ErrorSizes(np.ones(kinds), np.zeros(0, dtype=np.int64))
+        told = together(told)
+        estimated = components(told, groups, LEAST_SIZE, MOST_SIZE).sizes
+        # Few repeat one another: an odd episode among them makes the size that hides it. A place has more.
+        each = components(told, places, LEAST_SIZE, MOST_SIZE)
+        spread = each.unsure + np.diag(np.square(np.minimum(estimated, each.sizes)))
+        far = np.einsum("ek,ek->e", each.own, np.linalg.solve(spread, each.own[:, :, None])[:, :, 0])
+        return ErrorSizes(estimated, np.sort(each.episodes[far > ODD_Z**2]))
 
     def gains(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's that repeats it [1].
@@ -163,10 +156,7 @@ def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray
     return [course.session, place] if fitted else [course.session]
 
 
-def _successive(group: np.ndarray) -> np.ndarray:
-    """Return pairs of successive episodes of one group, shape (pairs, 2); of any, where groups make too few."""
-    order = np.argsort(group, kind="stable")
-    pairs = np.stack([order[:-1], order[1:]], axis=1)
-    again = np.diff(group[order]) == 0
-    every = np.arange(max(len(group) - 1, 0))
-    return pairs[again] if again.sum() >= readings.FEWEST_GAPS else np.stack([every, every + 1], axis=1)
+def _freedom(episodes: np.ndarray, groups: list[np.ndarray]) -> int:
+    """Return how many episodes there are beyond the means of their groups."""
+    means = np.concatenate([group[episodes, None] == np.unique(group[episodes]) for group in groups], axis=1)
+    return len(episodes) - int(np.linalg.matrix_rank(means.astype(float)))

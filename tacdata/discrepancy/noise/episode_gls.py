@@ -14,9 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 RIDGE = 1e-7
 """Ridge of what no row excites, over the mean of what rows do [1]."""
+MOST_TOGETHER = 40
+"""Most episodes of a place whose scores are told together: the cost grows with the cube."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,18 @@ class EpisodeErrorModel:
     and the offsets, are alike in all streams."""
     random_walk: np.ndarray | None = None
     """What one standard deviation of each mode of a stream's random walk changes [1], shape (streams, n, modes)."""
+
+
+@dataclass(frozen=True)
+class JointScores:
+    """What a residual says of columns of which each episode has its own, and how much it knows."""
+
+    episodes: np.ndarray
+    """Numbers of the episodes, shape (n,), int64."""
+    score: np.ndarray
+    """Products of the columns with the residual [1], shape (n, k)."""
+    information: np.ndarray
+    """Products of the columns, episode by episode [1], shape (n k, n k)."""
 
 
 class FactoredErrors:
@@ -96,27 +111,31 @@ class FactoredErrors:
         for k, (rows, _, _) in enumerate(self._episodes):
             white[:, rows] -= self._free.fitted(k, weights)
 
-    def episode_scores(self, left: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return scores and information of columns, each episode by itself.
+    def joint_scores(self, left: np.ndarray, columns: np.ndarray) -> list[JointScores]:
+        """Return scores and information of columns of which each episode has its own, episodes of a run together.
 
         Args:
             left: A residual, as `without` returns it, shape (streams, n).
             columns: Whitened, shape (streams, n, k).
-
-        Returns:
-            Scores, shape (episodes, k), and information, shape (episodes, k, k).
         """
-        scores, known = [], []
-        for k, (rows, offsets, errors) in enumerate(self._episodes):
-            own, rest = offsets.rooted(columns[:, rows]), left[:, rows]
-            inner = errors.inner(own)
-            turned = np.linalg.solve(np.eye(len(errors.gram)) + errors.gram, inner)
-            pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
-            scores.append(np.einsum("smk,sm->k", own, rest, dtype=np.float64) - inner.T @ pulled)
-            flat = own.reshape(-1, own.shape[2]).astype(np.float64)
-            power = flat.T @ flat - inner.T @ turned
-            known.append(power if self._free is None else power - self._free.taken_of_all(k, own, turned))
-        return np.array(scores), np.array(known)
+        runs = []
+        for first in range(0, len(self._episodes), MOST_TOGETHER):
+            scores, powers, rights = [], [], []
+            for k, (rows, offsets, errors) in enumerate(self._episodes[first : first + MOST_TOGETHER], first):
+                own, rest = offsets.rooted(columns[:, rows]), left[:, rows]
+                inner = errors.inner(own)
+                turned = np.linalg.solve(np.eye(len(errors.gram)) + errors.gram, inner)
+                pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
+                scores.append(np.einsum("smk,sm->k", own, rest, dtype=np.float64) - inner.T @ pulled)
+                flat = own.reshape(-1, own.shape[2]).astype(np.float64)
+                powers.append(flat.T @ flat - inner.T @ turned)
+                if self._free is not None:
+                    rights.append(self._free.right(k, own, turned))
+            information = block_diag(*powers)
+            if self._free is not None:
+                information = information - self._free.taken_of_all(np.concatenate(rights, axis=2))
+            runs.append(JointScores(np.arange(first, first + len(scores)), np.array(scores), information))
+        return runs
 
     def stream_scores(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return scores and information of columns that each stand in one stream of one episode.
@@ -282,10 +301,13 @@ class _Free:
         pulled = self._joint.T @ alone.reshape(len(self._joint), -1)
         return alone + self._through @ (self._inner @ pulled)
 
-    def taken_of_all(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
-        """Return how much of columns (streams, m, k) of an episode features take up, (k, k); ``turned`` (T, k)."""
-        right = (self._shared[episode].transpose(0, 2, 1) @ own).astype(np.float64) - self._joints[episode] @ turned
-        return np.einsum("spk,spl->kl", right, self._solved(right))
+    def right(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
+        """Return products of features and an episode's columns (streams, m, k), (streams, p, k); ``turned`` (T, k)."""
+        return (self._shared[episode].transpose(0, 2, 1) @ own).astype(np.float64) - self._joints[episode] @ turned
+
+    def taken_of_all(self, right: np.ndarray) -> np.ndarray:
+        """Return how much of columns features take up, shape (k, k); their products with features (streams, p, k)."""
+        return np.einsum("spk,spl->kl", right, self._solved(right), optimize=True)
 
     def taken(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
         """Return how much of columns in one stream of an episode features take up, shape (streams,).

@@ -185,7 +185,7 @@ def null_model(setting: Setting) -> NullModel:
         known = replace(known, gain_error=None)
         spread = measured.gains(known, errors, left)
         known = replace(known, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
-        own = measured.poses(known, prior, own.sizes, left)
+        own = measured.poses(known, prior, left)
         errors = prior * own.sizes
         now = np.array([*own.sizes, max(spread, LEAST_GAIN_ERROR)])
         if np.all(np.abs(now - before) <= SETTLED * now):

@@ -1,61 +1,174 @@
-"""Variance components: the size of several kinds of episode errors, estimated together by a robust likelihood."""
+"""Variance components: the sizes of several kinds of episode errors, by restricted maximum likelihood (REML).
+
+The errors e of a run of episodes tell the scores S = I e + noise of covariance I, I their joint information. Errors are
+the mean of a group of episodes, which is free, and each episode's own: e = G m + u. The sizes of u are those under
+which S is likeliest, all kinds and episodes at once (Patterson & Thompson, Biometrika 58, 1971, 545). Kinds that change
+readings almost alike explain each other. So do episodes of one place, which share its response.
+"""
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize, root_scalar
-from scipy.stats import chi2
+from scipy.linalg import block_diag, cholesky, solve_triangular
+from scipy.optimize import minimize
 
-T_FREEDOM = 4.0
-"""Degrees of freedom of the t likelihood: a few odd episodes hardly count [1]."""
-STARTS = (0.2, 1.0, 3.0)
-"""Standard deviations from which the likelihood is climbed [1]."""
+from tacdata.discrepancy.noise.episode_gls import JointScores
+
+FREE = 100.0
+"""Prior standard deviation of a group's mean: practically free [expected size of an episode's own error]."""
+SURE = 2.0
+"""Sizes are expected within so many e-folds of 1: few episodes say little of them [1]."""
+USUAL = 4.0
+"""An episode whose errors' mean square exceeds the size's by more counts the less [1]."""
+ROUNDS = 4
+"""Most estimates of what each episode counts..."""
+SETTLED = 0.05
+"""...until none changes by more [1]."""
+MOST_TOGETHER = 48
+"""Most episodes that groups span: the cost grows with the cube."""
+ROUNDED = 1e-6
+"""Information that is less, over the largest, is rounding [1]."""
+UNINFORMED = 1e-4
+"""Information added to an episode's own: what it has no information on is unknown, not zero [1]."""
 
 
-def spreads(gaps: np.ndarray, known: np.ndarray, least: float, most: float) -> np.ndarray:
-    """Return the standard deviation of each kind of error beyond what is known of it, shape (kinds,).
+@dataclass(frozen=True)
+class Components:
+    """Sizes of errors, and the errors themselves."""
 
-    Successive errors e of independent kinds differ with covariance 2 diag(s^2) + K, K known: the s of largest
-    likelihood, all at once, as kinds that change readings almost alike explain each other. The likelihood is that
-    of a multivariate t distribution, scaled to be consistent for normal differences (Maronna, Ann. Stat. 4, 1976).
+    sizes: np.ndarray
+    """Standard deviation of each kind [its prior's], shape (kinds,)."""
+    episodes: np.ndarray
+    """Numbers of the episodes, shape (n,), int64."""
+    own: np.ndarray
+    """Each one's own errors, as they would be told without any expectation of them, shape (n, kinds)."""
+    unsure: np.ndarray
+    """Their covariance, shape (n, kinds, kinds)."""
+
+
+def components(told: Sequence[JointScores], groups: Sequence[np.ndarray], least: float, most: float) -> Components:
+    """Return the sizes of episodes' own errors.
+
+    A few episodes unlike all others hardly count: each has a weight by how far it is off (multivariate t, but only for
+    those beyond `USUAL`; Pinheiro, Liu & Wu, J. Comput. Graph. Stat. 10, 2001, 249).
 
     Args:
-        gaps: Differences of successive errors, shape (n, kinds).
-        known: Covariance of each that is known, shape (n, kinds, kinds).
-        least: Least spread.
-        most: Largest spread.
+        told: Runs of episodes.
+        groups: Kinds of groups with a mean of their own, each as the number of the one that an episode has.
+        least: Least size.
+        most: Largest size.
     """
-    kinds = gaps.shape[1]
-    scale = T_FREEDOM * _consistent(kinds)
+    told, kinds = [_sound(run) for run in told], told[0].score.shape[1]
+    shared = [_shared(run.episodes, groups, kinds) for run in told]
+    weights = [np.ones(len(run.episodes)) for run in told]
+    log = np.zeros(kinds)
+    for _ in range(ROUNDS):
+        given = (told, shared, weights)
+        found = minimize(_unlikely, log, given, method="L-BFGS-B", bounds=[(np.log(least), np.log(most))] * kinds)
+        log, before = found.x, weights
+        posterior = [_posterior(run, mean, own, log) for run, mean, own in zip(*given, strict=True)]
+        weights = [_weights(errors, spread, log) for errors, spread in posterior]
+        if max(np.abs(new - old).max() for new, old in zip(weights, before, strict=True)) <= SETTLED:
+            break
+    alone = [_alone(*one, own, log) for one, own in zip(posterior, before, strict=True)]
+    own, unsure = (np.concatenate([one[k] for one in alone]) for k in (0, 1))
+    return Components(np.exp(log), np.concatenate([run.episodes for run in told]), own, unsure)
 
-    def unlikely(log: np.ndarray) -> float:
-        whole = known + 2 * np.diag(np.exp(2 * log))
-        far = np.einsum("nk,nk->n", gaps, np.linalg.solve(whole, gaps[:, :, None])[:, :, 0])
-        _, volume = np.linalg.slogdet(whole)
-        return float(0.5 * np.sum(volume + (T_FREEDOM + kinds) * np.log1p(far / scale)))
 
-    bounds = [(np.log(least), np.log(most))] * kinds
-    tried = [
-        minimize(unlikely, np.full(kinds, np.log(np.clip(s, least, most))), method="L-BFGS-B", bounds=bounds)
-        for s in STARTS
-    ]
-    return np.exp(min(tried, key=lambda one: float(one.fun)).x)
+def together(told: Sequence[JointScores]) -> list[JointScores]:
+    """Return runs laid together, `MOST_TOGETHER` episodes at most, unless one has more: groups span them."""
+    packs: list[list[JointScores]] = []
+    for run in told:
+        if not packs or sum(len(one.episodes) for one in packs[-1]) + len(run.episodes) > MOST_TOGETHER:
+            packs.append([])
+        packs[-1].append(run)
+    return [
+        JointScores(
+            np.concatenate([run.episodes for run in pack]), np.concatenate([run.score for run in pack]),
+            block_diag(*(run.information for run in pack)),
+        )
+        for pack in packs
+    ]  # fmt: skip
 
 
-def positive(matrices: np.ndarray) -> np.ndarray:
+def one_by_one(told: Sequence[JointScores]) -> list[JointScores]:
+    """Return a run for each episode, in their order: what it says by itself."""
+    kinds, each = told[0].score.shape[1], []
+    for run in told:
+        for k, episode in enumerate(run.episodes):
+            at = slice(k * kinds, (k + 1) * kinds)
+            each.append(JointScores(np.array([episode]), run.score[k : k + 1], run.information[at, at]))
+    return sorted(each, key=lambda one: int(one.episodes[0]))
+
+
+def _sound(run: JointScores) -> JointScores:
+    """Return a run without information that is rounding: what a response takes up is known of no episode."""
+    values, vectors = np.linalg.eigh(0.5 * (run.information + run.information.T))
+    kept = values > ROUNDED * max(float(values[-1]), 1e-300)
+    inside = vectors[:, kept]
+    score = inside @ (inside.T @ run.score.ravel())
+    return replace(run, score=score.reshape(run.score.shape), information=(inside * values[kept]) @ inside.T)
+
+
+def _shared(episodes: np.ndarray, groups: Sequence[np.ndarray], kinds: int) -> np.ndarray:
+    """Return the prior covariance of the groups' means, as episodes have them, shape (n kinds, n kinds)."""
+    same = np.sum([group[episodes][:, None] == group[episodes] for group in groups], axis=0)
+    return np.kron(FREE**2 * same, np.eye(kinds))
+
+
+def _covariance(shared: np.ndarray, weights: np.ndarray, log: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the prior variance of episodes' own errors, shape (n kinds,), and the covariance of all."""
+    own = (np.exp(2 * log) / weights[:, None]).ravel()
+    return own, shared + np.diag(own)
+
+
+def _unlikely(
+    log: np.ndarray, told: Sequence[JointScores], shared: list[np.ndarray], weights: list[np.ndarray]
+) -> float:  # fmt: skip
+    """Return the negative logarithm of how likely sizes are, given as logarithms."""
+    cost = 0.5 * float(np.sum(np.square(log / SURE)))
+    for run, mean, counts in zip(told, shared, weights, strict=True):
+        root = cholesky(_covariance(mean, counts, log)[1], lower=True, check_finite=False)
+        factor = cholesky(np.eye(len(root)) + root.T @ run.information @ root, lower=True, check_finite=False)
+        seen = solve_triangular(factor, root.T @ run.score.ravel(), lower=True, check_finite=False)
+        cost += float(np.log(np.diag(factor)).sum()) - 0.5 * float(seen @ seen)
+    return cost
+
+
+def _posterior(
+    run: JointScores, mean: np.ndarray, counts: np.ndarray, log: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return episodes' own errors, shape (n, kinds), and the covariance of each one's, shape (n, kinds, kinds)."""
+    count, kinds = run.score.shape
+    own, every = _covariance(mean, counts, log)
+    inner = np.linalg.inv(np.eye(len(every)) + run.information @ every)
+    errors = own * (inner @ run.score.ravel())
+    spread = np.diag(own) - own[:, None] * (inner @ run.information) * own
+    blocks = spread.reshape(count, kinds, count, kinds)[np.arange(count), :, np.arange(count)]
+    return errors.reshape(count, kinds), blocks
+
+
+def _weights(errors: np.ndarray, spread: np.ndarray, log: np.ndarray) -> np.ndarray:
+    """Return what each episode counts, shape (n,)."""
+    power = np.square(errors) + np.diagonal(spread, axis1=1, axis2=2)
+    return np.minimum(1.0, USUAL / np.maximum(np.mean(power / np.exp(2 * log), axis=1), 1e-12))
+
+
+def _alone(
+    errors: np.ndarray, spread: np.ndarray, counts: np.ndarray, log: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return errors and their covariance without the expectation of an episode's own."""
+    kinds = errors.shape[1]
+    inverse = np.linalg.inv(0.5 * (spread + np.swapaxes(spread, 1, 2)))
+    prior = counts[:, None, None] * np.diag(np.exp(-2 * log))
+    unsure = np.linalg.inv(_positive(inverse - prior) + UNINFORMED * np.eye(kinds))
+    return np.einsum("ekl,elm,em->ek", unsure, inverse, errors), unsure
+
+
+def _positive(matrices: np.ndarray) -> np.ndarray:
     """Return symmetric matrices (n, k, k) with what is negative of them taken as 0."""
     values, vectors = np.linalg.eigh(0.5 * (matrices + np.swapaxes(matrices, 1, 2)))
-    return (vectors * np.maximum(values, 1e-9)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-
-
-@cache
-def _consistent(kinds: int) -> float:
-    """Return the factor of the t distribution's scale that is consistent for normal numbers [1]."""
-    at = chi2.ppf((np.arange(4000) + 0.5) / 4000, kinds)
-
-    def bias(scale: float) -> float:
-        return float(np.mean((T_FREEDOM + kinds) * at / (T_FREEDOM * scale + at))) - kinds
-
-    return float(root_scalar(bias, bracket=(0.1, 20.0)).root)
+    return (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.noise.episode_gls import EpisodeErrorModel, FactoredErrors
+from tacdata.discrepancy.noise.episode_gls import EpisodeErrorModel, FactoredErrors, JointScores
 from tacdata.discrepancy.noise.gram import EpisodeGrams
 from tacdata.discrepancy.noise.noise_model import Noise
 
@@ -197,27 +197,25 @@ class Whitener:
             score[place.episodes, : self._seen], known[place.episodes, : self._seen] = own
         return score, np.maximum(known, 0.0)
 
-    def episode_scores(self, residual: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return scores and information of columns, each episode by itself.
+    def joint_scores(self, residual: np.ndarray, columns: np.ndarray) -> list[JointScores]:
+        """Return scores and information of columns of which each episode has its own, place by place.
 
         Args:
             residual: Shape (n, streams).
             columns: Shape (n, streams, k).
-
-        Returns:
-            Scores, shape (episodes, k), and information, shape (episodes, k, k) [1]; 0 where nothing is known.
         """
-        count = columns.shape[2]
-        score, known = np.zeros((self._course.episodes, count)), np.zeros((self._course.episodes, count, count))
-        white = self._colour.white(columns, slice(None))
+        found, white = [], self._colour.white(columns, slice(None))
         for place, part in self._parts(residual[:, :, None]):
-            episodes, own = place.episodes, _turned(white[place.rows])
-            score[episodes], known[episodes] = place.seen.episode_scores(part[: self._seen, :, 0], own[: self._seen])
+            own = _turned(white[place.rows])
+            runs = place.seen.joint_scores(part[: self._seen, :, 0], own[: self._seen])
             if place.tag is not None:
-                more = place.tag.episode_scores(part[self._seen :, :, 0], own[self._seen :])
-                score[episodes] += more[0]
-                known[episodes] += more[1]
-        return score, known
+                more = place.tag.joint_scores(part[self._seen :, :, 0], own[self._seen :])
+                runs = [
+                    replace(run, score=run.score + tag.score, information=run.information + tag.information)
+                    for run, tag in zip(runs, more, strict=True)
+                ]
+            found += [replace(run, episodes=place.episodes[run.episodes]) for run in runs]
+        return found
 
     def _of_seen(self) -> Noise:
         noise, seen = self._noise, self._seen

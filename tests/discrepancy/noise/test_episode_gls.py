@@ -138,13 +138,14 @@ def test_columns_in_one_stream_of_an_episode_are_told_like_any_others(free):
     factored, alone = FactoredErrors(spans, own), parts["gain_error"]
     left = taken_out(factored, parts["columns"])[:, :, 0]
     score, information = factored.stream_scores(left, alone)
-    joint = factored.episode_scores(left, parts["columns"][:, :, :2])
+    (joint,) = factored.joint_scores(left, parts["columns"][:, :, :2])
+    every = np.zeros((STREAMS, sum(LENGTHS), 2 * len(spans)))
     for e, rows in enumerate(spans):
-        of_all = np.zeros((STREAMS, sum(LENGTHS), 2))
-        of_all[:, rows] = parts["columns"][:, rows, :2]
-        white = taken_out(factored, of_all)
-        assert joint[0][e] == pytest.approx(np.einsum("snk,sn->k", white, left), rel=1e-4, abs=1e-6)
-        assert joint[1][e] == pytest.approx(np.einsum("snk,snl->kl", white, white), rel=1e-4, abs=1e-3)
+        every[:, rows, 2 * e : 2 * e + 2] = parts["columns"][:, rows, :2]
+    white = taken_out(factored, every)
+    assert joint.score.ravel() == pytest.approx(np.einsum("snk,sn->k", white, left), rel=1e-4, abs=1e-6)
+    assert joint.information == pytest.approx(np.einsum("snk,snl->kl", white, white), rel=1e-4, abs=1e-3)
+    for e, rows in enumerate(spans):
         for s in range(STREAMS):
             column = np.zeros((*alone.shape, 1))
             column[s, rows, 0] = alone[s, rows]
