@@ -34,6 +34,9 @@ REML_STEPS = 30
 """REML: steps to the weight of bending."""
 MOST_SMOOTHING = 1e9
 """REML: largest weight of bending [1]."""
+SLOPES = 10.0
+"""REML: noise is taken for so many times its variance. What moves the tip shows by slopes, which need more smoothing than
+values do. What a smoother response misses of the values is projected out [1]."""
 CACHED = 6
 """Evaluations remembered: most effects leave the pose alone."""
 FORM_ERROR = 0.15
@@ -235,7 +238,7 @@ class FittedResponse(Response):
         already[:count] = before
         bent = across.T @ (rough @ already)
         if smooth is None:
-            smooth = _smoothness(size, target, self._shaken**2)
+            smooth = _smoothness(size, target, SLOPES * self._shaken**2)
         weights = across @ ((target - smooth * bent) / (1 + size[:, None] * smooth))
         return weights[:count], smooth
 
