@@ -35,8 +35,8 @@ REML_STEPS = 30
 MOST_SMOOTHING = 1e9
 """REML: largest weight of bending [1]."""
 SLOPES = 10.0
-"""REML: noise is taken for so many times its variance. What moves the tip shows by slopes, which need more smoothing than
-values do. What a smoother response misses of the values is projected out [1]."""
+"""REML: noise is taken for so many times its variance. What moves the tip shows by slopes, which need more smoothing
+than values do. What a smoother response misses of the values is projected out [1]."""
 CACHED = 6
 """Evaluations remembered: most effects leave the pose alone."""
 FORM_ERROR = 0.15
