@@ -13,6 +13,7 @@ from tacdata.chain import Course
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
 from tacdata.discrepancy.noise.nuisances import FITTED_DEPTH_PRIOR, POSE_PRIOR
+from tacdata.discrepancy.noise.variance_components import one_by_one
 from tacdata.discrepancy.search.problem import Problem
 
 FEWEST = 16
@@ -78,10 +79,13 @@ def estimates(problem: Problem) -> tuple[np.ndarray, np.ndarray, np.ndarray, flo
     """Return presses, each one's error of depth and how far that is unsure [estimated spread], and this in mm."""
     null, setting = problem.null, problem.setting
     whitener = null.whitener_for(setting, [*setting.given, *problem.placed])
-    score, known = whitener.episode_scores(np.nan_to_num(problem.board.columns[0]), null.errors)
-    there = np.flatnonzero(np.diagonal(known, axis1=1, axis2=2).min(axis=1) > 0)
-    unsure = np.linalg.inv(known[there] + UNINFORMED * np.eye(known.shape[1]))
-    found = np.einsum("ekl,el->ek", unsure, score[there])[:, 0]
+    each = one_by_one(whitener.joint_scores(np.nan_to_num(problem.board.columns[0]), null.errors))
+    each = [one for one in each if np.diagonal(one.information).min() > 0]  # sealed presses say nothing
+    there = np.array([one.episodes[0] for one in each], dtype=np.int64)
+    kinds = null.errors.shape[2]
+    known = np.array([one.information for one in each]).reshape(-1, kinds, kinds)
+    unsure = np.linalg.inv(known + UNINFORMED * np.eye(kinds))
+    found = np.einsum("ekl,el->ek", unsure, np.array([one.score[0] for one in each]).reshape(-1, kinds))[:, 0]
     error = np.sqrt(np.maximum(unsure[:, 0, 0] - 1.0, 0.0))  # the spread itself is in it
     prior = FITTED_DEPTH_PRIOR * setting.course.stroke if setting.response.fitted else POSE_PRIOR[2]
     size = 1.0 if null.sizes is None else float(null.sizes[0])
