@@ -31,10 +31,10 @@ def changed(made, change):
     return replace(made, readings=readings)
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("noise", [0.5, 3.0])
-def test_ordinary_presses_raise_none(seed, noise):
-    assert seen(course(seed=seed, episodes=30, noise=noise)) == []
+def test_ordinary_presses_raise_hardly_any():
+    """Five tests at a level of 1 in 1,000: more than one in twelve is no chance (2 in 1,000)."""
+    raised = [seen(course(seed=seed, episodes=30, noise=noise)) for seed in range(6) for noise in (0.5, 3.0)]
+    assert sum(bool(words) for words in raised) <= 1, raised
 
 
 def test_what_a_cable_adds_is_seen_on_its_channels():
