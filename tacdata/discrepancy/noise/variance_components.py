@@ -44,9 +44,9 @@ class Components:
     episodes: np.ndarray
     """Numbers of the episodes, shape (n,), int64."""
     own: np.ndarray
-    """Each one's own errors, as they would be told without any expectation of them, shape (n, kinds)."""
+    """Each one's own errors, as they would be told without any expectation of them [1], shape (n, kinds)."""
     unsure: np.ndarray
-    """Their covariance, shape (n, kinds, kinds)."""
+    """Their covariance [1], shape (n, kinds, kinds)."""
 
 
 def components(told: Sequence[JointScores], groups: Sequence[np.ndarray], least: float, most: float) -> Components:

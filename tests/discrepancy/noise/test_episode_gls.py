@@ -189,5 +189,5 @@ def test_features_that_are_alike_in_all_streams_are_given_once():
     left = taken_out(each, parts["columns"])
     assert np.abs(left - parts["columns"]).max() > 0.1
     assert taken_out(once, parts["columns"]) == pytest.approx(left, abs=1e-5)
-    scores = [factored.episode_scores(left[:, :, 0], parts["columns"]) for factored in (once, each)]
-    assert scores[0][1] == pytest.approx(scores[1][1], rel=1e-4, abs=1e-4)
+    (first,), (second,) = (factored.joint_scores(left[:, :, 0], parts["columns"]) for factored in (once, each))
+    assert first.information == pytest.approx(second.information, rel=1e-4, abs=1e-4)
