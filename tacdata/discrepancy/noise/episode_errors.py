@@ -32,6 +32,8 @@ class ErrorSizes:
     """Standard deviation of each kind of error [its prior's], shape (kinds,)."""
     odd: np.ndarray
     """Episodes that err by far more than the others, shape (k,), int64."""
+    counts: np.ndarray
+    """What each episode counts among the others of its place [1], shape (episodes,)."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class EpisodeErrors:
         tag = readings.tag_offset_spread(rest, course, known)
         return replace(known, offsets=process, random_walk=walk, walk_rate=rate, tag=tag)
 
-    def left(self, known: Noise, errors: np.ndarray) -> np.ndarray:
+    def left(self, known: Noise, errors: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
         """Return what an over-rich fit leaves of the residual, shape (m, streams), float32.
 
         Its weights hardly depend on the sizes of the errors beside it: one fit serves all their estimates.
@@ -82,9 +84,10 @@ class EpisodeErrors:
         Args:
             known: Noise.
             errors: Of pose, shape (m, streams, kinds).
+            counts: What each episode counts, shape (episodes,); all alike, unless given.
         """
         columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
-        best = self._best(columns, Whitener(self.course, known, self.context, self.features, errors))
+        best = self._best(columns, Whitener(self.course, known, self.context, self.features, errors), counts)
         return (self.residual - self.rich @ best.astype(np.float32)).astype(np.float32)
 
     def poses(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> ErrorSizes:
@@ -107,15 +110,17 @@ class EpisodeErrors:
             number = np.zeros(course.episodes, dtype=np.int64)
             number[there] = np.arange(len(there)) // TOGETHER
             told, groups, places = one_by_one(told), [number], [number]
+        counts = np.ones(course.episodes)
         if _freedom(there, groups) < readings.FEWEST_GAPS:
-            return ErrorSizes(np.ones(kinds), np.zeros(0, dtype=np.int64))
+            return ErrorSizes(np.ones(kinds), np.zeros(0, dtype=np.int64), counts)
         told = together(told)
         estimated = components(told, groups, LEAST_SIZE, MOST_SIZE).sizes
         # Few repeat one another: an odd episode among them makes the size that hides it. A place has more.
         each = components(told, places, LEAST_SIZE, MOST_SIZE)
         spread = each.unsure + np.diag(np.square(np.minimum(estimated, each.sizes)))
         far = np.einsum("ek,ek->e", each.own, np.linalg.solve(spread, each.own[:, :, None])[:, :, 0])
-        return ErrorSizes(estimated, np.sort(each.episodes[far > ODD_Z**2]))
+        counts[each.episodes] = each.counts
+        return ErrorSizes(estimated, np.sort(each.episodes[far > ODD_Z**2]), counts)
 
     def gains(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's that repeats it [1].
@@ -138,10 +143,11 @@ class EpisodeErrors:
         place[self.course.episode] = self.context
         return place
 
-    def _best(self, columns: np.ndarray, whitener: Whitener) -> np.ndarray:
+    def _best(self, columns: np.ndarray, whitener: Whitener, counts: np.ndarray | None = None) -> np.ndarray:
         """Return the weights of the over-rich columns that fit best, shape (k,)."""
         count = self.rich.shape[2]
-        gram = whitener.episode_grams(columns).of(np.arange(self.course.episodes))
+        each = whitener.episode_grams(columns).gram
+        gram = each.sum(axis=0) if counts is None else np.einsum("e,eij->ij", counts, each)
         free = np.full(count, np.inf)
         return solve(gram, np.arange(count), np.ones(count), -free, free)
 

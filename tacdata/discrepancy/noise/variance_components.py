@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.linalg import block_diag, cholesky, solve_triangular
-from scipy.optimize import minimize
+from scipy.optimize import minimize, root_scalar
+from scipy.stats import chi2
 
 from tacdata.discrepancy.noise.episode_gls import JointScores
 
@@ -21,9 +23,9 @@ FREE = 100.0
 """Prior standard deviation of a group's mean: practically free [expected size of an episode's own error]."""
 SURE = 2.0
 """Sizes are expected within so many e-folds of 1: few episodes say little of them [1]."""
-USUAL = 4.0
-"""An episode whose errors' mean square exceeds the size's by more counts the less [1]."""
-ROUNDS = 4
+T_FREEDOM = 4.0
+"""Degrees of freedom of the t distribution by which episodes count: a few odd ones hardly do [1]."""
+ROUNDS = 20
 """Most estimates of what each episode counts..."""
 SETTLED = 0.05
 """...until none changes by more [1]."""
@@ -47,13 +49,15 @@ class Components:
     """Each one's own errors, as they would be told without any expectation of them [1], shape (n, kinds)."""
     unsure: np.ndarray
     """Their covariance [1], shape (n, kinds, kinds)."""
+    counts: np.ndarray
+    """What each episode counts [1], shape (n,)."""
 
 
 def components(told: Sequence[JointScores], groups: Sequence[np.ndarray], least: float, most: float) -> Components:
     """Return the sizes of episodes' own errors.
 
-    A few episodes unlike all others hardly count: each has a weight by how far it is off (multivariate t, but only for
-    those beyond `USUAL`; Pinheiro, Liu & Wu, J. Comput. Graph. Stat. 10, 2001, 249).
+    A few episodes unlike all others hardly count: each has a weight by how far it is off (multivariate t: Pinheiro, Liu
+    & Wu, J. Comput. Graph. Stat. 10, 2001, 249). It is scaled to be consistent for normal errors.
 
     Args:
         told: Runs of episodes.
@@ -75,7 +79,7 @@ def components(told: Sequence[JointScores], groups: Sequence[np.ndarray], least:
             break
     alone = [_alone(*one, own, log) for one, own in zip(posterior, before, strict=True)]
     own, unsure = (np.concatenate([one[k] for one in alone]) for k in (0, 1))
-    return Components(np.exp(log), np.concatenate([run.episodes for run in told]), own, unsure)
+    return Components(np.exp(log), np.concatenate([run.episodes for run in told]), own, unsure, np.concatenate(weights))
 
 
 def together(told: Sequence[JointScores]) -> list[JointScores]:
@@ -153,8 +157,9 @@ def _posterior(
 
 def _weights(errors: np.ndarray, spread: np.ndarray, log: np.ndarray) -> np.ndarray:
     """Return what each episode counts, shape (n,)."""
-    power = np.square(errors) + np.diagonal(spread, axis1=1, axis2=2)
-    return np.minimum(1.0, USUAL / np.maximum(np.mean(power / np.exp(2 * log), axis=1), 1e-12))
+    kinds = errors.shape[1]
+    power = np.sum((np.square(errors) + np.diagonal(spread, axis1=1, axis2=2)) / np.exp(2 * log), axis=1)
+    return (T_FREEDOM + kinds) / (T_FREEDOM * _consistent(kinds) + power)
 
 
 def _alone(
@@ -172,3 +177,14 @@ def _positive(matrices: np.ndarray) -> np.ndarray:
     """Return symmetric matrices (n, k, k) with what is negative of them taken as 0."""
     values, vectors = np.linalg.eigh(0.5 * (matrices + np.swapaxes(matrices, 1, 2)))
     return (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+
+
+@cache
+def _consistent(kinds: int) -> float:
+    """Return the factor of the t distribution's scale that is consistent for normal numbers [1]."""
+    at = chi2.ppf((np.arange(4000) + 0.5) / 4000, kinds)
+
+    def bias(scale: float) -> float:
+        return float(np.mean((T_FREEDOM + kinds) * at / (T_FREEDOM * scale + at))) - kinds
+
+    return float(root_scalar(bias, bracket=(0.1, 20.0)).root)
