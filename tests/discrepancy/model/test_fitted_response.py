@@ -202,7 +202,7 @@ def test_errors_of_an_episode_hold_no_effect_of_another_model(monkeypatch):
     """Beside large errors of gain a model without relaxation must not take it for every episode's own error."""
     made = course(relaxed=0.15, hold=4.0, pulls=False)
     setting, effect = Setting(made, FittedResponse(made), []), load("relaxation_read")
-    sizes = ErrorSizes(np.array([1.0, 10.0]), np.zeros(0, dtype=np.int64))
+    sizes = ErrorSizes(np.array([1.0, 10.0]), np.zeros(0, dtype=np.int64), np.ones(made.episodes))
     monkeypatch.setattr(EpisodeErrors, "poses", lambda *_: sizes)
     first = null_model(setting)
     start = Placed(effect, {"f": np.array(0.1), "tau": np.array(2.0), "m": np.array(1.0)})
