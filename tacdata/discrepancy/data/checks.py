@@ -10,7 +10,6 @@ from tacdata.discrepancy.data.single_channels import odd_channels
 from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, shortcomings
 from tacdata.discrepancy.data.wiring import miswired
 from tacdata.discrepancy.model.response_curve import response_curve
-from tacdata.discrepancy.model.series_compliance import series_compliance
 from tacdata.discrepancy.model.setting import Setting
 
 FITTED = (
@@ -61,5 +60,5 @@ def _base(setting: Setting) -> tuple[str, ...]:
     """Return what the base leaves open, and which contact law it is like; nothing of one that was not fitted."""
     if not setting.response.fitted:
         return ()
-    told = response_curve(setting.course), series_compliance(setting.course)
-    return (FITTED, *(str(one) for one in told if one is not None))
+    curve = response_curve(setting.course)
+    return (FITTED,) if curve is None else (FITTED, str(curve))

@@ -13,6 +13,7 @@ from tacdata import provenance
 from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.sufficiency import one_rate
+from tacdata.discrepancy.model.series_compliance import series_compliance
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.score_tests import DRAWS
 from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason
@@ -45,6 +46,8 @@ def document(
     """
     course, placed = found.problem.setting.course, [e.finding.placed for e in decision.effects]
     told = [p.effect.remark(p.values) for p in placed]
+    if any(p.effect.in_series for p in placed) and (shared := series_compliance(course)) is not None:
+        told.append(str(shared))
     late = any(p.effect.family is Family.DELAY_AND_FILTER for p in placed)
     clocks = () if late else checks.clocks
     spoken = decision.reason in (Reason.ALARM, Reason.UNEXPLAINED)
