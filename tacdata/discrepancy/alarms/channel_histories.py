@@ -16,6 +16,7 @@ from tacdata.chain import Course
 from tacdata.chain.memory import low_pass, play, running_max
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.regressors.generic import depth_share
 from tacdata.discrepancy.statistics.gram_fit import flips
 
 FEWEST = 12
@@ -141,10 +142,7 @@ def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:
 
 def _histories(course: Course) -> dict[str, np.ndarray]:
     """Return what a path remembers, by what it is called, each (n,) of size about 1."""
-    depth = np.maximum(course.tip[:, 2], 0.0)
-    if depth.max() <= 0:
-        depth = course.tip[:, 2] - course.tip[:, 2].min()
-    share = depth / max(float(depth.max()), 1e-9)
+    share = depth_share(course)
     speed = course.speed
     fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)
     late = {f"what was pressed {tau:g} s before": low_pass(share, course.step, tau) for tau in TIME_CONSTANTS}

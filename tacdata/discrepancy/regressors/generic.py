@@ -46,10 +46,7 @@ def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray
 
 def histories(course: Course) -> np.ndarray:
     """Return what a path remembers, each of size about 1, shape (n, k)."""
-    depth = np.maximum(course.tip[:, 2], 0.0)
-    if depth.max() <= 0:
-        depth = course.tip[:, 2] - course.tip[:, 2].min()
-    share = depth / max(float(depth.max()), 1e-9)
+    share = depth_share(course)
     speed = course.speed
     fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)
     clock = course.time / max(float(course.time[-1]), 1e-9) - 0.5
@@ -65,6 +62,14 @@ def histories(course: Course) -> np.ndarray:
         course.session[course.episode] - float(np.mean(course.session)),
     ]  # fmt: skip
     return np.stack(columns, axis=-1)
+
+
+def depth_share(course: Course) -> np.ndarray:
+    """Return the depth over the deepest of all [1], shape (n,); heights are taken where nothing is below the face."""
+    depth = np.maximum(course.tip[:, 2], 0.0)
+    if depth.max() <= 0:
+        depth = course.tip[:, 2] - course.tip[:, 2].min()
+    return depth / max(float(depth.max()), 1e-9)
 
 
 def depth_slope(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
