@@ -55,7 +55,8 @@ class Poroelasticity(Effect):
             rows = course.tool == t
             tau = float(values["tau"]) * radius / np.median(radii)
             own = np.where(rows[:, None], both, 0.0)
-            slow[rows] = low_passes(own, course.step, tau / rates, shares)[rows]
+            # What one tool pressed out comes back while another presses, too.
+            slow += low_passes(own, course.step, tau / rates, shares)
         both = both - values["f"] * slow
         return replace(state, load=both[:, :-1], force=both[:, -1])
 
