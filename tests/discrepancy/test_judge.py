@@ -194,6 +194,11 @@ def test_a_rival_with_more_numbers_is_out_unless_the_episodes_prefer_it(margin, 
     assert stands_in(margin, 2.33, behind) == rival
 
 
+@pytest.mark.parametrize(("margin", "rival"), [(-0.5, False), (-1.5, True), (-4.0, True)])
+def test_one_of_another_family_with_more_numbers_stays_in_sooner(margin, rival):
+    assert stands_in(margin, 2.33, 40.0, kin=False) == rival
+
+
 def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
     common, rare = load("relaxation"), load("poroelasticity")
     alike = required_margin(common, load("creep"))

@@ -101,7 +101,7 @@ def try_rivals(
         losses[name] = other.loss - current.loss
         richer = len(other.tangent.knobs) > len(current.tangent.knobs)
         behind = other.half_bic - current.half_bic if richer else 0.0
-        if stands_in(margins[name], level, behind):
+        if stands_in(margins[name], level, behind, best[name].effect.family is mine.effect.family):
             rivals.append(best[name].called)
     forms: dict[str, float] = {}
     for name in _forms(mine.effect, best, each):
@@ -123,17 +123,19 @@ def try_rivals(
     return Tried(found, better, RivalModels(begin, current, without, models, pooled))
 
 
-def stands_in(margin: float, level: float, behind: float) -> bool:
+def stands_in(margin: float, level: float, behind: float, kin: bool = True) -> bool:
     """Return whether a rival may stand in for an effect.
 
-    More numbers put one out that explains the episodes about as well. One that they prefer stays in.
+    More numbers put one out that explains the episodes about as well. One that they prefer stays in: kin that hold a
+    law as a special case always do a little better, others have no reason to.
 
     Args:
         margin: By how many standard errors over episodes the effect is better (J test).
         level: From which on the rival is out.
         behind: By how much half the BIC of a rival with more numbers is larger.
+        kin: Whether the rival is of the effect's family.
     """
-    return margin < level and (behind <= SIMPLER or margin < -RIVAL_Z)
+    return margin < level and (behind <= SIMPLER or margin < -(RIVAL_Z if kin else AHEAD))
 
 
 def required_margin(mine: Effect, rival: Effect) -> float:
