@@ -81,13 +81,14 @@ def with_families(found: Findings, lacking: Mapping[Family, Lack]) -> Findings:
 
 def elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
     """Return families that the answer has nothing of, and that are surely there, too, the largest first."""
-    if not lacking:
-        return []
-    least = SURE_SHARE * max(found.explained, 0.0)
-    sure = [
-        family for family in _others(found, lacking)
-        if lacking[family].t >= SURE_T and lacking[family].gain >= SURE_GAIN and lacking[family].size >= least
-    ]  # fmt: skip
+    sure = surely_elsewhere(found, lacking)
+    return [family for family in sure if lacking[family].size >= SURE_SHARE * max(found.explained, 0.0)]
+
+
+def surely_elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
+    """Return families beside the answer's that surely explain some of what it leaves, however little."""
+    others = _others(found, lacking) if lacking else []
+    sure = [family for family in others if lacking[family].t >= SURE_T and lacking[family].gain >= SURE_GAIN]
     return sorted(sure, key=lambda family: -lacking[family].size)
 
 

@@ -11,6 +11,7 @@ from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, elsewhere
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
+from tacdata.discrepancy.levels.several_names import LEFT_T, SHARE_LEFT_ALONE, beside_open, lent, stands_in, traded
 from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gate import GATE
@@ -23,10 +24,6 @@ from tacdata.effects import AtRest, Family, load
 
 SHARE_LEFT = 0.05
 """Leftovers: largest share of the explainable that an answer may leave [1]."""
-SHARE_LEFT_ALONE = 0.15
-"""Leftovers: the same for a single effect of which every rival leaves twice as much [1]."""
-LEFT_T = 2.0
-"""Leftovers: they count from so many standard errors over episodes on [1]."""
 GAP_T = 3.0
 """Leftovers: without any effect that helps, they are a gap from so many standard errors on [1]."""
 SAME_SIZE = 0.1
@@ -141,7 +138,8 @@ def decide(
         levels = [beside_much(found, f, own.get(f.placed.effect.name), shown) for f in answer]
         if first is None or levels[first] is None:
             levels = [None for _ in answer]
-        levels = [None if k != first and stands_in(found, f) else levels[k] for k, f in enumerate(answer)]
+        parts = [k != first and stands_in(found, f, lacking) for k, f in enumerate(answer)]
+        levels = [None if part else level for part, level in zip(parts, levels, strict=True)]
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
         elif first is not None and stands(found, answer[first], own.get(answer[first].placed.effect.name), shown):
@@ -153,17 +151,20 @@ def decide(
     if status == "named" and lends_form(found, answer):
         levels, status, reason = [Level.FAMILY], INCOMPLETE, Reason.INCOMPLETE
     early = [seems_early(f, answer) for f in answer]
-    open_ones = [e or (status == "named" and stands_in(found, f)) for e, f in zip(early, answer, strict=True)]
+    open_ones = [e or (status == "named" and stands_in(found, f, lacking)) for e, f in zip(early, answer, strict=True)]
     if status in ("named", INCOMPLETE) and any(open_ones):
         # One of several names may stand in for a part of what has none: only the others are sure.
         levels = [None if doubt else level for doubt, level in zip(open_ones, levels, strict=True)]
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
-    if status in ("named", INCOMPLETE):
-        rough = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
-        # Another law of the family is there, too, or in its place: the family alone is sure.
-        levels = [Level.FAMILY if own else level for own, level in zip(rough, levels, strict=True)]
-        if any(rough) or elsewhere(found, lacking):
-            status, reason = INCOMPLETE, Reason.INCOMPLETE
+    rough = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
+    # Another law of the family is there, too, or in its place: the family alone is sure.
+    levels = [Level.FAMILY if own else level for own, level in zip(rough, levels, strict=True)]
+    if status in ("named", INCOMPLETE) and (any(rough) or elsewhere(found, lacking)):
+        status, reason = INCOMPLETE, Reason.INCOMPLETE
+    if any(trades := traded(answer, levels)):
+        levels = [None if trade else level for trade, level in zip(trades, levels, strict=True)]
+        if status in ("named", INCOMPLETE):
+            status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
     if status in ("named", INCOMPLETE) and refuted(shown):
         status, reason = "unknown", Reason.SEALED
     if status == "named" and not found.gap and not borne_out(shown):
@@ -189,38 +190,6 @@ def _of_one_family(finding: FoundEffect) -> bool:
 def _within_bounds(finding: FoundEffect) -> FoundEffect:
     """Return an effect without the rivals that need an unphysical size: a remainder lends them what they explain."""
     return replace(finding, rivals=tuple(name for name in finding.rivals if name not in finding.unphysical))
-
-
-def stands_in(found: Findings, finding: FoundEffect) -> bool:
-    """Return whether an effect may be a part of what another leaves by its form, or of what all leave.
-
-    It explains little beside that, beyond the others. A form that is off by a tenth leaves a hundredth. A single effect
-    is held against what is left by `adequate`.
-    """
-    if len(found.effects) < 2 or finding.corrected_p is None:
-        return False
-    if lent(found, finding):
-        return True
-    if found.left.t < LEFT_T:
-        return False
-    return found.left.gain >= SHARE_LEFT_ALONE * (found.left.gain + max(finding.bought, 0.0))
-
-
-def lent(found: Findings, finding: FoundEffect) -> bool:
-    """Return whether an effect explains no more than another's form may leave."""
-    raced = [f for f in found.effects if f.corrected_p is not None]
-    return finding.bought < max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)
-
-
-def beside_open(found: Findings, answer: list[FoundEffect], levels: list[Level | None]) -> list[Level | None]:
-    """Return the levels that hold beside effects of the answer that are open: these count as left over, too.
-
-    What explains most has a name, whatever else of the answer may be something else.
-    """
-    left = found.left.gain if found.left.t >= LEFT_T else 0.0
-    left += sum(max(f.bought, 0.0) for f, level in zip(answer, levels, strict=True) if level is None)
-    large = [left < SHARE_LEFT_ALONE * (left + max(f.bought, 0.0)) for f in answer]
-    return [level if much else None for level, much in zip(levels, large, strict=True)]
 
 
 def lends_form(found: Findings, answer: list[FoundEffect]) -> bool:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.lack_of_fit import another_form, elsewhere, of_family
 from tacdata.discrepancy.levels.margins import Level
+from tacdata.discrepancy.levels.several_names import LEFT_T, SHARE_LEFT_ALONE
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
-from tacdata.discrepancy.verdict.decide import LEFT_T, SHARE_LEFT_ALONE, Decided, Decision, Reason
+from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import worsened
 from tacdata.effects import Family, load
@@ -49,7 +52,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         case Reason.CONTRADICTION:
             return "; ".join(checks.contradictions)
         case Reason.TOO_FEW:
-            best = f"; so far {_best(answer)}" if answer else ""
+            best = f"; so far {_best(decision.effects)}" if answer else ""
             return f"{checks.episodes} presses cannot carry a verdict{best}"
         case Reason.STOPPED:
             fits = f"; {names} {'fits' if len(answer) == 1 else 'fit'} best, rivals were not tried" if answer else ""
@@ -71,7 +74,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         case Reason.RIVALS:
             closed = _closed(decision, shown)
             either_way = f"; either way {closed} is closed" if closed else ""
-            return _undecided(decision) + either_way + _nameless(found, SHARE_LEFT_ALONE)
+            return "".join((_undecided(decision), either_way, _own_laws(decision), _nameless(found, SHARE_LEFT_ALONE)))
         case Reason.INCOMPLETE:
             return _incomplete(decision, shown) + _other_laws(decision, found) + _nameless(found, 0.0)
         case Reason.SEALED:
@@ -133,18 +136,22 @@ def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str
 
 def _other_laws(decision: Decision, found: Findings) -> str:
     """Return where other laws show: of a family that has a name, then of one that has none."""
+    others = elsewhere(found, decision.lacking)[:1]
+    more = [f"; something of {family.value} shows, too, in {SIGNS[family]}" for family in others]
+    return "".join((_own_laws(decision), *more))
+
+
+def _own_laws(decision: Decision) -> str:
+    """Return where another law of a family shows that has a name."""
     shares: dict[Family, float] = {}
     for e in decision.effects:
         family, own = e.finding.placed.effect.family, of_family(e.finding, decision.lacking)
         if e.level is not None and own is not None and another_form(e.finding, decision.lacking):
             shares[family] = min(100 * own.size / max(e.finding.bought, 1e-9), shares.get(family, np.inf))
-    words = [
-        f"another law of {family.value} would explain {share:.0f} % more, in {SIGNS[family]}"
+    return "".join(
+        f"; another law of {family.value} would explain {share:.0f} % more, in {SIGNS[family]}"
         for family, share in shares.items()
-    ]
-    if others := elsewhere(found, decision.lacking)[:1]:
-        words.append(f"something of {others[0].value} shows, too, in {SIGNS[others[0]]}")
-    return "".join(f"; {one}" for one in dict.fromkeys(words))
+    )
 
 
 def _called(decided: Decided) -> str:
@@ -178,8 +185,9 @@ def _undecided(decision: Decision) -> str:
     bounds = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if set(f.at_bound) - own]
     formed = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if own]
     weak = [f.placed.effect.spoken for f in answer if f.necessity < f.needed]
-    words = _best(answer)
-    shared = [e.finding.placed.effect.family.value for e in decision.effects if e.level is Level.FAMILY]
+    words = _best(decision.effects)
+    either = [e for e in decision.effects if e.level is Level.FAMILY and e.status != "named"]
+    shared = [e.finding.placed.effect.family.value for e in either]
     words += f"; either way it is {_listed(list(dict.fromkeys(shared)), 'and')}" if shared else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     words += f"; {', '.join(formed)} fits best where its equation ends: the form is another one" if formed else ""
@@ -218,11 +226,13 @@ def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
     return f"{words}, so {name}, or not all of it"
 
 
-def _best(answer: list[FoundEffect]) -> str:
+def _best(effects: Sequence[Decided]) -> str:
     """Return what is found, and where that is open what fits best and what may stand in for it."""
-    clear = list(dict.fromkeys(m.placed.effect.spoken for m in answer if not m.rivals))
+    alone = [e for e in effects if not e.finding.rivals]
+    told = [_called(e) if e.status == "named" else e.finding.placed.effect.spoken for e in alone]
+    clear = list(dict.fromkeys(told))
     groups: dict[frozenset[str], list[FoundEffect]] = {}
-    for m in answer:
+    for m in (e.finding for e in effects):
         if m.rivals:
             groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
     words = "; ".join(_open(own) for own in groups.values())

@@ -11,6 +11,7 @@ from pressing import course
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, lack, lack_of_fit, with_families
 from tacdata.discrepancy.levels.margins import Level
+from tacdata.discrepancy.levels.several_names import traded
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
@@ -120,6 +121,48 @@ def test_much_that_another_family_explains_is_left_over(family, gain, t, left):
     assert with_families(found, both).left.gain == 1.0, "what the own family explains better is its own"
     alone = replace(found, effects=(replace(found.effects[0], placed=Placed(load("bulge"), {})),))
     assert with_families(alone, {Family.SKIN_MEMORY: Lack(60.0, 3.0, 60.0)}).left.gain == 60.0
+
+
+@pytest.mark.parametrize(("size", "level"), [(30.0, Level.FAMILY), (10.0, Level.FORM)])
+def test_a_law_beside_one_that_is_open_is_held_against_its_family_too(size, level):
+    """A front of damp beside what is relaxation or the chip's own baseline: a gain changes, and not by one drift."""
+    found = findings()
+    unsure = replace(found.effects[0], rivals=("baseline_tracking",), bought=6000.0)
+    drift = replace(found.effects[0], placed=Placed(load("gain_drift"), {}), bought=100.0)
+    found = replace(found, effects=(unsure, drift), explained=6100.0)
+    decision = decide(found, DataChecks(44), lacking={Family.DRIFT: Lack(20.0, 3.0, size)})
+    assert decision.status == "ambiguous"
+    assert (decision.effects[1].status, decision.effects[1].level) == ("named", level)
+    words = reason_in_words(decision, found, DataChecks(44))
+    said = "gain and offset in time (gain drift fits best), and something else", "another law of gain and offset"
+    assert all((part in words) is (level is Level.FAMILY) for part in said), words
+
+
+@pytest.mark.parametrize(
+    ("family", "own", "level"),
+    [(Family.FRICTION_AND_PLAY, Lack(100.0, 2.5, 110.0), None), (Family.FRICTION_AND_PLAY, Lack(100.0, 1.0, 110.0), 3),
+     (Family.FRICTION_AND_PLAY, Lack(10.0, 2.5, 110.0), 3), (Family.KINEMATICS, Lack(5.0, 2.5, 15.0), 3)],
+)  # fmt: skip
+def test_a_second_name_explains_more_than_a_family_without_a_name(family, own, level):
+    """A tool that slides in its holder looks like a screw of the drive, and as much like friction that none names."""
+    found = findings()
+    first = replace(found.effects[0], placed=Placed(load("crosstalk"), {}), bought=7000.0)
+    second = replace(found.effects[0], placed=Placed(load("screw_error"), {}), bought=130.0)
+    found = replace(found, effects=(first, second), explained=7130.0)
+    decision = decide(found, DataChecks(44), lacking={family: own})
+    assert decision.effects[0].level is Level.FORM, "beside the first it is little"
+    assert decision.effects[1].level is (Level.FORM if level else None)
+    assert decision.status == ("named" if level else INCOMPLETE)
+
+
+@pytest.mark.parametrize("beside", ["thickness", "tilt"])
+def test_a_gain_that_calibration_shows_beside_its_own_rival_is_no_name(beside):
+    """The two trade: the skin is thicker, and the gain takes back what that is too much."""
+    one = findings().effects[0]
+    weak = replace(one, placed=Placed(load(beside), {}))
+    gain = replace(one, placed=Placed(load("gain"), {}), rivals=("modulus", "thickness"), corrected_p=None)
+    assert traded([one, weak, gain], [Level.FORM, None, Level.FAMILY]) == [False, False, beside == "thickness"]
+    assert not any(traded([one, weak, gain], [Level.FORM, Level.FORM, Level.FAMILY])), "both are there"
 
 
 @pytest.mark.parametrize(("bound", "told"), [((), 2), (("tau",), 1)])

@@ -10,17 +10,9 @@ import pytest
 from tacdata.discrepancy.levels.constancy import spread
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
+from tacdata.discrepancy.levels.several_names import beside_open, stands_in
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import (
-    beside_much,
-    beside_open,
-    finest,
-    leading,
-    lends_form,
-    seems_early,
-    stands,
-    stands_in,
-)  # fmt: skip
+from tacdata.discrepancy.verdict.decide import beside_much, finest, leading, lends_form, seems_early, stands
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.effects import Placed, load
 
@@ -188,9 +180,9 @@ def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
     """What it explains beyond the others must be large beside what nothing explains."""
     mine = replace(ONE, bought=bought)
     found = cast(Any, SimpleNamespace(effects=(mine, mine), left=SimpleNamespace(t=t, gain=left)))
-    assert stands_in(found, mine) == part
+    assert stands_in(found, mine, {}) == part
     alone = cast(Any, SimpleNamespace(effects=(ONE,), left=SimpleNamespace(t=t, gain=left)))
-    assert not stands_in(alone, replace(ONE, bought=bought))
+    assert not stands_in(alone, replace(ONE, bought=bought), {})
 
 
 @pytest.mark.parametrize(("bought", "part"), [(50, True), (200, False)])
@@ -198,12 +190,12 @@ def test_a_further_name_may_stand_in_for_the_form_of_another(bought, part):
     """A law of a material is off by a tenth and leaves a hundredth, though nothing stands out. A delay is exact."""
     large, small = replace(ONE, bought=10000.0), replace(ONE, bought=float(bought))
     found = cast(Any, SimpleNamespace(effects=(large, small), left=SimpleNamespace(t=0.0, gain=0.0)))
-    assert stands_in(found, small) == part and not stands_in(found, large)
+    assert stands_in(found, small, {}) == part and not stands_in(found, large, {})
     exact = replace(large, placed=Placed(load("latency"), {}))
-    assert not stands_in(cast(Any, SimpleNamespace(effects=(exact, small), left=found.left)), small)
+    assert not stands_in(cast(Any, SimpleNamespace(effects=(exact, small), left=found.left)), small, {})
     gain = replace(ONE, bought=float("inf"), corrected_p=None)
     found = cast(Any, SimpleNamespace(effects=(gain, small), left=SimpleNamespace(t=0.0, gain=0.0)))
-    assert not stands_in(found, small), "what calibration shows has no such figure"
+    assert not stands_in(found, small, {}), "what calibration shows has no such figure"
 
 
 @pytest.mark.parametrize(("bought", "left", "named"), [(100, 0, True), (100, 50, False), (5, 0, False)])

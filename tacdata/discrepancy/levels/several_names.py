@@ -1,0 +1,59 @@
+"""Of several names each must stand by itself: it may be a part of what has no name, or of another's form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from tacdata.discrepancy.levels.lack_of_fit import Lack, surely_elsewhere
+from tacdata.discrepancy.levels.margins import Level
+from tacdata.discrepancy.search.findings import Findings, FoundEffect
+from tacdata.effects import Family
+
+LEFT_T = 2.0
+"""Leftovers: they count from so many standard errors over episodes on [1]."""
+SHARE_LEFT_ALONE = 0.15
+"""Leftovers: largest share of the explainable that one effect may leave, of which every rival leaves twice as much."""
+
+
+def stands_in(found: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
+    """Return whether an effect may be a part of what another leaves by its form, or of what all leave.
+
+    It explains little beside that, beyond the others. A form that is off by a tenth leaves a hundredth. What a family
+    without a name surely explains is left, too. A single effect is held against what is left by `adequate`.
+    """
+    if len(found.effects) < 2 or finding.corrected_p is None:
+        return False
+    if lent(found, finding):
+        return True
+    left = max(_left(found), *(lacking[family].gain for family in surely_elsewhere(found, lacking)), 0.0)
+    return left > 0 and left >= SHARE_LEFT_ALONE * (left + max(finding.bought, 0.0))
+
+
+def lent(found: Findings, finding: FoundEffect) -> bool:
+    """Return whether an effect explains no more than another's form may leave."""
+    raced = [f for f in found.effects if f.corrected_p is not None]
+    return finding.bought < max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)
+
+
+def beside_open(found: Findings, answer: list[FoundEffect], levels: list[Level | None]) -> list[Level | None]:
+    """Return the levels that hold beside effects of the answer that are open: these count as left over, too.
+
+    What explains most has a name, whatever else of the answer may be something else.
+    """
+    left = _left(found) + sum(max(f.bought, 0.0) for f, level in zip(answer, levels, strict=True) if level is None)
+    large = [left < SHARE_LEFT_ALONE * (left + max(f.bought, 0.0)) for f in answer]
+    return [level if much else None for level, much in zip(levels, large, strict=True)]
+
+
+def traded(answer: Sequence[FoundEffect], levels: Sequence[Level | None]) -> list[bool]:
+    """Return of each effect whether it was told by calibration beside one in its place that has no name.
+
+    The two trade: each may be there to take back what the other falsely explains.
+    """
+    nameless = {f.placed.effect.called for f, level in zip(answer, levels, strict=True) if level is None}
+    return [f.corrected_p is None and bool(nameless & set(f.rivals)) for f in answer]
+
+
+def _left(found: Findings) -> float:
+    """Return what is surely left [half the whitened sum of squares, held out]."""
+    return found.left.gain if found.left.t >= LEFT_T else 0.0
