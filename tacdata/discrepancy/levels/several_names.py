@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from tacdata.discrepancy.levels.lack_of_fit import Lack, surely_elsewhere
+from tacdata.discrepancy.levels.lack_of_fit import CLEAR_GAIN, CLEAR_T, Lack, surely_elsewhere
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.effects import Family
@@ -25,6 +25,9 @@ def stands_in(found: Findings, finding: FoundEffect, lacking: Mapping[Family, La
         return False
     if lent(found, finding):
         return True
+    further = finding.bought < max(f.bought for f in found.effects if f.corrected_p is not None)
+    if further and found.left.gain >= max(finding.bought, CLEAR_GAIN) and found.left.t >= CLEAR_T:
+        return True  # more is left than it explains: less of that need be sure
     left = max(_left(found), *(lacking[family].gain for family in surely_elsewhere(found, lacking)), 0.0)
     return left > 0 and left >= SHARE_LEFT_ALONE * (left + max(finding.bought, 0.0))
 

@@ -138,8 +138,6 @@ def decide(
         levels = [beside_much(found, f, own.get(f.placed.effect.name), shown) for f in answer]
         if first is None or levels[first] is None:
             levels = [None for _ in answer]
-        parts = [k != first and stands_in(found, f, lacking) for k, f in enumerate(answer)]
-        levels = [None if part else level for part, level in zip(parts, levels, strict=True)]
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
         elif first is not None and stands(found, answer[first], own.get(answer[first].placed.effect.name), shown):
@@ -151,7 +149,9 @@ def decide(
     if status == "named" and lends_form(found, answer):
         levels, status, reason = [Level.FAMILY], INCOMPLETE, Reason.INCOMPLETE
     early = [seems_early(f, answer) for f in answer]
-    open_ones = [e or (status == "named" and stands_in(found, f, lacking)) for e, f in zip(early, answer, strict=True)]
+    asked = [status == "named" or k != leading(answer) for k in range(len(answer))]
+    parts = [ask and stands_in(found, f, lacking) for ask, f in zip(asked, answer, strict=True)]
+    open_ones = [e or part for e, part in zip(early, parts, strict=True)]
     if status in ("named", INCOMPLETE) and any(open_ones):
         # One of several names may stand in for a part of what has none: only the others are sure.
         levels = [None if doubt else level for doubt, level in zip(open_ones, levels, strict=True)]

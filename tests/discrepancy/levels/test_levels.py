@@ -185,6 +185,17 @@ def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
     assert not stands_in(alone, replace(ONE, bought=bought), {})
 
 
+@pytest.mark.parametrize(
+    ("bought", "left", "t", "part"),
+    [(100, 150, 1.2, True), (100, 90, 1.2, False), (100, 150, 0.8, False), (3, 5, 1.2, False), (300, 900, 1.2, False)],
+)  # fmt: skip
+def test_where_more_is_left_than_a_further_name_explains_less_of_that_need_be_sure(bought, left, t, part):
+    """A cable that moves along is left, and an air gap with a number for each channel takes up a part of it."""
+    large, mine = replace(ONE, placed=Placed(load("latency"), {}), bought=200.0), replace(ONE, bought=bought)
+    found = cast(Any, SimpleNamespace(effects=(large, mine), left=SimpleNamespace(t=t, gain=left)))
+    assert stands_in(found, mine, {}) == part, "what explains most is no part of another"
+
+
 @pytest.mark.parametrize(("bought", "part"), [(50, True), (200, False)])
 def test_a_further_name_may_stand_in_for_the_form_of_another(bought, part):
     """A law of a material is off by a tenth and leaves a hundredth, though nothing stands out. A delay is exact."""
