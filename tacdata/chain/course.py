@@ -73,6 +73,8 @@ class Course:
     """Recording that each episode is a stroke of, from 0, shape (episodes,), int64; None: each is its own."""
     numbers: tuple[int, ...] = ()
     """Each channel's number in the recordings; empty: none was left out."""
+    clipped: np.ndarray | None = None
+    """Readings that a channel's range ends at: more would read the same, shape (n, channels), bool; None: none."""
     apart: bool = False
     """Whether episodes are so far apart that nothing is remembered from one to the next, whatever the clock says."""
 
@@ -109,9 +111,11 @@ class Course:
             return self
         kept = {
             name: value[rows]
-            for name in ("time", "episode", "tip", "tool", "readings", "averaged", "force", "tag", "temperature")
+            for name in (
+                "time", "episode", "tip", "tool", "readings", "averaged", "force", "tag", "temperature", "clipped",
+            )
             if (value := getattr(self, name)) is not None
-        }
+        }  # fmt: skip
         return replace(self, **kept)
 
     @cached_property

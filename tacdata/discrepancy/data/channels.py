@@ -46,8 +46,12 @@ def readings(recording: Recording) -> Readings:
     return Readings(episode.taxels.counts[order], depth)
 
 
-def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, list[str]]:
-    """Return which channels can be used, shape (k,), int64, and in words why others cannot, and which are clipped.
+def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Return which channels can be used, the limits at which they are clipped, and in words what there is to know.
+
+    Returns:
+        Channels, shape (k,), int64; the least and the largest reading of each, -inf and inf where it is not clipped
+        [the source's unit], shape (2, k); why others cannot be used, and which are clipped.
 
     Raises:
         FormatError: If none can.
@@ -69,27 +73,29 @@ def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, list[str]]:
             f"no channel with usable readings ({'; '.join(notes[:3])})", "at least one that changes",
             "mend the board, or name other columns in the import's mapping, and record or import again",
         )  # fmt: skip
-    return np.array(kept), notes + _clipped(recorded, kept)
+    limits, words = _clipped(recorded, kept)
+    return np.array(kept), limits, notes + words
 
 
-def _clipped(recorded: Sequence[Readings], channels: list[int]) -> list[str]:
-    """Return in words which channels stop at their largest or smallest reading while the tip goes on deeper."""
-    words = []
-    for name, extreme in (("largest", np.nanmax), ("smallest", np.nanmin)):
+def _clipped(recorded: Sequence[Readings], channels: list[int]) -> tuple[np.ndarray, list[str]]:
+    """Return where channels stop at their largest or smallest reading while the tip goes on deeper, as in `usable`."""
+    words, limits = [], np.repeat([[-np.inf], [np.inf]], len(channels), axis=1)
+    for side, name, extreme in ((1, "largest", np.nanmax), (0, "smallest", np.nanmin)):
         found = []
-        for channel in channels:
+        for at, channel in enumerate(channels):
             values = np.concatenate([r.counts[:, channel] for r in recorded])
             limit = float(extreme(values))
             steps = np.diff(np.unique(values[np.isfinite(values)]))
             runs = [run for r in recorded for run in _stops(r.counts[:, channel], r.depth, limit, float(steps.min()))]
             if len(runs) >= FEWEST_STOPS or sum(runs) >= MANY_STOPPED:
+                limits[side, at] = limit
                 found.append(f"channel {channel} at {limit:g} ({100 * np.mean(values == limit):.2g} %)")
         if found:
             words.append(
                 f"clipped at the {name} reading (share of its readings): {', '.join(found)}; it stays while the tip "
-                "goes on deeper: press less deep, or give it a wider range"
+                "goes on deeper, so these are left out: press less deep, or give it a wider range"
             )
-    return words
+    return limits, words
 
 
 def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> list[int]:

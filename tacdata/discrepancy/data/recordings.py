@@ -71,7 +71,7 @@ def course_of(paths: list[Path]) -> Course:
             "judge sensors one at a time",
         )  # fmt: skip
     recordings = [r for _, r in every]
-    kept, left_out = usable([readings(r) for r in recordings])
+    kept, limits, left_out = usable([readings(r) for r in recordings])
     notes += in_source(recordings, min(counts)) + left_out + _dropouts([e for _, e in found])
     names = sorted({m.name for _, e in found for m in e.measured})
     force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
@@ -89,7 +89,7 @@ def course_of(paths: list[Path]) -> Course:
         notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
     if any(e.tags for _, e in found) and not views:
         notes.append("the tag was seen too seldom to check the guide: keep it in view during the presses")
-    return _joined(parts, kept, found[0][1], (bool(force), bool(temperature), bool(views)), notes)
+    return _joined(parts, (kept, limits), found[0][1], (bool(force), bool(temperature), bool(views)), notes)
 
 
 def _of_one_sensor(episodes: list[Episode]) -> list[str]:
@@ -207,9 +207,10 @@ def _tool(episode: Episode) -> Tool:
 
 
 def _joined(
-    parts: list[_Stroke], kept: np.ndarray, example: Episode, extra: tuple[bool, bool, bool], notes: list[str]
-) -> Course:
-    force, temperature, tag = extra
+    parts: list[_Stroke], usable: tuple[np.ndarray, np.ndarray], example: Episode, extra: tuple[bool, bool, bool],
+    notes: list[str],
+) -> Course:  # fmt: skip
+    (kept, (least, most)), (force, temperature, tag) = usable, extra
     tools = tuple(dict.fromkeys(p.tool for p in parts))
     clock, last = [], None
     for part in parts:
@@ -225,12 +226,13 @@ def _joined(
     channels = len(kept)
     centers = example.sensor.taxels.centers
     numbers = {s: k for k, s in enumerate(dict.fromkeys(p.session for p in parts))}
-    time = np.concatenate(clock)
+    time, read = np.concatenate(clock), values[:, :channels]
+    clipped = (read <= least) | (read >= most)
     site, told = _sites(parts, channels)
     recording = np.unique([p.recording for p in parts], return_inverse=True)[1]
     return Course(
         time=time - time[0], episode=episode, tip=np.concatenate([p.rows.tip for p in parts]),
-        tool=np.array([tools.index(p.tool) for p in parts])[episode], readings=values[:, :channels],
+        tool=np.array([tools.index(p.tool) for p in parts])[episode], readings=read,
         averaged=np.concatenate([p.rows.averaged for p in parts]),
         session=np.array([numbers[p.session] for p in parts]), site=site,
         tools=tools, names=tuple(p.name for p in parts),
@@ -239,6 +241,7 @@ def _joined(
         temperature=_filled(values[:, channels + force]) if temperature else None, notes=(*notes, *told),
         tag=values[:, channels + force + temperature :] if tag else None,
         recording=recording if recording.max() + 1 < len(parts) else None, numbers=tuple(int(k) for k in kept),
+        clipped=clipped if clipped.any() else None,
     )  # fmt: skip
 
 

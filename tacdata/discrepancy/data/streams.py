@@ -39,8 +39,8 @@ class Streams:
         return (*course.channel_names, *["force"] * self.force, *["tag x", "tag y", "tag depth"] * self.tag)
 
     def measured(self, course: Course) -> np.ndarray:
-        """Return what was measured at the rows that were read, shape (m, streams); NaN where missing."""
-        parts = [course.readings]
+        """Return what was measured at the rows that were read, shape (m, streams); NaN where missing or clipped."""
+        parts = [course.readings if course.clipped is None else np.where(course.clipped, np.nan, course.readings)]
         if self.force and course.force is not None:
             parts.append(course.force[:, None])
         if self.tag and course.tag is not None:

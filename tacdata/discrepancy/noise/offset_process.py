@@ -21,6 +21,7 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_array
 
 from tacdata.chain import Course
+from tacdata.chain.at_rest import quiet_rows, told_at_rest
 
 FREE_LEVEL = 1e3
 """Prior standard deviation of an unknown level: practically free [noise scales]."""
@@ -95,7 +96,7 @@ class OffsetProcess:
 
     def beside(self, course: Course) -> OffsetProcess:
         """Return it for a course with readings of more episodes: their offsets let no others be expected."""
-        return replace(self, quiet=_quiet(course), episode=course.episode)
+        return replace(self, quiet=quiet_rows(course), episode=course.episode)
 
     def expected(self, values: np.ndarray, missing: np.ndarray | None = None) -> np.ndarray:
         """Return the offsets that those of the episodes before let one expect, shape (episodes, streams, columns).
@@ -120,7 +121,7 @@ def offset_process(
         memory: Correlation of successive rows [1].
         levels: Kinds of unknown levels, each as the number of the one that an episode has, shape (episodes,).
     """
-    quiet = _quiet(course)
+    quiet = quiet_rows(course)
     streams = residual[:, : course.channels] / scale[: course.channels]
     missing = ~np.isfinite(streams)
     there = quiet & ~missing.any(axis=1)
@@ -132,16 +133,29 @@ def offset_process(
     # The mean of n rows with memory m and innovations of variance 1.
     error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
     time = _times(course)
-    walk, length, own = _reml(offsets[known], error[known], time[known], [level[known] for level in levels])
+    own_way = _without_gain(offsets, course, scale)
+    walk, length, own = _reml(own_way[known], error[known], time[known], [level[known] for level in levels])
     apart = np.abs(np.subtract.outer(time, time))
     same = np.sum([level[:, None] == level for level in levels], axis=0)
     covariance = walk * np.exp(-apart / length) + FREE_LEVEL**2 * same + max(own, LEAST_OWN**2) * np.eye(len(time))
     return OffsetProcess(covariance, error, quiet, course.episode)
 
 
-def _quiet(course: Course) -> np.ndarray:
-    """Return rows where nothing presses, shape (m,), bool."""
-    return course.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.05 * course.stroke)
+def _without_gain(offsets: np.ndarray, course: Course, scale: np.ndarray) -> np.ndarray:
+    """Return offsets in all directions but the one that a gain of whole readings has, shape (episodes, k).
+
+    A gain that drifts changes readings at rest by one factor. It is no chance, and would hide in the process.
+
+    Args:
+        offsets: In noise scales, shape (episodes, channels).
+        course: With the rows read alone.
+        scale: Standard deviation of the innovations of rows, shape (streams,).
+    """
+    idle, _ = told_at_rest(course)
+    if idle is None or len(idle) < 2:
+        return offsets
+    along = (idle / scale[: len(idle)])[:, None]
+    return offsets @ np.linalg.qr(along, mode="complete")[0][:, 1:]
 
 
 def _times(course: Course) -> np.ndarray:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.chain import Course, predict
+from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.regressors.generic import histories
 from tacdata.discrepancy.search.findings import Findings
 from tacdata.discrepancy.verdict.calibration import gains_beyond_calibration
@@ -144,12 +145,13 @@ def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
         return Gap(np.zeros(0), np.zeros(0), np.zeros(0), ())
     given, response = list(found.problem.setting.given), found.problem.setting.response
     rows = course.read
-    first = course.readings[rows] - predict(course, response, given).signal[rows]
+    measured = Streams.of(course).measured(course)[:, : course.channels]
+    first = measured - predict(course, response, given).signal[rows]
     model = found.final
     placed = [*model.setting.given, *model.placed]
     placed += [f.placed for f in gains_beyond_calibration(found)]
-    last = course.readings[rows] - predict(course, model.setting.response, placed).signal[rows]
-    rest = first - _predicted(course, first, episodes)
+    last = measured - predict(course, model.setting.response, placed).signal[rows]
+    rest = first - _predicted(course, np.nan_to_num(first), episodes)
     noise = found.problem.null.noise
     scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
     number = course.episode[rows]
@@ -157,7 +159,7 @@ def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
     without = {}
     for one in found.comparisons:
         others = [*model.setting.given, *one.without.placed]
-        alone = course.readings[rows] - predict(course, one.without.response, others).signal[rows]
+        alone = measured - predict(course, one.without.response, others).signal[rows]
         [name] = {p.effect.name for p in model.placed} - {p.effect.name for p in one.without.placed}
         without[name] = _squares(alone / scale, number, episodes)
     names = tuple(course.names[k] for k in episodes)
@@ -168,7 +170,7 @@ def _squares(residual: np.ndarray, number: np.ndarray, episodes: np.ndarray) -> 
     made = []
     for k in episodes:
         own = residual[number == k]
-        made.append(float(np.mean(np.square(own - np.median(own, axis=0)))))
+        made.append(float(np.nanmean(np.square(own - np.nanmedian(own, axis=0)))))
     return np.array(made)
 
 

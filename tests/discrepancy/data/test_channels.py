@@ -12,6 +12,7 @@ from pressing import course
 
 from tacdata import documents
 from tacdata.discrepancy.data.channels import Readings, in_source, usable
+from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.data.sufficiency import stuck
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.run import run
@@ -27,7 +28,7 @@ def unknown(counts):
 def test_a_channel_that_is_dead_at_another_reading_each_day_is_left_out_and_named():
     rng = np.random.default_rng(0)
     days = [np.column_stack([rng.normal(size=50), np.full(50, 5.0 + day), rng.normal(size=50)]) for day in (0, 1)]
-    kept, notes = usable([unknown(day) for day in days])
+    kept, _, notes = usable([unknown(day) for day in days])
     assert kept.tolist() == [0, 2]
     assert len(notes) == 1 and "channel 1" in notes[0] and "left out" in notes[0]
 
@@ -62,7 +63,10 @@ def test_channels_that_stop_while_the_tip_goes_on_are_told_of_whatever_share_sto
     made = pressed(lambda depth, late, play: force(depth), noise=noise, hold=0.1)
     made = [Readings(sign * np.minimum(np.column_stack([r.counts, r.counts / 3]), 2500), r.depth) for r in made]
     assert np.mean(np.concatenate([r.counts[:, 0] for r in made]) == sign * 2500) < 0.05
-    [words] = [note for note in usable(made)[1] if "clipped" in note]
+    _, (least, most), notes = usable(made)
+    [words] = [note for note in notes if "clipped" in note]
+    assert (most[0] if sign > 0 else least[0]) == sign * 2500
+    assert np.isinf(least if sign > 0 else most).all() and np.isinf([least[1], most[1]]).all()
     assert "channel 0 at" in words and "channel 1" not in words
     assert ("largest" if sign > 0 else "smallest") in words
 
@@ -85,7 +89,7 @@ def test_channels_that_stop_while_the_tip_goes_on_are_told_of_whatever_share_sto
 def test_steps_holds_play_and_soft_ends_are_no_clipping(read, step, noise):
     """Without noise all of a hold reads the largest count, and all of the air the smallest."""
     for hold in (0.0, 2.0):
-        _, notes = usable(pressed(read, noise=noise, step=step, hold=hold))
+        _, _, notes = usable(pressed(read, noise=noise, step=step, hold=hold))
         assert notes == []
 
 
@@ -106,6 +110,14 @@ def test_a_channel_that_sticks_is_told_of_by_its_own_number():
     readings[made.episode % 2 == 0, 3] = 77.0
     [words] = stuck(replace(made, readings=readings, numbers=(0, 1, 3, 6)))
     assert words.startswith("channel 6: the same reading")
+
+
+def test_clipped_readings_count_as_not_read_and_those_beside_them_do():
+    made = course(episodes=12)
+    clipped = np.zeros(made.readings.shape, dtype=bool)
+    clipped[100:110, 1] = True
+    read = Streams.of(made).measured(replace(made, clipped=clipped))
+    assert np.array_equal(np.isnan(read), clipped[made.read])
 
 
 MAPPING = {
