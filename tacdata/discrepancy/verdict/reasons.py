@@ -81,7 +81,8 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             fits = f"{names} {'fits' if len(answer) == 1 else 'fit'} the presses that were judged"
             return f"{fits}; {_against(shown)}: not the name"
         case Reason.LEFTOVERS:
-            return f"something is missing that has no name yet; {_closest(answer, found.share_left, shown)}"
+            closest = _closest(answer, found.share_left, shown)
+            return f"something is missing that has no name yet; {closest}{_elsewhere(decision, found)}"
         case Reason.ODD:
             odd = _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
             return odd + _lone(decision, found, "; ")
@@ -136,9 +137,13 @@ def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str
 
 def _other_laws(decision: Decision, found: Findings) -> str:
     """Return where other laws show: of a family that has a name, then of one that has none."""
+    return _own_laws(decision) + _elsewhere(decision, found)
+
+
+def _elsewhere(decision: Decision, found: Findings) -> str:
+    """Return where another family shows, that which explains most."""
     others = elsewhere(found, decision.lacking)[:1]
-    more = [f"; something of {family.value} shows, too, in {SIGNS[family]}" for family in others]
-    return "".join((_own_laws(decision), *more))
+    return "".join(f"; something of {family.value} shows, too, in {SIGNS[family]}" for family in others)
 
 
 def _own_laws(decision: Decision) -> str:

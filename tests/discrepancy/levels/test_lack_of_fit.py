@@ -19,7 +19,7 @@ from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.problem import prepare
-from tacdata.discrepancy.verdict.decide import INCOMPLETE, answer_of, decide
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason, answer_of, decide
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.effects import Family, Placed, load
 
@@ -106,6 +106,18 @@ def test_what_another_family_surely_explains_makes_a_verdict_incomplete(lacking,
     decision, words = decided(Family.FRICTION_AND_PLAY, lacking)
     assert (decision.status, decision.effects[0].level) == (INCOMPLETE if there else "named", Level.FORM)
     assert ("something of friction and play shows, too, in loading against unloading" in words) is there, words
+
+
+@pytest.mark.parametrize("t", [3.0, 1.0])
+def test_where_no_name_holds_what_shows_of_another_family_is_told(t):
+    """A sensor that rocks has no name, but depths go with the side that is pressed: that is where to look."""
+    found = findings()
+    effects = (Decided(found.effects[0], "suspected", {}, None),)
+    lacking = {Family.KINEMATICS: Lack(90.0, t, 95.0)}
+    words = reason_in_words(Decision("unknown", Reason.LEFTOVERS, effects, lacking=lacking), found, DataChecks(8))
+    assert words.startswith("something is missing that has no name yet; relaxation comes closest")
+    said = "; something of kinematics shows, too, in depths and places that go with place, side, order or direction"
+    assert words.endswith(said) is (t > 2), words
 
 
 @pytest.mark.parametrize(
