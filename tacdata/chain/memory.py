@@ -110,6 +110,8 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
         episode: Episode of each row, shape (n,).
         delay: How long before [s], shape (n,); negative for later.
     """
+    from tacdata.chain.memory_kernels import between
+
     wanted = time - delay
     starts = np.searchsorted(episode, np.arange(episode[-1] + 1))
     ends = np.append(starts[1:], len(time))
@@ -118,9 +120,5 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
     right = np.clip(np.searchsorted(time, wanted), low + 1, high)
     right = np.maximum(right, 1)
     gap = np.maximum(time[right] - time[right - 1], 1e-12)
-    share = np.clip((wanted - time[right - 1]) / gap, 0.0, 1.0)[:, None]
-    result, after = values.take(right - 1, axis=0), values.take(right, axis=0)
-    after -= result
-    after *= share
-    result += after
-    return result
+    share = np.clip((wanted - time[right - 1]) / gap, 0.0, 1.0)
+    return between(_wide(values), right, share)

@@ -41,6 +41,33 @@ def _play(
                 result[i, j] = wp.max(u - width, wp.min(u + width, result[i - 1, j]))
 
 
+@wp.kernel(module="unique", enable_backward=False)
+def _between(
+    values: wp.array2d(dtype=wp.float64), right: wp.array(dtype=wp.int64), share: wp.array(dtype=wp.float64),
+    result: wp.array2d(dtype=wp.float64),
+):  # fmt: skip
+    i = wp.tid()
+    after, by = right[i], share[i]
+    for j in range(values.shape[1]):
+        before = values[after - wp.int64(1), j]
+        result[i, j] = before + by * (values[after, j] - before)
+
+
+def between(values: np.ndarray, right: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return values between rows, shape (m, k).
+
+    Args:
+        values: Shape (n, k), float64.
+        right: Row after each place, from 1, shape (m,), int64.
+        share: How far it is from the row before to that one [1], shape (m,), float64.
+    """
+    result = np.empty((len(right), values.shape[1]))
+    if len(right):
+        after = wp.array(np.ascontiguousarray(right), dtype=wp.int64, device="cpu", copy=False)
+        wp.launch(_between, len(right), [_shared(values), after, _shared(share), _shared(result)], device="cpu")
+    return result
+
+
 def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Return the sum of y_i = E_i y_{i-1} + (1 - w_i) u_i + (w_i - E_i) u_{i-1}, y_0 = 0, over filters, shape (n, k).
 
@@ -51,8 +78,9 @@ def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray, share: n
         share: By which each is multiplied, shape (t,), float64.
     """
     columns, wide = values.shape[1], padded(values)
-    result, now = np.zeros(wide.shape), np.zeros((len(share), wide.shape[1]))
+    result, now = np.empty(wide.shape), np.zeros((len(share), wide.shape[1]))
     if len(values):
+        result[0] = 0.0
         given = [in_lanes(wide), _shared(decay), _shared(weight), _shared(share), in_lanes(now), in_lanes(result)]
         wp.launch(_filter, 1, given, device="cpu")
     return np.ascontiguousarray(result[:, :columns])

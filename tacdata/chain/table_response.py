@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -107,8 +108,11 @@ class TableResponse(Response):
         if key in self._kept:
             return self._kept[key].force
         if key not in self._forces:
+            normal = np.zeros(len(pose))
+            for rows, values in self._read(pose, tool, force=True):
+                normal[rows] = values[:, 0]
             _make_room(self._forces)
-            self._forces[key] = _locked(self._read(pose, tool, force=True)[:, 0])
+            self._forces[key] = _locked(normal)
         return self._forces[key]
 
     def signal(self, load: np.ndarray) -> np.ndarray:
@@ -132,23 +136,24 @@ class TableResponse(Response):
     def _both(self, pose: np.ndarray, tool: np.ndarray) -> _Answer:
         key = _key(pose, tool)
         if key not in self._kept:
-            result = self._read(pose, tool)
+            load, normal = np.zeros((len(pose), self._channels)), np.zeros(len(pose))
+            for rows, values in self._read(pose, tool):
+                load[rows], normal[rows] = values[:, : self._channels], values[:, self._channels]
             _make_room(self._kept)
-            load = np.ascontiguousarray(result[:, : self._channels])
-            self._kept[key] = _Answer(_locked(load), _locked(result[:, self._channels].copy()))
+            self._kept[key] = _Answer(_locked(load), _locked(normal))
         return self._kept[key]
 
-    def _read(self, pose: np.ndarray, tool: np.ndarray, force: bool = False) -> np.ndarray:
-        """Return loads and then the force, or the force alone, shape (n, channels + 1) or (n, 1)."""
+    def _read(
+        self, pose: np.ndarray, tool: np.ndarray, force: bool = False
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
+        """Give rows in contact with loads and then the force, or the force alone, shape (m, channels + 1) or (m, 1)."""
         from tacdata.chain.table_kernels import cubic
 
-        columns = 1 if force else self._channels + 1
-        result, touching = np.zeros((len(pose), columns)), pose[:, 2] > 0
+        touching = pose[:, 2] > 0
         for t, table in enumerate(self._nodes if self._rough else self._splines):
             rows = np.flatnonzero(touching & (tool == t))
             values = table.force if force else table.both
-            result[rows] = cubic(values, self._places(pose[rows]), self._rough, columns)
-        return result
+            yield rows, cubic(values, self._places(pose[rows]), self._rough, 1 if force else self._channels + 1)
 
     def _places(self, pose: np.ndarray) -> np.ndarray:
         """Return places in units of nodes, kept inside the table, shape (n, 3)."""

@@ -28,11 +28,11 @@ class Crosstalk(Effect):
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         idle = state.response.signal(np.zeros_like(state.load[:1]))
-        rise = state.signal - idle
-        both = np.zeros_like(rise)
-        both[:, 1:] += rise[:, :-1]
-        both[:, :-1] += rise[:, 1:]
-        return replace(state, signal=state.signal + values["k"] * both)
+        channels = state.signal.shape[1]
+        mixed = float(values["k"]) * (np.eye(channels, k=1) + np.eye(channels, k=-1))
+        signal = state.signal @ (np.eye(channels) + mixed)
+        signal -= idle @ mixed
+        return replace(state, signal=signal)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         """Return why such recordings cannot show it; empty if they may."""

@@ -83,3 +83,18 @@ def test_the_curve_goes_on_straight_beyond_its_ends():
                          np.array([1.0, 10.0]), np.array([5.0, 0.0]), ("ball",))  # fmt: skip
     read = made.signal(np.array([[-0.5, 0.5], [3.0, 2.0], [200.0, -100.0]]))
     assert read == pytest.approx(np.array([[3.5, 15.0], [10.0, 40.0], [207.0, -3000.0]]), rel=1e-12)
+
+
+@pytest.mark.parametrize("rougher", [False, True])
+def test_a_press_at_one_place_is_read_as_its_rows_would_be_by_themselves(rougher):
+    """Along a press only depth changes, and a table of the place alone is read."""
+    made = table(9).rougher() if rougher else table(9)
+    depth = np.concatenate([np.linspace(-0.1, 1.0, 60), np.linspace(1.0, 0.0, 40)])
+    places = np.array([[0.1, 0.3], [-3.0, 1.9], [0.1, 0.3], [2.99, -2.0]])
+    pose = np.column_stack([np.repeat(places, len(depth), axis=0), np.tile(depth, len(places))])
+    order = np.random.default_rng(3).permutation(len(pose))
+    tool = np.zeros(len(pose), dtype=int)
+    scattered = np.empty((len(pose), 1))
+    scattered[order] = made.load(pose[order], tool)
+    np.testing.assert_allclose(made.load(pose, tool), scattered, rtol=1e-12, atol=1e-14)
+    np.testing.assert_array_equal(made.force(pose, tool), made.load(pose, tool)[:, 0])
