@@ -205,7 +205,7 @@ def test_one_that_follows_the_clock_is_held_against_others_that_do(newcomer, clo
         episode = np.repeat(np.arange(12), 10)
         return SimpleNamespace(
             left=residual, episode=episode, place=episode // 4, placed=placed, freedom=0.0, projected_draws=still,
-            energy=0.5 * np.bincount(episode, np.square(residual).sum(axis=1)), tangent=SimpleNamespace(knobs=[]),
+            energy=0.5 * np.bincount(episode, np.square(residual).sum(axis=1)), knobs=[],
             loss=0.5 * float(np.square(residual).sum()),
         )  # fmt: skip
 

@@ -18,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.chain import Course
+from tacdata.discrepancy.statistics.gram_fit import Beside
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class EpisodeGrams:
     rows: np.ndarray
     """Whitened values behind each episode [1], shape (episodes,)."""
     _sums: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
+    _beside: dict[tuple[bytes, ...], Beside] = field(default_factory=dict, repr=False, compare=False)
 
     def of(self, episodes: np.ndarray) -> np.ndarray:
         """Return the summed Gram matrix of some episodes."""
@@ -36,6 +38,13 @@ class EpisodeGrams:
         if key not in self._sums:
             self._sums[key] = self.gram[episodes].sum(axis=0)
         return self._sums[key]
+
+    def beside(self, columns: np.ndarray, ridge: np.ndarray, episodes: np.ndarray) -> Beside:
+        """Return the same beside columns that are free of bounds, fitted to some episodes."""
+        key = (columns.tobytes(), ridge.tobytes(), np.asarray(episodes).tobytes())
+        if key not in self._beside:
+            self._beside[key] = Beside(self.gram, self.of(episodes), columns, ridge)
+        return self._beside[key]
 
 
 def episode_grams(

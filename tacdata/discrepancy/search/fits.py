@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.discrepancy.regressors.candidates import Candidate
 from tacdata.discrepancy.search.problem import Problem
-from tacdata.discrepancy.statistics.gram_fit import gains, solve
+from tacdata.discrepancy.statistics.gram_fit import Beside
 
 INFORMED = 3.0
 """A channel's gain is estimated if presses have so many times its prior's information [1]."""
@@ -20,18 +20,45 @@ def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) 
     Returns:
         Columns (from 0) and their coefficients; the candidates' first.
     """
-    own = [c.columns for c in chosen]
-    moving = problem.tangent
-    columns = np.concatenate([*own, moving.columns, problem.model_errors, problem.nuisances]).astype(int)
-    wide = sum(map(len, own))
-    rooms = [k.room(problem.placed) for k in moving.knobs]
-    free = np.full(len(problem.model_errors) + len(problem.nuisances), np.inf)
-    low = np.concatenate([*(c.low for c in chosen), [r[0] for r in rooms], -free])
-    high = np.concatenate([*(c.high for c in chosen), [r[1] for r in rooms], free])
-    weak, tight = np.full(wide, 1e-6), np.ones(len(rooms) + len(problem.model_errors))
-    ridge = np.concatenate([weak, tight, problem.ridge])
-    low, high = np.minimum(low, -1e-12), np.maximum(high, 1e-12)
-    return columns, solve(problem.grams.of(episodes), columns, ridge, low, high)
+    free, beside = _beside(problem, episodes)
+    columns, values, rest = _bounded(problem, beside, chosen)
+    return np.concatenate([columns, free]), np.concatenate([values, rest])
+
+
+def gained(
+    problem: Problem, chosen: Sequence[Candidate], train: np.ndarray, episodes: np.ndarray | None = None
+) -> np.ndarray:  # fmt: skip
+    """Return by how much such a fit lowers half the sum of squares of episodes, shape (episodes,).
+
+    Args:
+        problem: The problem.
+        chosen: Candidates.
+        train: Episodes that are fitted.
+        episodes: Those that are looked at; those that are fitted, unless given.
+    """
+    _, beside = _beside(problem, train)
+    columns, values, _ = _bounded(problem, beside, chosen)
+    return beside.gains(columns, values, train if episodes is None else episodes)
+
+
+def _beside(problem: Problem, episodes: np.ndarray) -> tuple[np.ndarray, Beside]:
+    """Return the columns without bounds, and the Gram matrices beside them."""
+    free = np.concatenate([problem.model_errors, problem.nuisances]).astype(int)
+    ridge = np.concatenate([np.ones(len(problem.model_errors)), problem.ridge])
+    return free, problem.grams.beside(free, ridge, episodes)
+
+
+def _bounded(
+    problem: Problem, beside: Beside, chosen: Sequence[Candidate]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return columns of candidates and of what is placed, their coefficients, and those of columns without bounds."""
+    moving, own = problem.tangent.columns, [c.columns for c in chosen]
+    columns = np.concatenate([*own, moving]).astype(int)
+    rooms = np.array([k.room(problem.placed) for k in problem.tangent.knobs]).reshape(-1, 2)
+    low = np.minimum(np.concatenate([*(c.low for c in chosen), rooms[:, 0]]), -1e-12)
+    high = np.maximum(np.concatenate([*(c.high for c in chosen), rooms[:, 1]]), 1e-12)
+    ridge = np.concatenate([np.full(len(columns) - len(moving), 1e-6), np.ones(len(moving))])
+    return columns, *beside.fit(columns, ridge, low, high)
 
 
 def held_out(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
@@ -39,28 +66,29 @@ def held_out(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
     result = np.zeros(len(problem.folds))
     for fold in np.unique(problem.folds):
         train, rest = np.flatnonzero(problem.folds != fold), np.flatnonzero(problem.folds == fold)
-        columns, values = fitted(problem, chosen, train)
-        empty, start = fitted(problem, [], train)
-        gram = problem.grams.gram[rest]
-        result[rest] = gains(gram, columns, values) - gains(gram, empty, start)
+        result[rest] = gained(problem, chosen, train, rest) - gained(problem, [], train, rest)
     return result
 
 
-def best_shapes(problem: Problem, among: np.ndarray | None = None) -> dict[str, Candidate]:
-    """Return each effect's candidate with the largest gain in a fit with its bounds."""
-    everything = np.arange(len(problem.folds)) if among is None else among
+def best_shapes(problem: Problem, gains: Sequence[float] | None = None) -> dict[str, Candidate]:
+    """Return each effect's candidate with the largest gain in a fit with its bounds.
+
+    Args:
+        problem: The problem.
+        gains: `shape_gains`, where they are known.
+    """
     best: dict[str, tuple[float, Candidate]] = {}
-    for candidate, gain in zip(problem.candidates, shape_gains(problem, everything), strict=True):
+    for candidate, gain in zip(problem.candidates, shape_gains(problem) if gains is None else gains, strict=True):
         name = candidate.effect.name
         if name not in best or gain > best[name][0]:
             best[name] = gain, candidate
     return {name: candidate for name, (_, candidate) in best.items()}
 
 
-def shape_gains(problem: Problem, among: np.ndarray) -> list[float]:
-    """Return by how much each candidate lowers half the sum of squares of some episodes, in a fit with its bounds."""
-    total = problem.grams.of(among)[None]
-    return [float(gains(total, *fitted(problem, [candidate], among))[0]) for candidate in problem.candidates]
+def shape_gains(problem: Problem) -> list[float]:
+    """Return by how much each candidate lowers half the sum of squares of all episodes, in a fit with its bounds."""
+    everything = np.arange(len(problem.folds))
+    return [float(gained(problem, [candidate], everything).sum()) for candidate in problem.candidates]
 
 
 def channel_gains(problem: Problem, among: np.ndarray | None = None) -> np.ndarray:

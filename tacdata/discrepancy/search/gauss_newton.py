@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -16,7 +17,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.gram import EpisodeGrams, episode_grams
 from tacdata.discrepancy.noise.null_model import NullModel
 from tacdata.discrepancy.noise.whitener import Whitener
-from tacdata.discrepancy.regressors.tangent import Tangent, tangents
+from tacdata.discrepancy.regressors.tangent import Knob, knobs_of, tangents
 from tacdata.discrepancy.statistics.gram_fit import solve
 from tacdata.effects import Placed
 
@@ -38,11 +39,10 @@ class Refined:
 
     placed: tuple[Placed, ...]
     response: Response
-    tangent: Tangent
+    knobs: list[Knob]
+    """Its numbers."""
     energy: np.ndarray
     """Half the whitened sum of squares of each episode, nuisances fitted [1], shape (episodes,)."""
-    covariance: np.ndarray
-    """Of the knobs [their steps], as episodes scatter; 1.645 standard errors hold 90 %, shape (knobs, knobs)."""
     left: np.ndarray
     """Whitened residual without nuisances [noise scales], shape (m, streams), float32."""
     episode: np.ndarray
@@ -55,6 +55,13 @@ class Refined:
     """What took nuisances out of it, and what its response may take up."""
     freedom: float
     """Degrees of freedom that its response takes up [1]; another response has others where effects move the pose."""
+    ending: Callable[[], _State]
+    """Tells where it might go on from its optimum: dear, and asked of few models."""
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Of the knobs [their steps], as episodes scatter; 1.645 standard errors hold 90 %, shape (knobs, knobs)."""
+        return self.ending().covariance
 
     @property
     def loss(self) -> float:
@@ -64,35 +71,40 @@ class Refined:
     @property
     def half_bic(self) -> float:
         """Half the Bayesian information criterion, with the episodes as the sample [1]."""
-        return self.loss + 0.5 * len(self.tangent.knobs) * float(np.log(max(len(self.energy), 2)))
+        return self.loss + 0.5 * len(self.knobs) * float(np.log(max(len(self.energy), 2)))
 
     def errors(self, at: int) -> tuple[dict[str, float], tuple[str, ...]]:
         """Return the standard error of each parameter of one effect, in its unit, and the parameters at a bound."""
         error: dict[str, float] = {}
-        bound = []
         spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        for k, knob in enumerate(self.tangent.knobs):
-            if knob.at != at:
-                continue
+        for k, knob in enumerate(self.knobs):
+            if knob.at == at:
+                p, value = knob.parameter, knob.value(self.placed)
+                size = float(spread[k]) * (abs(value) if knob.shape else p.typical)
+                error[p.name] = max(error.get(p.name, 0.0), size)
+        return error, self.bounds(at)
+
+    def bounds(self, at: int) -> tuple[str, ...]:
+        """Return the parameters of one effect that are at a bound."""
+        bound = []
+        for knob in (k for k in self.knobs if k.at == at):
             p, value = knob.parameter, knob.value(self.placed)
-            size = float(spread[k]) * (abs(value) if knob.shape else p.typical)
-            error[p.name] = max(error.get(p.name, 0.0), size)
             if not knob.shape and p.low < p.default and (value <= p.low * 0.999 or value >= p.high * 0.999):
                 bound.append(p.name)
             elif value >= p.high * 0.999:
                 bound.append(p.name)
-        return error, tuple(bound)
+        return tuple(bound)
 
     def narrowest(self, at: int) -> tuple[str, ...]:
         """Return the shapes of one effect that are at their lower bound, and are known there: its form ends at it.
 
         One that is not known makes no difference below, as a time constant that is shorter than a reading lasts.
         """
-        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return tuple(
-            knob.parameter.name for knob, error in zip(self.tangent.knobs, spread, strict=True)
-            if knob.at == at and knob.shape and error < KNOWN and knob.value(self.placed) <= knob.parameter.low * 1.001
-        )  # fmt: skip
+        ends = [
+            k for k, knob in enumerate(self.knobs)
+            if knob.at == at and knob.shape and knob.value(self.placed) <= knob.parameter.low * 1.001
+        ]  # fmt: skip
+        return tuple(self.knobs[k].parameter.name for k in ends if self.covariance[k, k] < KNOWN**2)
 
 
 def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = MOST_STEPS) -> Refined:
@@ -109,14 +121,14 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
     if isinstance(response, FittedResponse) and now:
         _correct(response, setting, now)
     view = _looked(setting, response, now, null)
-    state = _state(setting, response, now, null, view)
+    begin, ended = (setting, response, now, view), None
     for _ in range(steps):
-        best = None
+        state, best = _state(*begin, null), None
         for share in (1.0, 0.3):
             if state.fall * share * (2 - share) < HOPELESS:
                 continue
             there = now
-            for knob, by in zip(state.tangent.knobs, share * state.move, strict=True):
+            for knob, by in zip(state.knobs, share * state.move, strict=True):
                 there = knob.moved(there, float(np.clip(by, -1.5, 1.5) if knob.shape else by))
             fresh = _own(response)
             if isinstance(fresh, FittedResponse):
@@ -126,15 +138,19 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
                 best = tried, there, fresh
                 break
         if best is None:
+            ended = state
             break
         gained = view.energy.sum() - best[0].energy.sum()
         view, now, response = best
-        state = _state(replace(setting, response=response), response, now, null, view)
+        begin = replace(setting, response=response), response, now, view
         if gained < SMALL_GAIN:
             break
+    # A run of the chain is large, and most models are never asked.
+    later = partial(_state, *begin[:3], replace(view, chain=None), null)
     return Refined(
-        tuple(now), response, state.tangent, view.energy, state.covariance, view.left, setting.course.reduced.episode,
-        null.context, null.projected_draws(view.whitener), view.whitener, view.whitener.freedom,
+        tuple(now), response, knobs_of(now, setting.course.channels), view.energy, view.left,
+        setting.course.reduced.episode, null.context, null.projected_draws(view.whitener), view.whitener,
+        view.whitener.freedom, later if ended is None else lambda: ended,
     )  # fmt: skip
 
 
@@ -162,19 +178,29 @@ class _View:
     """What took nuisances out of it."""
     energy: np.ndarray
     left: np.ndarray
-    chain: Chain
-    """The run that predicts it."""
+    chain: Chain | None
+    """The run that predicts it, where it is kept."""
 
 
 @dataclass(frozen=True)
 class _State:
     """Where a model may go from there."""
 
-    tangent: Tangent
+    knobs: list[Knob]
     move: np.ndarray
-    covariance: np.ndarray
-    fall: float = 0.0
+    fall: float
     """Of half the sum of squares by the move, to first order [1]."""
+    found: EpisodeGrams
+    """Of what is left, and the derivatives by knobs and nuisances."""
+    best: np.ndarray
+    """Coefficients of those."""
+    weight: np.ndarray
+    """Of their priors [1]."""
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of the knobs."""
+        return _covariance(self.found, self.best, self.weight, len(self.knobs))
 
 
 def _looked(setting: Setting, response: Response, placed: list[Placed], null: NullModel) -> _View:
@@ -190,23 +216,21 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
     return _View(clean, whitener, _energy(found, still), left, chain)
 
 
-def _state(setting: Setting, response: Response, placed: list[Placed], null: NullModel, view: _View) -> _State:
+def _state(setting: Setting, response: Response, placed: list[Placed], view: _View, null: NullModel) -> _State:
     course, ridge = setting.course, null.ridge
     moving = tangents(course, response, placed, setting.given, view.chain)
-    if not moving.knobs:
-        return _State(moving, np.zeros(0), np.zeros((0, 0)))
-    clean = view.whitener.whitened(moving.values)
+    k = len(moving.knobs)
+    clean = view.whitener.whitened(moving.values) if k else moving.values
     both = np.concatenate([view.clean, clean], axis=2)
     found = episode_grams(both, course.reduced, null.nuisances, null.inner)
-    k = len(moving.knobs)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
     free = np.full(len(ridge), np.inf)
     low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -free])
     high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), free])
     best = solve(found.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
-    fall = float(view.energy.sum() - _energy(found, best).sum())
-    return _State(moving, best[:k], _covariance(found, best, weight, k), fall)
+    fall = float(view.energy.sum() - _energy(found, best).sum()) if k else 0.0
+    return _State(moving.knobs, best[:k], fall, found, best, weight)
 
 
 def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:

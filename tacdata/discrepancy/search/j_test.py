@@ -180,7 +180,7 @@ def necessity(setting: Setting, model: Refined, without: Refined, null: NullMode
 def _further_amplitudes(model: Refined, other: Refined) -> int:
     """Return how many amplitudes, beyond the first, a model has that another has not."""
     taken = {p.effect.name for p in other.placed}
-    own = [k for k in model.tangent.knobs if not k.shape and model.placed[k.at].effect.name not in taken]
+    own = [k for k in model.knobs if not k.shape and model.placed[k.at].effect.name not in taken]
     return max(len(own) - 1, 0)
 
 

@@ -135,7 +135,7 @@ def physical_first(tried: list[Refined], current: Refined) -> list[Refined]:
 
 def _at_bound(model: Refined, current: Refined) -> bool:
     """Return whether a number of what a model adds is at a physical bound."""
-    return any(model.errors(k)[1] for k in range(len(current.placed), len(model.placed)))
+    return any(model.bounds(k) for k in range(len(current.placed), len(model.placed)))
 
 
 def _is_minor(selection: Selection, best: Refined) -> bool:

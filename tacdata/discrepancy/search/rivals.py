@@ -10,12 +10,12 @@ import numpy as np
 from tacdata.discrepancy.regressors.candidates import Candidate, Form
 from tacdata.discrepancy.regressors.tangent import Tangent
 from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
-from tacdata.discrepancy.search.fits import best_shapes, fitted, shape_gains
+from tacdata.discrepancy.search.fits import best_shapes, fitted, gained, shape_gains
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.j_test import NEEDED_Z, ModelError, Pooled, j_statistic
 from tacdata.discrepancy.search.problem import Problem, prepare
 from tacdata.discrepancy.search.shortlist import RIVAL_Z, TOP
-from tacdata.discrepancy.statistics.gram_fit import clipped_t, gains
+from tacdata.discrepancy.statistics.gram_fit import clipped_t
 from tacdata.effects import Effect, Placed
 
 LEAST_MARGIN = 1.0
@@ -67,7 +67,11 @@ def try_rivals(
     begin, mine, null = replace(beside.setting, response=without.response), current.placed[at], beside.null
     told, taken = beside.without(at), {p.effect.called for p in current.placed}
     late_ones = {p.effect.name for p in late}
-    wanted = _worth_preparing(told, taken, lambda e: e.called == mine.effect.called or e.name in late_ones)
+    explained = shape_gains(told)
+    best_told = best_shapes(told, explained)
+    wanted = _worth_preparing(
+        told, explained, best_told, taken, lambda e: e.called == mine.effect.called or e.name in late_ones
+    )
     bare = prepare(begin, null, without.placed, tested=False, among=wanted)
     best, everything = best_shapes(bare), np.arange(len(bare.folds))
     each = _first_order_gains(bare, best)
@@ -99,7 +103,7 @@ def try_rivals(
         ):
             better = other
         losses[name] = other.loss - current.loss
-        richer = len(other.tangent.knobs) > len(current.tangent.knobs)
+        richer = len(other.knobs) > len(current.knobs)
         behind = other.half_bic - current.half_bic if richer else 0.0
         if stands_in(margins[name], level, behind, best[name].effect.family is mine.effect.family):
             rivals.append(best[name].called)
@@ -111,7 +115,7 @@ def try_rivals(
         if better is None and ahead and not _unphysical(other, current):
             better = other
     error, bounds = current.errors(at)
-    rest = {name: c for name, c in best_shapes(told).items() if name not in best}
+    rest = {name: c for name, c in best_told.items() if name not in best}
     apart = _still(bare) - _still(told)
     chosen = _chosen(bare, best | rest, each | {n: g + apart for n, g in _first_order_gains(told, rest).items()})
     found = FoundEffect(
@@ -162,21 +166,22 @@ def _only_unphysical(current: Refined, best: dict[str, Candidate], models: dict[
 
 def _bound(model: Refined) -> bool:
     """Return whether an amplitude is at its bound. A shape at its own says that the form is another one."""
-    return any(
-        set(model.errors(k)[1]) - {p.name for p in placed.effect.shapes} for k, placed in enumerate(model.placed)
-    )
+    return any(set(model.bounds(k)) - {p.name for p in placed.effect.shapes} for k, placed in enumerate(model.placed))
 
 
-def _worth_preparing(told: Problem, taken: set[str], always: Callable[[Effect], bool]) -> set[Form]:
+def _worth_preparing(
+    told: Problem, gain: list[float], best: dict[str, Candidate], taken: set[str], always: Callable[[Effect], bool]
+) -> set[Form]:  # fmt: skip
     """Return the effects and shapes that may be close in the place of one.
 
     Args:
         told: Without the one to first order: columns are those beside it.
+        gain: What each of its candidates explains.
+        best: Effect -> its best shapes.
         taken: Mechanisms of the whole answer.
         always: Effects that are prepared whatever they explain.
     """
-    gain, still = shape_gains(told, np.arange(len(told.folds))), _still(told)
-    best = best_shapes(told)
+    still = _still(told)
     # The others are not at their optimum without the one: what their numbers explain is no rival's.
     bare = replace(told, model_errors=told.model_errors[:0])
     moved = _still(bare) - _still(replace(bare, tangent=Tangent([], told.tangent.values, told.tangent.columns[:0])))
@@ -191,16 +196,13 @@ def _worth_preparing(told: Problem, taken: set[str], always: Callable[[Effect], 
 
 def _first_order_gains(problem: Problem, best: dict[str, Candidate]) -> dict[str, np.ndarray]:
     """Return by how much each effect alone lowers half the sum of squares of each episode, shape (episodes,)."""
-    everything, each = np.arange(len(problem.folds)), {}
-    for name, candidate in best.items():
-        columns, values = fitted(problem, [candidate], everything)
-        each[name] = gains(problem.grams.gram, columns, values)
-    return each
+    everything = np.arange(len(problem.folds))
+    return {name: gained(problem, [candidate], everything) for name, candidate in best.items()}
 
 
 def _still(problem: Problem) -> np.ndarray:
     """Return by how much half the sum of squares of each episode falls without any effect, shape (episodes,)."""
-    return gains(problem.grams.gram, *fitted(problem, [], np.arange(len(problem.folds))))
+    return gained(problem, [], np.arange(len(problem.folds)))
 
 
 def _close(

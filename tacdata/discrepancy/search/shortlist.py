@@ -6,10 +6,10 @@ import numpy as np
 
 from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.regressors.candidates import Candidate
-from tacdata.discrepancy.search.fits import best_shapes, fitted, held_out
+from tacdata.discrepancy.search.fits import best_shapes, gained, held_out
 from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.search.score_tests import ScoreTests
-from tacdata.discrepancy.statistics.gram_fit import clipped_t, gains
+from tacdata.discrepancy.statistics.gram_fit import clipped_t
 
 ALPHA = 0.01
 """Level of the score tests, corrected for the number of candidates [1]."""
@@ -57,9 +57,8 @@ def _tried(order: list[Candidate]) -> list[Candidate]:
 
 def _gain(problem: Problem, chosen: list[Candidate]) -> float:
     everything = np.arange(len(problem.folds))
-    columns, values = fitted(problem, chosen, everything)
     fee = 0.5 * sum(len(c.columns) for c in chosen) * float(np.log(max(len(problem.folds), 2)))
-    return float(gains(problem.grams.of(everything)[None], columns, values)[0]) - fee
+    return float(gained(problem, chosen, everything).sum()) - fee
 
 
 def _beside(problem: Problem, first: Candidate, others: list[Candidate]) -> list[float]:

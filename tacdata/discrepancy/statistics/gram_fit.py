@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 FOLDS = 5
 """Cross-validation: number of folds."""
+JITTER = 1e-9
+"""Weight on every coefficient, over the mean information of a column: some may be alike [1]."""
+MOST_SETS = 10
+"""Active sets: most steps for each coefficient..."""
+SETTLED = 1e-10
+"""...which end where no slope that points inside is larger [largest slope at 0]."""
 
 
 def solve(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -21,14 +26,92 @@ def solve(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray, low: np.ndar
     """
     index = columns + 1
     matrix = gram[np.ix_(index, index)] + np.diag(ridge)
-    matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / max(len(index), 1), 1e-12)
-    target = gram[index, 0]
-    free = np.linalg.solve(matrix, target)
-    if np.all(free >= low) and np.all(free <= high):
-        return free
-    factor = np.linalg.cholesky(matrix).T
-    rest = np.linalg.solve(factor.T, target)
-    return lsq_linear(factor, rest, bounds=(low, np.maximum(high, low + 1e-12)), method="bvls").x
+    matrix = matrix + JITTER * np.eye(len(index)) * max(float(np.trace(matrix)) / max(len(index), 1), 1e-12)
+    return bounded(matrix, gram[index, 0], low, np.maximum(high, low + 1e-12))
+
+
+def bounded(matrix: np.ndarray, target: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return the x between bounds that has the least x' matrix x / 2 - target' x, shape (k,).
+
+    Active sets, as in Stark & Parker (Computational Statistics 10, 1995, 129): those held at a bound are let go one by
+    one where the slope points inside; a step ends at the first bound in its way.
+
+    Args:
+        matrix: Positive definite, shape (k, k).
+        target: Shape (k,).
+        low: Least values, shape (k,).
+        high: Largest values, shape (k,), above the least.
+    """
+    best = np.linalg.solve(matrix, target)
+    if np.all(best >= low) and np.all(best <= high):
+        return best
+    x = np.clip(best, low, high)
+    held = x != best
+    for _ in range(MOST_SETS * len(x)):
+        free = np.flatnonzero(~held)
+        step = np.zeros(len(x))
+        step[free] = np.linalg.solve(matrix[np.ix_(free, free)], target[free] - matrix[free] @ x)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            room = np.where(step > 0, (high - x) / step, np.where(step < 0, (low - x) / step, np.inf))
+        share = min(float(room.min()), 1.0)
+        x = np.clip(x + share * step, low, high)
+        if share < 1:
+            first = int(np.argmin(room))
+            x[first], held[first] = (high if step[first] > 0 else low)[first], True
+            continue
+        slope = (target - matrix @ x) / np.sqrt(np.diag(matrix))
+        inward = np.where(held, np.where(x <= low, slope, -slope), 0.0)
+        if inward.max() <= SETTLED * np.abs(target / np.sqrt(np.diag(matrix))).max():
+            break
+        held[int(np.argmax(inward))] = False
+    return x
+
+
+class Beside:
+    """Gram matrices beside columns that are free of bounds: these are taken out once, and fits are of a few columns."""
+
+    def __init__(self, gram: np.ndarray, total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> None:
+        """Take them out.
+
+        Args:
+            gram: Of each episode, residual first, shape (episodes, 1 + p, 1 + p).
+            total: Of the episodes that are fitted, shape (1 + p, 1 + p).
+            columns: Those that are free, counted from 0 without the residual, shape (f,).
+            ridge: Weight of a zero-mean prior on each, shape (f,).
+        """
+        self._gram, self._index = gram, columns + 1
+        matrix = total[np.ix_(self._index, self._index)] + np.diag(ridge)
+        self._trace = float(np.trace(matrix))
+        matrix = matrix + JITTER * np.eye(len(columns)) * max(self._trace / max(len(columns), 1), 1e-12)
+        self._through = np.linalg.solve(matrix, total[self._index])
+        self._rest = total - total[:, self._index] @ self._through
+        self._left: dict[bytes, np.ndarray] = {}
+
+    def fit(
+        self, columns: np.ndarray, ridge: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the coefficients of some columns as `solve` does, and those of the free ones beside them."""
+        index = columns + 1
+        matrix = self._rest[np.ix_(index, index)] + np.diag(ridge)
+        mean = (float(np.trace(matrix)) + self._trace) / max(len(index) + len(self._index), 1)
+        matrix = matrix + JITTER * np.eye(len(index)) * max(mean, 1e-12)
+        values = bounded(matrix, self._rest[index, 0], low, np.maximum(high, low + 1e-12))
+        return values, self._through[:, 0] - self._through[:, index] @ values
+
+    def gains(self, columns: np.ndarray, values: np.ndarray, episodes: np.ndarray) -> np.ndarray:
+        """Return by how much coefficients, and the free ones beside them, lower half the sum of squares of episodes."""
+        key, index = np.asarray(episodes).tobytes(), columns + 1
+        if key not in self._left:
+            self._left[key] = self._without(self._gram[episodes])
+        left = self._left[key]
+        linear = left[:, 0, :][:, index] @ values
+        square = np.einsum("i,eij,j->e", values, left[:, index[:, None], index], values)
+        return 0.5 * (self._gram[episodes, 0, 0] - left[:, 0, 0]) + linear - 0.5 * square
+
+    def _without(self, gram: np.ndarray) -> np.ndarray:
+        """Return Gram matrices of what the free columns leave of the others."""
+        half = gram - gram[:, :, self._index] @ self._through
+        return half - self._through.T @ half[:, self._index]
 
 
 def gains(gram: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -62,7 +145,7 @@ def eliminated(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.n
     index = columns + 1
     total = gram.sum(axis=0)
     matrix = total[np.ix_(index, index)] + np.diag(ridge)
-    matrix = matrix + 1e-9 * np.eye(len(index)) * max(float(np.trace(matrix)) / len(index), 1e-12)
+    matrix = matrix + JITTER * np.eye(len(index)) * max(float(np.trace(matrix)) / len(index), 1e-12)
     through = np.linalg.solve(matrix, total[index])
     half = gram - gram[:, :, index] @ through
     result = half - through.T @ half[:, index]

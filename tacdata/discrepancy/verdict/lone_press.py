@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.discrepancy.search.fits import fitted
+from tacdata.discrepancy.search.fits import gained, shape_gains
 from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.statistics.cluster_robust import LARGEST_LEVERAGE
-from tacdata.discrepancy.statistics.gram_fit import eliminated, gains
+from tacdata.discrepancy.statistics.gram_fit import eliminated
 from tacdata.effects import Effect
 
 MOST_OF_IT = 0.5
@@ -36,16 +36,11 @@ class LonePress:
 
 def lone_press(problem: Problem) -> LonePress | None:
     """Return the effect that explains most, where one press alone shows it; None where there is no such effect."""
-    everything, total = np.arange(len(problem.folds)), problem.grams.gram.sum(axis=0)[None]
-    columns, values = fitted(problem, [], everything)
-    bare = float(gains(total, columns, values)[0])
-    excess = 0.5 * (float(total[0, 0, 0]) - float(problem.grams.rows.sum())) - bare
+    bare = float(gained(problem, [], np.arange(len(problem.folds))).sum())
+    excess = 0.5 * (float(problem.grams.gram[:, 0, 0].sum()) - float(problem.grams.rows.sum())) - bare
     if excess <= 0 or not problem.candidates:
         return None
-    own = []
-    for candidate in problem.candidates:
-        columns, values = fitted(problem, [candidate], everything)
-        own.append(float(gains(total, columns, values)[0]) - bare)
+    own = [gain - bare for gain in shape_gains(problem)]
     best = int(np.argmax(own))
     chosen = problem.candidates[best]
     if own[best] < MOST_OF_IT * excess:

@@ -33,7 +33,7 @@ def model(left, *names):
     return SimpleNamespace(
         left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0,
         projected_draws=UNSHAKEN,
-        tangent=SimpleNamespace(knobs=[]), place=episode // 4,
+        knobs=[], place=episode // 4,
     )  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def test_numbers_of_its_own_do_not_bring_a_model_ahead():
     for _ in range(200):
         noise = rng.normal(size=(rows, 1))
         richer = model(noise - basis @ (basis.T @ noise), "relaxation", "drift")
-        richer.tangent = SimpleNamespace(knobs=knobs)
+        richer.knobs = knobs
         told.append(j_statistic(richer, model(noise, "relaxation"), Nothing()))
     assert np.mean(np.array(told) > 2.33) < 0.03, "by 3.5 on average if they are not counted"
     assert abs(np.mean(told)) < 0.7

@@ -10,8 +10,8 @@ from tacdata.discrepancy.search.race import physical_first
 
 
 def model(half_bic, bound=False):
-    errors = ({}, ("f",) if bound else ())
-    return cast(Any, SimpleNamespace(half_bic=half_bic, placed=(None,), errors=lambda k: errors))
+    bounds = ("f",) if bound else ()
+    return cast(Any, SimpleNamespace(half_bic=half_bic, placed=(None,), bounds=lambda k: bounds))
 
 
 @pytest.mark.parametrize(("explains", "first"), [(60, True), (40, False)])
@@ -27,7 +27,7 @@ def test_two_models_of_the_same_effects_are_ordered():
     """A model holds arrays, which have no one truth: models are told apart by what they are, not by their numbers."""
     current = cast(Any, SimpleNamespace(half_bic=0.0, placed=()))
     same = [
-        cast(Any, SimpleNamespace(left=np.zeros(2), half_bic=-100.0, placed=(None,), errors=lambda k, b=b: ({}, b)))
+        cast(Any, SimpleNamespace(left=np.zeros(2), half_bic=-100.0, placed=(None,), bounds=lambda k, b=b: b))
         for b in (("f",), ())
     ]
-    assert [m.errors(0)[1] for m in physical_first(same, current)] == [(), ("f",)]
+    assert [m.bounds(0) for m in physical_first(same, current)] == [(), ("f",)]
