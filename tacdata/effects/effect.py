@@ -230,6 +230,10 @@ class Effect(ABC):
         """Return the skin's thickness over the nominal one [1]; 1 for most effects."""
         return 1.0
 
+    def of_force(self, values: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
+        """Return values by which readings would change as the force does; None for most effects: they do already."""
+        return None
+
     def remark(self, values: dict[str, np.ndarray]) -> str:
         """Return what finding it says of the recordings, with the remedy; empty for most effects."""
         return ""

@@ -149,14 +149,21 @@ class FittedResponse(Response):
 
         Args:
             residual: Of the rows read, shape (m, channels), or one more with the force.
-            features: What each spline adds to a reading in a model, shape (m, most splines of a place).
+            features: What each spline adds to a reading in a model, shape (m, most splines of a place); to each
+                stream, shape (m, streams, splines), where the force differs.
         """
         self._answers = []
+        last = residual.shape[1] - 1
+        parts = [slice(None)] if features.ndim == 2 else [slice(0, last), slice(last, None)]
         for k, basis in enumerate(self._bases):
             rows, count = self._within(k), len(basis.t) - basis.k - 1
-            more, _ = self._solve(
-                rows, np.nan_to_num(residual[rows]), features[rows, :count], basis, self._smooth[k], self._weights[k]
-            )
+            more = np.empty_like(self._weights[k])
+            for of in parts:
+                own = features[rows] if features.ndim == 2 else features[rows, of.start]
+                more[:, of], _ = self._solve(
+                    rows, np.nan_to_num(residual[rows, of]), own[:, :count], basis, self._smooth[k][of],
+                    self._weights[k][:, of],
+                )  # fmt: skip
             self._weights[k] = self._weights[k] + more
 
     def _fit(self, streams: np.ndarray) -> None:

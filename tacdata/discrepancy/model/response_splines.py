@@ -50,6 +50,8 @@ class SplineResponse(Response):
 def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np.ndarray | None:
     """Return what a unit of each spline adds to a reading, at the rows read, shape (m, splines).
 
+    Where an effect changes the force in another way, each stream has its own: shape (m, channels + 1, splines).
+
     A model must not be blamed for splines that do not go through its own effects: a delayed response is made of delayed
     splines. What differs between channels is left out: features are shared by all. So is what a press remembers of
     others: splines of another place would go on in this one, as freedom that the response does not have.
@@ -62,6 +64,16 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
     acting = [p for p in placed if not p.effect.by_channel]
     if not isinstance(response, FittedResponse) or not acting:
         return response.features(course.reduced)
+    readings = _through(course, response, acting)
+    own = [p.effect.of_force(p.values) for p in acting]
+    if course.force is None or not any(own):
+        return readings
+    force = [p if values is None else replace(p, values=values) for p, values in zip(acting, own, strict=True)]
+    return np.stack([*[readings] * course.channels, _through(course, response, force)], axis=1)
+
+
+def _through(course: Course, response: FittedResponse, acting: Sequence[Placed]) -> np.ndarray:
+    """Return what a unit of each spline adds to a reading, gone through effects, shape (m, splines)."""
     none = np.zeros((course.rows, response.width + 1))
     plain = replace(course, readings=none, centers=None, force=None, apart=True)
     little = SMALL_SHARE * max(float(np.abs(response.force(course.tip, course.tool)).max()), 1e-12)

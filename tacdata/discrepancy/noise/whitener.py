@@ -94,7 +94,8 @@ class Whitener:
             course: Whose rows.
             noise: Noise model.
             context: Group of rows that share features, shape (n,); an episode lies in one.
-            features: What the response may take up, shape (n, k); None for nothing but offsets.
+            features: What the response may take up, shape (n, k), or (n, streams, k) where it differs between streams;
+                None for nothing but offsets.
             pose_errors: Change by an episode's pose errors of one standard deviation, shape (n, streams, kinds).
             like: Of the same course, context and noise, but for gains: its offsets are not factored again.
         """
@@ -116,7 +117,7 @@ class Whitener:
             swung = self._colour.white(noise.gain_error[:, :, None], slice(None))[:, :, 0]
         ahead = None
         if offsets is not None and features is not None:
-            ahead = offsets.expected(features[:, None, :]).astype(np.float32)
+            ahead = offsets.expected(_each(features)).astype(np.float32)
         order = np.argsort(context, kind="stable")
         self._places: list[_Place] = []
         # A place at a time: columns of all rows together would not stay in a processor's cache.
@@ -126,9 +127,10 @@ class Whitener:
             free = np.full(len(spans), np.inf)
             shared = None
             if features is not None:
-                used = np.abs(features[group]).max(axis=0) > 1e-9
+                there = _each(features[group])
+                used = np.abs(there).max(axis=(0, 1)) > 1e-9
                 # Where noise is not alike in all streams, whitened features are not.
-                shared = _turned(one.white(features[group][:, None, used], group))
+                shared = _turned(one.white(there[:, :, used], group))
                 if ahead is not None:
                     ones = _turned(one.white(np.ones((len(group), 1, 1)), group)[:, :, 0])
                     for episode, (_, at) in zip(episodes, spans, strict=True):
@@ -281,6 +283,11 @@ def _follow(white: np.ndarray, offset: np.ndarray, expected: np.ndarray) -> None
         expected: In noise scales, shape (streams, columns).
     """
     white -= offset[: len(white), :, None] * expected[:, None, :]
+
+
+def _each(features: np.ndarray) -> np.ndarray:
+    """Return features of every stream, shape (n, streams, k), or (n, 1, k) if all have the same."""
+    return features if features.ndim == 3 else features[:, None, :]
 
 
 def _turned(values: np.ndarray) -> np.ndarray:
