@@ -19,7 +19,8 @@ def course(count):
     depth = np.tile(np.repeat([-0.3, 1.0], ROWS), count)
     return SimpleNamespace(
         episode=episode, episodes=count, time=APART * episode + np.tile(np.linspace(0, 3, 2 * ROWS), count),
-        tip=np.column_stack([0 * depth, 0 * depth, depth]), stroke=1.3, channels=24,
+        tip=np.column_stack([0 * depth, 0 * depth, depth]), stroke=1.3, channels=24, rows=len(depth),
+        read=np.arange(len(depth)), readings=np.full((len(depth), 24), 9000.0),
     )  # fmt: skip
 
 
