@@ -40,6 +40,10 @@ SURE_GAIN = 5.0
 """Another family is there, too, if it lowers half the held-out sum of squares by so much [1]..."""
 SURE_SHARE = 0.03
 """...and explains this share of what the answer does: its laws may be off by less [1]."""
+FAR_MORE = 2.0
+"""A family explains far more of what is left than another if so many times as much [1]."""
+SHARE_LEFT = 0.05
+"""Leftovers: largest share of the explainable that an answer may leave [1]."""
 MODEL = {Family.CONTACT: Family.KINEMATICS}
 """Families that share a saturated model: where the tip is, and where it meets the skin."""
 
@@ -68,6 +72,19 @@ def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     if own is None or own.size < ANOTHER_FORM * max(finding.bought, 0.0):
         return False
     return own.t >= SURE_T or (own.gain >= CLEAR_GAIN and own.t >= CLEAR_T)
+
+
+def fills(found: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
+    """Return whether what an answer leaves is another law of an effect's family: at that level hardly anything is left.
+
+    The family explains nearly all of it, and far more than any other does: models of families overlap.
+    """
+    own = of_family(finding, lacking)
+    if own is None or own.t < SURE_T:
+        return False
+    others = max((other.gain for other in lacking.values() if other is not own), default=0.0)
+    rest = found.left.gain - own.gain
+    return own.gain >= FAR_MORE * others and rest < SHARE_LEFT * (found.left.gain + max(found.explained, 0.0))
 
 
 def with_families(found: Findings, lacking: Mapping[Family, Lack]) -> Findings:

@@ -9,12 +9,13 @@ from enum import Enum, auto
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
-from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, elsewhere
+from tacdata.discrepancy.levels.lack_of_fit import SHARE_LEFT, Lack, another_form, elsewhere, fills
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.several_names import LEFT_T, SHARE_LEFT_ALONE, beside_open, lent, stands_in, traded
 from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gate import GATE
+from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.shortlist import RIVAL_Z
 from tacdata.discrepancy.verdict.calibration import calibration_error, compliance_of_specimens, gains_beyond_calibration
 from tacdata.discrepancy.verdict.confidence import confidence, features
@@ -22,8 +23,6 @@ from tacdata.discrepancy.verdict.lone_press import LonePress, lone_press
 from tacdata.discrepancy.verdict.sealed import Gap, borne_out, refuted
 from tacdata.effects import AtRest, Family, load
 
-SHARE_LEFT = 0.05
-"""Leftovers: largest share of the explainable that an answer may leave [1]."""
 GAP_T = 3.0
 """Leftovers: without any effect that helps, they are a gap from so many standard errors on [1]."""
 SAME_SIZE = 0.1
@@ -138,6 +137,10 @@ def decide(
         levels = [beside_much(found, f, own.get(f.placed.effect.name), shown) for f in answer]
         if first is None or levels[first] is None:
             levels = [None for _ in answer]
+        if not any(levels) and first is not None and fills(found, answer[first], lacking):
+            # What is left is another law of its family: at that level nothing is, and no rival hides in it.
+            answer[first] = answer_of(replace(found, left=Leftovers(0.0, 0.0)))[first]
+            levels[first] = finest(answer[first]) and Level.FAMILY
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
         elif first is not None and stands(found, answer[first], own.get(answer[first].placed.effect.name), shown):

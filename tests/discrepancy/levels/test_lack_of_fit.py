@@ -108,6 +108,29 @@ def test_what_another_family_surely_explains_makes_a_verdict_incomplete(lacking,
     assert ("something of friction and play shows, too, in loading against unloading" in words) is there, words
 
 
+@pytest.mark.parametrize(
+    ("own", "other", "named"),
+    [(Lack(2500.0, 3.0, 2900.0), 1200.0, True), (Lack(2500.0, 1.9, 2900.0), 1200.0, False),
+     (Lack(2500.0, 3.0, 2900.0), 1300.0, False), (Lack(1000.0, 3.0, 1100.0), 0.0, False)],
+)  # fmt: skip
+def test_what_another_law_of_its_family_fills_leaves_the_family(own, other, named):
+    """Steps lost and found beside a frame that grows: neither law is right, and both are kinematics.
+
+    A rival that is worse by less than what is left may be a turn of the law away. Beside the whole family it is not.
+    """
+    found = findings()
+    mine = replace(
+        found.effects[0], placed=Placed(load("lost_steps"), {}), bought=4900.0, margins={"gain_drift": 2.9},
+        losses={"gain_drift": 1000.0},
+    )  # fmt: skip
+    found = replace(found, effects=(mine,), explained=4900.0, left=Leftovers(1500.0, 2.4))
+    lacking = {Family.KINEMATICS: own, Family.RESPONSE_CURVE: Lack(other, 1.7, other)}
+    decision = decide(found, DataChecks(44), lacking=lacking)
+    told = decision.status, decision.effects[0].status, decision.effects[0].level
+    assert told == ((INCOMPLETE, "named", Level.FAMILY) if named else ("unknown", "suspected", None))
+    assert decision.effects[0].finding.rivals == (() if named else ("gain_drift",))
+
+
 @pytest.mark.parametrize("t", [3.0, 1.0])
 def test_where_no_name_holds_what_shows_of_another_family_is_told(t):
     """A sensor that rocks has no name, but depths go with the side that is pressed: that is where to look."""
