@@ -72,7 +72,7 @@ def test_a_mechanism_may_have_any_of_its_forms_and_shapes(pressed):
         "power_creep_read": 9, "nonlinear_relaxation": 4,
     }  # fmt: skip
     assert counts["proportional_hysteresis"] == {
-        "proportional_hysteresis": 5, "hysteresis": 1, "bouc_wen": 3, "hysteresis_read": 6,
+        "proportional_hysteresis": 5, "hysteresis": 1, "bouc_wen": 3, "hysteresis_read": 6, "hysteresis_apart": 4,
     }  # fmt: skip
     assert counts["low_pass_filter"] == {"low_pass_filter": 4}
     wide = Placed(load("low_pass_filter"), {"tau": np.array(1.0)})
