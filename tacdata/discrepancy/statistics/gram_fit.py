@@ -80,6 +80,8 @@ class Beside:
             ridge: Weight of a zero-mean prior on each, shape (f,).
         """
         self._gram, self._index = gram, columns + 1
+        self._kept = np.setdiff1d(np.arange(len(total)), self._index)
+        self._at = np.searchsorted(self._kept, np.arange(len(total)))
         matrix = total[np.ix_(self._index, self._index)] + np.diag(ridge)
         self._trace = float(np.trace(matrix))
         matrix = matrix + JITTER * np.eye(len(columns)) * max(self._trace / max(len(columns), 1), 1e-12)
@@ -100,7 +102,7 @@ class Beside:
 
     def gains(self, columns: np.ndarray, values: np.ndarray, episodes: np.ndarray) -> np.ndarray:
         """Return by how much coefficients, and the free ones beside them, lower half the sum of squares of episodes."""
-        key, index = np.asarray(episodes).tobytes(), columns + 1
+        key, index = np.asarray(episodes).tobytes(), self._at[columns + 1]
         if key not in self._left:
             self._left[key] = self._without(self._gram[episodes])
         left = self._left[key]
@@ -109,9 +111,10 @@ class Beside:
         return 0.5 * (self._gram[episodes, 0, 0] - left[:, 0, 0]) + linear - 0.5 * square
 
     def _without(self, gram: np.ndarray) -> np.ndarray:
-        """Return Gram matrices of what the free columns leave of the others."""
-        half = gram - gram[:, :, self._index] @ self._through
-        return half - self._through.T @ half[:, self._index]
+        """Return Gram matrices of what the free columns leave of the others, without those themselves."""
+        through = self._through[:, self._kept]
+        half = gram[:, :, self._kept] - gram[:, :, self._index] @ through
+        return half[:, self._kept] - through.T @ half[:, self._index]
 
 
 def gains(gram: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
