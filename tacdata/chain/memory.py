@@ -69,6 +69,17 @@ def dead_band(values: np.ndarray, width: float, noise: float) -> np.ndarray:
     return play(values, still + width) - play(values, still)
 
 
+def slip_lags(values: np.ndarray, widths: np.ndarray, anew: np.ndarray) -> np.ndarray:
+    """Return by how much elements that slip lie behind a falling input, shape (elements, n); 0 while it rises.
+
+    Args:
+        values: Input, shape (n,).
+        widths: Half the band of each element, in the input's unit, shape (elements,).
+        anew: Rows at which all elements begin anew, shape (n,), bool.
+    """
+    return np.stack([play(values, width, anew) + width - values for width in widths.tolist()])
+
+
 def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:
     """Return z of dz = (1 - z sgn du) du / w: -1 to 1 as an input rises by far more than ``width``, shape (n,).
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.chain.memory import play
+from tacdata.chain.memory import slip_lags
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
@@ -34,8 +34,7 @@ class Hysteresis(Effect):
         force = np.maximum(state.force, 0.0)
         largest = max(float(force.max()), 1e-12)
         free = state.depth <= 0
-        lost = np.mean([play(force, r * largest, free) + r * largest for r in (0.05, 0.15, 0.4)], axis=0)
-        lag = lost - force
+        lag = slip_lags(force, largest * np.array([0.05, 0.15, 0.4]), free).mean(axis=0)
         share = np.minimum(lag / np.maximum(force, 0.02 * largest), 3.0)
         ease = np.maximum(1 - values["a"] * share, 0.0)
         return replace(state, load=state.load * ease[:, None], force=state.force * ease)

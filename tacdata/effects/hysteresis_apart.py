@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.chain.memory import play
+from tacdata.chain.memory import slip_lags
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 THRESHOLDS = (0.15, 0.35, 0.55, 0.75, 1.0, 1.3, 1.7)
@@ -41,9 +41,9 @@ class HysteresisApart(Effect):
         """Return the state after it."""
         course, depth, response = state.course, state.depth, state.response
         free, most = depth <= 0, float(values["w"]) * course.span
-        behind = [play(depth, w * most, free) + w * most - depth for w in THRESHOLDS]
+        behind = slip_lags(depth, most * np.array(THRESHOLDS), free)
         # No element lets go below the depth at which nothing presses: the lag ends there, and does not jump.
-        late = np.mean([np.clip(lag, 0.0, np.maximum(depth, 0.0)) for lag in behind], axis=0)
+        late = np.clip(behind, 0.0, np.maximum(depth, 0.0)).mean(axis=0)
         late = late[:, None] * np.array([0.0, 0.0, 1.0])
         poses = state.pose, state.pose + values["b"] * late, state.pose - values["a"] * late
         load, more = (response.load(pose, course.tool) for pose in poses[:2])

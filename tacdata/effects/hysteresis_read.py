@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import Course, Response, State
-from tacdata.chain.memory import play
+from tacdata.chain.memory import slip_lags
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 THRESHOLDS = (0.25, 0.6, 1.0)
@@ -42,7 +42,7 @@ class HysteresisRead(Effect):
         force, power = np.maximum(state.force, 0.0), float(values["m"])
         load = (force / max(float(force.max()), 1e-12)) ** (1 / power)
         free, most = state.depth <= 0, float(values["w"])
-        late = np.mean([play(load, w * most, free) + w * most for w in THRESHOLDS], axis=0) - load
+        late = slip_lags(load, most * np.array(THRESHOLDS), free).mean(axis=0)
         left = np.maximum(load - values["a"] * late, 0.0)
         there = load > 1e-9
         ease = np.where(there, (left / np.where(there, load, 1.0)) ** power, 1.0)
