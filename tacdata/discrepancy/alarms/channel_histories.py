@@ -16,6 +16,7 @@ from tacdata.chain import Course
 from tacdata.chain.memory import low_pass, play, running_max
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.regressors.generic import depth_share
 from tacdata.discrepancy.statistics.gram_fit import flips
 
@@ -163,12 +164,13 @@ def _told(cleaned: Cleaned, best: Best) -> Alarm:
     order = order[best.size[order] > 0]
     names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
     most = float(best.size[order[0]])
-    large = f"by up to about {most:.2g} in readings, {100 * most / cleaned.largest:.2g} % of the largest rise"
+    share = plain_number(100 * most / cleaned.largest, 2)
+    large = f"by up to about {plain_number(most, 2)} in readings, {share} % of the largest rise"
     changes = f", and that goes with {best.over}" if best.over else ""
     if best.kind == LATE:
         late = 1e3 * float(np.abs(best.weight).max())
         where = f" {best.history}" if best.history else ""
-        seen = f"channels are late by times of their own{where}{changes}: {large} (some {late:.2g} ms)"
+        seen = f"channels are late by times of their own{where}{changes}: {large} (some {plain_number(late, 2)} ms)"
         following = "look at the order and the times at which channels are read; press at three speeds"
     elif best.kind == OFFSET:
         seen = f"channels move with the path whatever presses them, each its own way ({best.history}{changes}): {large}"

@@ -12,6 +12,7 @@ from scipy.stats import gamma
 from tacdata.chain import Course
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.plain_number import plain_number
 
 CHANCE = 1e-4
 """Probability that noise makes one of all lines as large [1]."""
@@ -59,7 +60,8 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
     order = np.argsort(-size)[:MOST_NAMED]
     names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
     most = float(size[order[0]])
-    large = f"by up to about {most:.2g}, {100 * most / cleaned.largest:.2g} % of the largest rise"
+    share = plain_number(100 * most / cleaned.largest, 2)
+    large = f"by up to about {plain_number(most, 2)}, {share} % of the largest rise"
     return [Alarm(
         f"while the path moves, and not while it stands, readings swing at {frequency[best]:.3g} Hz, or an alias of "
         f"it, {large}; most on {names}: a motor's drive is heard",

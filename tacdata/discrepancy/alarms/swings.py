@@ -16,6 +16,7 @@ import numpy as np
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
 from tacdata.discrepancy.alarms.motor_lines import hums
+from tacdata.discrepancy.plain_number import plain_number
 
 FEWEST = 12
 """Presses, at least."""
@@ -61,7 +62,8 @@ def swings(cleaned: Cleaned) -> list[Alarm]:
     found = strongest(cleaned)
     if found is None or found.p > CHANCE or found.z < LEAST_Z:
         return []
-    size = f"by about {100 * found.share:.2g} % of the rise, up to {found.share * cleaned.largest:.2g} in readings"
+    share, most = plain_number(100 * found.share, 2), plain_number(found.share * cleaned.largest, 2)
+    size = f"by about {share} % of the rise, up to {most} in readings"
     if found.wave < len(WAVES):
         every = cleaned.problem.setting.course.stroke / WAVES[found.wave]
         return [Alarm(

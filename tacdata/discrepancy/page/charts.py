@@ -7,6 +7,8 @@ from html import escape
 
 import numpy as np
 
+from tacdata.discrepancy.plain_number import plain_number
+
 WIDTH, HEIGHT = 360, 150
 """Of a chart [px]."""
 LEFT, RIGHT, TOP, BOTTOM = 46, 8, 16, 26
@@ -80,7 +82,8 @@ def map_of(title: str, rows: Sequence[str], columns: Sequence[str], values: np.n
             parts.append(
                 f'<rect x="{x}" y="{y}" width="{wide - 2}" height="{high - 2}" class="heat" '
                 f'style="fill-opacity:{0.08 + 0.8 * strength:.2f}"/>'
-                f'<text x="{x + wide / 2:.0f}" y="{y + 15}" class="middle" style="fill:{ink}">{_number(value)}</text>'
+                f'<text x="{x + wide / 2:.0f}" y="{y + 15}" class="middle" style="fill:{ink}">'
+                f"{plain_number(value, 3)}</text>"
             )
     size = f"0 0 {first + wide * len(columns)} {24 + high * len(rows)}"
     return _figure(title, size, "".join(parts))
@@ -108,20 +111,15 @@ def _framed(title: str, parts: list[str], x: _Axis, y: _Axis, labels: tuple[str,
     """Return a chart with its frame, the ends of its axes and their names."""
     low, high = HEIGHT - BOTTOM, TOP
     ticks = [
-        f'<text x="{LEFT}" y="{low + 12}">{_number(x.low)}</text>',
-        f'<text x="{WIDTH - RIGHT}" y="{low + 12}" class="end">{_number(x.high)}</text>',
+        f'<text x="{LEFT}" y="{low + 12}">{plain_number(x.low, 3)}</text>',
+        f'<text x="{WIDTH - RIGHT}" y="{low + 12}" class="end">{plain_number(x.high, 3)}</text>',
         f'<text x="{(LEFT + WIDTH) / 2:.0f}" y="{low + 22}" class="middle">{escape(labels[0])}</text>',
-        f'<text x="{LEFT - 4}" y="{low}" class="end">{_number(y.low)}</text>',
-        f'<text x="{LEFT - 4}" y="{high + 6}" class="end">{_number(y.high)}</text>',
+        f'<text x="{LEFT - 4}" y="{low}" class="end">{plain_number(y.low, 3)}</text>',
+        f'<text x="{LEFT - 4}" y="{high + 6}" class="end">{plain_number(y.high, 3)}</text>',
         f'<text x="{LEFT}" y="{high - 5}">{escape(labels[1])}</text>',
     ]
     frame = f'<path class="frame" d="M{LEFT} {high}V{low}H{WIDTH - RIGHT}"/>'
     return _figure(title, f"0 0 {WIDTH} {HEIGHT}", f"{frame}{''.join(ticks)}{''.join(parts)}")
-
-
-def _number(value: float) -> str:
-    """Return a number as short as an axis has room for, without an exponent where it needs none."""
-    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def _figure(title: str, size: str, inner: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from tacdata.discrepancy.page import charts
 from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.telling import ToldPress, telling
+from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.verdict.residual_table import Residuals
 from tacdata.effects import Family, load
 
@@ -61,7 +62,7 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
             tiles.append((f"{100 * e['confidence']:.0f} %", f"sure of {load(e['effect']).spoken}"))
     if sealed["episodes"] and verdict["effects"]:
         words = f"residual of {sealed['episodes']} sealed presses, mean square over the noise (1 is noise alone)"
-        tiles.append((f"{sealed['before']:.3g} → {sealed['after']:.3g}", words))
+        tiles.append((f"{plain_number(sealed['before'], 3)} → {plain_number(sealed['after'], 3)}", words))
         if sealed["certain"]:
             low, high = sealed["interval"]
             spread = f"of their gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"

@@ -10,6 +10,7 @@ from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.lack_of_fit import another_form, elsewhere, of_family
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.levels.several_names import LEFT_T, SHARE_LEFT_ALONE
+from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
@@ -222,8 +223,8 @@ def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
         against = shown.ratio is None or shown.ratio.observed < 0
         if against and (worse := worsened(before, after)):
             return (
-                f"{words}, but sealed presses fit {worse} with {it} (mean square {before:.3g} times the noise "
-                f"without, {after:.3g} with): {name}"
+                f"{words}, but sealed presses fit {worse} with {it} (mean square {plain_number(before, 3)} times the "
+                f"noise without, {plain_number(after, 3)} with): {name}"
             )
     if instead := list(dict.fromkeys(load(r).spoken for m in answer for r in m.rivals)):
         few = _listed(instead, "or") if len(instead) <= MOST_STAND_INS else f"{len(instead)} others"

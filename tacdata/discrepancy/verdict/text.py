@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.search.gate import GATE
 from tacdata.discrepancy.verdict.residual_slices import figure
 from tacdata.effects import library, load
@@ -78,12 +79,12 @@ def _effect(entry: dict[str, Any]) -> list[str]:
         unit = "" if p["unit"] == "1" else f" {'of the ' * p['unit'].startswith('largest')}{p['unit']}"
         meaning = f" ({meanings[name]})" if name in meanings else ""
         if isinstance(p["value"], list):
-            ends = dict.fromkeys(f"{value:.4g}" for value in (min(p["value"]), max(p["value"])))
+            ends = dict.fromkeys(plain_number(value, 4) for value in (min(p["value"]), max(p["value"])))
             over = " over the channels" if len(ends) > 1 else ""
             lines.append(f"    {name}: {' to '.join(ends)}{unit}{over}{meaning}")
         else:
-            spread = f" +- {p['error']:.2g}" if p["error"] is not None else ""
-            lines.append(f"    {name} = {p['value']:.4g}{spread}{unit}{meaning}")
+            spread = f" +- {plain_number(p['error'], 2)}" if p["error"] is not None else ""
+            lines.append(f"    {name} = {plain_number(p['value'], 4)}{spread}{unit}{meaning}")
     if entry["alternatives"]:
         others = ", ".join(load(name).spoken for name in entry["alternatives"])
         lines.append(f"    these presses leave open whether it is: {others}")
