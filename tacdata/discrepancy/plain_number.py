@@ -10,6 +10,7 @@ def plain_number(value: float, digits: int) -> str:
     """Return a number with so many significant digits; below a million without a power of ten.
 
     Example:
+        >>> from tacdata.discrepancy.plain_number import plain_number
         >>> plain_number(18_960.0, 2), plain_number(0.0123, 2), plain_number(2.4e9, 2)
         ('19000', '0.012', '2.4e+09')
     """
