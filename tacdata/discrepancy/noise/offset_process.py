@@ -3,7 +3,11 @@
 A stream's offset in an episode is the sum of three parts: a level of its place and session, an Ornstein-Uhlenbeck
 process in time, and the episode's own error. Their variances are those of restricted maximum likelihood (REML:
 Patterson & Thompson, Biometrika 58, 1971, 545) beside a straight line. REML leaves slow processes undecided: of the
-time constants that are likely, the one counts by which a drift is least certain.
+time constants that are likely, the one counts by which a drift is least certain. What all channels share, as a warm-up
+does, or what goes with a measured temperature, is no evidence of the process either: it is tested against it.
+
+An offset is read as a mean over the rows without contact, and a mean moves less than the process does: its covariance
+is that of means. An episode's own offset is the mean over all of it.
 
 Episodes are made independent by their innovations (the Cholesky factor of the offsets' covariance): what the earlier
 offsets, read without contact, predict is taken off. An effect that follows the clock must then exceed this drift.
@@ -14,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
@@ -27,6 +32,10 @@ FREE_LEVEL = 1e3
 """Prior standard deviation of an unknown level: practically free [noise scales]."""
 FEWEST_OFFSETS = 6
 """REML: with fewer episodes no process is estimated, and every offset is free."""
+MANY_CHANNELS = 8
+"""REML: of so many channels or more, what they share is left out."""
+POINTS = 40
+"""Covariance of means: most points of an episode that its mean is taken over."""
 QUIET_ROWS = 3
 """Rows without contact from which an episode's offset is read, at least."""
 LEAST_OWN = 0.05
@@ -44,11 +53,15 @@ class OffsetProcess:
     """What is known of episodes' offsets before they are read."""
 
     covariance: np.ndarray
-    """Of the offsets as they are [noise scales squared], shape (episodes, episodes)."""
+    """Of the means where nothing presses [noise scales squared], shape (episodes, episodes)."""
+    cross: np.ndarray
+    """Of each episode's offset, the mean over all of it, with those means [the same], shape (episodes, episodes)."""
+    variance: np.ndarray
+    """Of each episode's offset [the same], shape (episodes,)."""
     error: np.ndarray
-    """Variance with which each is read where nothing presses [the same], shape (episodes,); inf where none was read."""
+    """Variance with which each mean is read [the same], shape (episodes,); inf where none was read."""
     quiet: np.ndarray
-    """Rows where nothing presses, of those read, shape (m,), bool."""
+    """Readings behind each row read where nothing presses, 0 where something does [1], shape (m,)."""
     episode: np.ndarray
     """Episode of each row read, shape (m,), int64."""
 
@@ -69,13 +82,13 @@ class OffsetProcess:
         # An episode whose offset cannot be read has no part in the others' prediction.
         read[blind] = read[:, blind] = 0.0
         read[blind, blind] = 1.0
-        # Its inverse's rows up to e whiten the offsets before e: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e.
+        # Its inverse's rows up to e whiten the means before e: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e.
         inverse = solve_triangular(cholesky(read, lower=True), np.eye(count), lower=True)
         weights, spread = np.zeros((count, count)), np.zeros(count)
         for e in range(count):
-            half = inverse[:e, :e] @ np.where(blind[:e], 0.0, self.covariance[e, :e])
+            half = inverse[:e, :e] @ np.where(blind[:e], 0.0, self.cross[e, :e])
             weights[e, :e] = half @ inverse[:e, :e]
-            spread[e] = np.sqrt(max(self.covariance[e, e] - float(half @ half), LEAST_OWN**2))
+            spread[e] = np.sqrt(max(self.variance[e] - float(half @ half), LEAST_OWN**2))
         return weights, spread
 
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> OffsetProcess:
@@ -89,14 +102,15 @@ class OffsetProcess:
         if episodes is None:
             there = np.isin(np.arange(len(self.error)), number)
             return replace(self, error=np.where(there, self.error, np.inf), quiet=self.quiet[rows], episode=number)
+        among = np.ix_(episodes, episodes)
         return OffsetProcess(
-            self.covariance[np.ix_(episodes, episodes)], self.error[episodes], self.quiet[rows],
-            np.searchsorted(episodes, number),
+            self.covariance[among], self.cross[among], self.variance[episodes], self.error[episodes],
+            self.quiet[rows], np.searchsorted(episodes, number),
         )  # fmt: skip
 
     def beside(self, course: Course) -> OffsetProcess:
         """Return it for a course with readings of more episodes: their offsets let no others be expected."""
-        return replace(self, quiet=quiet_rows(course), episode=course.episode)
+        return replace(self, quiet=_quiet(course), episode=course.episode)
 
     def expected(self, values: np.ndarray, missing: np.ndarray | None = None) -> np.ndarray:
         """Return the offsets that those of the episodes before let one expect, shape (episodes, streams, columns).
@@ -125,37 +139,120 @@ def offset_process(
     streams = residual[:, : course.channels] / scale[: course.channels]
     missing = ~np.isfinite(streams)
     there = quiet & ~missing.any(axis=1)
-    count = np.bincount(course.episode[there], minlength=course.episodes)
-    known = count >= QUIET_ROWS
+    known = np.bincount(course.episode[there], minlength=course.episodes) >= QUIET_ROWS
+    count = np.bincount(course.episode[there], course.averaged[there], minlength=course.episodes)
     if known.sum() < FEWEST_OFFSETS:
         return None
-    offsets = _means(streams[:, :, None], there, course.episode, course.episodes, None)[:, :, 0]
-    # The mean of n rows with memory m and innovations of variance 1.
+    weight = np.where(there, course.averaged, 0.0)
+    offsets = _means(streams[:, :, None], weight, course.episode, course.episodes, None)[:, :, 0]
+    # The mean of n readings with memory m and innovations of variance 1.
     error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
-    time = _times(course)
-    own_way = _without_gain(offsets, course, scale)
-    walk, length, own = _reml(own_way[known], error[known], time[known], [level[known] for level in levels])
-    apart = np.abs(np.subtract.outer(time, time))
-    same = np.sum([level[:, None] == level for level in levels], axis=0)
-    covariance = walk * np.exp(-apart / length) + FREE_LEVEL**2 * same + max(own, LEAST_OWN**2) * np.eye(len(time))
-    return OffsetProcess(covariance, error, quiet, course.episode)
+    spans = _Spans.of(course, weight)
+    own_way, kinds = _own_way(offsets, course, scale), [level[known] for level in levels]
+    walk, length, own = _reml(own_way[known], error[known], spans.among(known), kinds, _warmth(course)[known])
+    same = FREE_LEVEL**2 * np.sum([level[:, None] == level for level in levels], axis=0)
+    nugget = max(own, LEAST_OWN**2) * np.eye(course.episodes)
+    covariance, cross, variance = spans.covariances(length)
+    more = same + nugget
+    return OffsetProcess(
+        walk * covariance + more, walk * cross + more, walk * variance + np.diag(more), error, _quiet(course),
+        course.episode,
+    )  # fmt: skip
 
 
-def _without_gain(offsets: np.ndarray, course: Course, scale: np.ndarray) -> np.ndarray:
-    """Return offsets in all directions but the one that a gain of whole readings has, shape (episodes, k).
+@dataclass(frozen=True)
+class _Spans:
+    """Times over which an episode's means are taken: where nothing presses, and over all of it."""
 
-    A gain that drifts changes readings at rest by one factor. It is no chance, and would hide in the process.
+    time: np.ndarray
+    """Of each episode [s], shape (episodes,)."""
+    quiet: list[np.ndarray]
+    """Times without contact, from that [s]; empty where there are none."""
+    whole: list[np.ndarray]
+    """Times of all of it, from that [s]."""
+
+    @classmethod
+    def of(cls, course: Course, weight: np.ndarray) -> _Spans:
+        """Return those of a course of which rows say what the offset is, each by its weight, shape (m,)."""
+        time = _times(course)
+        quiet, whole, share = [], [], (np.arange(POINTS) + 0.5) / POINTS
+        edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
+        for first, last in pairwise(edges):
+            own = course.time[first:last]
+            own = own - float(own.mean()) if len(own) else np.zeros(1)
+            sums = np.cumsum(weight[first:last])
+            there = len(sums) > 0 and sums[-1] > 0
+            quiet.append(own[np.searchsorted(sums, share * sums[-1])] if there else own[:0])
+            whole.append(own[0] + (own[-1] - own[0]) * share)
+        return cls(time, quiet, whole)
+
+    def among(self, known: np.ndarray) -> _Spans:
+        """Return those of some episodes, shape (episodes,), bool, at most of `MOST_OFFSETS`."""
+        few = np.flatnonzero(known)[:MOST_OFFSETS]
+        return _Spans(self.time[few], [self.quiet[k] for k in few], [self.whole[k] for k in few])
+
+    def covariances(self, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return covariances of a process of variance 1: of means, of offsets with means, and offsets' variances.
+
+        That of two episodes is a product: exp(-|t - s| / length) of any two of their times.
+
+        Args:
+            length: Time constant [s].
+        """
+        before = np.exp(-np.maximum(np.subtract.outer(self.time, self.time), 0.0) / length)
+        quiet_on, quiet_off, whole_off = (
+            np.array([float(np.mean(np.exp(np.clip(sign * at / length, -40, 40)))) if len(at) else 1.0 for at in each])
+            for sign, each in ((1, self.quiet), (-1, self.quiet), (-1, self.whole))
+        )
+        later = np.tril(np.minimum(before * quiet_on[None, :] * quiet_off[:, None], 1.0), -1)
+        own = np.array([_mean_alike(a, a, length) for a in self.quiet])
+        cross = np.tril(np.minimum(before * quiet_on[None, :] * whole_off[:, None], 1.0), -1)
+        inside = np.array([_mean_alike(a, b, length) for a, b in zip(self.whole, self.quiet, strict=True)])
+        variance = np.array([_mean_alike(a, a, length) for a in self.whole])
+        return later + later.T + np.diag(own), cross + np.diag(inside), variance
+
+
+def _mean_alike(first: np.ndarray, second: np.ndarray, length: float) -> float:
+    """Return the covariance of the means over two sets of times of one episode, for a process of variance 1."""
+    if not (len(first) and len(second)):
+        return 1.0
+    return float(np.mean(np.exp(-np.abs(np.subtract.outer(first, second)) / length)))
+
+
+def _own_way(offsets: np.ndarray, course: Course, scale: np.ndarray) -> np.ndarray:
+    """Return offsets in all directions but those that all channels share, shape (episodes, k).
+
+    What settles or drifts alike in all channels, or by one factor of their readings at rest, is no chance: it would
+    hide in the process.
 
     Args:
         offsets: In noise scales, shape (episodes, channels).
         course: With the rows read alone.
         scale: Standard deviation of the innovations of rows, shape (streams,).
     """
+    channels = offsets.shape[1]
     idle, _ = told_at_rest(course)
-    if idle is None or len(idle) < 2:
+    shared = [idle] if idle is not None and channels > 1 else []
+    if channels >= MANY_CHANNELS:
+        shared.append(np.ones(channels))
+    if not shared:
         return offsets
-    along = (idle / scale[: len(idle)])[:, None]
-    return offsets @ np.linalg.qr(along, mode="complete")[0][:, 1:]
+    along = np.stack(shared, axis=1) / scale[:channels, None]
+    return offsets @ _complement(along / np.linalg.norm(along, axis=0))
+
+
+def _warmth(course: Course) -> np.ndarray:
+    """Return the measured temperature of each episode, less its mean [degC], shape (episodes, 1), or (episodes, 0)."""
+    if course.temperature is None:
+        return np.zeros((course.episodes, 0))
+    count = np.maximum(np.bincount(course.episode, minlength=course.episodes), 1)
+    warmth = np.bincount(course.episode, course.temperature, minlength=course.episodes) / count
+    return (warmth - warmth.mean())[:, None]
+
+
+def _quiet(course: Course) -> np.ndarray:
+    """Return the readings behind each row where nothing presses, 0 elsewhere, shape (m,)."""
+    return np.where(quiet_rows(course), course.averaged, 0.0)
 
 
 def _times(course: Course) -> np.ndarray:
@@ -165,49 +262,47 @@ def _times(course: Course) -> np.ndarray:
 
 
 def _means(
-    values: np.ndarray, rows: np.ndarray, episode: np.ndarray, episodes: int, missing: np.ndarray | None
+    values: np.ndarray, weight: np.ndarray, episode: np.ndarray, episodes: int, missing: np.ndarray | None
 ) -> np.ndarray:
-    """Return the means of some rows of each episode, shape (episodes, ...), 0 where there are none."""
+    """Return the weighted means of each episode's rows, shape (episodes, ...), 0 where there are none."""
+    chosen = np.flatnonzero(weight > 0)
     gone = ~np.isfinite(values[..., 0]) if missing is None else missing
-    if gone[rows].any():
+    if gone[chosen].any():
         values = np.where(gone[:, :, None], 0.0, values)
-    flat, chosen = values.reshape(len(values), -1), np.flatnonzero(rows)
-    each = csr_array(
-        (np.ones(len(chosen), dtype=values.dtype), (episode[chosen], chosen)), shape=(episodes, len(values))
-    )
+    flat = values.reshape(len(values), -1)
+    each = csr_array((weight[chosen].astype(values.dtype), (episode[chosen], chosen)), shape=(episodes, len(values)))
     count = (each @ (~gone).astype(float))[:, :, None]
-    return (each @ flat).astype(float).reshape(episodes, *values.shape[1:]) / np.maximum(count, 1)
+    return (each @ flat).astype(float).reshape(episodes, *values.shape[1:]) / np.where(count > 0, count, 1.0)
 
 
 def _reml(
-    offsets: np.ndarray, error: np.ndarray, time: np.ndarray, levels: Sequence[np.ndarray]
+    offsets: np.ndarray, error: np.ndarray, spans: _Spans, levels: Sequence[np.ndarray], warmth: np.ndarray
 ) -> tuple[float, float, float]:  # fmt: skip
     """Return the REML variance and time constant [s] of the process, and the variance of episodes' own offsets.
 
     Args:
         offsets: In noise scales, shape (episodes, channels).
         error: Variance of each that is known [1].
-        time: Of each [s].
+        spans: Their times.
         levels: Of each.
+        warmth: What else a drift may go with, shape (episodes, k).
     """
-    offsets, error, time = offsets[:MOST_OFFSETS], error[:MOST_OFFSETS], time[:MOST_OFFSETS]
+    offsets, error, time = offsets[:MOST_OFFSETS], error[:MOST_OFFSETS], spans.time
     clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
     # A line beside levels that are not known: a drift is no evidence of the process.
     few = [level[:MOST_OFFSETS] for level in levels]
-    basis = np.column_stack([*(level[:, None] == np.unique(level) for level in few), clock])
-    values, vectors = np.linalg.eigh(basis @ basis.T)
-    kept = values < 1e-9 * values[-1]
-    contrast = vectors[:, kept]
+    known = [level[:, None] == np.unique(level) for level in few]
+    basis = np.column_stack([*known, warmth[:MOST_OFFSETS] / max(float(np.abs(warmth).max(initial=0.0)), 1e-9), clock])
+    contrast = _complement(basis)
     if contrast.shape[1] < FEWEST_OFFSETS // 2:
         return 0.0, 1.0, float(np.var(offsets, axis=0).mean())
-    apart = np.abs(np.subtract.outer(time, time))
     between = max(float(np.median(np.diff(time))), 1e-9)
     seen = contrast.T @ offsets
     read_error = (contrast.T * error) @ contrast
     size = max(float(np.mean(seen**2) - np.trace(read_error) / len(read_error)), 0.01 * float(np.mean(seen**2)), 1e-6)
     best = []
     for steps in TIME_CONSTANTS:
-        alike = np.exp(-apart / (steps * between))
+        alike = spans.covariances(steps * between)[0]
         pattern = contrast.T @ alike @ contrast
 
         def cost(log: np.ndarray, pattern: np.ndarray = pattern) -> float:
@@ -224,6 +319,12 @@ def _reml(
         best.append((float(found.fun), _doubt(matrix, basis), (walk, steps * between, own)))
     least = min(value for value, _, _ in best)
     return max((b for b in best if b[0] <= least + LIKELY), key=lambda b: b[1])[2]
+
+
+def _complement(basis: np.ndarray) -> np.ndarray:
+    """Return orthonormal columns that are orthogonal to those of a basis, shape (n, k)."""
+    values, vectors = np.linalg.eigh(basis @ basis.T)
+    return vectors[:, values < 1e-9 * values[-1]]
 
 
 def _doubt(covariance: np.ndarray, basis: np.ndarray) -> float:

@@ -19,19 +19,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import digamma, fdtrc, ndtri, polygamma
 
-CLUSTER_SIZE = 5
-"""Clusters: successive episodes in one cluster, where they correlate [episodes]."""
+CLUSTER_SIZES = (1, 2, 3, 5)
+"""Clusters: successive episodes in one cluster, as many as it takes for clusters not to correlate [episodes]."""
 FEWEST_CLUSTERS, MOST_CLUSTERS = 10, 24
-"""Clusters: bounds of their number; few clusters leave no degrees of freedom, many are correlated again."""
+"""Clusters: bounds of the number of the largest ones; few leave no degrees of freedom, many are correlated again."""
 CORRELATED_Z = 1.64
 """Clusters: episodes are joined if lag-1 correlation exceeds so many standard errors (5 %, one-sided) [1]."""
 LARGEST_LEVERAGE = 0.6
 """HC3: an amplitude of which one cluster holds a larger share of the information is not tested [1]."""
 FLOOR = 1e-300
-PRIOR_FREEDOM = 0.5
-"""Shrinkage: most prior degrees of freedom, over the number of effects; many effects look alike [1]."""
+PRIOR_FREEDOM = 2.0
+"""Shrinkage: most prior degrees of freedom, over the number of effects: fewer show as a spread of their ratios [1]."""
+INDEPENDENT = 0.5
+"""Shrinkage: share of the effects that are independent of one another; many look alike [1]."""
 LEAST_EXCESS = 1.0
 """Shrinkage: least prior excess. Less than the noise expects is chance, or an overestimated noise [1]."""
+SURELY = 1.0
+"""Shrinkage: ratios spread by more than chance beyond so many standard errors of that [1]."""
+CLOCK_Z = 2.0
+"""Shrinkage: effects that follow the clock scatter more beyond so many standard errors of the two ratios [1]."""
 OUTLIER_P = 0.05
 """Shrinkage: an effect whose variance is less probable than this under the prior is shrunk the less [1]."""
 FEWEST_POOLED = 5
@@ -64,9 +70,12 @@ class ClusteredScore:
         """Return the F statistic as a standard normal score [1], its variance shrunk towards a prior if given."""
         variance, (first, second) = self.variance, self.freedom
         if pooled is not None:
-            more = pooled.freedom * self._prior_weight(pooled)
-            variance = (second * variance + more * pooled.excess * self.expected_variance) / (second + more)
-            second = second + more
+            expected, more = pooled.excess * self.expected_variance, pooled.freedom * self._prior_weight(pooled)
+            own, prior = second * variance / (second + more), more * expected / (second + more)
+            variance, second = own + prior, second + more
+            # The prior's covariance is a multiple of the unit matrix: all amplitudes are degrees of freedom.
+            square = own**2 / first + (2 * own + prior) * prior / self.residuals.shape[1]
+            first = variance**2 / square
         return float(_normal(np.array([np.sum(np.square(self.total)) / variance]), first, second)[0])
 
     def _prior_weight(self, pooled: PooledExcess) -> float:
@@ -99,6 +108,8 @@ class PooledExcess:
     """Prior ratio [1]."""
     freedom: float
     """Prior degrees of freedom [1]."""
+    error: float = 0.0
+    """Standard error of the ratio's natural logarithm [1]."""
 
 
 def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | None:
@@ -117,20 +128,24 @@ def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | No
     excess = [np.median([s.variance / max(s.expected_variance, 1e-12) for s in shapes]) for shapes in excited]
     log = np.log(excess) - digamma(half) + np.log(half)
     middle = float(np.median(log))
-    spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - float(np.mean(polygamma(1, half)))
+    chance, independent = float(np.mean(polygamma(1, half))), INDEPENDENT * len(excited)
+    # A spread of ratios is one beyond the standard error of what chance makes of it.
+    spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - chance * (1 + SURELY * np.sqrt(2 / independent))
     most = PRIOR_FREEDOM * len(excited)
     freedom = min(2 * _trigamma_inverse(spread), most) if spread > 0 else most
-    return PooledExcess(max(float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2))), LEAST_EXCESS), freedom)
+    ratio = float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2)))
+    return PooledExcess(max(ratio, LEAST_EXCESS), freedom, 1.2533 * float(np.sqrt(chance / independent)))
 
 
 def pooled_by_kind(others: PooledExcess | None, clock: PooledExcess | None) -> dict[bool, PooledExcess | None]:
     """Return the priors of effects that follow the clock (True) and of all others (False).
 
-    Few effects follow the clock, and estimate a prior badly. Where they scatter no more than the others, they get the
-    others' prior. Where something drifts, they keep their own.
+    Few effects follow the clock, and estimate a prior badly. They get that of the others. Where something drifts, they
+    surely scatter more, and keep their own.
     """
-    if others is not None and clock is not None and others.excess >= clock.excess:
-        clock = others
+    if others is not None and clock is not None:
+        surely = float(np.log(clock.excess / others.excess)) > CLOCK_Z * np.hypot(clock.error, others.error)
+        clock = clock if surely else others
     return {False: others, True: clock}
 
 
@@ -167,14 +182,16 @@ def clustered_score(gram: np.ndarray, columns: np.ndarray) -> ClusteredScore:
     inside = np.einsum("ji,eik,lk->ejl", turned, information, turned, optimize=True)
     bare = white - inside @ whole
     leverage = np.einsum("ejj->ej", inside)
-    cluster = np.arange(len(gram))
-    if _correlated(bare, leverage):
-        count = int(np.clip(len(gram) // CLUSTER_SIZE, min(FEWEST_CLUSTERS, len(gram)), MOST_CLUSTERS))
-        cluster = cluster * count // len(gram)
-    together = np.zeros((cluster.max() + 1, len(index)))
-    heavy = np.zeros_like(together)
-    np.add.at(together, cluster, bare)
-    np.add.at(heavy, cluster, leverage)
+    for size in CLUSTER_SIZES:
+        count = max(len(gram) // size, min(FEWEST_CLUSTERS, len(gram)))
+        if size == CLUSTER_SIZES[-1]:
+            count = min(count, MOST_CLUSTERS)
+        cluster = np.arange(len(gram)) * count // len(gram)
+        together, heavy = np.zeros((2, count, len(index)))
+        np.add.at(together, cluster, bare)
+        np.add.at(heavy, cluster, leverage)
+        if not _correlated(together, heavy):
+            break
     tested = heavy.max(axis=0) <= LARGEST_LEVERAGE
     if not tested.any():
         return _nothing(len(gram))

@@ -19,32 +19,34 @@ def course(count):
     depth = np.tile(np.repeat([-0.3, 1.0], ROWS), count)
     return SimpleNamespace(
         episode=episode, episodes=count, time=APART * episode + np.tile(np.linspace(0, 3, 2 * ROWS), count),
-        tip=np.column_stack([0 * depth, 0 * depth, depth]), stroke=1.3, channels=24, rows=len(depth),
-        read=np.arange(len(depth)), readings=np.full((len(depth), 24), 9000.0),
+        tip=np.column_stack([0 * depth, 0 * depth, depth]), stroke=1.3, channels=24, rows=len(depth), temperature=None,
+        read=np.arange(len(depth)), readings=np.full((len(depth), 24), 9000.0), averaged=np.ones(len(depth)),
     )  # fmt: skip
 
 
 def followed(rng, count, length, spread):
-    """Return an Ornstein-Uhlenbeck process at rest, shape (count, 24); a length of 0: independent numbers."""
-    keep = np.exp(-APART / length) if length else 0.0
-    made = np.empty((count, 24))
-    now = rng.normal(size=24)
-    for k in range(count):
-        made[k] = now
+    """Return an Ornstein-Uhlenbeck process as it goes on, shape (rows, 24); a length of 0: a number an episode."""
+    c = course(count)
+    if not length:
+        return spread * rng.normal(size=(count, 24))[c.episode]
+    made, now = np.empty((len(c.time), 24)), rng.normal(size=24)
+    for k, step in enumerate(np.diff(c.time, prepend=c.time[0])):
+        keep = np.exp(-step / length)
         now = keep * now + np.sqrt(1 - keep**2) * rng.normal(size=24)
+        made[k] = now
     return spread * made
 
 
 def slope_score(offsets, rng, levels=None):
     """Return the standard normal score of a drift in each channel, by innovations, shape (24,), and what was told."""
-    count = len(offsets)
+    count = len(offsets) // (2 * ROWS)
     c = course(count)
-    read = offsets[c.episode] + rng.normal(size=(len(c.episode), 24))
+    read = offsets + rng.normal(size=offsets.shape)
     none = np.zeros(count, dtype=np.int64)
     told = offset_process(read, c, np.ones(24), 0.0, levels or [none])
     assert told is not None
     clock = (np.arange(count) - count / 2)[c.episode][:, None, None] * np.ones((1, 24, 1))
-    means = np.stack([read[(c.episode == e) & told.quiet].mean(axis=0) for e in range(count)])
+    means = np.stack([read[(c.episode == e) & (told.quiet > 0)].mean(axis=0) for e in range(count)])
     line = (np.arange(count) - count / 2)[:, None]
     left, way = means - told.expected(read[:, :, None])[:, :, 0], line - told.expected(clock)[:, :1, 0]
     weight = 1 / (told.spread**2 + 1 / ROWS)[:, None]
@@ -65,7 +67,7 @@ def test_independent_offsets_leave_a_drift_as_clear_as_least_squares_does():
     rng, count = np.random.default_rng(2), 48
     line = np.arange(count) - count / 2
     sure = 0.3 / np.sqrt(np.sum((line - line.mean()) ** 2))  # offsets of 0.3, which are hardly read worse
-    scores, told = slope_score(0.3 * rng.normal(size=(count, 24)) + 6 * sure * line[:, None], rng)
+    scores, told = slope_score(0.3 * followed(rng, count, 0.0, 1.0) + 6 * sure * line[course(count).episode, None], rng)
     assert np.median(scores) == pytest.approx(6 * 0.3 / np.hypot(0.3, 1 / np.sqrt(ROWS)), rel=0.2)
     assert told.spread[-1] == pytest.approx(0.3, rel=0.2)
 
