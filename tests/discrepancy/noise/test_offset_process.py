@@ -80,6 +80,24 @@ def test_what_came_before_says_what_comes():
     assert np.allclose(told.weights, np.tril(told.weights, -1))
 
 
+def test_what_all_channels_share_or_warmth_moves_is_no_wander():
+    count, quick = 48, 20.0
+    wander = followed(np.random.default_rng(6), count, quick, 0.5)
+    c = course(count)
+    settling = 8 * np.exp(-c.time / 80)[:, None]
+    warmth = np.sin(c.time / 50)[:, None] * np.linspace(-3, 3, 24)
+
+    def told(read, temperature=None):
+        c.temperature = temperature
+        noise = np.random.default_rng(7).normal(size=read.shape)
+        return offset_process(read + noise, c, np.ones(24), 0.0, [np.zeros(count, dtype=np.int64)])
+
+    bare = np.median(told(wander).variance - 1e6)
+    assert np.median(told(wander + settling).variance - 1e6) == pytest.approx(bare, rel=1e-3)
+    assert np.median(told(wander + warmth, np.sin(c.time / 50)).variance - 1e6) < 1.3 * bare
+    assert np.median(told(wander + warmth).variance - 1e6) > 2 * bare
+
+
 def test_a_place_keeps_its_level_to_itself():
     """A constant of one place is taken off that place alone, and all of it from its second visit on."""
     rng, count = np.random.default_rng(4), 24
