@@ -163,6 +163,10 @@ class Effect(ABC):
     """The mechanism as a person calls it; empty: its name with blanks. The same for all forms."""
     at_rest: ClassVar[AtRest | None] = None
     """For memory of the rate, which needs two rates of pressing, or a hold; the same for all forms."""
+    times_by_radius: ClassVar[float | None] = None
+    """For linear memory of load: power of the tool's radius by which its times grow [1]; None for all else."""
+    memory_by_depth: ClassVar[bool] = False
+    """For linear memory of load: whether what relaxes grows with depth."""
     grows_with: ClassVar[Growth | None] = None
     """For what grows from press to press; needs unevenly spaced presses."""
     follows_clock: ClassVar[bool] = False

@@ -28,6 +28,8 @@ class NonlinearRelaxation(Effect):
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.4, 2.5, 16.0, 60.0)),
     )
     at_rest = AtRest.RELAXES
+    times_by_radius = 0.0
+    memory_by_depth = True
     mechanism = "relaxation"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -38,6 +38,7 @@ class Poroelasticity(Effect):
         "relaxation does not"
     )
     odds = 0.04  # silicone is a dry rubber, which relaxes; fluid moves in gels, foams and wet covers
+    times_by_radius = 1.0
     parameters = (
         Parameter("f", "1", "relaxed share", 0.1, 0.0, 0.95),
         Parameter("tau", "s", "time at the median radius", 10.0, 0.5, 500.0, grid=(1.0, 4.0, 16.0, 60.0)),

@@ -31,6 +31,7 @@ class PowerCreep(Effect):
         Parameter("tau0", "s", "shortest time constant", 0.1, 0.01, 10.0, grid=(0.05, 0.3, 2.0)),
     )
     at_rest = AtRest.RELAXES
+    times_by_radius = 0.0
     mechanism = "relaxation"
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

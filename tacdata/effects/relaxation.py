@@ -32,6 +32,7 @@ class Relaxation(Effect):
         Parameter("tau", "s", "time constant", 2.0, 0.05, 500.0, grid=(0.15, 0.4, 1.0, 2.5, 6.0, 16.0, 40.0, 120.0)),
     )
     at_rest = AtRest.RELAXES
+    times_by_radius = 0.0
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

@@ -27,6 +27,7 @@ class RelaxationRead(Relaxation):
         POWER,
     )
     mechanism = "relaxation"
+    times_by_radius = None  # of loads that are not known
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""

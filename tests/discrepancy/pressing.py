@@ -1,5 +1,7 @@
 """Presses of a small made-up sensor, time-stepped apart from the library."""
 
+import itertools
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -11,9 +13,12 @@ FINE = 200
 
 def course(
     seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5, pulls=True,
-    power=1.0, friction=0.0, recovery=None,
+    power=1.0, friction=0.0, recovery=None, times=((2.0, 1.0),), radii=(4.0,), by_radius=0.0,
 ):  # fmt: skip
     """Return presses of three channels at two places; sizes in s, s, share, mm.
+
+    What relaxes does so by ``times``, each with its share; under a tool they are longer by its radius over the mean of
+    all, to the power ``by_radius``.
 
     A tool that pulls sticks to the skin; readings grow by a power of load. Friction is a share of load, carried by
     elements that slip beyond loads of their own and come to rest when the tool is off. While the tip leaves, readings
@@ -21,7 +26,8 @@ def course(
     """
     slips = np.array([0.03, 0.08, 0.2])
     rng = np.random.default_rng(seed)
-    parts, clock, slow = [], 0.0, np.zeros(3)
+    tools = rng.permutation(np.arange(episodes) % len(radii)) if len(radii) > 1 else np.zeros(episodes, dtype=int)
+    parts, clock, slow = [], 0.0, {}
     for k in range(episodes):
         rate, depth = rng.choice(rates), rng.choice([0.6, 1.0])
         way = (depth + 0.3) / rate
@@ -34,9 +40,12 @@ def course(
         pressed = np.maximum(followed(tip, play) + jitter, 0.0) ** 1.5
         carried = (1 - friction) * pressed + friction * slid(pressed, slips) if friction else pressed
         load = weights * np.maximum(carried, 0.0)[:, None]
-        slow = lagged(load, 2.0, slow * np.exp(-1 / 2.0))
-        now = load - relaxed * slow if pulls else np.maximum(load - relaxed * slow, 0.0)
-        slow = slow[-1]
+        left = load
+        for (t, radius), (tau, share) in itertools.product(enumerate(radii), times):
+            own = tau * (radius / np.mean(radii)) ** by_radius
+            behind = lagged(load * (t == tools[k]), own, slow.get((t, tau), np.zeros(3)) * np.exp(-1 / own))
+            left, slow[t, tau] = left - relaxed * share * behind, behind[-1]
+        now = left if pulls else np.maximum(left, 0.0)
         late = lagged(now, lag, np.zeros(3)) if lag > 0 else now
         read = 5000 + 800 * (late if power == 1.0 else np.maximum(late, 0.0) ** power)
         pick = np.arange(rng.integers(6), len(time), 6)
@@ -49,10 +58,10 @@ def course(
     episode = np.repeat(np.arange(episodes), count)
     return Course(
         time=np.concatenate([begin + rows.time for begin, rows in parts]), episode=episode,
-        tip=np.concatenate([rows.tip for _, rows in parts]), tool=np.zeros(len(episode), dtype=int),
+        tip=np.concatenate([rows.tip for _, rows in parts]), tool=tools[episode],
         readings=np.concatenate([rows.values for _, rows in parts]),
         averaged=np.concatenate([rows.averaged for _, rows in parts]), session=np.zeros(episodes, dtype=int),
-        site=np.arange(episodes) % 2, tools=(Tool("ball", "sphere", 4.0),),
+        site=np.arange(episodes) % 2, tools=tuple(Tool(f"ball {k}", "sphere", r) for k, r in enumerate(radii)),
         names=tuple(f"press {k}" for k in range(episodes)), centers=np.array([[-1.0, 0], [0, 0], [1, 0]]),
     )  # fmt: skip
 

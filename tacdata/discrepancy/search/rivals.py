@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import NullModel
 from tacdata.discrepancy.regressors.candidates import Candidate, Form
+from tacdata.discrepancy.regressors.spectrum import spectrum
 from tacdata.discrepancy.regressors.tangent import Tangent
 from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.fits import best_shapes, fitted, gained, shape_gains
@@ -34,6 +37,8 @@ SLACK, PREPARED = 0.8, 12
 """Rivals: told beside the whole answer, so many are prepared afresh; `CLOSE`, `BEHIND`, `FAR_Z` have this slack [1]."""
 ALIKE = 0.7
 """Rivals: shapes are prepared that explain this share of what the effect's best one does [1]."""
+SPECTRUM_STEPS = 3
+"""Gauss-Newton steps of a spectrum, which is nearly linear in its shares."""
 BOOTSTRAPS = 200
 """Resamplings of the episodes by which selection is judged."""
 
@@ -76,6 +81,7 @@ def try_rivals(
     best, everything = best_shapes(bare), np.arange(len(bare.folds))
     each = _first_order_gains(bare, best)
     margins, losses, rivals, models = {}, {}, [], {}
+    spectra = Spectra(begin, without, null, pooled)
     better: Refined | None = None
 
     def in_its_place(name: str) -> Refined:
@@ -89,20 +95,22 @@ def try_rivals(
     for name in dict.fromkeys([*_close(taken, best, each), *long]):
         other = models[name] = in_its_place(name)
         level = required_margin(mine.effect, best[name].effect)
-        margins[name] = j_statistic(current, other, pooled)
+        margins[name], losses[name] = j_statistic(current, other, pooled), other.loss - current.loss
         if margins[name] >= level:
             # Its equation may be wrong by a little: what that explains is nothing against it.
             error = ModelError.of(begin, other, null, len(without.placed))
             margins[name] = j_statistic(current, other, pooled, error)
+        by_spectra = margins[name] < max(level, RIVAL_Z) and spectra.both(mine.effect, best[name].effect)
+        if by_spectra:
+            margins[name], losses[name] = spectra.compared(mine.effect, best[name].effect)
         if (
             margins[name] < -AHEAD
             and not _unphysical(other, current)
             and (better is None or other.half_bic < better.half_bic)
-            and other.half_bic < current.half_bic
+            and (by_spectra or other.half_bic < current.half_bic)
             and j_statistic(other, without, pooled) > (need if margins[name] > -RIVAL_Z else min(need, NEEDED_Z))
         ):
             better = other
-        losses[name] = other.loss - current.loss
         richer = len(other.knobs) > len(current.knobs)
         behind = other.half_bic - current.half_bic if richer else 0.0
         if stands_in(margins[name], level, behind, best[name].effect.family is mine.effect.family):
@@ -125,6 +133,41 @@ def try_rivals(
         bought=without.loss - current.loss, unphysical=_only_unphysical(current, best, models),
     )  # fmt: skip
     return Tried(found, better, RivalModels(begin, current, without, models, pooled))
+
+
+@dataclass
+class Spectra:
+    """Laws of linear memory that are held against each other by all mixtures of times, instead of by their own.
+
+    A law with the right mechanism and the wrong mixture may be behind one with the wrong mechanism. Of two spectra with
+    as many numbers only what their times go with is left: the tool's radius, or nothing.
+    """
+
+    begin: Setting
+    without: Refined
+    null: NullModel
+    pooled: Pooled
+    fits: dict[tuple[float, bool], Refined] = field(default_factory=dict)
+    """Power of the radius, and whether shares grow with depth -> the best spectrum in the effect's place."""
+
+    @staticmethod
+    def both(mine: Effect, rival: Effect) -> bool:
+        """Return whether both are such laws, of times that go with different powers of the radius."""
+        powers = mine.times_by_radius, rival.times_by_radius
+        return None not in powers and powers[0] != powers[1]
+
+    def compared(self, mine: Effect, rival: Effect) -> tuple[float, float]:
+        """Return by how many standard errors over episodes the first's is better, and how far the other is behind."""
+        law = mine if mine.times_by_radius == 0.0 else rival
+        first, second = (self._fit(law, e.times_by_radius or 0.0) for e in (mine, rival))
+        return j_statistic(first, second, self.pooled), second.loss - first.loss
+
+    def _fit(self, law: Effect, by_radius: float) -> Refined:
+        key = by_radius, law.memory_by_depth
+        if key not in self.fits:
+            placed = [*self.without.placed, spectrum(law, by_radius)]
+            self.fits[key] = refine(self.begin, placed, self.null, SPECTRUM_STEPS)
+        return self.fits[key]
 
 
 def stands_in(margin: float, level: float, behind: float, kin: bool = True) -> bool:
