@@ -28,7 +28,7 @@ def compared(by_radius):
         refine(setting, [Placed(law, {"f": np.array(0.01), "tau": np.array(2.0)})], null) for law in (RELAXATION, FLUID)
     ]
     spectra = Spectra(setting, refine(setting, [], null), null, {})
-    return j_statistic(*laws, {}), spectra.compared(RELAXATION, FLUID)[0]
+    return j_statistic(laws[0], laws[1], {}), spectra.compared(RELAXATION, FLUID)[0]
 
 
 def test_a_skin_that_relaxes_as_a_gel_does_but_alike_under_both_tools_is_no_gel():
