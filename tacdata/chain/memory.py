@@ -6,6 +6,10 @@ import numpy as np
 
 STILL = 4.0
 """An input that moves by less is still, in standard deviations of its noise [1]."""
+UNEVEN = 6.0
+"""Rows that are so many times as far from one neighbour as from the other do not say how an input bends there [1]."""
+DOUBLE = 1e-4
+"""Two poles are as good as one double pole if the square of the damping is off 1 by less [1]."""
 
 
 def low_pass(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
@@ -37,6 +41,85 @@ def low_passes(values: np.ndarray, step: np.ndarray, taus: np.ndarray, shares: n
     decay = np.exp(-np.minimum(ratio, 700.0))
     weight = np.where(ratio > 1e-8, -np.expm1(-ratio) / np.maximum(ratio, 1e-12), 1.0)
     return filtered(_wide(values), decay, weight, np.asarray(shares, dtype=float)).reshape(values.shape)
+
+
+def low_pass_between(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
+    """Return what `low_pass` does of an input that bends between rows, exact for a parabola.
+
+    A straight line between two rows is above a load that grows ever faster: read late, it looks filtered.
+
+    Args:
+        values: Input, shape (n, k).
+        step: Time since the row before [s], shape (n,).
+        tau: Time constant [s], above 0.
+    """
+    ratio = np.minimum(step / tau, 700.0)
+    decay = np.exp(-ratio)
+    share = 0.5 * tau**2 * (2.0 - ratio - decay * (2.0 + ratio))
+    return low_pass(values, step, tau) + _recursion(bends(values, step) * share[:, None], decay)
+
+
+def second_order(values: np.ndarray, step: np.ndarray, tau: float, damping: float) -> np.ndarray:
+    """Return the solution of y'' / w^2 + tau y' + y = u, w = 2 D / tau, for u linear between rows, from rest, (n,).
+
+    Both poles at once are exact. One low-pass filter behind another is not: what the first returns bends between rows.
+
+    Args:
+        values: Input u, 0 at first, shape (n,).
+        step: Time since the row before [s], shape (n,).
+        tau: How late y is behind a ramp [s], above 0.
+        damping: D; 1 is critical, from there on y does not overshoot [1].
+    """
+    apart = damping**2 - 1
+    apart = apart if abs(apart) > DOUBLE else -DOUBLE
+    if apart > 0:
+        taus = 0.5 * tau * (1 + np.array([1.0, -1.0]) * np.sqrt(apart) / damping)
+        return low_passes(values, step, taus, taus * [1.0, -1.0] / (taus[0] - taus[1]))
+    pole = 0.5 * tau * (1 + 1j * np.sqrt(-apart) / damping)
+    ratio = step / pole
+    ratio = np.where(ratio.real > 700.0, 700.0, ratio)
+    decay = np.exp(-ratio)
+    small = np.abs(ratio) < 1e-8
+    weight = np.where(small, 1.0, (1 - decay) / np.where(small, 1.0, ratio))
+    given = (1 - weight) * values + (weight - decay) * np.concatenate([[0.0], values[:-1]])
+    # Turned along with the pole, only a real recursion is left of a complex one.
+    turn = np.exp(-1j * np.cumsum(ratio.imag))
+    turned = given / turn
+    both = _recursion(np.stack([turned.real, turned.imag], axis=-1), np.abs(decay)) @ np.array([1.0, 1j])
+    return (pole * both * turn).imag / pole.imag
+
+
+def _recursion(given: np.ndarray, decay: np.ndarray) -> np.ndarray:
+    """Return y_i = E_i y_{i-1} + b_i, y_0 = 0, for ``given`` b, shape (n, k), and ``decay`` E, shape (n,)."""
+    from tacdata.chain.memory_kernels import filtered
+
+    fresh = np.maximum(1 - decay, 1e-300)[:, None]
+    return filtered(np.ascontiguousarray(given / fresh), decay[:, None], decay[:, None], np.ones(1))
+
+
+def bends(values: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Return the second derivative of an input between each row and the one before [its unit / s^2], shape (n, k).
+
+    It is 0 beside rows that are spaced too unevenly to say.
+
+    Args:
+        values: Input, shape (n, k).
+        step: Time since the row before [s], shape (n,).
+    """
+    before, after = step[1:-1], step[2:]
+    known = np.maximum(before, after) <= UNEVEN * np.minimum(before, after)
+    known &= np.minimum(before, after) > 0
+    width = np.where(known, 0.5 * (before + after), np.inf)[:, None]
+    slope = np.diff(values, axis=0)
+    slope /= np.maximum(step[1:], 1e-12)[:, None]
+    own = np.zeros(values.shape)
+    np.divide(np.diff(slope, axis=0), width, out=own[1:-1])
+    count = np.zeros(len(values))
+    count[1:-1] = known
+    both = np.maximum(count[1:] + count[:-1], 1.0)[:, None]
+    result = np.zeros(values.shape)
+    np.divide(own[1:] + own[:-1], both, out=result[1:])
+    return result
 
 
 def play(values: np.ndarray, width: float, anew: np.ndarray | None = None) -> np.ndarray:
@@ -113,7 +196,9 @@ def running_max(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 
 def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np.ndarray) -> np.ndarray:
-    """Return values as they were ``delay`` before each row, linear between rows, never across episodes.
+    """Return values as they were ``delay`` before each row, never across episodes.
+
+    Between rows they bend as rows beside say: straight lines would smooth them, as a filter does.
 
     Args:
         values: Shape (n, k).
@@ -132,4 +217,10 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
     right = np.maximum(right, 1)
     gap = np.maximum(time[right] - time[right - 1], 1e-12)
     share = np.clip((wanted - time[right - 1]) / gap, 0.0, 1.0)
-    return between(_wide(values), right, share)
+    result = between(_wide(values), right, share)
+    step = np.diff(time, prepend=time[0])
+    step[starts] = np.inf
+    curved = bends(_wide(values), step).take(right, axis=0)
+    curved *= (0.5 * share * (1 - share) * np.square(gap))[:, None]
+    result -= curved
+    return result

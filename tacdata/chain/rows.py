@@ -17,6 +17,10 @@ KINK = 0.15
 """Change of speed from one reading to the next, of the largest speed, that is sudden [1]."""
 SHORT = 0.4
 """A sudden change of speed over less of the longest way does not matter [1]."""
+BENT = 0.1
+"""A path may be off the straight lines between rows by this share of the longest way [1]..."""
+NOISE, MIDDLE = 4.0, 1.4826
+"""...and so many standard deviations of its noise; one is so many medians of what is off without its sign [1]."""
 SETTLED = 0.4
 """Time after the last motion from which readings are averaged [s]."""
 MANY = 300
@@ -71,6 +75,7 @@ def rows_of(
     mean = np.stack([_mean(group, column) for column in values.T], axis=-1)
     longest = BETWEEN * max(1.0, float(path[:, 2].max()))
     between = _between(mean_time, tip_at(mean_time), longest) if len(mean_time) > 1 else np.zeros(0)
+    between = np.union1d(between, _corners(np.union1d(mean_time, between), path_time, path, BENT * longest))
     every = np.concatenate([mean_time, between])
     order = np.argsort(every, kind="stable")
     filled = np.concatenate([mean, np.full((len(between), values.shape[1]), np.nan)])[order]
@@ -110,6 +115,38 @@ def _groups(time: np.ndarray, last: np.ndarray, tip: np.ndarray, slow: float) ->
                 number, begin = number + 1, i
         result[i] = number
     return result
+
+
+def _corners(time: np.ndarray, path_time: np.ndarray, path: np.ndarray, most: float) -> np.ndarray:
+    """Return times at which the path is off the straight lines between rows: a few of each gap, the farthest first.
+
+    A corner that is cut is a load that rises early, or late: so would a delay or a filter have it.
+
+    Args:
+        time: Times of the rows [s], shape (n,), increasing.
+        path_time: Times of the path [s], shape (p,).
+        path: x, y, depth [mm], shape (p, 3).
+        most: How far off a straight line may be [mm]; what is measured has noise beside.
+    """
+    bent = np.diff(path, 2, axis=0)
+    # Fewer points than readings are the corners of a command.
+    measured = len(path) > len(time)
+    noise = MIDDLE * np.median(np.abs(bent), axis=0) / np.sqrt(6) if measured and len(bent) else np.zeros(3)
+    within = (path_time > time[0]) & (path_time < time[-1])
+    when, there = path_time[within], path[within]
+    rows = time
+    for _ in range(FEW_BETWEEN):
+        straight = np.stack([np.interp(rows, path_time, path[:, axis]) for axis in range(3)], axis=-1)
+        off = np.stack([np.interp(when, rows, straight[:, axis]) for axis in range(3)], axis=-1) - there
+        off = (np.abs(off) - NOISE * noise).max(axis=1, initial=-np.inf)
+        gap = np.searchsorted(time, when)
+        order = np.lexsort((-off, gap))
+        first = order[np.flatnonzero(np.diff(gap[order], prepend=-1))]
+        added = when[first[off[first] > most]]
+        if not len(added):
+            break
+        rows = np.union1d(rows, added)
+    return np.setdiff1d(rows, time)
 
 
 def _between(time: np.ndarray, tip: np.ndarray, longest: float) -> np.ndarray:

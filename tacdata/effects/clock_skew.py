@@ -24,6 +24,7 @@ class ClockSkew(Effect):
     source = "standard form"
     experiment = "an early and a late sync event"
     form_error = 0.02
+    spread = False
     parameters = (Parameter("r", "s", "delay gained over all recordings", 0.1, -5.0, 5.0),)
     follows_clock = True
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from tacdata.chain import State
 from tacdata.chain.memory import delayed
-from tacdata.effects.effect import AtRest, Effect, Family, Parameter
-from tacdata.effects.latency import LONG
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter, Placed
+from tacdata.effects.latency import LONG, Latency
 
 
 class LatencyEitherWay(Effect):
@@ -27,6 +27,7 @@ class LatencyEitherWay(Effect):
     experiment = "three rates: each edge is late by its own constant time"
     mechanism = "latency"
     form_error = 0.05
+    spread = False
     parameters = (
         Parameter("L_in", "s", "delay while load rises", 0.05, -1.0, 2.0),
         Parameter("L_out", "s", "delay while load falls", 0.05, -1.0, 2.0),
@@ -54,6 +55,10 @@ class LatencyEitherWay(Effect):
     def delay(self, values: dict[str, np.ndarray]) -> float:
         """Return by how much readings come late, in the mean of both ways [s]."""
         return 0.5 * float(values["L_in"] + values["L_out"])
+
+    def plain(self, values: dict[str, np.ndarray]) -> Placed:
+        """Return one delay for both ways."""
+        return Placed(Latency(), {"L": np.asarray(self.delay(values))})
 
     def remark(self, values: dict[str, np.ndarray]) -> str:
         """Return what long delays say of the clocks, or of what holds the load."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.chain.memory import low_pass
+from tacdata.chain.memory import low_pass_between
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
@@ -33,4 +33,4 @@ class LowPassFilter(Effect):
         if tau <= 0.0:
             return state
         start = state.signal[:1]
-        return replace(state, signal=start + low_pass(state.signal - start, state.course.step, tau))
+        return replace(state, signal=start + low_pass_between(state.signal - start, state.course.step, tau))

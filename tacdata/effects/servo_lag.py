@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
 from tacdata.chain import State
-from tacdata.chain.memory import low_pass
+from tacdata.chain.memory import second_order
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter
 
 
@@ -27,6 +28,8 @@ class ServoLag(Effect):
     parameters = (Parameter("tau", "s", "time constant", 0.05, 0.0, 1.0),)
     at_rest = AtRest.CATCHES_UP
     seen_by_tag = True
+    damping: ClassVar[float] = 1.0
+    """Damping of the loop; 1 is critical [1]."""
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
@@ -35,5 +38,5 @@ class ServoLag(Effect):
             return state
         pose = state.pose.copy()
         way, step = pose[:, 2] - pose[0, 2], state.course.step
-        pose[:, 2] = pose[0, 2] + low_pass(low_pass(way, step, tau / 2), step, tau / 2)
+        pose[:, 2] = pose[0, 2] + second_order(way, step, tau, self.damping)
         return replace(state, pose=pose)

@@ -33,6 +33,25 @@ def test_rests_are_averaged_and_fast_motion_is_dense():
     assert np.isnan(rows.values[rows.averaged == 0]).all()
 
 
+def test_no_corner_of_the_path_is_cut():
+    """Readings miss them all; after the hold, averaged for seconds, a delay would be seen early."""
+    time = np.arange(0.01, 13, 1 / 30)
+    rows = rows_of(time, np.column_stack([time, 2 * time]), PATH_TIME, PATH)
+    there = np.interp(PATH_TIME[1:-1], rows.time, rows.tip[:, 2])
+    np.testing.assert_allclose(there, PATH[1:-1, 2], atol=0.004)
+
+
+def test_noise_of_a_measured_path_is_no_corner():
+    rng, path_time = np.random.default_rng(7), np.arange(0, 13, 0.01)
+    path = np.column_stack([0 * path_time, 0 * path_time, np.interp(path_time, PATH_TIME, PATH[:, 2])])
+    time = np.arange(0.01, 12.9, 1 / 30)
+    plain, noisy = (
+        rows_of(time, np.column_stack([time, 2 * time]), path_time, path + noise * rng.normal(size=path.shape))
+        for noise in (0.0, 0.004)
+    )
+    assert np.count_nonzero(noisy.averaged == 0) <= np.count_nonzero(plain.averaged == 0) + 5
+
+
 def test_slow_motion_read_often_is_averaged_and_fast_motion_is_not():
     path_time, path = np.array([0.0, 5.0, 6.0, 6.2]), np.array([[0, 0, 0.0], [0, 0, 1.0], [0, 0, 1.0], [0, 0, 0.0]])
     time = np.arange(0, 6.2, 0.01)  # 0.2 mm/s down, 5 mm/s up

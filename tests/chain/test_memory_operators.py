@@ -3,7 +3,20 @@
 import numpy as np
 import pytest
 
-from tacdata.chain.memory import dead_band, delayed, low_pass, low_passes, play, running_max, slipping
+from scipy.integrate import solve_ivp
+
+from tacdata.chain.memory import (
+    bends,
+    dead_band,
+    delayed,
+    low_pass,
+    low_pass_between,
+    low_passes,
+    play,
+    running_max,
+    second_order,
+    slipping,
+)
 
 
 @pytest.mark.parametrize("tau", [0.02, 0.3, 5.0, 400.0])
@@ -31,6 +44,54 @@ def test_several_lags_at_once_are_their_sum(columns):
     np.testing.assert_allclose(low_passes(values, step, taus, shares), expected, atol=1e-13)
     alone = low_pass(values[:, 0], step, 0.5)
     np.testing.assert_array_equal(low_pass(values, step, 0.5)[:, 0], alone)
+
+
+def bent():
+    """Rows of uneven steps, and a load that grows ever faster."""
+    time = np.concatenate([[0.0], np.cumsum(np.random.default_rng(5).uniform(0.005, 0.02, 200))])
+    return time, np.diff(time, prepend=time[0]), 3 * time**2 + time
+
+
+def test_a_filter_of_what_bends_between_rows_is_exact_for_a_parabola():
+    time, step, load = bent()
+    tau = 0.0065
+    settled = load - tau * (6 * time + 1) + 6 * tau**2
+    expected = settled - settled[0] * np.exp(-time / tau)
+    np.testing.assert_allclose(low_pass_between(load[:, None], step, tau)[:, 0], expected, atol=1e-12)
+    straight = low_pass(load, step, tau) - expected
+    assert 1e-4 > straight[20:].mean() > 2e-5, "straight lines between rows are above it"
+
+
+def test_a_delay_of_what_bends_between_rows_is_exact_for_a_parabola():
+    time, _, load = bent()
+    late = delayed(load[:, None], time, np.zeros(len(time), dtype=int), np.full(len(time), 0.013))[:, 0]
+    then = time - 0.013
+    np.testing.assert_allclose(late[5:], (3 * then**2 + then)[5:], atol=1e-12)
+
+
+def test_beside_a_long_gap_nothing_bends():
+    """A load that rises at once after a rest would swing far below before it."""
+    time = np.array([0.0, 0.5, 1.0, 1.02, 1.04, 1.06, 1.08])
+    load = np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0])
+    assert np.abs(bends(load[:, None], np.diff(time, prepend=0.0))).max() < 1e-9
+    late = delayed(load[:, None], time, np.zeros(7, dtype=int), np.full(7, 0.1))
+    assert late.min() >= 0.0
+    np.testing.assert_allclose(bends((time**2)[3:, None], np.diff(time, prepend=0.0)[3:])[1:], 2.0)
+
+
+@pytest.mark.parametrize("damping", [0.7, 0.99999, 1.0, 1.3])
+def test_a_second_order_lag_follows_its_equation(damping):
+    corners, path = [0.0, 0.3, 0.5, 0.55, 1.0], [0.0, 0.6, 0.6, 0.5, 0.5]
+    time = np.unique(np.concatenate([corners, np.random.default_rng(6).uniform(0, 1, 120)]))
+    tau = 0.03
+    w = 2 * damping / tau
+
+    def equation(t, state):
+        return [state[1], w**2 * (np.interp(t, corners, path) - state[0] - tau * state[1])]
+
+    expected = solve_ivp(equation, (0, 1), [0, 0], t_eval=time, max_step=5e-4, rtol=1e-8, atol=1e-10).y[0]
+    found = second_order(np.interp(time, corners, path), np.diff(time, prepend=0.0), tau, damping)
+    np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
 def test_play_follows_through_its_dead_band():

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise.null_model import NullModel
 from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
-from tacdata.discrepancy.search.j_test import NEEDED_Z, j_statistic, necessity
+from tacdata.discrepancy.search.j_test import NEEDED_Z, Pooled, j_statistic, necessity
 from tacdata.discrepancy.search.problem import Problem, prepare
-from tacdata.discrepancy.search.race import REFITS, Selection, least_p_values
+from tacdata.discrepancy.search.race import MOST_EFFECTS, REFITS, Selection, least_p_values
 from tacdata.discrepancy.search.rivals import try_rivals
 from tacdata.discrepancy.search.score_tests import score_tests
 from tacdata.discrepancy.search.shortlist import ALPHA
+from tacdata.effects import AtRest, Effect, Family, Placed
 
 SWAPS = 4
 """How often a rival may take the place of an effect."""
@@ -56,7 +59,9 @@ def eliminate(setting: Setting, selection: Selection) -> Answer:
 
 def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) -> Answer:
     """Drop the effects that the others can stand in for, then find those that would do as well in each one's place."""
-    placed, null, pooled = list(model.placed), selection.null, selection.tests.pooled
+    null, pooled = selection.null, selection.tests.pooled
+    model, maybe_two = two_lags(setting, plainest(setting, model, null, pooled), selection.nothing, null, pooled)
+    placed = list(model.placed)
     without: dict[int, Refined] = {}
     need: dict[int, float] = {}
     while len(placed) > 1:
@@ -76,13 +81,89 @@ def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) 
         problem = prepare(replace(setting, response=model.response), null, model.placed)
     made, compared = [], []
     for k in range(len(placed)):
-        tried = try_rivals(model, without[k], k, problem, need[k], pooled, selection.late)
+        tried = try_rivals(model, without[k], k, problem, need[k], pooled, _late(setting, selection, placed[k]))
         if tried.better is not None and swaps > 0:
             # A rival that was behind to first order is ahead on the chain: it takes the place.
             return _needed(setting, selection, tried.better, swaps - 1)
-        made.append(tried.finding)
+        made.append(_beside_another(setting, tried.finding) if maybe_two else tried.finding)
         compared.append(tried.comparison)
     return Answer(tuple(made), model, problem, tuple(compared))
+
+
+def plainest(setting: Setting, model: Refined, null: NullModel, pooled: Pooled) -> Refined:
+    """Return a model with effects in their plainer form where that explains the episodes, but for its model error.
+
+    A form that contains another fits better than it by chance, or by a part of what the other effects are off about.
+    """
+    for at, one in enumerate(model.placed):
+        form = one.effect.plain(one.values)
+        if form is None:
+            continue
+        begin = replace(setting, response=model.response)
+        plain = refine(begin, [*model.placed[:at], form, *model.placed[at + 1 :]], null, REFITS)
+        if necessity(begin, model, plain, null, pooled) < NEEDED_Z:
+            model = plain
+    return model
+
+
+def two_lags(setting: Setting, model: Refined, nothing: Refined, null: NullModel, pooled: Pooled) -> tuple[Refined, bool]:
+    """Return a model with two lags in the place of one where no single one explains the episodes, and whether that is open.
+
+    To first order a delay, a filter and a drive's lag are one. So another one beside is no finding of the race: the
+    chain itself must tell them, each alone and two at a time. What two explain more is open where it is no more than
+    what the equation of a single one may be off about.
+    """
+    own = [k for k, p in enumerate(model.placed) if _is_lag(p.effect)]
+    if len(own) != 1 or len(model.placed) >= MOST_EFFECTS:
+        return model, False
+    at, begin = own[0], replace(setting, response=model.response)
+    mine, others = model.placed[at], [*model.placed[:at], *model.placed[at + 1 :]]
+    behind = _lag(mine)
+    kin = [e for e in setting.effects if _is_lag(e)]
+    pairs = [pair for pair in combinations(kin, 2) if len({e.called for e in pair}) == 2]
+    both = [refine(begin, [*others, *(_behind(e, 0.5 * behind) for e in pair)], null) for pair in pairs]
+    best = min(both, key=lambda two: two.half_bic, default=model)
+    if best.half_bic >= model.half_bic or necessity(begin, best, model, null, pooled) < NEEDED_Z:
+        return model, False
+    alone = {e: refine(begin, [*others, _behind(e, behind)], null) for e in kin if e.name != mine.effect.name}
+    alone[mine.effect] = model
+    if any(necessity(begin, best, one, null, pooled) < NEEDED_Z for one in alone.values()):
+        return model, False
+    large = all(one.loss - best.loss > e.form_error**2 * (nothing.loss - one.loss) for e, one in alone.items())
+    return (best, False) if large else (model, True)
+
+
+def _beside_another(setting: Setting, finding: FoundEffect) -> FoundEffect:
+    """Return a finding with all other lags as its rivals where there may be two; one that is no lag as it is."""
+    if not _is_lag(finding.placed.effect):
+        return finding
+    kin = [e.called for e in setting.effects if _is_lag(e) and e.called != finding.placed.effect.called]
+    return replace(finding, rivals=tuple(dict.fromkeys([*finding.rivals, *kin])))
+
+
+def _late(setting: Setting, selection: Selection, one: Placed) -> list[Placed]:
+    """Return delays and filters to begin with in the place of an effect: one lag is held against all others."""
+    if not _is_lag(one.effect):
+        return list(selection.late)
+    kin = [_behind(e, _lag(one)) for e in setting.effects if _is_lag(e) and e.name != one.effect.name]
+    return [*selection.late, *kin]
+
+
+def _lag(one: Placed) -> float:
+    """Return how far an effect is behind a ramp [s]."""
+    return one.effect.time_constant(one.values) + one.effect.delay(one.values)
+
+
+def _is_lag(effect: Effect) -> bool:
+    """Return whether it is late by one time, whichever way the load goes."""
+    lag = effect.family is Family.DELAY_AND_FILTER and effect.at_rest is AtRest.CATCHES_UP
+    return lag and [p.unit for p in effect.parameters] == ["s"]
+
+
+def _behind(effect: Effect, lag: float) -> Placed:
+    """Return a lag that is so much behind a ramp [s]."""
+    one = effect.parameters[0]
+    return Placed(effect, {one.name: np.asarray(np.clip(lag, one.low, one.high))})
 
 
 def _p_values(setting: Setting, selection: Selection, model: Refined) -> list[float]:

@@ -15,7 +15,7 @@ from tacdata.discrepancy.regressors.tangent import Tangent
 from tacdata.discrepancy.search.findings import FoundEffect, RivalModels
 from tacdata.discrepancy.search.fits import best_shapes, fitted, gained, shape_gains
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
-from tacdata.discrepancy.search.j_test import NEEDED_Z, ModelError, Pooled, j_statistic
+from tacdata.discrepancy.search.j_test import NEEDED_Z, ModelError, Pooled, j_statistic, necessity
 from tacdata.discrepancy.search.problem import Problem, prepare
 from tacdata.discrepancy.search.shortlist import RIVAL_Z, TOP
 from tacdata.discrepancy.statistics.gram_fit import clipped_t
@@ -120,6 +120,10 @@ def try_rivals(
         other = in_its_place(name)
         forms[name] = j_statistic(current, other, pooled)
         ahead = forms[name] < -AHEAD and other.half_bic < current.half_bic
+        # A form that contains this one is ahead by chance, or by a part of what the other effects are off about.
+        wider = other.placed[-1].effect.plain(other.placed[-1].values)
+        if ahead and wider is not None and wider.effect.name == mine.effect.name:
+            ahead = necessity(begin, other, current, null, pooled) >= NEEDED_Z
         if better is None and ahead and not _unphysical(other, current):
             better = other
     error, bounds = current.errors(at)
@@ -233,7 +237,7 @@ def _worth_preparing(
     most = {name: float((own + moved - still).sum()) for name, own in each.items()}
     return {
         c.form for c, own in zip(told.candidates, gain, strict=True)
-        if (c.effect.name in near or always(c.effect)) and own - still.sum() >= ALIKE * most[c.effect.name]
+        if (c.effect.name in near or always(c.effect)) and own - still.sum() >= most[c.effect.name] - (1 - ALIKE) * abs(most[c.effect.name])
     }  # fmt: skip
 
 
