@@ -106,12 +106,14 @@ def plainest(setting: Setting, model: Refined, null: NullModel, pooled: Pooled) 
     return model
 
 
-def two_lags(setting: Setting, model: Refined, nothing: Refined, null: NullModel, pooled: Pooled) -> tuple[Refined, bool]:
-    """Return a model with two lags in the place of one where no single one explains the episodes, and whether that is open.
+def two_lags(
+    setting: Setting, model: Refined, nothing: Refined, null: NullModel, pooled: Pooled
+) -> tuple[Refined, bool]:  # fmt: skip
+    """Return a model with two lags where no single one explains the episodes, and whether there may be two.
 
     To first order a delay, a filter and a drive's lag are one. So another one beside is no finding of the race: the
-    chain itself must tell them, each alone and two at a time. What two explain more is open where it is no more than
-    what the equation of a single one may be off about.
+    chain itself must tell them, each alone and two at a time. Two that explain no more than the equation of a single
+    one may be off about are one, if it is a delay, and open, if it is a law.
     """
     own = [k for k, p in enumerate(model.placed) if _is_lag(p.effect)]
     if len(own) != 1 or len(model.placed) >= MOST_EFFECTS:
@@ -130,7 +132,7 @@ def two_lags(setting: Setting, model: Refined, nothing: Refined, null: NullModel
     if any(necessity(begin, best, one, null, pooled) < NEEDED_Z for one in alone.values()):
         return model, False
     large = all(one.loss - best.loss > e.form_error**2 * (nothing.loss - one.loss) for e, one in alone.items())
-    return (best, False) if large else (model, True)
+    return (best, False) if large else (model, mine.effect.spread)
 
 
 def _beside_another(setting: Setting, finding: FoundEffect) -> FoundEffect:

@@ -237,7 +237,8 @@ def _worth_preparing(
     most = {name: float((own + moved - still).sum()) for name, own in each.items()}
     return {
         c.form for c, own in zip(told.candidates, gain, strict=True)
-        if (c.effect.name in near or always(c.effect)) and own - still.sum() >= most[c.effect.name] - (1 - ALIKE) * abs(most[c.effect.name])
+        if (c.effect.name in near or always(c.effect))
+        and own - still.sum() >= most[c.effect.name] - (1 - ALIKE) * abs(most[c.effect.name])
     }  # fmt: skip
 
 
