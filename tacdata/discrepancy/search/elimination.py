@@ -127,11 +127,10 @@ def two_lags(
     best = min(both, key=lambda two: two.half_bic, default=model)
     if best.half_bic >= model.half_bic or necessity(begin, best, model, null, pooled) < NEEDED_Z:
         return model, False
-    alone = {e: refine(begin, [*others, _behind(e, behind)], null) for e in kin if e.name != mine.effect.name}
-    alone[mine.effect] = model
-    if any(necessity(begin, best, one, null, pooled) < NEEDED_Z for one in alone.values()):
+    alone = [refine(begin, [*others, _behind(e, behind)], null) for e in kin if e.name != mine.effect.name]
+    if any(necessity(begin, best, one, null, pooled) < NEEDED_Z for one in alone):
         return model, False
-    large = all(one.loss - best.loss > e.form_error**2 * (nothing.loss - one.loss) for e, one in alone.items())
+    large = model.loss - best.loss > mine.effect.form_error**2 * (nothing.loss - model.loss)
     return (best, False) if large else (model, mine.effect.spread)
 
 

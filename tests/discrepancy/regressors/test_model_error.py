@@ -38,7 +38,7 @@ def test_columns_are_a_share_of_each_effect(pressed):
     made, response, late = pressed
     assert model_errors(made, response, []).values.shape[2] == 0
     one = model_errors(made, response, [late]).values
-    assert one.shape == (len(made.read), 3, 5 + 2), "modulations, and one either way: a delay of several sizes is a filter"
+    assert one.shape == (len(made.read), 3, 5 + 2), "a delay of several sizes is a filter"
     twice = model_errors(made, response, [replace(late, values={"L": np.array(0.1)})]).values
     size = np.linalg.norm(twice, axis=(0, 1)) / np.linalg.norm(one, axis=(0, 1))
     assert np.all((size > 1.7) & (size < 2.1))
