@@ -7,9 +7,9 @@ import numpy as np
 STILL = 4.0
 """An input that moves by less is still, in standard deviations of its noise [1]."""
 UNEVEN = 6.0
-"""Rows that are so many times as far from one neighbour as from the other do not say how an input bends there [1]."""
+"""Rows spaced more unevenly do not say how an input bends there [1]."""
 DOUBLE = 1e-4
-"""Two poles are as good as one double pole if the square of the damping is off 1 by less [1]."""
+"""Square of the damping, off 1: below, two poles are one [1]."""
 
 
 def low_pass(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
@@ -46,7 +46,7 @@ def low_passes(values: np.ndarray, step: np.ndarray, taus: np.ndarray, shares: n
 def low_pass_between(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
     """Return what `low_pass` does of an input that bends between rows, exact for a parabola.
 
-    A straight line between two rows is above a load that grows ever faster: read late, it looks filtered.
+    A straight line lies above a load that grows ever faster.
 
     Args:
         values: Input, shape (n, k).
@@ -62,7 +62,7 @@ def low_pass_between(values: np.ndarray, step: np.ndarray, tau: float) -> np.nda
 def second_order(values: np.ndarray, step: np.ndarray, tau: float, damping: float) -> np.ndarray:
     """Return the solution of y'' / w^2 + tau y' + y = u, w = 2 D / tau, for u linear between rows, from rest, (n,).
 
-    Both poles at once are exact. One low-pass filter behind another is not: what the first returns bends between rows.
+    One low-pass filter behind another is not exact.
 
     Args:
         values: Input u, 0 at first, shape (n,).
@@ -198,7 +198,7 @@ def running_max(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np.ndarray) -> np.ndarray:
     """Return values as they were ``delay`` before each row, never across episodes.
 
-    Between rows they bend as rows beside say: straight lines would smooth them, as a filter does.
+    Between rows they bend. Straight lines would smooth them.
 
     Args:
         values: Shape (n, k).

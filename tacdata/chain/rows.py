@@ -18,9 +18,9 @@ KINK = 0.15
 SHORT = 0.4
 """A sudden change of speed over less of the longest way does not matter [1]."""
 BENT = 0.1
-"""A path may be off the straight lines between rows by this share of the longest way [1]..."""
+"""A path may be off straight lines by this share of the longest way [1]..."""
 NOISE, MIDDLE = 4.0, 1.4826
-"""...and so many standard deviations of its noise; one is so many medians of what is off without its sign [1]."""
+"""...and by its noise: standard deviations; one, over the median [1]."""
 SETTLED = 0.4
 """Time after the last motion from which readings are averaged [s]."""
 MANY = 300
@@ -118,15 +118,15 @@ def _groups(time: np.ndarray, last: np.ndarray, tip: np.ndarray, slow: float) ->
 
 
 def _corners(time: np.ndarray, path_time: np.ndarray, path: np.ndarray, most: float) -> np.ndarray:
-    """Return times at which the path is off the straight lines between rows: a few of each gap, the farthest first.
+    """Return times at which the path is off the straight lines between rows.
 
-    A corner that is cut is a load that rises early, or late: so would a delay or a filter have it.
+    A corner that is cut looks like a delay or a filter.
 
     Args:
         time: Times of the rows [s], shape (n,), increasing.
         path_time: Times of the path [s], shape (p,).
         path: x, y, depth [mm], shape (p, 3).
-        most: How far off a straight line may be [mm]; what is measured has noise beside.
+        most: How far off a straight line may be [mm].
     """
     bent = np.diff(path, 2, axis=0)
     # Fewer points than readings are the corners of a command.

@@ -155,7 +155,7 @@ class Effect(ABC):
     """How far its equation may be off, over its contribution, as a standard deviation [1]; less where it is geometry,
     arithmetic or a clock rather than a law of a material."""
     spread: ClassVar[bool] = True
-    """Whether it may be of several sizes at once, as a skin has many time constants; a delay of several is a filter."""
+    """Whether it may be of several sizes at once. A delay of several is a filter."""
     odds: ClassVar[float] = 1.0
     """How likely it is in a soft skin before any data, over an effect that is not rare [1]; less than 1 only where
     there is a physical reason."""
@@ -233,7 +233,7 @@ class Effect(ABC):
         return 0.0
 
     def plain(self, values: dict[str, np.ndarray]) -> Placed | None:
-        """Return the simpler form that it is where its further numbers say nothing; None for most effects."""
+        """Return its simpler form; None for most effects."""
         return None
 
     def thickness_factor(self, values: dict[str, np.ndarray]) -> float:

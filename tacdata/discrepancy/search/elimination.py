@@ -91,9 +91,9 @@ def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) 
 
 
 def plainest(setting: Setting, model: Refined, null: NullModel, pooled: Pooled) -> Refined:
-    """Return a model with effects in their plainer form where that explains the episodes, but for its model error.
+    """Return a model with effects in their plainer form where that will do.
 
-    A form that contains another fits better than it by chance, or by a part of what the other effects are off about.
+    A form that contains another always fits better.
     """
     for at, one in enumerate(model.placed):
         form = one.effect.plain(one.values)
@@ -111,9 +111,8 @@ def two_lags(
 ) -> tuple[Refined, bool]:  # fmt: skip
     """Return a model with two lags where no single one explains the episodes, and whether there may be two.
 
-    To first order a delay, a filter and a drive's lag are one. So another one beside is no finding of the race: the
-    chain itself must tell them, each alone and two at a time. Two that explain no more than the equation of a single
-    one may be off about are one, if it is a delay, and open, if it is a law.
+    To first order all lags are one. The chain itself must tell them, each alone and two at a time. What lies within
+    the form error of a single one is open. A delay has no such error.
     """
     own = [k for k, p in enumerate(model.placed) if _is_lag(p.effect)]
     if len(own) != 1 or len(model.placed) >= MOST_EFFECTS:
@@ -135,7 +134,7 @@ def two_lags(
 
 
 def _beside_another(setting: Setting, finding: FoundEffect) -> FoundEffect:
-    """Return a finding with all other lags as its rivals where there may be two; one that is no lag as it is."""
+    """Return a lag with all others as its rivals."""
     if not _is_lag(finding.placed.effect):
         return finding
     kin = [e.called for e in setting.effects if _is_lag(e) and e.called != finding.placed.effect.called]
@@ -143,7 +142,7 @@ def _beside_another(setting: Setting, finding: FoundEffect) -> FoundEffect:
 
 
 def _late(setting: Setting, selection: Selection, one: Placed) -> list[Placed]:
-    """Return delays and filters to begin with in the place of an effect: one lag is held against all others."""
+    """Return lags to begin with in the place of an effect."""
     if not _is_lag(one.effect):
         return list(selection.late)
     kin = [_behind(e, _lag(one)) for e in setting.effects if _is_lag(e) and e.name != one.effect.name]
