@@ -96,15 +96,16 @@ class Refined:
         return tuple(bound)
 
     def narrowest(self, at: int) -> tuple[str, ...]:
-        """Return the shapes of one effect that are at their lower bound, and are known there: its form ends at it.
+        """Return the shapes of one effect within a standard error of their lower bound, and known: its form ends there.
 
         One that is not known makes no difference below, as a time constant that is shorter than a reading lasts.
         """
-        ends = [
-            k for k, knob in enumerate(self.knobs)
-            if knob.at == at and knob.shape and knob.value(self.placed) <= knob.parameter.low * 1.001
-        ]  # fmt: skip
-        return tuple(self.knobs[k].parameter.name for k in ends if self.covariance[k, k] < KNOWN**2)
+        own = [(k, knob) for k, knob in enumerate(self.knobs) if knob.at == at and knob.shape]
+        error = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) if own else np.zeros(0)
+        return tuple(
+            knob.parameter.name for k, knob in own
+            if error[k] < KNOWN and knob.value(self.placed) <= knob.parameter.low * (1.001 + error[k])
+        )  # fmt: skip
 
 
 def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = MOST_STEPS) -> Refined:
