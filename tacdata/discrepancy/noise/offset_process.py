@@ -34,6 +34,10 @@ FEWEST_OFFSETS = 6
 """REML: with fewer episodes no process is estimated, and every offset is free."""
 MANY_CHANNELS = 8
 """REML: of so many channels or more, what they share is left out."""
+SETTLING = (0.7, 1.5, 3.0, 6.0, 12.0)
+"""Common wander: what settles at these rates is no part of it [over the time of all episodes]."""
+TOGETHER_Z = 1.64
+"""Common wander: it is larger if its variance exceeds the others' by so many standard errors (5 %, one-sided) [1]."""
 POINTS = 40
 """Covariance of means: most points of an episode that its mean is taken over."""
 QUIET_ROWS = 3
@@ -148,8 +152,11 @@ def offset_process(
     # The mean of n readings with memory m and innovations of variance 1.
     error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
     spans = _Spans.of(course, weight)
-    own_way, kinds = _own_way(offsets, course, scale), [level[known] for level in levels]
-    walk, length, own = _reml(own_way[known], error[known], spans.among(known), kinds, _warmth(course)[known])
+    kinds, near, warmth = [level[known] for level in levels], spans.among(known), _warmth(course)[known]
+    alike, own_way = _shared(offsets[known], course, scale)
+    walk, length, own = _reml(own_way, error[known], near, kinds, warmth)
+    louder = _louder(alike, (walk, length, own), error[known], near, kinds, warmth)
+    walk, own = walk * louder, own * louder
     same = FREE_LEVEL**2 * np.sum([level[:, None] == level for level in levels], axis=0)
     nugget = max(own, LEAST_OWN**2) * np.eye(course.episodes)
     covariance, cross, variance = spans.covariances(length)
@@ -219,8 +226,8 @@ def _mean_alike(first: np.ndarray, second: np.ndarray, length: float) -> float:
     return float(np.mean(np.exp(-np.abs(np.subtract.outer(first, second)) / length)))
 
 
-def _own_way(offsets: np.ndarray, course: Course, scale: np.ndarray) -> np.ndarray:
-    """Return offsets in all directions but those that all channels share, shape (episodes, k).
+def _shared(offsets: np.ndarray, course: Course, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return offsets in the directions that all channels share, and in all others, shapes (episodes, k).
 
     What settles or drifts alike in all channels, or by one factor of their readings at rest, is no chance: it would
     hide in the process.
@@ -236,9 +243,44 @@ def _own_way(offsets: np.ndarray, course: Course, scale: np.ndarray) -> np.ndarr
     if channels >= MANY_CHANNELS:
         shared.append(np.ones(channels))
     if not shared:
-        return offsets
+        return offsets[:, :0], offsets
     along = np.stack(shared, axis=1) / scale[:channels, None]
-    return offsets @ _complement(along / np.linalg.norm(along, axis=0))
+    apart = _complement(along / np.linalg.norm(along, axis=0))
+    return offsets @ _complement(apart), offsets @ apart
+
+
+def _louder(
+    shared: np.ndarray, process: tuple[float, float, float], error: np.ndarray, spans: _Spans,
+    levels: Sequence[np.ndarray], warmth: np.ndarray,
+) -> float:  # fmt: skip
+    """Return how much larger variances are where channels wander together [1]: 1 where they surely do not.
+
+    Common noise of all channels is quick, too; what settles or warms up is slow, and has no part in this.
+
+    Args:
+        shared: Offsets in directions that channels share [noise scales], shape (episodes, k).
+        process: What REML says of the other directions.
+        error: Variance of each that is known [1].
+        spans: Their times.
+        levels: Of each.
+        warmth: What else a drift may go with, shape (episodes, k).
+    """
+    walk, length, own = process
+    few = shared[:MOST_OFFSETS]
+    span = spans.time - spans.time[0]
+    rates = np.exp(-np.outer(span, SETTLING) / max(float(span[-1]), 1e-9))
+    contrast = _complement(np.column_stack([_slow(spans.time, levels, warmth), rates]))
+    if not few.size or not contrast.shape[1]:
+        return 1.0
+    read_error = (contrast.T * error[:MOST_OFFSETS]) @ contrast
+    process_of = spans.covariances(length)[0]
+    said = walk * contrast.T @ process_of @ contrast + max(own, LEAST_OWN**2) * np.eye(len(read_error))
+    seen = contrast.T @ few
+    ratio = float(np.sum(seen * np.linalg.solve(said + read_error, seen))) / seen.size
+    if ratio <= 1 + TOGETHER_Z * np.sqrt(2 / seen.size):
+        return 1.0
+    expected = float(np.trace(np.linalg.solve(said + read_error, said))) / len(said)
+    return 1 + (ratio - 1) / max(expected, LEAST_OWN)
 
 
 def _warmth(course: Course) -> np.ndarray:
@@ -288,11 +330,7 @@ def _reml(
         warmth: What else a drift may go with, shape (episodes, k).
     """
     offsets, error, time = offsets[:MOST_OFFSETS], error[:MOST_OFFSETS], spans.time
-    clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
-    # A line beside levels that are not known: a drift is no evidence of the process.
-    few = [level[:MOST_OFFSETS] for level in levels]
-    known = [level[:, None] == np.unique(level) for level in few]
-    basis = np.column_stack([*known, warmth[:MOST_OFFSETS] / max(float(np.abs(warmth).max(initial=0.0)), 1e-9), clock])
+    basis = _slow(time, levels, warmth)
     contrast = _complement(basis)
     if contrast.shape[1] < FEWEST_OFFSETS // 2:
         return 0.0, 1.0, float(np.var(offsets, axis=0).mean())
@@ -319,6 +357,13 @@ def _reml(
         best.append((float(found.fun), _doubt(matrix, basis), (walk, steps * between, own)))
     least = min(value for value, _, _ in best)
     return max((b for b in best if b[0] <= least + LIKELY), key=lambda b: b[1])[2]
+
+
+def _slow(time: np.ndarray, levels: Sequence[np.ndarray], warmth: np.ndarray) -> np.ndarray:
+    """Return what is no evidence of the process: unknown levels, what goes with warmth, and last a straight line."""
+    known = [level[:MOST_OFFSETS, None] == np.unique(level[:MOST_OFFSETS]) for level in levels]
+    clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
+    return np.column_stack([*known, warmth[:MOST_OFFSETS] / max(float(np.abs(warmth).max(initial=0.0)), 1e-9), clock])
 
 
 def _complement(basis: np.ndarray) -> np.ndarray:

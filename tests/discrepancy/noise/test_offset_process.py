@@ -126,3 +126,18 @@ def test_episodes_left_out_say_nothing_and_the_others_go_on():
 def test_few_episodes_tell_no_wander():
     c = course(4)
     assert offset_process(np.zeros((len(c.episode), 24)), c, np.ones(24), 0.0, [np.zeros(4, dtype=np.int64)]) is None
+
+
+@pytest.mark.parametrize("common, larger", [(0.0, 1.0), (3.0, 8.0)])
+def test_what_all_channels_wander_together_counts_in_full(common, larger):
+    """Variances of what channels share are those of the process alone where it is not common."""
+    count, rng = 60, np.random.default_rng(11)
+    c = course(count)
+    wander = followed(np.random.default_rng(6), count, 20.0, 0.5)
+    together = followed(np.random.default_rng(9), count, 20.0, common / np.sqrt(24))[:, :1]
+    noise = rng.normal(size=wander.shape)
+    none = [np.zeros(count, dtype=np.int64)]
+    alone = offset_process(wander + noise, c, np.ones(24), 0.0, none)
+    both = offset_process(wander + together + noise, c, np.ones(24), 0.0, none)
+    grown = np.median((both.variance - 1e6) / (alone.variance - 1e6))
+    assert grown == pytest.approx(1.0) if larger == 1.0 else grown > 1.5
