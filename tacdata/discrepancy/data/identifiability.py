@@ -19,6 +19,8 @@ QUICK = 0.2
 """Relaxation so much shorter than a press takes is a lag of the other sign: one rate does not split them [1]."""
 OVER = 5.0
 """A lag is over in a hold of so many times its length [1]."""
+NEARLY_ONE = 0.2
+"""Two delays that differ by less are one that another form rounds: a filter's edges are late by unequal times [1]."""
 SAME_CLOCK = 0.995
 """Presses are evenly spaced from this correlation of their number at a place with the clock on [1]."""
 
@@ -26,7 +28,7 @@ SAME_CLOCK = 0.995
 def lookalikes(course: Course, effect: Effect, values: Mapping[str, np.ndarray | float]) -> tuple[str, ...]:
     """Return mechanisms that a course cannot tell from an effect with some values.
 
-    Presses of one rate, without holds, or evenly spaced, leave several open.
+    Presses of one rate, without holds, or evenly spaced, leave several open. So do two delays that hardly differ.
 
     Args:
         course: The recordings.
@@ -35,6 +37,8 @@ def lookalikes(course: Course, effect: Effect, values: Mapping[str, np.ndarray |
     """
     alike = _at_one_rate(course, effect, values)
     others = [name for name in alike if name != effect.called] if effect.called in alike else []
+    if _nearly_one(effect, values):
+        others += [name for name in _that(AtRest.CATCHES_UP) if name not in (effect.called, *others)]
     if effect.grows_with is not None and _evenly_spaced(course):
         others += sorted({e.called for e in library() if e.grows_with not in (None, effect.grows_with)})
     return tuple(others)
@@ -63,6 +67,13 @@ def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray
     if effect.at_rest is AtRest.STAYS:
         return [effect.called, *_that(AtRest.GOES_ON, AtRest.RELAXES)]
     return _that(AtRest.STAYS) + _that(AtRest.GOES_ON, AtRest.RELAXES)
+
+
+def _nearly_one(effect: Effect, values: Mapping[str, np.ndarray | float]) -> bool:
+    """Return whether an effect is late by two times that hardly differ."""
+    late = [float(values.get(p.name, 0.0)) for p in effect.parameters if p.unit == "s"]
+    alike = len(late) == 2 and float(np.ptp(late)) < NEARLY_ONE * float(np.abs(late).max())
+    return alike and effect.at_rest is AtRest.CATCHES_UP
 
 
 def _that(*kinds: AtRest) -> list[str]:

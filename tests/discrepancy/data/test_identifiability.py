@@ -147,3 +147,11 @@ def test_a_lag_that_is_over_in_a_hold_is_of_its_family():
         found = set(lookalikes(course(rates=(1.0,), hold=hold), load("latency"), {"L": late}))
         assert {*kin, other} < found
     assert "backlash" in lookalikes(course(rates=(1.0,), hold=1.5), load("low_pass_filter"), {"tau": 0.6})
+
+
+def test_two_delays_that_hardly_differ_may_be_a_filter():
+    """A filter rounds both edges: one time does not fit them, and two do."""
+    made, either_way = course(rates=(0.5, 2.0)), load("latency_either_way")
+    assert "low_pass_filter" in lookalikes(made, either_way, {"L_in": 0.050, "L_out": 0.052})
+    assert lookalikes(made, either_way, {"L_in": 0.05, "L_out": 0.2}) == ()
+    assert lookalikes(made, load("latency"), {"L": 0.05}) == ()
