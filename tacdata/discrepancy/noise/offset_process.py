@@ -33,11 +33,11 @@ FREE_LEVEL = 1e3
 FEWEST_OFFSETS = 6
 """REML: with fewer episodes no process is estimated, and every offset is free."""
 MANY_CHANNELS = 8
-"""REML: of so many channels or more, what they share is left out."""
+"""REML: from so many channels on, what they share is left out."""
 SETTLING = (0.7, 1.5, 3.0, 6.0, 12.0)
-"""Common wander: what settles at these rates is no part of it [over the time of all episodes]."""
+"""Common wander: rates of what settles [over the time of all episodes]."""
 TOGETHER_Z = 1.64
-"""Common wander: it is larger if its variance exceeds the others' by so many standard errors (5 %, one-sided) [1]."""
+"""Common wander: it is larger from so many standard errors of its variance on (5 %, one-sided) [1]."""
 POINTS = 40
 """Covariance of means: most points of an episode that its mean is taken over."""
 QUIET_ROWS = 3

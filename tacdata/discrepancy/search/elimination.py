@@ -20,7 +20,7 @@ from tacdata.discrepancy.search.shortlist import ALPHA
 from tacdata.effects import AtRest, Effect, Family, Placed
 
 CHAIN_ERROR = 0.01
-"""Two lags: how far the chain may be off about a delay [1]. Between rows it is: presses stepped apart show 0.006."""
+"""Two lags: how far the chain may be off about a delay [1]; presses stepped apart show 0.006."""
 SWAPS = 4
 """How often a rival may take the place of an effect."""
 LARGEST_P = 0.05
