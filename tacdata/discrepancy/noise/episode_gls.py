@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-RIDGE = 1e-5
+RIDGE = 1e-7
 """Ridge of what no row excites, over the mean of what rows do [1]."""
 MOST_TOGETHER = 40
 """Most episodes of a place whose scores are told together: the cost grows with the cube."""
