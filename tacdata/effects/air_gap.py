@@ -21,7 +21,7 @@ class AirGap(Effect):
     family = Family.CONTACT
     equation = "s_i = max(0, s_i - g_i) above idle"
     source = "standard form"
-    experiment = "slow approach over every taxel: onset against slope"
+    experiment = "approach every taxel slowly: over air the onset is late, and readings rise slowly at first"
     parameters = (Parameter("g", "1", "lost share of the channel's largest rise", 0.03, 0.0, 0.6, per_channel=True),)
     by_channel = True
 

@@ -21,7 +21,7 @@ class Bulge(Effect):
     family = Family.CROSSTALK
     equation = "q_i = q_i - k sum_j w_ij q_j, w = exp(-((r_ij / p - l) / (0.35 l))^2), p the least pitch"
     source = "a bonded layer that keeps its volume rises at about its thickness: Johnson, Contact Mechanics, sec. 5.8"
-    experiment = "flat punch against sphere: the sign of far neighbours"
+    experiment = "the same presses with a flat punch and with a sphere: channels far away change their sign"
     parameters = (
         Parameter("k", "1", "share taken from far neighbours", 0.03, -0.5, 0.5),
         Parameter("l", "pitches", "how far away", 2.0, 1.0, 4.0, grid=(1.5, 2.0, 2.7)),

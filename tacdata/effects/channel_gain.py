@@ -21,7 +21,7 @@ class ChannelGain(Effect):
     family = Family.RESPONSE_CURVE
     equation = "s_i = (1 + e_i) s_i above idle"
     source = "standard form"
-    experiment = "uniform pressure, or presses between taxels: a gain follows the channel, inhomogeneity the place"
+    experiment = "press all channels alike, or between taxels: a gain goes with the channel, uneven skin with the place"
     form_error = 0.02
     parameters = (Parameter("e", "1", "relative excess of the channel", 0.1, -0.95, 3.0, per_channel=True),)
     gain = GainKind.PER_CHANNEL

@@ -22,7 +22,7 @@ class ClockSkew(Effect):
     family = Family.DELAY_AND_FILTER
     equation = "s(t) = s_e(t - r (t - T/2))"
     source = "standard form"
-    experiment = "an early and a late sync event"
+    experiment = "a sync event early in the recording, and one late"
     form_error = 0.02
     spread = False
     parameters = (Parameter("r", "s", "delay gained over all recordings", 0.1, -5.0, 5.0),)

@@ -21,7 +21,7 @@ class Crosstalk(Effect):
     family = Family.CROSSTALK
     equation = "s_i = s_i + k (s_{i-1} + s_{i+1}) above idle"
     source = "standard form"
-    experiment = "charge one channel electrically: traces, not distance"
+    experiment = "charge one channel electrically: neighbours on the wire answer, not those in place"
     parameters = (Parameter("k", "1", "share of each neighbour", 0.03, -0.4, 0.4),)
     by_channel = True
 

@@ -21,7 +21,7 @@ class Gain(Effect):
     family = Family.RESPONSE_CURVE
     equation = "s = (1 + e) s above idle"
     source = "standard form"
-    experiment = "a reference capacitor; force"
+    experiment = "a reference capacitor in a taxel's place, or a force sensor: whether readings are off, or the skin"
     form_error = 0.02
     parameters = (Parameter("e", "1", "relative excess", 0.1, -0.9, 3.0),)
     gain = GainKind.COMMON

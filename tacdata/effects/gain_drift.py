@@ -21,7 +21,7 @@ class GainDrift(Effect):
     family = Family.DRIFT
     equation = "s = s (1 + k (t / T - 1/2)) above idle"
     source = "standard form"
-    experiment = "the same reference press through the session; a reference capacitor"
+    experiment = "the same press all through the session; a reference capacitor beside it tells electronics from skin"
     parameters = (Parameter("k", "1", "relative change over all recordings", 0.05, -1.5, 1.5),)
     follows_clock = True
     grows_with = Growth.TIME

@@ -21,7 +21,7 @@ class GantrySag(Effect):
     family = Family.KINEMATICS
     equation = "d -> d + k (x^2 + y^2) / L^2, L the largest distance from the centre"
     source = "standard form"
-    experiment = "move the sensor on the bed: it follows the machine"
+    experiment = "move the sensor to another place on the bed: a sag stays with the machine"
     parameters = (Parameter("k", "mm", "height at the largest distance", 0.03, -0.5, 0.5),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -21,7 +21,7 @@ class GapCurvature(Effect):
     family = Family.RESPONSE_CURVE
     equation = "s = s + k s^2 / S above idle, S the largest"
     source = "parallel plate: C = eps A / (g - u)"
-    experiment = "two indenters: collapses on the reading itself"
+    experiment = "presses with two indenters: a curve of the taxel is the same over readings, one of the skin is not"
     parameters = (Parameter("k", "1", "excess at the largest reading", 0.1, 0.0, 3.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

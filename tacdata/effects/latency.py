@@ -26,7 +26,7 @@ class Latency(Effect):
     word = "delay"
     equation = "s(t) = s_e(t - L)"
     source = "standard form"
-    experiment = "three rates: constant in time, and edges keep their shape"
+    experiment = "three rates: a delay is the same time at each, and edges keep their shape"
     form_error = 0.02
     spread = False
     parameters = (Parameter("L", "s", "delay", 0.05, -1.0, 2.0),)

@@ -24,7 +24,7 @@ class LatencyEitherWay(Effect):
     word = "delay"
     equation = "s(t) = s_e(t - L_in) while load rises, s_e(t - L_out) while it falls"
     source = "standard form; two times, as rise and fall times of a channel are given"
-    experiment = "three rates: each edge is late by its own constant time"
+    experiment = "three rates: each edge is late by its own time, the same at every rate"
     mechanism = "latency"
     form_error = 0.05
     spread = False

@@ -23,7 +23,7 @@ class QuantizationHysteresis(Effect):
     word = "dead band of the readings"
     equation = "s = play_w(s) + w: the reading follows through a dead band of fixed width in counts"
     source = "play operator; comparators with hysteresis"
-    experiment = "histogram of first differences; loops of any size have the same width in counts"
+    experiment = "slow loops of several sizes: all are as wide, in counts"
     parameters = (Parameter("w", "largest rise", "half the dead band", 0.02, 0.0, 0.3),)
     at_rest = AtRest.STAYS
 

@@ -21,7 +21,7 @@ class Saturation(Effect):
     family = Family.RESPONSE_CURVE
     equation = "s = s / (1 + k |s| / S) above idle, S the largest"
     source = "standard form"
-    experiment = "histogram of readings: pile-up at a value of the reading, not of depth"
+    experiment = "deeper presses, and a histogram: readings pile up at one value, whatever the depth"
     parameters = (Parameter("k", "1", "loss at the largest reading", 0.1, 0.0, 5.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -21,7 +21,7 @@ class ScrewError(Effect):
     family = Family.KINEMATICS
     equation = "d -> d + s sin(2 pi d / p) + c cos(2 pi d / p) - c, p no longer than the stroke"
     source = "standard form"
-    experiment = "slow presses over several periods: the residual's spectrum in commanded position"
+    experiment = "slow presses over several turns of the screw: the residual repeats with the commanded depth"
     parameters = (
         Parameter("s", "mm", "sine part", 0.01, -0.2, 0.2),
         Parameter("c", "mm", "cosine part", 0.01, -0.2, 0.2),

@@ -21,7 +21,7 @@ class SeatingGap(Effect):
     family = Family.CONTACT
     equation = "q = max(0, q_e - g largest q_e)"
     source = "standard form"
-    experiment = "map of onsets over the skin: constant is a zero error, a dome is a gap"
+    experiment = "touch off all over the skin: a zero error is the same everywhere, a gap is a dome"
     parameters = (Parameter("g", "1", "share of the largest load needed to close it", 0.02, 0.0, 0.5),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -24,7 +24,7 @@ class ServoLag(Effect):
     word = "lag of the drive"
     equation = "(tau / 2)^2 d'' + tau d' + d = z: critically damped"
     source = "standard form"
-    experiment = "other accelerations at the same speed; a tag sees it"
+    experiment = "the same speed with other accelerations; a tag on the carriage sees a drive's lag"
     parameters = (Parameter("tau", "s", "time constant", 0.05, 0.0, 1.0),)
     at_rest = AtRest.CATCHES_UP
     seen_by_tag = True

@@ -21,7 +21,7 @@ class SettlingGain(Effect):
     family = Family.DRIFT
     equation = "s = s (1 + k exp(-t / tau)) above idle"
     source = "first-order approach to the temperature at work"
-    experiment = "the same reference press through the session; a reference capacitor"
+    experiment = "the same press all through the session; a reference capacitor beside it tells electronics from skin"
     parameters = (
         Parameter("k", "1", "relative change since the first recording", 0.05, -1.5, 1.5),
         Parameter("tau", "s", "time constant", 600.0, 20.0, 20000.0, grid=(200.0, 1500.0)),

@@ -21,7 +21,7 @@ class Skew(Effect):
     family = Family.KINEMATICS
     equation = "(x, y) -> (x + g y, y sqrt(1 - g^2)): y's axis leans and is as long as before"
     source = "standard form"
-    experiment = "corner presses with a tag"
+    experiment = "presses in the corners, with a tag in view"
     form_error = 0.02
     parameters = (Parameter("g", "1", "sine of the lean", 0.02, -0.3, 0.3),)
     seen_by_tag = True

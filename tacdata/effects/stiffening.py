@@ -21,7 +21,9 @@ class Stiffening(Effect):
     family = Family.RESPONSE_CURVE
     equation = "q = q_e (1 + k d / D), D the deepest depth"
     source = "second term of a series in strain; Yeoh, Rubber Chem. Technol. 66 (1993) 754"
-    experiment = "two indenters: a law of the taxel collapses on the reading, one of the skin on depth over radius"
+    experiment = (
+        "presses with two indenters: a law of the taxel is the same over readings, one of the skin over depth by radius"
+    )
     parameters = (Parameter("k", "1", "stiffer at the deepest depth", 0.1, -0.9, 3.0),)
 
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:

@@ -21,7 +21,7 @@ class ThermalGrowth(Effect):
     family = Family.KINEMATICS
     equation = "d -> d + dz (1 - exp(-t / tau))"
     source = "standard form"
-    experiment = "touch-off every few presses; readings without contact stay as they are"
+    experiment = "touch off every few presses; readings without contact stay as they are"
     parameters = (
         Parameter("dz", "mm", "final growth", 0.05, -1.0, 1.0),
         Parameter("tau", "s", "time constant", 600.0, 60.0, 20000.0, grid=(200.0, 800.0, 3000.0)),

@@ -37,7 +37,7 @@ class Thickness(Effect):
         "force: 0.5 to 0.9 e less for a / h of 0.3 to 0.6, Dimitriadis et al., Biophys. J. 82 (2002) 2798; "
         "loads under a layer by similarity: P g(r / h) / h^2"
     )
-    experiment = "calliper; a flat punch touching off at the sensor's corners; neighbours over centre against depth"
+    experiment = "measure the skin with a calliper; touch off with a flat punch at the sensor's corners"
     parameters = (Parameter("e", "1", "relative excess of thickness", 0.06, -0.5, 0.5),)
     like_gain = LikeGain.SIMILAR
     changes_skin = True

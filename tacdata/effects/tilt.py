@@ -21,7 +21,7 @@ class Tilt(Effect):
     family = Family.KINEMATICS
     equation = "d -> d + a x + b y"
     source = "standard form"
-    experiment = "touch-off at three corners"
+    experiment = "touch off at three corners"
     form_error = 0.02
     parameters = (
         Parameter("a", "mm/mm", "slope along x", 0.01, -0.2, 0.2),

@@ -21,7 +21,7 @@ class TravelScale(Effect):
     family = Family.KINEMATICS
     equation = "(x, y, d) -> (1 + k) (x, y, d)"
     source = "standard form"
-    experiment = "gauge block or tag over a long travel"
+    experiment = "a gauge block, or a tag, over a long travel"
     form_error = 0.02
     parameters = (Parameter("k", "1", "relative error of travel", 0.02, -0.3, 0.3),)
     scale = Scale.DRIVE

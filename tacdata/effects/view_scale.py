@@ -21,7 +21,7 @@ class ViewScale(Effect):
     family = Family.KINEMATICS
     equation = "what is seen of (x, y, d) is (1 + s) (x, y, d)"
     source = "standard form"
-    experiment = "a gauge block, or a second camera: the readings do not follow what one of two observers sees wrong"
+    experiment = "a gauge block, or a second camera: what one of two observers sees wrong, readings do not follow"
     form_error = 0.02
     seen_by_tag = True
     parameters = (Parameter("s", "1", "relative error of lengths seen", 0.01, -0.3, 0.3),)

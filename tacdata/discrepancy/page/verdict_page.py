@@ -96,10 +96,11 @@ def _loops(verdict: dict[str, Any], presses: list[ToldPress]) -> Part:
         return Part("")
     pictures = []
     for p in presses:
-        level = float(np.nanmedian(p.measured[:5]))
-        lines = [("measured", p.measured - level), ("before", p.before - level), ("after", p.after - level)]
-        pictures.append(charts.curves(f"{p.name}, {p.stream}", p.depth, lines, ("depth [mm]", "reading above idle")))
-    return Part("Loops over depth", tuple(pictures), legend=_legend(True))
+        # Beside the readings themselves a loop is too thin to be seen.
+        lines = [("measured", p.measured - p.before), ("after", p.after - p.before)]
+        pictures.append(charts.curves(f"{p.name}, {p.stream}", p.depth, lines, ("depth [mm]", "beyond the model")))
+    legend = (("measured", "measured, less the model as it was"), ("after", "what the effects add to it"))
+    return Part("Loops over depth", tuple(pictures), legend=legend)
 
 
 def _shares(verdict: dict[str, Any]) -> Part:
@@ -122,7 +123,7 @@ def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     if verdict["effects"]:
         pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after, most))
     rest = [f"without a name yet: {words}" for words in verdict.get("located_after", ())]
-    beside = "the map holds what differs from press to press, too; the figures below leave that out"
+    beside = "the map holds each press's own pose and gain, too; these mean squares over the noise leave that out"
     located = (beside, *verdict["located"]) if verdict["located"] else ()
     return Part("Where the gap lives", tuple(pictures), (*located, *rest))
 

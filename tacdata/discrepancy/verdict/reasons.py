@@ -19,6 +19,10 @@ from tacdata.effects import Family, load
 
 SPEAKS_FROM = 0.005
 """Share of what could be explained from which on a form is worth a word [1]."""
+SMALL = 0.01
+"""Change of the residual of sealed presses below which effects are said to be small [1]."""
+ALL_CLOSED = 0.995
+"""Share of the gap from which on all of it is closed [1]."""
 LEAST_CLOSED = 0.01
 """Share of the gap on sealed presses from which on it is worth a word [1]."""
 SIGNS = {
@@ -71,11 +75,10 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             little = found.left.t < LEFT_T or found.share_left < SPEAKS_FROM
             law = "its law is" if len(answer) == 1 else "their laws are"
             more = "" if little else f". {100 * found.share_left:.1f} % is left: {law} a little different"
-            return f"{_there(names, len(answer), decision, shown)}. Nothing else explains the presses as well{more}"
+            said = f"{_there(names, len(answer), decision, shown)}. Nothing else explains the presses as well"
+            return said + _small(len(answer), shown) + more
         case Reason.RIVALS:
-            closed = _closed(decision, shown)
-            either_way = f"; either way {closed} is closed" if closed else ""
-            return "".join((_undecided(decision), either_way, _own_laws(decision), _nameless(found, SHARE_LEFT_ALONE)))
+            return "".join((_undecided(decision, shown), _own_laws(decision), _nameless(found, SHARE_LEFT_ALONE)))
         case Reason.INCOMPLETE:
             return _incomplete(decision, shown) + _other_laws(decision, found) + _nameless(found, 0.0)
         case Reason.SEALED:
@@ -136,6 +139,14 @@ def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str
     return f"{said} and {'closes' if count == 1 else 'close'} {closed}" if closed else said
 
 
+def _small(count: int, shown: Gap | None) -> str:
+    """Return that effects hardly matter, where sealed presses fit as well without them; empty where they do matter."""
+    sealed = shown.document() if shown is not None and len(shown.before) else {}
+    if not sealed or abs(sealed["after"] - sealed["before"]) > SMALL * sealed["before"]:
+        return ""
+    return f". {'It is' if count == 1 else 'They are'} small: sealed presses fit as well without"
+
+
 def _other_laws(decision: Decision, found: Findings) -> str:
     """Return where other laws show: of a family that has a name, then of one that has none."""
     return _own_laws(decision) + _elsewhere(decision, found)
@@ -173,7 +184,8 @@ def _closed(decision: Decision, shown: Gap | None) -> str:
         return ""
     each, own = sealed["shares"], [e.finding.placed.effect.name for e in decision.effects if e.level is not None]
     share = sum(each.get(name, 0.0) for name in own) if own and any(each.values()) else sealed["closed"]
-    return f"{100 * share:.0f} % of the gap on sealed presses" if share >= LEAST_CLOSED else ""
+    much = "all" if share >= ALL_CLOSED else f"{100 * share:.0f} %"
+    return f"{much} of the gap on sealed presses" if share >= LEAST_CLOSED else ""
 
 
 def _nameless(found: Findings, least: float) -> str:
@@ -184,7 +196,7 @@ def _nameless(found: Findings, least: float) -> str:
     return f"; {much} of what could be explained has no name yet"
 
 
-def _undecided(decision: Decision) -> str:
+def _undecided(decision: Decision, shown: Gap | None) -> str:
     """Return what is open: rivals, bounds, episodes that are too few; and what is not: a family that all share."""
     answer = [e.finding for e in decision.effects]
     shapes = [{p.name for p in f.placed.effect.shapes} & set(f.at_bound) for f in answer]
@@ -194,7 +206,10 @@ def _undecided(decision: Decision) -> str:
     words = _best(decision.effects)
     either = [e for e in decision.effects if e.level is Level.FAMILY and e.status != "named"]
     shared = [e.finding.placed.effect.family.value for e in either]
-    words += f"; either way it is {_listed(list(dict.fromkeys(shared)), 'and')}" if shared else ""
+    closed = _closed(decision, shown)
+    sure = [f"it is {_listed(list(dict.fromkeys(shared)), 'and')}"] if shared else []
+    sure += [f"{closed} is closed"] if closed else []
+    words += f". Either way {' and '.join(sure)}" if sure else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     words += f"; {', '.join(formed)} fits best where its equation ends: the form is another one" if formed else ""
     return words + (f"; more presses must say whether {', '.join(weak)} is needed" if weak else "")
@@ -223,8 +238,8 @@ def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
         against = shown.ratio is None or shown.ratio.observed < 0
         if against and (worse := worsened(before, after)):
             return (
-                f"{words}, but sealed presses fit {worse} with {it} (mean square {plain_number(before, 3)} times the "
-                f"noise without, {plain_number(after, 3)} with): {name}"
+                f"{words}, but sealed presses fit {worse} with {it} (mean square over the noise "
+                f"{plain_number(before, 3)} without, {plain_number(after, 3)} with): {name}"
             )
     if instead := list(dict.fromkeys(load(r).spoken for m in answer for r in m.rivals)):
         few = _listed(instead, "or") if len(instead) <= MOST_STAND_INS else f"{len(instead)} others"
@@ -244,7 +259,8 @@ def _best(effects: Sequence[Decided]) -> str:
     words = "; ".join(_open(own) for own in groups.values())
     if not words:
         return _listed(clear, "and")
-    begins = f"{_listed(clear, 'and')}, and something else: " if clear else ""
+    are = "is" if len(clear) == 1 else "are"
+    begins = f"{_listed(clear, 'and')} {are} there. Something else is, too, and " if clear else ""
     return f"{begins}these recordings do not say which effect it is: {words}"
 
 

@@ -17,7 +17,7 @@ NOTABLE = 1.3
 NOTABLE_T = 3.0
 """...and from so many standard errors over episodes on [1]."""
 NOWHERE = "nowhere does the residual stand out from the noise"
-SPREAD = "no part stands out in most presses; over all of them the residual is {:.2f} times the noise"
+SPREAD = "no part stands out in most presses; over all of them it is {:.2f}"
 
 
 @dataclass(frozen=True)
@@ -127,13 +127,13 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
     order = sorted(high.tolist(), key=lambda k: -energy[k] / values[k])
     words = ", ".join(f"{names[k]} {2 * energy[k] / values[k]:.3g}" for k in order[:5])
     return [
-        f"episode: {words} times the noise, the others {usual:.3g}: {len(high)} of {len(there)} stand out by "
+        f"episode: {words}, the others {usual:.3g}: {len(high)} of {len(there)} stand out by "
         "themselves; look at them, or record what they did again"
     ]
 
 
 def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 1.0) -> list[str]:
-    """Return sentences on what stands out: ``alone`` first, then the slices, each kind of slice by itself.
+    """Return sentences on what stands out, ``alone`` first, then each kind of slice, with mean squares [noise floor].
 
     Args:
         found: The slices.
@@ -150,10 +150,9 @@ def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 
             alike.append((by, float(np.median([s.mean_square for s in high]))))
         else:
             high.sort(key=lambda s: -s.mean_square)
-            each = ", ".join(f"{s.name} at {figure(s.mean_square)}" for s in high[:4])
-            words.append(f"{by}: {each} times the noise")
+            words.append(f"{by}: {', '.join(f'{s.name} {figure(s.mean_square)}' for s in high[:4])}")
     if alike:
         usual = [level for _, level in alike]
         much = _range(min(usual), max(usual))
-        words.append(f"{', '.join(by for by, _ in alike)}: everywhere alike, {much} times the noise")
+        words.append(f"{', '.join(by for by, _ in alike)}: everywhere alike, {much}")
     return words or [SPREAD.format(whole) if whole > NOTABLE else NOWHERE]

@@ -13,6 +13,9 @@ MOST_RIVALS = 6
 """Most rivals that are listed."""
 MOST_UNJUDGED = 6
 """Effects that cannot be judged are listed up to so many; of more, only their number is given."""
+MEAN_SQUARE = "as a mean square over the noise (1 is noise alone)"
+WITHIN_NOISE = 2.0
+"""What is left is noise below so many standard errors [1]."""
 EVEN = 0.05
 """A rival by which an effect is behind by less fits as well [standard errors]."""
 LOW = 0.7
@@ -28,19 +31,16 @@ def in_text(verdict: dict[str, Any]) -> str:
     lines = [f"{verdict['status'].upper()}: {verdict['why']}", ""]
     for e in verdict["effects"]:
         lines += _effect(e)
-    gate = verdict["gate"]
     lines += [""] if verdict["effects"] else []
-    lines.append(
-        f"could chance do it? p = {gate['p']:.3f} by the known effects, {gate['p_generic']:.3f} by patterns of none of "
-        f"them; from {GATE:g} down there is a gap"
-    )
-    lines += _sizes(verdict)
-    if verdict["located"]:
-        lines += ["where it lives:", *(f"  {words}" for words in verdict["located"])]
-    if verdict.get("located_after"):
-        lines += ["where what has no name lives:", *(f"  {words}" for words in verdict["located_after"])]
     if verdict["next"]:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]
+    lines += [_gate(verdict["gate"]), *_sizes(verdict)]
+    if verdict["located"]:
+        lines += [f"where it lives, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located"])]
+    if verdict.get("located_after"):
+        lines += [
+            f"where what has no name lives, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located_after"])
+        ]
     if verdict["remarks"]:
         lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
     spoken = answered(verdict)
@@ -55,6 +55,15 @@ def in_text(verdict: dict[str, Any]) -> str:
         few = "; ".join(titles) if len(titles) <= MOST_UNJUDGED else f"{len(titles)} effects; verdict.html lists them"
         lines.append(f"known, not modelled: {few}")
     return "\n".join(lines) + "\n"
+
+
+def _gate(gate: dict[str, Any]) -> str:
+    """Return whether there is a gap, and how probable such recordings are without one."""
+    there = "yes, beyond chance" if gate["gap"] else "none beyond chance"
+    return (
+        f"is there a gap? {there}: p = {gate['p']:.3f} along the known effects, {gate['p_generic']:.3f} along patterns "
+        f"of none of them; a gap is {GATE:g} or less"
+    )
 
 
 def _plain(names: list[str]) -> str:
@@ -75,6 +84,7 @@ def _effect(entry: dict[str, Any]) -> list[str]:
     effect = load(entry["effect"])
     lines = [f"  {effect.spoken}: {_standing(entry)}", f"    {effect.title}"]
     meanings = {p.name: p.meaning for p in effect.parameters}
+    vague = [name for name, p in entry["parameters"].items() if _is_vague(p)]
     for name, p in entry["parameters"].items():
         unit = "" if p["unit"] == "1" else f" {'of the ' * p['unit'].startswith('largest')}{p['unit']}"
         meaning = f" ({meanings[name]})" if name in meanings else ""
@@ -84,7 +94,11 @@ def _effect(entry: dict[str, Any]) -> list[str]:
             lines.append(f"    {name}: {' to '.join(ends)}{unit}{over}{meaning}")
         else:
             spread = f" +- {plain_number(p['error'], 2)}" if p["error"] is not None else ""
-            lines.append(f"    {name} = {plain_number(p['value'], 4)}{spread}{unit}{meaning}")
+            spread = "" if name in vague else spread
+            lines.append(f"    {name} = {plain_number(p['value'], 2 if name in vague else 4)}{spread}{unit}{meaning}")
+    if vague:
+        they = "is not known: other values fit" if len(vague) == 1 else "are not known, each by itself: other pairs fit"
+        lines.append(f"    {' and '.join(vague)} {they} as well")
     if entry["alternatives"]:
         others = ", ".join(load(name).spoken for name in entry["alternatives"])
         lines.append(f"    these presses leave open whether it is: {others}")
@@ -109,6 +123,12 @@ def _effect(entry: dict[str, Any]) -> list[str]:
     return lines
 
 
+def _is_vague(parameter: dict[str, Any]) -> bool:
+    """Return whether the error of a number is larger than the number."""
+    value, error = parameter["value"], parameter["error"]
+    return error is not None and not isinstance(value, list) and error > abs(value)
+
+
 def _standing(entry: dict[str, Any]) -> str:
     """Return how sure an effect is, and of what: where only its family is, that it is the one that fits best."""
     status, sure = entry["status"], entry["confidence"]
@@ -125,13 +145,13 @@ def _by(rivals: list[tuple[str, float]]) -> str:
 def _sizes(verdict: dict[str, Any]) -> list[str]:
     """Return how large the residual is, with what each number is; before and after only where something was added."""
     left, sealed, none = verdict["left"], verdict["sealed"], not verdict["effects"]
-    lines = ["residual, as a mean square over the noise (1 is noise alone):"]
-    own = "without what differs from press to press (pose, gain)"
+    lines = [f"residual, {MEAN_SQUARE}:"]
+    own = "their own pose and gain"
     after = "" if none else f" before, {figure(left['after'])} after"
     over = "" if none or left["after"] > LOW else "; below 1, since part of it had been taken for noise"
-    lines.append(f"  presses that were fitted, {own}: {figure(left['before'])}{after}{over}")
+    lines.append(f"  presses that were fitted, {own} taken out: {figure(left['before'])}{after}{over}")
     if sealed["episodes"]:
-        head = f"  {sealed['episodes']} sealed presses, with it: {figure(sealed['before'])}"
+        head = f"  {sealed['episodes']} sealed presses, {own} left in: {figure(sealed['before'])}"
         lines.append(f"{head}{'' if none else _closed(sealed)}")
         if sealed["ceiling"] < BEST * sealed["before" if none else "after"]:
             lines.append(
@@ -139,7 +159,8 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
             )
         lines += [] if none or sealed["certain"] else _borne_out(sealed.get("ratio"))
     if not none and left["after"] < left["before"]:
-        much = f"{_percent(left['share'])} of what could be explained ({left['t']:.1f} standard errors)"
+        beyond = "within noise" if left["t"] < WITHIN_NOISE else f"{left['t']:.1f} standard errors"
+        much = f"{_percent(left['share'])} of what could be explained ({beyond})"
         lines.append(f"left without an explanation: {much}")
     return lines
 
@@ -149,8 +170,8 @@ def _borne_out(ratio: dict[str, Any] | None) -> list[str]:
     if ratio is None or ratio["error"] is None:
         return []
     return [
-        f"  they show {100 * ratio['share']:.0f} % of the answer (standard error {100 * ratio['error']:.0f} %), each "
-        "press's own pose and gain aside: 100 % is expected with it, 0 % without"
+        f"  pose and gain aside, they show {100 * ratio['share']:.0f} +- {100 * ratio['error']:.0f} % of "
+        "what the effects predict"
     ]
 
 

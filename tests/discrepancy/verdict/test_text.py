@@ -33,7 +33,8 @@ def effect(name, alternatives=(), margins=None, status="named"):
 def document(status="named", effects=(), limits=None, sealed=None, share=0.02) -> dict[str, Any]:
     """Return what the text reads of a verdict."""
     return {
-        "status": status, "why": "so it is", "effects": list(effects), "gate": {"p": 0.001, "p_generic": 1.0},
+        "status": status, "why": "so it is", "effects": list(effects),
+        "gate": {"gap": True, "p": 0.001, "p_generic": 1.0},
         "left": {"before": 3.316, "after": 1.612, "share": share, "t": 3.0}, "located": ["everywhere"], "next": [],
         "remarks": [], "limits": limits or {}, "untested": [], "unjudgeable": {"frame_compliance": "x", "tilt": "y"},
         "sealed": {"episodes": 4, "before": 18.489, "after": 20.374, "ceiling": 1.286, "closed": -0.11,
@@ -50,12 +51,12 @@ def line(text, beginning):
 def test_where_nothing_is_missing_no_share_of_it_is_left_and_each_number_says_what_it_is():
     text = in_text(document("none", share=1.0, sealed={"before": 42.429, "after": 42.429, "ceiling": 12.478}))
     assert "could be explained" not in text and "before" not in text and "closed" not in text
-    assert line(text, "presses that were").endswith("without what differs from press to press (pose, gain): 3.32")
-    assert line(text, "4 sealed") == "  4 sealed presses, with it: 42.4"
+    assert line(text, "presses that were").endswith("their own pose and gain taken out: 3.32")
+    assert line(text, "4 sealed") == "  4 sealed presses, their own pose and gain left in: 42.4"
     assert line(text, "a regression").endswith("would bring the sealed ones to 12.5")
     assert line(text, "residual").endswith("as a mean square over the noise (1 is noise alone):")
     same = in_text(document("none", sealed={"before": 57.954, "after": 57.954, "ceiling": 57.954}))
-    assert line(same, "4 sealed") == "  4 sealed presses, with it: 58.0" and "a regression" not in same
+    assert line(same, "4 sealed").endswith("pose and gain left in: 58.0") and "a regression" not in same
 
 
 def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
@@ -78,7 +79,7 @@ def test_what_is_worse_is_not_called_better():
 
 def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
     worse = line(in_text(document("unknown", [effect("power_creep")])), "4 sealed")
-    assert worse == "  4 sealed presses, with it: 18.5 before, 20.4 after, worse by 10 %"
+    assert worse == "  4 sealed presses, their own pose and gain left in: 18.5 before, 20.4 after, worse by 10 %"
     closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.94, "interval": [0.9, 1.0], "certain": True}
     better = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
     assert "2.00 after, 94 % of the gap closed (90 %: 90 to 100 %)" in better
@@ -112,7 +113,7 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
         "low-pass filter fits best, but delay or creep may stand in for it"
     )
     assert said("ambiguous", [finding("drift"), finding("backlash", "creep")]).startswith(
-        "drift, and something else: these recordings do not say which effect it is: backlash fits best, but creep may"
+        "drift is there. Something else is, too, and these recordings do not say which effect it is: backlash fits best"
     )
     pair = [finding("backlash", "hysteresis"), finding("bouc_wen", "backlash")]
     assert said("ambiguous", pair).endswith("and hysteresis together fit best, but one may stand in for another")
@@ -189,7 +190,7 @@ def test_where_two_effects_close_the_gap_each_has_its_share():
 def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
     assert said("unknown", [finding("power_creep")], 18.489, 20.374) == (
         "something is missing that has no name yet; relaxation comes closest and leaves 10 % of what could be "
-        "explained, but sealed presses fit worse by 10 % with it (mean square 18.5 times the noise without, 20.4 "
+        "explained, but sealed presses fit worse by 10 % with it (mean square over the noise 18.5 without, 20.4 "
         "with): it is not the name"
     )
     assert "fit no better" in said("unknown", [finding("power_creep")], 20.128, 20.130)
@@ -207,7 +208,7 @@ def test_a_family_that_all_rivals_share_is_said():
     decided = Decided(finding("low_pass_filter", "latency"), "ambiguous", {}, None, Level.FAMILY)
     decision = Decision("ambiguous", Reason.RIVALS, (decided,))
     found = cast(Findings, SimpleNamespace(until="decide", share_left=0.1, left=SimpleNamespace(t=3.0)))
-    assert reason_in_words(decision, found, DataChecks(8)).endswith("; either way it is delay and filtering")
+    assert reason_in_words(decision, found, DataChecks(8)).endswith(". Either way it is delay and filtering")
 
 
 def test_an_equation_that_ends_too_early_is_no_unphysical_size():
@@ -239,7 +240,7 @@ def test_what_sealed_presses_show_is_told_where_their_mean_square_says_little():
     ratio = {"observed": 20.7, "expected": 28.0, "share": 0.87, "error": 0.16}
     text = in_text(document("named", [effect("power_creep")], sealed={"ratio": ratio}))
     assert "worse" not in line(text, "4 sealed")
-    assert line(text, "they show").startswith("  they show 87 % of the answer (standard error 16 %)")
+    assert line(text, "pose and gain") == "  pose and gain aside, they show 87 +- 16 % of what the effects predict"
     against = in_text(document("unknown", [effect("power_creep")], sealed={"ratio": ratio | {"observed": -3.0}}))
     assert "worse by 10 %" in line(against, "4 sealed")
 
@@ -270,3 +271,30 @@ def test_a_rival_that_fits_as_well_is_not_said_to_fit_better():
     text = in_text(document("named", [effect("permanent_set", margins={"thermal_growth": 0.0, "lost_steps": -1.2})]))
     assert line(text, "fits as well") == "    fits as well, with more numbers: thermal growth"
     assert line(text, "fits worse").endswith("than: lost steps 1.2")
+
+
+def test_numbers_that_are_known_only_together_are_said_to_be():
+    entry = effect("thermal_growth")
+    entry["parameters"] = {
+        "dz": {"value": -0.5807, "unit": "mm", "error": 3.3}, "tau": {"value": 4623.0, "unit": "s", "error": 29000.0},
+    }  # fmt: skip
+    text = in_text(document("named", [entry]))
+    assert line(text, "dz =") == "    dz = -0.58 mm (final growth)" and "+-" not in text
+    assert line(text, "dz and tau").endswith("are not known, each by itself: other pairs fit as well")
+    entry["parameters"]["dz"]["error"] = 0.1
+    assert line(in_text(document("named", [entry])), "tau is").endswith("tau is not known: other values fit as well")
+
+
+def test_whether_there_is_a_gap_comes_before_its_probability():
+    assert line(in_text(document()), "is there").startswith("is there a gap? yes, beyond chance: p = 0.001")
+    quiet = document("none") | {"gate": {"gap": False, "p": 0.2, "p_generic": 0.5}}
+    assert line(in_text(quiet), "is there").startswith("is there a gap? none beyond chance: p = 0.200")
+
+
+def test_an_effect_that_sealed_presses_do_not_need_is_said_to_be_small():
+    decision = Decision("named", Reason.NAMED, (Decided(finding("drift"), "named", {}, None, Level.FORM),))
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.0, left=SimpleNamespace(t=0.0)))
+    for after, small in ((29.9, True), (29.0, False)):
+        shown = Gap(np.full(4, 30.0), np.full(4, after), np.full(4, 1.0), tuple("abcd"))
+        words = reason_in_words(decision, found, DataChecks(8), shown)
+        assert words.endswith("It is small: sealed presses fit as well without") == small
