@@ -17,6 +17,9 @@ class Response(ABC):
     form_error = 0.0
     """Share of what an effect explains that may be its equation's error through this response, root of squares [1]."""
 
+    error = 0.0
+    """Root mean square of its numerical error, over that of the loads [1]; 0 where none is stated."""
+
     @property
     def spacing(self) -> float | None:
         """Largest distance between successive depths that were solved [mm]; None where none were."""

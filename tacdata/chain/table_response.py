@@ -28,6 +28,7 @@ class TableResponse(Response):
     def __init__(
         self, x: np.ndarray, y: np.ndarray, depth: np.ndarray, load: np.ndarray, force: np.ndarray,
         curve_load: np.ndarray, curve_signal: np.ndarray, gain: np.ndarray, offset: np.ndarray, tools: tuple[str, ...],
+        error: float = 0.0,
     ) -> None:  # fmt: skip
         """Keep the table.
 
@@ -42,7 +43,9 @@ class TableResponse(Response):
             gain: Gain of each channel, shape (channels,).
             offset: Reading without load, shape (channels,).
             tools: Name of each tool.
+            error: Root mean square error of the loads, over that of the loads [1]; 0 if none is stated.
         """
+        self.error = error
         self.x, self.y, self.depth, self.tools = x, y, depth, tools
         self._curve = _straight_beyond(curve_load, curve_signal)
         self.gain, self.offset = gain, offset
@@ -78,12 +81,13 @@ class TableResponse(Response):
         try:
             with np.load(path, allow_pickle=False) as data:
                 values = {name: data[name] for name in FIELDS}
+                error = float(data["error"]) if "error" in data else 0.0
         except (ValueError, KeyError, OSError) as error:
             raise FormatError(
                 f"{path} is no response table ({error})", f"an .npz file with {', '.join(FIELDS)}", "make it again"
             ) from None
         tools = tuple(str(name) for name in values.pop("tools"))
-        return cls(**values, tools=tools)
+        return cls(**values, tools=tools, error=error)
 
     def idling_at(self, offset: np.ndarray) -> TableResponse:
         """Return the same response with other readings without load, shape (channels,)."""

@@ -18,14 +18,14 @@ from tacdata.skin.press import PressRequest
 from tacdata.surrogate.symmetry import foldable
 
 EDGE = 2
-"""Nodes beyond the solved ones, at every end: splines are mirrored at the table's ends, where that does no harm."""
+"""Nodes beyond the solved ones, at every end: splines are mirrored at the ends of places, where that does no harm."""
 MARGIN = 0.2
 """Margin around the pressed positions [mm]: effects move the tip."""
 DEEPER = 0.1
 """Margin below the deepest press [mm]."""
-UNIT = 0.03
+UNIT = 0.0075
 """Depth of the first node [mm]."""
-FEWEST = 5
+FEWEST = 9
 """Minimum number of depths, the undeformed state included."""
 
 

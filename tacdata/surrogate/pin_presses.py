@@ -23,7 +23,7 @@ from tacdata.surrogate.solved import Solved
 
 TOOLS = ("sphere_2", "sphere_4", "punch", "ring", "cone")
 """Tools that are round, so that a quarter of the positions suffices."""
-SPACING, COLUMNS, ROWS, STATES = 0.8, 8, 6, 9
+SPACING, COLUMNS, ROWS, STATES = 0.8, 8, 6, 17
 """Spacing of the positions [mm], number of positions along x and y from the middle, number of depths."""
 
 

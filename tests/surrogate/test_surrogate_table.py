@@ -83,6 +83,7 @@ def test_a_table_says_between_its_nodes_what_the_model_says_there(tmp_path):
     table, off = made(tmp_path, FastModel(), reach).done()
     assert off and off.presses == 6
     assert off.load < 0.003 and off.worst < 0.02
+    assert table.error == off.share == table.response.error and 0 < off.share < 0.02
     rng = np.random.default_rng(1)
     pose = np.column_stack([rng.uniform(-3, 3, 200), rng.uniform(-2, 2, 200), rng.uniform(0.05, 1.2, 200)])
     said = table.response.load(pose, np.zeros(200, dtype=int))
@@ -92,6 +93,32 @@ def test_a_table_says_between_its_nodes_what_the_model_says_there(tmp_path):
     assert worse and worse.load > 3 * off.load, "a wide table must be told to be worse"
     assert table.uncovered((("ball", np.array([2.9, -1.9]), 1.2),)) == []
     assert len(table.uncovered((("ball", np.array([6.9, 0.0]), 1.2), ("ball", np.array([0.0, 0.0]), 3.2)))) == 2
+
+
+class StiffeningModel(FastModel):
+    """Loads that grow by a higher power the deeper the press, as those of a bonded layer do."""
+
+    def solve_many(self, requests, capacity=1):
+        for k, answer in super().solve_many(requests, capacity):
+            factor = 1 + 2 * np.asarray(answer.depth)[:, None] ** 2
+            yield k, replace(answer, taxel_force=answer.taxel_force * factor)
+
+
+def test_a_table_as_deep_as_the_presses_says_what_a_deeper_one_says(tmp_path):
+    deep, shallow = (
+        made(tmp_path / str(d), StiffeningModel(), Reach(BALL, 0.0, (-2.0, -1.0), (2.0, 1.0), d), left_out=0).done()[0]
+        for d in (1.9, 1.2)
+    )
+    depth = np.linspace(0.1, 1.2, 40)
+    pose = np.column_stack([np.full(40, 0.3), np.full(40, -0.4), depth])
+    none = np.zeros(40, dtype=int)
+    true = load_at(*pose.T) * (1 + 2 * depth**2)[:, None]
+    largest = np.abs(true).max(axis=1)
+    for table, most in ((deep, 0.01), (shallow, 0.01)):
+        off = np.abs(table.response.load(pose, none) - true).max(axis=1) / largest
+        assert off[depth > 0.5].max() < most
+    apart = np.abs(shallow.response.load(pose, none) - deep.response.load(pose, none)).max(axis=1) / largest
+    assert apart.max() < 5e-4, "what lies beyond the presses must not bend the spline through them"
 
 
 def test_presses_are_kept_and_a_press_without_equilibrium_ends_earlier(tmp_path):

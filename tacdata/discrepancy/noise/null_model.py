@@ -25,6 +25,8 @@ from tacdata.effects import Placed
 
 LEAST_GAIN_ERROR = 0.003
 """Least standard deviation of a stream's gain in an episode: no response is exact [1]."""
+REPEATED = 2.0
+"""A table's error stands in for that many times as much: episodes of one place share it, and do not average it [1]."""
 NOISE_DRAWS = 2
 """Draws of noise by which the J test estimates how two models differ by noise alone."""
 ROUNDS = 3
@@ -181,19 +183,20 @@ def null_model(setting: Setting) -> NullModel:
     known = measured.noise(errors)
     left = measured.left(known, errors)
     prior, own = errors, ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64), np.ones(reduced.episodes))
-    before, spread = np.zeros(errors.shape[2] + 1), LEAST_GAIN_ERROR
+    least = float(np.hypot(LEAST_GAIN_ERROR, REPEATED * response.error))
+    before, spread = np.zeros(errors.shape[2] + 1), least
     for turn in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is estimated beside the other.
         known = replace(known, gain_error=None)
         spread = measured.gains(known, errors, left)
-        known = replace(known, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
+        known = replace(known, gain_error=(rise * max(spread, least)).astype(np.float32))
         own = measured.poses(known, prior, left)
         if turn == 0 and own.counts.min() < ODD:
             # The fit bends to follow an episode unlike all others, and leaves its neighbours what it takes off it.
             left = measured.left(known, prior * own.sizes, own.counts)
             own = measured.poses(known, prior, left)
         errors = prior * own.sizes
-        now = np.array([*own.sizes, max(spread, LEAST_GAIN_ERROR)])
+        now = np.array([*own.sizes, max(spread, least)])
         if np.all(np.abs(now - before) <= SETTLED * now):
             break
         before = now
@@ -202,5 +205,5 @@ def null_model(setting: Setting) -> NullModel:
     folds = fold_of(course.episodes)
     return NullModel.of(
         reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, own.sizes,
-        max(spread, LEAST_GAIN_ERROR),
+        max(spread, least),
     )  # fmt: skip

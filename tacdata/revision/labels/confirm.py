@@ -17,10 +17,13 @@ from tacdata.sensor import Sensor
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.surrogate.grid import UNIT, Reach
+from tacdata.surrogate.grid import Reach
 from tacdata.surrogate.press_store import PressStore
 from tacdata.surrogate.reading import reading_of
 from tacdata.transduction import Loads, Transducer
+
+SHALLOW = 0.03
+"""Least depth of a press that is solved again, and of its first state [mm]."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +124,8 @@ def _spread(change: np.ndarray, site: np.ndarray, tool: np.ndarray, count: int) 
 
 
 def _press(reach: Reach, pose: np.ndarray) -> PressRequest:
-    depth = max(float(pose[2]), UNIT)
-    states = max(int(np.ceil(np.sqrt(depth / UNIT))), 3)
+    depth = max(float(pose[2]), SHALLOW)
+    states = max(int(np.ceil(np.sqrt(depth / SHALLOW))), 3)
     depths = depth * (np.arange(states + 1) / states) ** 2
     x, y = (round(float(v), 4) for v in pose[:2])
     return PressRequest(reach.indenter, x, y, reach.yaw, tuple(round(float(d), 6) for d in depths), *reach.tilt)
