@@ -135,7 +135,6 @@ def scored(out):
         wrong = sum(count for outcome, count in singles.items() if outcome.startswith("wrong"))
         figures = (nulls.total(), nulls["right none"], nulls["false name"], singles.total(), singles["success"], wrong)
         print("|", " | ".join([unit, base, *map(str, figures)]), "|")
-        print(dict(nulls), dict(singles))
 
 
 def main():
