@@ -9,6 +9,7 @@ import numpy as np
 from tacdata.chain import Prediction, predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.setting import Setting
+from tacdata.discrepancy.noise import table_error
 from tacdata.discrepancy.regressors.candidates import build
 from tacdata.discrepancy.regressors.generic import depth_slope
 from tacdata.discrepancy.regressors.stack import side_by_side
@@ -31,8 +32,8 @@ MOST_SET_UPS = 24
 def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
     """Return the nuisances' columns (n, streams, k) and the weights of their priors (k,).
 
-    Calibration's (a gain of each channel, then what is known of each without load) unless the response is fitted; then
-    what recordings of several strokes are off one another.
+    Calibration's (a gain of each channel, then what is known of each without load) and a table's error, unless the
+    response is fitted; then what recordings of several strokes are off one another.
     """
     course, response = setting.course, setting.response
     if response.fitted:
@@ -40,8 +41,10 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
     effects = [load(name) for name in setting.nuisance]
     board = build(course, response, placed, effects)
     idle = np.zeros((len(course.read), board.columns[0].shape[1], course.channels), dtype=np.float32)
-    rise = Streams.of(course).rise(predict(course, response, placed), response)[:, : course.channels]
-    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * float(np.abs(rise).max())
+    rise = Streams.of(course).rise(predict(course, response, placed), response)
+    largest = float(np.abs(rise[:, : course.channels]).max())
+    idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * largest
+    off = table_error.common(response.error, rise, course.reduced)
     weights = [
         (p.typical / setting.nuisance[c.effect.name]) ** 2
         for c in board.candidates
@@ -49,8 +52,8 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
         for _ in range(len(c.columns) // len(c.effect.amplitudes))
     ]
     own, ridge = set_ups(setting, placed)
-    columns = np.concatenate([side_by_side(board.columns)[:, :, 1:], idle, own], axis=2)
-    return columns, np.array([*weights, *np.ones(course.channels), *ridge])
+    columns = np.concatenate([side_by_side(board.columns)[:, :, 1:], idle, off, own], axis=2)
+    return columns, np.array([*weights, *np.ones(course.channels + off.shape[2]), *ridge])
 
 
 def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:

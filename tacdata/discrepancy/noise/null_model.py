@@ -13,7 +13,7 @@ from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.fitted_response import contexts
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise import offset_random_walk, readings
+from tacdata.discrepancy.noise import offset_random_walk, readings, table_error
 from tacdata.discrepancy.noise.episode_errors import EpisodeErrors, ErrorSizes
 from tacdata.discrepancy.noise.gram import episode_grams
 from tacdata.discrepancy.noise.noise_model import Noise
@@ -25,8 +25,6 @@ from tacdata.effects import Placed
 
 LEAST_GAIN_ERROR = 0.003
 """Least standard deviation of a stream's gain in an episode: no response is exact [1]."""
-REPEATED = 2.0
-"""A table's error stands in for that many times as much: episodes of one place share it, and do not average it [1]."""
 NOISE_DRAWS = 2
 """Draws of noise by which the J test estimates how two models differ by noise alone."""
 ROUNDS = 3
@@ -128,7 +126,10 @@ class NullModel:
         missing, noise, process = ~np.isfinite(residual), self.noise, self.noise.offsets
         noise = replace(
             noise, gain_error=(rise * self.spread).astype(np.float32), missing=missing if missing.any() else None,
-            random_walk=offset_random_walk.modes(noise.walk_rate, reduced, noise.memory),
+            random_walk=_together(
+                offset_random_walk.modes(noise.walk_rate, reduced, noise.memory),
+                table_error.modes(response.error, rise, noise.scale, reduced),
+            ),
             relative_scale=None if noise.relative_scale is None else readings.relative_scale(residual, rise, reduced),
             offsets=process and process.beside(reduced),
         )  # fmt: skip
@@ -166,6 +167,12 @@ def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> n
     return (shape * (by[:, None] if reference.ndim == 3 else by)).astype(np.float32)
 
 
+def _together(*modes: np.ndarray | None) -> np.ndarray | None:
+    """Return modes of several causes, each shape (m, modes), beside one another; None for none."""
+    there = [own for own in modes if own is not None]
+    return np.concatenate(there, axis=1) if there else None
+
+
 def null_model(setting: Setting) -> NullModel:
     """Estimate noise and nuisances of a model without further effects."""
     course, response = setting.course, setting.response
@@ -181,22 +188,23 @@ def null_model(setting: Setting) -> NullModel:
     rise = streams.rise(predicted, response).astype(np.float32)
     measured = EpisodeErrors(residual, every, reduced, context, features, rise)
     known = measured.noise(errors)
+    off = table_error.modes(response.error, rise, known.scale, reduced)
+    known = replace(known, random_walk=_together(known.random_walk, off))
     left = measured.left(known, errors)
     prior, own = errors, ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64), np.ones(reduced.episodes))
-    least = float(np.hypot(LEAST_GAIN_ERROR, REPEATED * response.error))
-    before, spread = np.zeros(errors.shape[2] + 1), least
+    before, spread = np.zeros(errors.shape[2] + 1), LEAST_GAIN_ERROR
     for turn in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is estimated beside the other.
         known = replace(known, gain_error=None)
         spread = measured.gains(known, errors, left)
-        known = replace(known, gain_error=(rise * max(spread, least)).astype(np.float32))
+        known = replace(known, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
         own = measured.poses(known, prior, left)
         if turn == 0 and own.counts.min() < ODD:
             # The fit bends to follow an episode unlike all others, and leaves its neighbours what it takes off it.
             left = measured.left(known, prior * own.sizes, own.counts)
             own = measured.poses(known, prior, left)
         errors = prior * own.sizes
-        now = np.array([*own.sizes, max(spread, least)])
+        now = np.array([*own.sizes, max(spread, LEAST_GAIN_ERROR)])
         if np.all(np.abs(now - before) <= SETTLED * now):
             break
         before = now
@@ -205,5 +213,5 @@ def null_model(setting: Setting) -> NullModel:
     folds = fold_of(course.episodes)
     return NullModel.of(
         reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, own.sizes,
-        max(spread, least),
+        max(spread, LEAST_GAIN_ERROR),
     )  # fmt: skip
