@@ -93,7 +93,8 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
         case Reason.ALARM:
             return f"no effect of the library shows, but {_seen(decision)}"
         case Reason.LOUD:
-            off = f"readings are off by {found.loudness:.1f} times the noise, but no effect shows in several presses"
+            loud = f"{plain_number(found.loudness, 2)} times the noise's"
+            off = f"the residual's mean square is {loud}, but no effect shows in several presses"
             return off + (_lone(decision, found, ": ") or ": look at where it lives")
         case Reason.UNEXPLAINED:
             seen = f": {_seen(decision)}" if decision.alarms else ""
