@@ -34,7 +34,7 @@ def in_text(verdict: dict[str, Any]) -> str:
     lines += [""] if verdict["effects"] else []
     if verdict["next"]:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]
-    lines += [_gate(verdict["gate"]), *_sizes(verdict)]
+    lines += [_gate(verdict), *_sizes(verdict)]
     if verdict["located"]:
         lines += [f"where it lives, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located"])]
     if verdict.get("located_after"):
@@ -57,9 +57,13 @@ def in_text(verdict: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _gate(gate: dict[str, Any]) -> str:
+def _gate(verdict: dict[str, Any]) -> str:
     """Return whether there is a gap, and how probable such recordings are without one."""
-    there = "yes, beyond chance" if gate["gap"] else "none beyond chance"
+    gate, there = verdict["gate"], "yes, beyond chance"
+    if not gate["gap"]:
+        # Specimens are fitted each by itself: what they say together is in no residual.
+        between = any(load(e["effect"]).in_series for e in verdict["effects"])
+        there = "not within a specimen, only between specimens" if between else "none beyond chance"
     return (
         f"is there a gap? {there}: p = {gate['p']:.3f} along the known effects, {gate['p_generic']:.3f} along patterns "
         f"of none of them; a gap is {GATE:g} or less"

@@ -291,6 +291,15 @@ def test_whether_there_is_a_gap_comes_before_its_probability():
     assert line(in_text(quiet), "is there").startswith("is there a gap? none beyond chance: p = 0.200")
 
 
+def test_a_frame_told_by_specimens_is_no_gap_within_one():
+    told = effect("frame_compliance") | {"status": "ambiguous", "alternatives": ["stiffening"]}
+    shown = document("ambiguous", [told]) | {"gate": {"gap": False, "p": 0.7, "p_generic": 1.0}}
+    between = "is there a gap? not within a specimen, only between specimens: p = 0.700"
+    assert line(in_text(shown), "is there").startswith(between)
+    gains = shown | {"effects": [effect("channel_gain")]}
+    assert line(in_text(gains), "is there").startswith("is there a gap? none beyond chance: p")
+
+
 def test_an_effect_that_sealed_presses_do_not_need_is_said_to_be_small():
     decision = Decision("named", Reason.NAMED, (Decided(finding("drift"), "named", {}, None, Level.FORM),))
     found = cast(Findings, SimpleNamespace(until="decide", share_left=0.0, left=SimpleNamespace(t=0.0)))
