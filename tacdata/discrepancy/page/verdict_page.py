@@ -13,6 +13,7 @@ from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.telling import ToldPress, telling
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.verdict.residual_table import Residuals
+from tacdata.discrepancy.verdict.text import LEAST_CLOSED, unsaid
 from tacdata.effects import Family, load
 
 MOST_RIVALS = 4
@@ -45,9 +46,10 @@ def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
     """
     presses = telling(found)
     parts = [
+        Part("What to do next", lines=tuple(verdict["next"])),
         _presses(verdict, found, presses), _loops(verdict, presses), _shares(verdict), _where(verdict, found),
-        _path(verdict), _rivals(verdict), Part("What to record next", lines=tuple(verdict["next"])),
-        Part("Of these recordings", lines=tuple(verdict["remarks"])), *_folded(verdict),
+        _path(verdict), _rivals(verdict), Part("Of these recordings", lines=tuple(unsaid(verdict))),
+        *_folded(verdict),
     ]  # fmt: skip
     shown = [part for part in parts if part.pictures or part.lines]
     return _template().render(verdict=verdict, parts=shown, tiles=_tiles(verdict))
@@ -63,7 +65,7 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
     if sealed["episodes"] and verdict["effects"]:
         words = f"residual of {sealed['episodes']} sealed presses, mean square over the noise (1 is noise alone)"
         tiles.append((f"{plain_number(sealed['before'], 3)} → {plain_number(sealed['after'], 3)}", words))
-        if sealed["certain"]:
+        if sealed["certain"] and sealed["closed"] >= LEAST_CLOSED:
             low, high = sealed["interval"]
             spread = f"of their gap closed (90 %: {100 * low:.0f} to {100 * high:.0f} %)"
             tiles.append((f"{100 * sealed['closed']:.0f} %", spread))
@@ -122,10 +124,12 @@ def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     pictures = [charts.map_of("before, mean square over the noise", made.rows, made.columns, made.before, most)]
     if verdict["effects"]:
         pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after, most))
-    rest = [f"without a name yet: {words}" for words in verdict.get("located_after", ())]
+    after = verdict.get("located_after", ())
+    rest = [f"without a name yet: {words}" for words in after if list(after) != verdict["located"]]
     beside = "the map holds each press's own pose and gain, too; these mean squares over the noise leave that out"
     located = (beside, *verdict["located"]) if verdict["located"] else ()
-    return Part("Where the gap lives", tuple(pictures), (*located, *rest))
+    title = "Where the gap lives" if verdict["gate"]["gap"] else "Where the residual is largest"
+    return Part(title, tuple(pictures), (*located, *rest))
 
 
 def _path(verdict: dict[str, Any]) -> Part:

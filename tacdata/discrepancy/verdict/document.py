@@ -164,7 +164,7 @@ def following(decision: Decision, course: Course, watched: bool = False, fitted:
     if decision.reason is Reason.ALARM:
         return [alarm.next for alarm in decision.alarms]
     if decision.reason is Reason.QUIET and watched:
-        return ["mend what the remarks say of single channels, and record again"]
+        return ["mend the channels that the verdict names, and record again"]
     if decision.reason is Reason.QUIET:
         words = ["nothing: below the limits in verdict.json an effect shows only in more or deeper presses"]
         return words + ["for stiffness, gain and compliance: judge again with a model (--fem or --spec)"] * fitted
@@ -175,7 +175,7 @@ def following(decision: Decision, course: Course, watched: bool = False, fitted:
     if any(f.placed.effect.at_rest is not None and f.rivals for f in answer) and one_rate(course):
         words.insert(0, "the same presses at three rates over a decade: one rate splits no delay from play or memory")
     if decision.status == "ambiguous":
-        words.append(f"the presses that split them soonest: {REVISE} writes them as next.yaml")
+        words.append(f"the presses that settle it soonest: {REVISE} writes them as next.yaml")
     if (lone := decision.lone) is not None:
         words.append(
             f"{lone.effect.spoken}: repeat that press, best on three more places or specimens that nobody pressed "

@@ -14,7 +14,7 @@ from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
 from tacdata.discrepancy.verdict.sealed import Gap
-from tacdata.discrepancy.verdict.text import worsened
+from tacdata.discrepancy.verdict.text import LEAST_CLOSED, worsened
 from tacdata.effects import Family, load
 
 SPEAKS_FROM = 0.005
@@ -23,8 +23,6 @@ SMALL = 0.01
 """Change of the residual of sealed presses below which effects are said to be small [1]."""
 ALL_CLOSED = 0.995
 """Share of the gap from which on all of it is closed [1]."""
-LEAST_CLOSED = 0.01
-"""Share of the gap on sealed presses from which on it is worth a word [1]."""
 SIGNS = {
     Family.DRIFT: "gains that each part of the sensor changes by itself",
     Family.KINEMATICS: "depths and places that go with place, side, order or direction",
@@ -128,7 +126,7 @@ def _lone(decision: Decision, found: Findings, before: str) -> str:
 def _incomplete(decision: Decision, shown: Gap | None) -> str:
     """Return what has a name, how fine it is, and what it closes."""
     sure = [e for e in decision.effects if e.level is not None]
-    words = list(dict.fromkeys(_called(e) for e in sure))
+    words = _all_called(sure)
     open_ones = list(dict.fromkeys(e.finding.placed.effect.spoken for e in decision.effects if e.level is None))
     said = _there(_listed(words, "and"), len(words), decision, shown)
     return said + (f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else "")
@@ -178,6 +176,18 @@ def _called(decided: Decided) -> str:
     return f"{effect.family.value} ({effect.spoken} fits best)" if decided.level is Level.FAMILY else effect.spoken
 
 
+def _all_called(effects: Sequence[Decided]) -> list[str]:
+    """Return effects by the level at which they are named, a family once with all that fit best."""
+    words: list[str] = []
+    for e in effects:
+        family = e.finding.placed.effect.family
+        own = [o for o in effects if o.level is Level.FAMILY and o.finding.placed.effect.family is family]
+        best = list(dict.fromkeys(o.finding.placed.effect.spoken for o in own))
+        together = e.level is Level.FAMILY and len(best) > 1
+        words.append(f"{family.value} ({_listed(best, 'and')} fit best)" if together else _called(e))
+    return list(dict.fromkeys(words))
+
+
 def _closed(decision: Decision, shown: Gap | None) -> str:
     """Return what is closed of the gap on sealed episodes, by effects with a name if there are any; empty if unsure."""
     sealed = shown.document() if shown is not None and len(shown.before) else {}
@@ -204,7 +214,7 @@ def _undecided(decision: Decision, shown: Gap | None) -> str:
     bounds = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if set(f.at_bound) - own]
     formed = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if own]
     weak = [f.placed.effect.spoken for f in answer if f.necessity < f.needed]
-    words = _best(decision.effects)
+    words = _best(decision.effects) if any(f.rivals for f in answer) else _needed(decision.effects)
     either = [e for e in decision.effects if e.level is Level.FAMILY and e.status != "named"]
     shared = [e.finding.placed.effect.family.value for e in either]
     closed = _closed(decision, shown)
@@ -214,6 +224,16 @@ def _undecided(decision: Decision, shown: Gap | None) -> str:
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     words += f"; {', '.join(formed)} fits best where its equation ends: the form is another one" if formed else ""
     return words + (f"; more presses must say whether {', '.join(weak)} is needed" if weak else "")
+
+
+def _needed(effects: Sequence[Decided]) -> str:
+    """Return what is there and what only fits best, where nothing may stand in for either."""
+    sure = _all_called([e for e in effects if e.status == "named"])
+    fits = list(dict.fromkeys(e.finding.placed.effect.spoken for e in effects if e.status != "named"))
+    words = [f"{_listed(sure, 'and')} {'is' if len(sure) == 1 else 'are'} there"] if sure else []
+    words += [f"{_listed(fits, 'and')} {'fits' if len(fits) == 1 else 'fit'} best"] if fits and not sure else []
+    words += [f"{_listed(fits, 'and')} may be there, too"] if fits and sure else []
+    return "; ".join(words)
 
 
 def _odd(names: list[str]) -> str:

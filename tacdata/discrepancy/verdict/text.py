@@ -22,6 +22,8 @@ LOW = 0.7
 """A residual below this [noise] is said to be so."""
 BEST = 0.9
 """A regression on the path's history is worth a word below this share of the residual [1]."""
+LEAST_CLOSED = 0.01
+"""Share of the gap on sealed presses from which on it is worth a word [1]."""
 WEAK_LIMIT = 3.0
 """Effects with a larger detection limit are listed [typical sizes]."""
 
@@ -36,13 +38,14 @@ def in_text(verdict: dict[str, Any]) -> str:
         lines += ["next:", *(f"  {words}" for words in verdict["next"])]
     lines += [_gate(verdict), *_sizes(verdict)]
     if verdict["located"]:
-        lines += [f"where it lives, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located"])]
-    if verdict.get("located_after"):
+        lines += [f"where the residual is largest, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located"])]
+    if verdict.get("located_after") not in (None, [], verdict["located"]):
         lines += [
-            f"where what has no name lives, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located_after"])
+            f"where what has no name lives, {MEAN_SQUARE}:",
+            *(f"  {words}" for words in verdict["located_after"]),
         ]
-    if verdict["remarks"]:
-        lines += ["of these recordings:", *(f"  {words}" for words in verdict["remarks"])]
+    if remarks := unsaid(verdict):
+        lines += ["of these recordings:", *(f"  {words}" for words in remarks)]
     spoken = answered(verdict)
     if hidden := sorted(set(verdict["unjudgeable"]) - spoken):
         few = _plain(hidden) if len(hidden) <= MOST_UNJUDGED else f"{len(hidden)} effects; verdict.html says why"
@@ -55,6 +58,11 @@ def in_text(verdict: dict[str, Any]) -> str:
         few = "; ".join(titles) if len(titles) <= MOST_UNJUDGED else f"{len(titles)} effects; verdict.html lists them"
         lines.append(f"known, not modelled: {few}")
     return "\n".join(lines) + "\n"
+
+
+def unsaid(verdict: dict[str, Any]) -> list[str]:
+    """Return the remarks on the recordings that the sentence above all has not said."""
+    return [words for words in verdict["remarks"] if words not in verdict["why"]]
 
 
 def _gate(verdict: dict[str, Any]) -> str:
@@ -156,14 +164,15 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
     lines.append(f"  presses that were fitted, {own} taken out: {figure(left['before'])}{after}{over}")
     if sealed["episodes"]:
         head = f"  {sealed['episodes']} sealed presses, {own} left in: {figure(sealed['before'])}"
-        lines.append(f"{head}{'' if none else _closed(sealed)}")
+        lines.append(f"{head}{'' if none else _closed(sealed, verdict['status'].startswith('named'))}")
         if sealed["ceiling"] < BEST * sealed["before" if none else "after"]:
             lines.append(
                 f"  a regression on the path's history would bring the sealed ones to {figure(sealed['ceiling'])}"
             )
         lines += [] if none or sealed["certain"] else _borne_out(sealed.get("ratio"))
     if not none and left["after"] < left["before"]:
-        beyond = "within noise" if left["t"] < WITHIN_NOISE else f"{left['t']:.1f} standard errors"
+        clear = f"{left['t']:.1f} standard errors from none"
+        beyond = clear if left["t"] >= WITHIN_NOISE else "chance alone may leave as much"
         much = f"{_percent(left['share'])} of what could be explained ({beyond})"
         lines.append(f"left without an explanation: {much}")
     return lines
@@ -175,18 +184,27 @@ def _borne_out(ratio: dict[str, Any] | None) -> list[str]:
         return []
     return [
         f"  pose and gain aside, they show {100 * ratio['share']:.0f} +- {100 * ratio['error']:.0f} % of "
-        "what the effects predict"
+        "what the effects predict (100 % if these are there, 0 % if not)"
     ]
 
 
-def _closed(sealed: dict[str, Any]) -> str:
-    """Return how far the gap on sealed episodes is closed, in words that follow its numbers."""
+def _closed(sealed: dict[str, Any], named: bool) -> str:
+    """Return how far the gap on sealed episodes is closed, in words that follow its numbers.
+
+    Args:
+        sealed: Of the verdict.
+        named: Whether the effects have names. What is worse beyond chance has none.
+    """
     after, ratio = f" before, {figure(sealed['after'])} after", sealed.get("ratio")
     if (ratio is None or ratio["observed"] < 0) and (worse := worsened(sealed["before"], sealed["after"])):
-        return f"{after}, {worse}"
+        return f"{after}, {worse}{', no more than chance may do' if named and ratio is not None else ''}"
     if not sealed["certain"]:
-        return f"{after} (90 %: {figure(sealed['after_interval'][0])} to {figure(sealed['after_interval'][1])})"
+        hidden = "" if sealed["after"] < sealed["before"] else "; pose and gain hide what the effects do"
+        low, high = sealed["after_interval"]
+        return f"{after} (90 %: {figure(low)} to {figure(high)}){hidden}"
     low, high = sealed["interval"]
+    if sealed["closed"] < LEAST_CLOSED:
+        return f"{after}, no better (90 %: {100 * low:.0f} to {100 * high:.0f} % of it closed)"
     each = {load(name).spoken: share for name, share in sealed.get("shares", {}).items() if share > 0}
     parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in each.items()) if len(each) > 1 else ""
     closed, low, high = (round(100 * part) for part in (sealed["closed"], low, high))

@@ -67,7 +67,7 @@ def test_the_gate_can_be_had_alone_and_then_where_the_residual_lives(step, tmp_p
     assert f"stopped after {step}: a gap" in done.document["why"]
     located = step == "locate"
     assert bool(done.document["located"]) == bool(done.document["slices"]) == located
-    assert ("where it lives" in in_text(done.document)) == located
+    assert ("where the residual is largest" in in_text(done.document)) == located
     draw(done.found, done.before, done.after, done.document, tmp_path / "page.png")
     assert (tmp_path / "page.png").stat().st_size > 10_000
 

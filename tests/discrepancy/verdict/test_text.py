@@ -240,7 +240,9 @@ def test_what_sealed_presses_show_is_told_where_their_mean_square_says_little():
     ratio = {"observed": 20.7, "expected": 28.0, "share": 0.87, "error": 0.16}
     text = in_text(document("named", [effect("power_creep")], sealed={"ratio": ratio}))
     assert "worse" not in line(text, "4 sealed")
-    assert line(text, "pose and gain") == "  pose and gain aside, they show 87 +- 16 % of what the effects predict"
+    assert line(text, "pose and gain") == (
+        "  pose and gain aside, they show 87 +- 16 % of what the effects predict (100 % if these are there, 0 % if not)"
+    )
     against = in_text(document("unknown", [effect("power_creep")], sealed={"ratio": ratio | {"observed": -3.0}}))
     assert "worse by 10 %" in line(against, "4 sealed")
 
@@ -307,3 +309,36 @@ def test_an_effect_that_sealed_presses_do_not_need_is_said_to_be_small():
         shown = Gap(np.full(4, 30.0), np.full(4, after), np.full(4, 1.0), tuple("abcd"))
         words = reason_in_words(decision, found, DataChecks(8), shown)
         assert words.endswith("It is small: sealed presses fit as well without") == small
+
+
+def test_nothing_is_said_twice():
+    """Neither what the sentence above all says already, nor the same of what is left as of the whole."""
+    twice = document("none") | {"why": "no effect shows, but channel 8 hums", "remarks": ["channel 8 hums", "no force"]}
+    text = in_text(twice | {"located_after": ["everywhere"]})
+    assert text.count("channel 8 hums") == 1 and text.count("everywhere") == 1 and "no force" in text
+
+
+def test_a_share_of_the_gap_is_not_negative():
+    widened = {"after": 18.6, "closed": -0.07, "interval": [-0.22, 0.09], "certain": True}
+    told = line(
+        in_text(document("named", [effect("drift")], sealed=widened | {"ratio": {"observed": 1, "error": None}})), "4"
+    )
+    assert told.endswith("18.6 after, no better (90 %: -22 to 9 % of it closed)")
+
+
+def test_a_family_is_said_once_with_all_that_fit_best():
+    decided = tuple(Decided(finding(n), "named", {}, None, Level.FAMILY) for n in ("drift", "gain_drift"))
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.0, left=SimpleNamespace(t=0.0)))
+    words = reason_in_words(Decision(INCOMPLETE, Reason.INCOMPLETE, decided), found, DataChecks(8))
+    assert words == f"{load('drift').family.value} (drift and gain drift fit best) is there"
+
+
+def test_what_is_there_is_told_from_what_more_presses_must_show():
+    """Without a rival nothing stands in for either; one is only too weak."""
+    weak = Decided(replace(finding("gain_drift"), necessity=1.0), "ambiguous", {}, None)
+    sure = Decided(finding("frame_compliance"), "named", {}, None, Level.FORM)
+    found = cast(Findings, SimpleNamespace(until="decide", share_left=0.0, left=SimpleNamespace(t=0.0)))
+    words = reason_in_words(Decision("ambiguous", Reason.RIVALS, (sure, weak)), found, DataChecks(8))
+    assert words == (
+        "frame compliance is there; gain drift may be there, too; more presses must say whether gain drift is needed"
+    )
