@@ -150,7 +150,7 @@ def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 
             alike.append((by, float(np.median([s.mean_square for s in high]))))
         else:
             high.sort(key=lambda s: -s.mean_square)
-            words.append(f"{by}: {', '.join(f'{s.name} {figure(s.mean_square)}' for s in high[:4])}")
+            words.append(f"{by}: {', '.join(f'{s.name} at {figure(s.mean_square)}' for s in high[:4])}")
     if alike:
         usual = [level for _, level in alike]
         much = _range(min(usual), max(usual))
