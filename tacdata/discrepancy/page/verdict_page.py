@@ -13,7 +13,7 @@ from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.telling import ToldPress, telling
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.verdict.residual_table import Residuals
-from tacdata.discrepancy.verdict.text import LEAST_CLOSED, unsaid
+from tacdata.discrepancy.verdict.text import LEAST_CLOSED, between_specimens, unsaid
 from tacdata.effects import Family, load
 
 MOST_RIVALS = 4
@@ -73,7 +73,7 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _presses(verdict: dict[str, Any], found: Residuals, presses: list[ToldPress]) -> Part:
-    added = bool(verdict["effects"])
+    added = bool(verdict["effects"]) and not between_specimens(verdict)
     pictures: list[str] = []
     for p in presses:
         level = float(np.nanmedian(p.measured[:5]))
@@ -122,7 +122,7 @@ def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     made = heat_map(found)
     most = max(float(np.nanmax(made.before, initial=1.0)), 2.0)
     pictures = [charts.map_of("before, mean square over the noise", made.rows, made.columns, made.before, most)]
-    if verdict["effects"]:
+    if verdict["effects"] and not between_specimens(verdict):
         pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after, most))
     after = verdict.get("located_after", ())
     rest = [f"without a name yet: {words}" for words in after if list(after) != verdict["located"]]

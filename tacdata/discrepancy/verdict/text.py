@@ -69,13 +69,19 @@ def _gate(verdict: dict[str, Any]) -> str:
     """Return whether there is a gap, and how probable such recordings are without one."""
     gate, there = verdict["gate"], "yes, beyond chance"
     if not gate["gap"]:
-        # Specimens are fitted each by itself: what they say together is in no residual.
-        between = any(load(e["effect"]).in_series for e in verdict["effects"])
-        there = "not within a specimen, only between specimens" if between else "none beyond chance"
+        there = "not within a specimen, only between specimens" if between_specimens(verdict) else "none beyond chance"
     return (
         f"is there a gap? {there}: p = {gate['p']:.3f} along the known effects, {gate['p_generic']:.3f} along patterns "
         f"of none of them; a gap is {GATE:g} or less"
     )
+
+
+def between_specimens(verdict: dict[str, Any]) -> bool:
+    """Return whether only specimens together tell the effect.
+
+    Each has a curve of its own, so the effect is in no residual.
+    """
+    return not verdict["gate"]["gap"] and any(load(e["effect"]).in_series for e in verdict["effects"])
 
 
 def _plain(names: list[str]) -> str:

@@ -70,6 +70,18 @@ def test_the_page_the_document_and_the_text_are_of_one_mind(judged):
     assert words == ("of their gap closed" in page) == bool(verdict["effects"] and sealed["certain"])
 
 
+def test_what_only_specimens_tell_together_is_drawn_into_no_press(judged):
+    verdict, residuals = judged
+    told = {
+        "effect": "frame_compliance", "mechanism": "frame_compliance", "family": "kinematics", "status": "ambiguous",
+        "alternatives": ["stiffening"], "margins": {}, "confidence": None,
+    }  # fmt: skip
+    for gap in (True, False):
+        shown = verdict | {"status": "ambiguous", "effects": [told], "gate": verdict["gate"] | {"gap": gap}}
+        page = verdict_page(shown, residuals)
+        assert ("model with the effects" in page) == ("with the effects" in page) == gap
+
+
 def test_telling_presses_are_sealed_ones(judged):
     verdict, residuals = judged
     presses = telling(residuals)
