@@ -61,7 +61,8 @@ def course(
         tip=np.concatenate([rows.tip for _, rows in parts]), tool=tools[episode],
         readings=np.concatenate([rows.values for _, rows in parts]),
         averaged=np.concatenate([rows.averaged for _, rows in parts]), session=np.zeros(episodes, dtype=int),
-        site=np.arange(episodes) % 2, tools=tuple(Tool(f"ball {k}", "sphere", r) for k, r in enumerate(radii)),
+        site=np.arange(episodes) % 2,
+        tools=tuple(Tool(f"ball {k}" if k else "ball", "sphere", r) for k, r in enumerate(radii)),
         names=tuple(f"press {k}" for k in range(episodes)), centers=np.array([[-1.0, 0], [0, 0], [1, 0]]),
     )  # fmt: skip
 
