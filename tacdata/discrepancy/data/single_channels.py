@@ -56,7 +56,8 @@ def _turned(course: Course, episodes: np.ndarray, rows: list[np.ndarray], measur
     A fitted response is of no help: it follows the mean of both signs. Slopes over depth are compared at each place.
     """
     known, depth = [np.nan_to_num(m) for m in measured], course.reduced.tip[:, 2]
-    ways = [depth[r] - depth[r].min() for r in rows]
+    # About its mean: what a press begins with may be friction already.
+    ways = [depth[r] - depth[r].mean() for r in rows]
     peak = np.array([m.T @ way / max(float(np.linalg.norm(way)), 1e-9) for m, way in zip(known, ways, strict=True)])
     place, steps = course.site[episodes], np.concatenate([np.abs(np.diff(m, axis=0)) for m in known])
     noise = 1.4826 * np.median(steps, axis=0) / np.sqrt(2)

@@ -53,6 +53,17 @@ def test_a_gain_that_wanders_is_told_of():
     assert words.startswith("channel 2: its gain wanders by")
 
 
+def test_friction_that_slow_presses_begin_with_turns_no_channel():
+    """Slow presses are in motion for more of their first rows, so their level holds the friction."""
+    made = course(noise=0.5)
+    rows = [np.flatnonzero(made.episode == e) for e in np.unique(made.episode)]
+    early = np.concatenate([r[: len(r) // 10 + 1] for r in rows[:9]])
+    offset = np.zeros((len(made.time), 1))
+    offset[early] = np.nanmax(np.abs(made.readings - IDLE))
+    said = odd_channels(replace(made, readings=made.readings + offset), FittedResponse(made))
+    assert not any("other sign" in words for words in said)
+
+
 def test_channels_that_change_places_are_told_of():
     made = course()
     swapped = with_readings(made, lambda t, e, r: np.where(e >= 17, r[:, [2, 1, 0]], r))
