@@ -110,7 +110,7 @@ class _Import:
             self.failures.append((files.label or self.source.name, error))
             return
         try:
-            trials = list(split_tables(tables, self.mapping.get("trials", {})))
+            trials = list(split_tables(tables, self.mapping))
         except TacdataError as error:
             self.failures.append((files.label or self.source.name, error))
             return

@@ -15,21 +15,53 @@ from tacdata.importing.formats.source_format import SourceTable
 
 
 def split_tables(
-    tables: dict[str, SourceTable], trials: dict[str, Any]
+    tables: dict[str, SourceTable], mapping: dict[str, Any]
 ) -> Iterator[tuple[str, dict[str, SourceTable]]]:
-    """Yield the label and the rows of each trial by a column; all rows under "" without such a column.
+    """Yield the label and the rows of each trial by a column, all rows under "" without such a column.
+
+    A trial is of one specimen: where the channels' file names several, by a column, each has a trial of its own.
 
     Raises:
         FormatError: If no file has the column.
     """
-    if "column" not in trials:
-        yield "", tables
+    column, pieces = mapping.get("trials", {}).get("column"), iter([("", tables)])
+    if column is not None:
+        pieces = _by_column(tables, column)
+    for label, rows in pieces:
+        yield from _by_specimen(label, rows, mapping)
+
+
+def _by_specimen(
+    label: str, tables: dict[str, SourceTable], mapping: dict[str, Any]
+) -> Iterator[tuple[str, dict[str, SourceTable]]]:
+    """Yield the parts of a trial that are of one specimen each."""
+    entry, read = mapping.get("press", {}).get("specimen"), mapping["taxels"].get("file")
+    if not isinstance(entry, dict) or "column" not in entry or entry.get("file", next(iter(tables))) != read:
+        yield label, tables
         return
+    words = _labels(tables[read], entry["column"])
+    said = np.flatnonzero(words != "")
+    if len(set(words[said].tolist())) < 2:
+        yield label, tables
+        return
+    # A word holds until the next one: some write it only into the first row of a block.
+    words = words[said[np.maximum(np.searchsorted(said, np.arange(len(words)), side="right") - 1, 0)]]
+    for word in dict.fromkeys(words.tolist()):
+        yield f"{label} {word}".strip(), tables | {read: _kept(tables[read], words == word)}
+
+
+def _kept(table: SourceTable, rows: np.ndarray) -> SourceTable:
+    return replace(table, columns={name: values[rows] for name, values in table.columns.items()})
+
+
+def _by_column(
+    tables: dict[str, SourceTable], column: str | int
+) -> Iterator[tuple[str, dict[str, SourceTable]]]:
     named: dict[str, np.ndarray] = {}
     refused = FormatError("no file to split by a column", "one or more", "correct the mapping")
     for alias, table in tables.items():
         try:
-            named[alias] = _labels(table, trials["column"])
+            named[alias] = _labels(table, column)
         except FormatError as error:  # another file may have it
             refused = error
     if not named:
@@ -41,9 +73,7 @@ def split_tables(
             yield (
                 f"{label}",
                 {
-                    alias: replace(table, columns={n: v[rows[alias]] for n, v in table.columns.items()})
-                    if alias in rows
-                    else table
+                    alias: _kept(table, rows[alias]) if alias in rows else table
                     for alias, table in tables.items()
                 },
             )

@@ -44,6 +44,26 @@ def test_each_specimen_of_a_column_has_a_place_of_its_own(tmp_path):
     assert len(set(plain.site)) == 1
 
 
+@pytest.mark.parametrize("trials", [{"gap": 0.5}, {"column": "again"}, {"press_above": 0.1}])
+@pytest.mark.parametrize("once", [False, True])
+def test_a_recording_holds_one_specimen_however_trials_are_cut(tmp_path, trials, once):
+    """Runs are counted anew for each material, and some write its name into the first row of a block only."""
+    lines = ["again,run,material,t,disp,cap0"]
+    for number, material in enumerate(("eco30", "eco30", "ds10", "ds10")):
+        block = [f"{number % 2},{line}" for line in rows(number, material)]
+        lines += [block[0], *(line.replace(material, "") if once else line for line in block[1:])]
+    (tmp_path / "wide.csv").write_text("\n".join(lines) + "\n")
+    path = mapping(
+        tmp_path, measured=None, trials=trials, files={"data": {"path": "wide.csv", "time": {"column": "t"}}},
+        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+        press={"specimen": {"column": "material"}},
+    )  # fmt: skip
+    made = import_session(tmp_path, path, tmp_path / "session")
+    course = course_of([made.folder])
+    assert made.recordings == 4 and sorted(np.bincount(course.site)) == [2, 2]
+    assert any("2 specimens by the source" in words for words in course.notes)
+
+
 def test_a_path_says_it_too(tmp_path):
     for number, material in enumerate(MATERIALS):
         lines = ["run,material,t,disp,cap0", *rows(number, material)]

@@ -32,7 +32,7 @@ def tried(source: Path, mapping: dict[str, Any], beside: Path) -> str:
         centre = centre_of(mapping, tables)
         presses = [
             press
-            for label, rows in split_tables(tables, mapping.get("trials", {}))
+            for label, rows in split_tables(tables, mapping)
             for press in presses_of(mapping, beside, rows, first.parts, {**record, "trial": label}, centre)
         ]
     except TacdataError as error:
