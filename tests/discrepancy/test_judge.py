@@ -274,11 +274,13 @@ def test_what_is_of_another_unit_or_stuck_is_said():
 
 
 @pytest.mark.long("tacdata/discrepancy", reason="a pair of effects, judged with one rate and with two")
-def test_what_one_rate_cannot_split_is_a_set_and_no_pair():
+def test_what_one_rate_cannot_split_has_no_name():
     effects = (*FEW, "servo_lag")
     answer = judged(effects=effects, rates=(1.0,), play=0.05, delay=0.1, hold=0.4)
-    assert answer.decision.status == "ambiguous" and len(answer.found.effects) == 1
-    assert {"latency", "backlash"} <= {*answer.names, *answer.decision.effects[0].finding.rivals}
+    assert answer.decision.status == "ambiguous"
+    assert not [e for e in answer.decision.effects if e.status == "named"], "one rate leaves each open"
+    told = {name for e in answer.decision.effects for name in (e.finding.placed.effect.called, *e.finding.rivals)}
+    assert {"latency", "backlash"} <= told
     assert judged(effects=effects, play=0.05, delay=0.1).names == {"latency", "backlash"}, "two rates split them"
 
 

@@ -14,7 +14,7 @@ from tacdata.sensor import default_sensor
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings
 from tacdata.surrogate.build import LEAST_ERROR, TableSettings, Work, work
-from tacdata.surrogate.grid import Reach, covering
+from tacdata.surrogate.grid import UNIT, Reach, covering
 from tacdata.surrogate.press_store import PressStore
 from tacdata.surrogate.reading import reading_of
 from tacdata.surrogate.shipped import Shipped
@@ -180,11 +180,11 @@ def test_a_shipped_press_is_what_the_model_of_today_says():
     from tacdata.skin.model import SkinModel
     from tacdata.skin.press import PressRequest
 
-    depths = (0.0, 0.03, 0.12, 0.27, 0.48)
+    depths = tuple(round(UNIT * k**2, 6) for k in range(9))
     asked = PressRequest(from_document({"shape": "sphere", "radius": 4.0}, "t"), 0.8, 0.8, 0.0, depths)
     kept = Shipped.of(SENSOR, MeshSettings()).get(asked)
     assert kept is not None
     # Straight to the deepest: what is asked in between is solved for its own sake.
-    now = SkinModel(SENSOR, ModelSettings(error_estimate=False)).solve(replace(asked, depths=depths[::4]))
+    now = SkinModel(SENSOR, ModelSettings(error_estimate=False)).solve(replace(asked, depths=depths[::8]))
     assert kept.normal[-1] == pytest.approx(now.force[-1, 2], rel=0.02)
     assert np.abs(kept.loads.force[-1] - now.taxel_force[-1]).max() < 0.02 * now.taxel_force[-1].max()

@@ -12,6 +12,8 @@ from tacdata.chain import Course
 
 MODES = 16
 """Cosine series: the shortest wave is an eighth of the deepest press [1]."""
+COMMON = 0.25
+"""Share of the error that all presses have alike (`benchmarks/fem_bases`) [1]."""
 REPEATED = 2.0
 """By how much more it counts: presses of one place do not average it [1]."""
 
@@ -45,7 +47,7 @@ def common(error: float, rise: np.ndarray, course: Course) -> np.ndarray:
         course: With the rows read alone.
     """
     waves = _waves(course)[:, : MODES if error > 0.0 else 0]
-    return (error * rise[:, :, None] * waves[:, None, :]).astype(np.float32)
+    return (COMMON * error * rise[:, :, None] * waves[:, None, :]).astype(np.float32)
 
 
 def _waves(course: Course) -> np.ndarray:
