@@ -24,7 +24,7 @@ class ClockSkew(Effect):
     source = "standard form"
     experiment = "a sync event early in the recording, and one late"
     form_error = 0.02
-    spread = False
+    distributed = False
     parameters = (Parameter("r", "s", "delay gained over all recordings", 0.1, -5.0, 5.0),)
     follows_clock = True
 

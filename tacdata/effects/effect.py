@@ -154,7 +154,7 @@ class Effect(ABC):
     form_error: ClassVar[float] = 0.1
     """How far its equation may be off, over its contribution, as a standard deviation [1]; less where it is geometry,
     arithmetic or a clock rather than a law of a material."""
-    spread: ClassVar[bool] = True
+    distributed: ClassVar[bool] = True
     """Whether it may be of several sizes at once. A delay of several is a filter."""
     odds: ClassVar[float] = 1.0
     """How likely it is in a soft skin before any data, over an effect that is not rare [1]; less than 1 only where
@@ -232,8 +232,8 @@ class Effect(ABC):
         """Return by how much readings come later than what they belong to [s]; 0 for most effects."""
         return 0.0
 
-    def plain(self, values: dict[str, np.ndarray]) -> Placed | None:
-        """Return its simpler form; None for most effects."""
+    def nested(self, values: dict[str, np.ndarray]) -> Placed | None:
+        """Return the model nested in it, with its values; None for most effects."""
         return None
 
     def thickness_factor(self, values: dict[str, np.ndarray]) -> float:

@@ -28,7 +28,7 @@ class Latency(Effect):
     source = "standard form"
     experiment = "three rates: a delay is the same time at each, and edges keep their shape"
     form_error = 0.02
-    spread = False
+    distributed = False
     parameters = (Parameter("L", "s", "delay", 0.05, -1.0, 2.0),)
     at_rest = AtRest.CATCHES_UP
 

@@ -27,7 +27,7 @@ class LatencyEitherWay(Effect):
     experiment = "three rates: each edge is late by its own time, the same at every rate"
     mechanism = "latency"
     form_error = 0.05
-    spread = False
+    distributed = False
     parameters = (
         Parameter("L_in", "s", "delay while load rises", 0.05, -1.0, 2.0),
         Parameter("L_out", "s", "delay while load falls", 0.05, -1.0, 2.0),
@@ -56,7 +56,7 @@ class LatencyEitherWay(Effect):
         """Return by how much readings come late, in the mean of both ways [s]."""
         return 0.5 * float(values["L_in"] + values["L_out"])
 
-    def plain(self, values: dict[str, np.ndarray]) -> Placed:
+    def nested(self, values: dict[str, np.ndarray]) -> Placed:
         """Return one delay for both ways."""
         return Placed(Latency(), {"L": np.asarray(self.delay(values))})
 

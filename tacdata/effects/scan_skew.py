@@ -24,7 +24,7 @@ class ScanSkew(Effect):
     source = "standard form"
     experiment = "fast presses over several channels: the delay is linear in the channel's number"
     form_error = 0.02
-    spread = False
+    distributed = False
     parameters = (Parameter("D", "s", "from the first channel to the last", 0.03, -0.5, 0.5),)
     by_channel = True
 

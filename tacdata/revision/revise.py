@@ -15,6 +15,7 @@ from tacdata import documents, provenance
 from tacdata.discrepancy.data.recordings import course_of
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.run import VERDICT, recording_hash
+from tacdata.discrepancy.verdict.document import REVISE
 from tacdata.effects import Placed
 from tacdata.errors import UsageError
 from tacdata.plans import Plan
@@ -254,17 +255,19 @@ def _next(
     if status not in ("ambiguous", "unknown", "named, incomplete"):
         return {"plan": None, "presses": [], "remark": ""}
     sessions = _sessions(recordings)
+    # Without a plan the verdict's own words hold, but those that send one here.
+    others = [words for words in verdict["next"] if REVISE not in words]
     found = rivals(held, verdict, note=note)
     if len(found) < 2 or not sessions:
         why = "no session with a plan" if not sessions else "the rivals do not come out differently in these recordings"
-        return {"plan": None, "presses": list(verdict["next"]), "remark": f"no plan: {why}"}
+        return {"plan": None, "presses": others, "remark": f"no plan: {why}"}
     note("next presses")
     plan = read_session(sessions[-1]).plan
     chosen = choose(held, found, plan, asked.presses)
     if not chosen:
         names = ", ".join(r.mechanism for r in found)
         remark = f"no press at these places tells {names} apart beyond the noise: another kind of measurement is needed"
-        return {"plan": None, "presses": list(verdict["next"]), "remark": remark}
+        return {"plan": None, "presses": others, "remark": remark}
     document = plan_of(chosen, held, plan, f"{plan.name}, next")
     documents.write(out / PLAN, document, "plan")
     Plan.from_document(document, PLAN).check_against(read_session(sessions[-1]).sensor)

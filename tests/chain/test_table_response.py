@@ -6,6 +6,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates
 
 from tacdata.chain.table_response import TableResponse
+from tacdata.errors import FormatError
 
 
 def truth(pose):
@@ -98,3 +99,24 @@ def test_a_press_at_one_place_is_read_as_its_rows_would_be_by_themselves(rougher
     scattered[order] = made.load(pose[order], tool)
     np.testing.assert_allclose(made.load(pose, tool), scattered, rtol=1e-12, atol=1e-14)
     np.testing.assert_array_equal(made.force(pose, tool), made.load(pose, tool)[:, 0])
+
+
+def written(path, **changes):
+    made, curve = table(3), np.array([0.0, 2.0])
+    values = {"x": made.x, "y": made.y, "depth": made.depth, "load": np.zeros((1, 3, 3, 3, 1)),
+              "force": np.zeros((1, 3, 3, 3)), "curve_load": curve, "curve_signal": curve, "gain": np.ones(1),
+              "offset": np.zeros(1), "tools": np.array(["ball"])}  # fmt: skip
+    np.savez(path, **{**values, **changes})
+    return path
+
+
+def test_a_tables_stated_error_is_read_and_kept(tmp_path):
+    assert TableResponse.read(written(tmp_path / "t.npz")).error == 0.0
+    made = TableResponse.read(written(tmp_path / "t.npz", error=0.007))
+    assert made.error == made.idling_at(np.ones(1)).error == 0.007
+
+
+@pytest.mark.parametrize("error", [-0.1, np.nan, 7.0, [0.1, 0.2], "much"])
+def test_an_error_that_is_no_share_is_refused(tmp_path, error):
+    with pytest.raises(FormatError, match=r"t\.npz"):
+        TableResponse.read(written(tmp_path / "t.npz", error=error))

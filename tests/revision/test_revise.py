@@ -9,6 +9,7 @@ from revised_bench import verdict
 
 from tacdata import documents
 from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.verdict.document import REVISE
 from tacdata.errors import UsageError
 from tacdata.plans.plan import read_plan
 from tacdata.revision.revise import revise
@@ -80,6 +81,17 @@ def test_an_undecided_verdict_adds_nothing_and_plans_presses_that_decide(loose, 
     plan = read_plan(made.folder / made.document["next"]["plan"])
     assert any(abs(p.speed - 1.3) > 0.5 or p.overshoot for p in plan.presses), "another rate, or from below"
     assert all("tells" in p.purpose for p in plan.presses) and len(made.document["next"]["presses"]) >= 1
+
+
+def test_without_a_plan_nobody_is_sent_to_where_they_are(loose, tmp_path):
+    """The verdict asks for a rigid block, and for the presses that `tacdata revise` chooses: it found none."""
+    judged = verdict(tmp_path / "verdict", "backlash", {"b": 0.06}, "ambiguous")
+    told = documents.read(judged / "verdict.json", "verdict")
+    words = ["press a rigid block", f"the presses that settle it soonest: {REVISE} writes them as next.yaml"]
+    documents.write(judged / "verdict.json", told | {"next": words}, "verdict")
+    made = revise(judged, [loose], read_spec(None), tmp_path / "revision").document["next"]
+    assert made["plan"] is None and made["remark"].startswith("no plan: ")
+    assert made["presses"] == ["press a rigid block"]
 
 
 def test_play_moves_the_paths_of_labels_on_the_way_back_alone(loose):

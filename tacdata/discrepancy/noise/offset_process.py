@@ -155,8 +155,8 @@ def offset_process(
     kinds, near, warmth = [level[known] for level in levels], spans.among(known), _warmth(course)[known]
     alike, own_way = _shared(offsets[known], course, scale)
     walk, length, own = _reml(own_way, error[known], near, kinds, warmth)
-    louder = _louder(alike, (walk, length, own), error[known], near, kinds, warmth)
-    walk, own = walk * louder, own * louder
+    ratio = _variance_ratio(alike, (walk, length, own), error[known], near, kinds, warmth)
+    walk, own = walk * ratio, own * ratio
     same = FREE_LEVEL**2 * np.sum([level[:, None] == level for level in levels], axis=0)
     nugget = max(own, LEAST_OWN**2) * np.eye(course.episodes)
     covariance, cross, variance = spans.covariances(length)
@@ -249,7 +249,7 @@ def _shared(offsets: np.ndarray, course: Course, scale: np.ndarray) -> tuple[np.
     return offsets @ _complement(apart), offsets @ apart
 
 
-def _louder(
+def _variance_ratio(
     shared: np.ndarray, process: tuple[float, float, float], error: np.ndarray, spans: _Spans,
     levels: Sequence[np.ndarray], warmth: np.ndarray,
 ) -> float:  # fmt: skip

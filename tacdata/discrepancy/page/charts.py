@@ -11,8 +11,8 @@ from tacdata.discrepancy.plain_number import plain_number
 
 WIDTH, HEIGHT = 360, 150
 """Of a chart [px]."""
-LEFT, RIGHT, TOP, BOTTOM = 46, 8, 16, 26
-"""Margins for axes [px]."""
+LEFT, RIGHT, TOP, BOTTOM = 58, 8, 16, 26
+"""Margins for axes [px]; on the left a number with its sign has room."""
 MOST_POINTS = 400
 """Points of a curve that are drawn."""
 

@@ -81,7 +81,7 @@ def variants(one: Placed, channels: int) -> list[Placed]:
         if effect.called != one.effect.called:
             continue
         if not effect.shapes and effect.name == one.effect.name:
-            made += [_sized(one, by) for by in OTHER_SIZES if effect.spread]
+            made += [_sized(one, by) for by in OTHER_SIZES if effect.distributed]
             continue
         sizes = [
             {

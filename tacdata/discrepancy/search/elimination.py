@@ -62,7 +62,7 @@ def eliminate(setting: Setting, selection: Selection) -> Answer:
 def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) -> Answer:
     """Drop the effects that the others can stand in for, then find those that would do as well in each one's place."""
     null, pooled = selection.null, selection.tests.pooled
-    model, maybe_two = two_lags(setting, plainest(setting, model, null, pooled), selection.nothing, null, pooled)
+    model, maybe_two = two_lags(setting, parsimonious(setting, model, null, pooled), selection.nothing, null, pooled)
     placed = list(model.placed)
     without: dict[int, Refined] = {}
     need: dict[int, float] = {}
@@ -92,13 +92,13 @@ def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) 
     return Answer(tuple(made), model, problem, tuple(compared))
 
 
-def plainest(setting: Setting, model: Refined, null: NullModel, pooled: Pooled) -> Refined:
-    """Return a model with effects in their plainer form where that will do.
+def parsimonious(setting: Setting, model: Refined, null: NullModel, pooled: Pooled) -> Refined:
+    """Return a model with the nested form of effects where that explains the presses as well.
 
     A form that contains another always fits better.
     """
     for at, one in enumerate(model.placed):
-        form = one.effect.plain(one.values)
+        form = one.effect.nested(one.values)
         if form is None:
             continue
         begin = replace(setting, response=model.response)
@@ -131,9 +131,9 @@ def two_lags(
     alone = [refine(begin, [*others, _behind(e, behind)], null) for e in kin if e.name != mine.effect.name]
     if any(necessity(begin, best, one, null, pooled) < NEEDED_Z for one in alone):
         return model, False
-    error = mine.effect.form_error if mine.effect.spread else CHAIN_ERROR
+    error = mine.effect.form_error if mine.effect.distributed else CHAIN_ERROR
     large = model.loss - best.loss > error**2 * (nothing.loss - model.loss)
-    return (best, False) if large else (model, mine.effect.spread)
+    return (best, False) if large else (model, mine.effect.distributed)
 
 
 def _beside_another(setting: Setting, finding: FoundEffect) -> FoundEffect:

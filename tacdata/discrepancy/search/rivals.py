@@ -121,7 +121,7 @@ def try_rivals(
         forms[name] = j_statistic(current, other, pooled)
         ahead = forms[name] < -AHEAD and other.half_bic < current.half_bic
         # A form that contains this one is ahead by chance, or by a part of what the other effects are off about.
-        wider = other.placed[-1].effect.plain(other.placed[-1].values)
+        wider = other.placed[-1].effect.nested(other.placed[-1].values)
         if ahead and wider is not None and wider.effect.name == mine.effect.name:
             ahead = necessity(begin, other, current, null, pooled) >= NEEDED_Z
         if better is None and ahead and not _unphysical(other, current):

@@ -9,7 +9,7 @@ from pressing import course
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
-from tacdata.discrepancy.search.elimination import plainest, two_lags
+from tacdata.discrepancy.search.elimination import parsimonious, two_lags
 from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.effects import Placed, load
 
@@ -28,7 +28,7 @@ def fitted(made, name, **values):
 @pytest.mark.parametrize(("recovery", "left"), [(None, "latency"), (0.1, "latency_either_way")])
 def test_two_delays_are_one_unless_presses_tell_them_apart(recovery, left):
     setting, null, model = fitted(course(delay=0.05, recovery=recovery), "latency_either_way", L_in=0.05, L_out=0.06)
-    (found,) = plainest(setting, model, null, {}).placed
+    (found,) = parsimonious(setting, model, null, {}).placed
     assert found.effect.name == left
     assert found.effect.delay(found.values) == pytest.approx(0.05 if recovery is None else 0.075, abs=0.01)
 
