@@ -39,6 +39,6 @@ def test_equal_times_are_the_plain_delay():
     assert load("latency_either_way").delay(values) == pytest.approx(0.2)
     assert "0.10 s late while load rises and 0.30 s" in load("latency_either_way").remark(values)
     assert load("latency_either_way").remark({"L_in": np.array(0.1), "L_out": np.array(0.2)}) == ""
-    plain = load("latency_either_way").plain(values)
-    assert plain is not None and plain.effect.name == "latency" and plain.values["L"] == pytest.approx(0.2)
-    assert load("latency").plain({"L": np.array(0.2)}) is None
+    nested = load("latency_either_way").nested(values)
+    assert nested is not None and nested.effect.name == "latency" and nested.values["L"] == pytest.approx(0.2)
+    assert load("latency").nested({"L": np.array(0.2)}) is None
