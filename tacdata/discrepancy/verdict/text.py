@@ -72,7 +72,7 @@ def _gate(verdict: dict[str, Any]) -> str:
         there = "not within a specimen, only between specimens" if between_specimens(verdict) else "none beyond chance"
     return (
         f"is there a gap? {there}: p = {gate['p']:.3f} along the known effects, {gate['p_generic']:.3f} along patterns "
-        f"of none of them; a gap is {GATE:g} or less"
+        f"of none of them ({GATE:g} or less is a gap)"
     )
 
 
