@@ -43,6 +43,10 @@ SCALE = re.compile(
 """A number before a unit, as a counter's step has one: "10 ms", "0.1 um", "1/20 s", "10^-3 s"."""
 WIDE_BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d\u3010\u3011\uff5b\uff5d", "()[][]{}")
 """Brackets of Chinese and Japanese programs, and ours."""
+WORDS = ("IN", "MIN")
+"""What "V_IN" and "T_MIN" end in is no unit."""
+CLOCKS = r"(time|t|zeit|elapsed|timestamp|clock)"
+"""Names behind which a capital S is seconds, and no siemens."""
 BRACKETED = r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*"
 OTHERS = {"pf", "ff", "nf", "v", "mv", "uv", "count", "counts", "lsb", "adc", "ut", "mt", "gauss", "kpa", "pa", "mpa",
           "degc", "c", "k", "ohm", "kohm", "a", "ma", "hz", "1", "raw", "%"}  # fmt: skip
@@ -83,8 +87,9 @@ def _factor(unit: str, wanted: str) -> float | None:
 
 
 def quantity_of(unit: str) -> str | None:
-    """Return our unit that ``unit`` converts to, or None."""
-    return next((ours for ours, table in FACTORS.items() if plain(unit) in table), None)
+    """Return our unit that ``unit`` converts to, or None. "MM" is mm; "IN" and "MIN" are rather words of a name."""
+    spelled = {plain(unit), plain(unit.lower()) if len(unit) > 1 and unit.isupper() and unit not in WORDS else ""}
+    return next((ours for ours, table in FACTORS.items() if spelled & table.keys()), None)
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -101,6 +106,8 @@ def split_unit(name: str) -> tuple[str, str]:
             return f"{name[: match.start()]} {name[match.end() :]}".strip(), unit
     if match := re.fullmatch(r"(.+?)\s*[/_ ,;|]\s*([A-Za-z\u00b5\u03bc%]+)", name):
         known = quantity_of(match[2]) or plain(match[2]).lower() in OTHERS - {"c", "k", "a", "v", "1"}
+        if match[2] == "S" and re.fullmatch(CLOCKS, match[1].strip().lower()):
+            return match[1].strip(), "s"
         # Without brackets a lone "d" is a name (depth, distance), no unit of days.
         return (match[1].strip(), match[2]) if known and match[2] != "d" else (name, "")
     if match := re.fullmatch(r"(.+?)\s*[-.:]\s*([A-Za-z\u00b5]{2,})", name) or re.fullmatch(

@@ -281,3 +281,56 @@ def test_a_place_in_the_path_moves_the_tip(tmp_path):
     found, _ = proposed(source)
     presses = imported(source, found.mapping, tmp_path)
     assert sorted(press.tip[0, 0] for press in presses) == [-2, 3]
+
+
+def test_a_clock_in_capitals_is_a_time_and_a_copy_of_the_depth_is_no_gauge(tmp_path):
+    """A universal testing machine writes the size beside the displacement, and which half of a cycle a row is of."""
+    clock, depth = np.tile(T, 4) + np.repeat([0.0, 4, 8, 12], len(T)), np.tile(STROKE, 4)
+    half = np.where(np.arange(len(T)) < 35, "Stretch", "Recover")
+    cycle = [f"{k + 1}-{word}" for k in range(4) for word in half]
+    columns = cycle, clock, 29.2 + depth, depth, 1.3 * depth
+    written(tmp_path / "log.csv", "Cycle,Time_S,Size_mm,Displacement_mm,Force_N", *columns)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["files"]["log"]["time"] == {"column": "Time_S", "unit": "s"}
+    assert found.mapping["taxels"]["columns"] == ["Force_N"]
+    assert found.mapping["position"]["depth"]["column"] == "Displacement_mm"
+    assert "measured" not in found.mapping, "the size is the displacement from another zero"
+    assert any("tells the way in from the way back" in question for question in found.questions)
+    assert [press.press.depth for press in imported(tmp_path, found.mapping, tmp_path / "made")] == [1, 1, 1, 1]
+
+
+@pytest.mark.parametrize(("header", "unit", "much"), [
+    ("load_g", "um", "1000 g as 1 mm"), ("Force (N)", "mm", "1 N as 1 mm"), ("Bend (deg)", "mm", "1 deg as 1 mm"),
+    ("Strain [%]", "mm", "1 % as 1 mm"), ("stretch", "mm", "1 of strain as 1 mm"),
+])  # fmt: skip
+def test_a_force_or_an_angle_stands_for_a_depth_that_nobody_measured(tmp_path, header, unit, much):
+    size = 400.0 if unit == "um" else 8.0
+    trial, place, deep = (np.repeat(values, len(T)) for values in ([1, 2, 3], [-5, 0, 5], [0.6, 0.9, 1.2]))
+    drive, reading = -size * np.tile(STROKE, 3) * deep, 2 + np.tile(STROKE, 3) * deep
+    columns = np.tile(T, 3), trial, place, 0 * place, deep, reading, np.gradient(reading), drive
+    written(tmp_path / "log.csv", f"t_s,trial,x_location,y_location,z_location,voltage,grad,{header}", *columns)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["taxels"]["columns"] == ["voltage"], "neither a place nor a slope reads the skin"
+    assert found.mapping["position"]["depth"] == {"column": header, "unit": unit, "scale": -1.0}
+    assert found.questions[0].startswith("no column is a position or a depth") and much in found.questions[0]
+    presses = imported(tmp_path, found.mapping, tmp_path / "made")
+    assert [press.press.x for press in presses] == [-5, 0, 5]
+    assert max(press.press.depth for press in presses) == pytest.approx(size * 1.2 * (1e-3 if unit == "um" else 1))
+
+
+def test_rows_of_a_map_are_no_clock(tmp_path):
+    """A scan by rows: the second column grows once a row of places, as no time does."""
+    x, y = np.tile(np.arange(24), 4), np.repeat([0, 0.5, 1, 1.5], 24)
+    written(tmp_path / "map.csv", "0.1,0.0,0.2", x, y, np.sin(x + y))
+    found, _ = proposed(tmp_path)
+    (entry,) = found.mapping["files"].values()
+    assert "column" not in entry["time"]
+    assert any("no column of times" in question for question in found.questions)
+
+
+def test_a_strain_beside_a_length_reads_nothing(tmp_path):
+    columns = T, 2 * STROKE, 20 * STROKE, 5 * STROKE
+    written(tmp_path / "log.csv", "Time (s),Extension (mm),Tensile strain (%),Capacitance (pF)", *columns)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["taxels"]["columns"] == ["Capacitance (pF)"]
+    assert found.mapping["position"]["depth"]["column"] == "Extension (mm)"

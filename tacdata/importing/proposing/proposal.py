@@ -13,6 +13,7 @@ import schemas
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.proposing.description import FoundKind
+from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
 from tacdata.importing.proposing.roles import roles_of
 from tacdata.importing.proposing.strokes import PressingAxis, pressing_axis
@@ -59,7 +60,9 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         for found in roles.values():
             found["channels"] = found.pop("force", [])
     wide = max(aliases, key=lambda alias: (len(roles[alias]["channels"]), "value" in roles[alias]))
-    asked: list[str] = []
+    asked = [question] if (question := stand_in(tables, roles)) else []
+    for alias, found in roles.items():
+        _whole_strokes(tables[alias], found, asked)
     document: dict[str, Any] = {
         "version": schemas.version("import_mapping"), "name": source.stem, "source": "say where the data come from",
         "files": {alias: _file(kind, kinds[kind], roles[alias], asked) for alias, kind in aliases.items()},
@@ -98,11 +101,14 @@ def _place(
             entry = {key: _axis(table, found[key][0]) for key in chosen if key in found}
             document["position"] = {"file": alias} | entry
             unsaid = [found[key][0] for key in chosen if key in found and "unit" in entry[key]]
-            if unsaid:
+            if "stand_in" in found:
+                entry["depth"]["unit"] = length_of(table, found["stand_in"][0])
+            elif unsaid:
                 unit = _length(table, entry, found[chosen[-1]][0])
                 asked.append(f"{_and(unsaid)}: no unit is given; {unit} is a guess")
             _motion(document, table, found, roles[document["taxels"]["file"]]["channels"], asked)
         lengths = found.get("depth", [])
+        lengths = lengths[:1] + [name for name in lengths[1:] if not is_copy(table, lengths[0], name)]
         if len(lengths) > 1 and "displacement" not in document.get("measured", {}):
             # A second length is a gauge beside the drive; it separates compliance from the skin's deformation.
             told = {"file": alias, "columns": lengths[1:2], "unit": plain(table.units.get(lengths[1], "")) or "mm"}
@@ -114,6 +120,18 @@ def _place(
                 document.setdefault("measured", {})[key] = entry
     if "position" not in document:
         asked.append("no column is named as a position or a depth: give position, or schedule")
+
+
+def _whole_strokes(table: SourceTable, found: dict[str, list[str]], asked: list[str]) -> None:
+    """Let no column part trials that says which half of a stroke a row is of."""
+    moving = found.get("depth") or found.get("z")
+    if not moving or "trial" not in found or "[" in moving[0]:
+        return
+    labels = table.column(found["trial"][0]).astype(str)
+    if are_halves(labels, table.column(moving[0]).astype(float)):
+        (name,) = found.pop("trial")[:1]
+        words = _and(list(dict.fromkeys(labels.tolist()))[:3])
+        asked.append(f"{name} tells the way in from the way back ({words}): trials are cut by depth instead")
 
 
 def _motion(

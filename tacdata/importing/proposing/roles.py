@@ -11,7 +11,7 @@ from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.times import times
 from tacdata.importing.units import OTHERS, plain, quantity_of, split_unit
 
-BODY = r"(pos(ition)?|stage|tcp|tip|tool|ee|robot|probe|indenter|actual)"
+BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|actual)"
 """What a coordinate in a column's name is one of."""
 GUESSES = {
     "time": (
@@ -36,6 +36,11 @@ GUESSES = {
     "number": r"(channel|ch|taxel|sensor)(_?(id|no|nr|number|index))?",
     "value": r"(value|val|reading|wert)",
     "setting": r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))|(set|target|cmd)_\w+",
+    "derived": r"grad(ient)?|derivative|slope",
+    "strain": (
+        r"((true|eng(ineering)?|nominal|axial|tensile|compressive)_?)?(strain|stretch|elongation|dehnung|stauchung)(_?ratio)?"
+    ),
+    "angle": r"((rotary|joint|motor)_?)?(encoder|angle)(_?(pos(ition)?|counts?))?",
 }
 """Meaning of a column by its name without the unit."""
 PLACE = r"(tip|tcp|pos(ition)?s?|pose|xyz|probe|indenter|stage|ee(_?pos)?|end_?effector|robot(_?pos)?)"
@@ -45,6 +50,8 @@ GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 DEGREES = ("degc", "c", "k", "degf")
 ROWS = 50
 """Rows of a text column that are tried as times."""
+NAMED = re.compile(r"_?(id|no|nr|number|index)$")
+"""Ends of names of columns that number things, and so read nothing."""
 
 
 def roles_of(table: SourceTable) -> dict[str, list[str]]:
@@ -59,7 +66,7 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
             roles["channels"].append(name)
         elif role:
             roles.setdefault(role, []).append(name)
-    roles["depth"] = sorted(roles.get("depth", []), key=lambda name: bool(re.search(GAUGE, name.lower())))
+    roles["depth"] = sorted(roles.get("depth", []), key=_rank)
     if not roles["depth"]:
         del roles["depth"]
         if "x" in roles and not {"y", "z"} & set(roles):
@@ -73,7 +80,10 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     _set_for_each_trial(table, roles)
     if not ("number" in roles and "value" in roles):
         # Without a column that numbers channels a value is a channel, and the other way round.
-        roles["channels"] += roles.pop("value", []) + roles.pop("number", [])
+        unnumbered = [name for name in roles.pop("number", []) if not NAMED.search(name.lower())]
+        roles["channels"] += roles.pop("value", []) + unnumbered
+    if not roles["channels"] and "force" not in roles:
+        roles["channels"] = roles.pop("strain", []) + roles.pop("angle", [])
     if "time" in roles and f"{roles['time'][0]}'" in table.columns:
         # Blocks of several trials stand beside each other: each name comes again.
         roles = {role: [name for name in names if not name.endswith("'")] for role, names in roles.items()}
@@ -102,7 +112,13 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
         return "time"  # "ms", "seconds"
     if role is None and values.dtype == object and _are_times(table, name):
         return "time"
-    return "depth" if role is None and unit == "mm" else role
+    return {"mm": "depth", "deg": "angle"}.get(unit or "") if role is None else role
+
+
+def _rank(name: str) -> tuple[bool, bool]:
+    """Return where a length stands: a gauge behind the drive, any other length behind one that is named as a depth."""
+    bare = re.sub(r"\s+", "_", split_unit(name)[0].lower())
+    return bool(re.search(GAUGE, name.lower())), not re.fullmatch(GUESSES["depth"], bare)
 
 
 def _are_times(table: SourceTable, name: str) -> bool:
@@ -117,7 +133,8 @@ def _are_times(table: SourceTable, name: str) -> bool:
 
 def _first_rising(table: SourceTable, roles: dict[str, list[str]]) -> None:
     for name in list(roles["channels"]):
-        if (np.diff(table.columns[name]) >= 0).all():
+        steps = np.diff(table.columns[name])
+        if (steps >= 0).all() and (steps > 0).mean() > 0.5:  # a row of places stands still for many rows
             roles["time"] = [name]
             roles["channels"].remove(name)
             return
@@ -141,9 +158,12 @@ def _set_for_each_trial(table: SourceTable, roles: dict[str, list[str]]) -> None
     _, trial = np.unique(table.column(roles["trial"][0]).astype(str), return_inverse=True)
     order = np.argsort(trial, kind="stable")
     same = np.diff(trial[order]) == 0
-    for name in list(roles["channels"]):
-        values = table.column(name)[order]
-        steps = np.diff(values, axis=0)
-        if values.ndim == 1 and not steps[same].any() and steps[~same].any():
-            roles["channels"].remove(name)
-            roles.setdefault("setting", []).append(name)
+    for role in ("channels", "depth", "z"):
+        for name in list(roles.get(role, [])):
+            values = table.column(name)[order]
+            steps = np.diff(values, axis=0)
+            if values.ndim == 1 and same.any() and not steps[same].any() and steps[~same].any():
+                roles[role].remove(name)
+                roles.setdefault("setting", []).append(name)
+        if role != "channels" and not roles.get(role):
+            roles.pop(role, None)

@@ -1,0 +1,88 @@
+"""What moves where no column is a position, and columns that part strokes and no trials."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.units import plain
+
+MEANT = {"strain": "of strain", "angle": "deg", "force": "N"}
+"""What may stand for a depth, best first, and its unit where the file gives none."""
+ONE_WAY, WIDE, APART = 0.8, 0.5, 0.2
+"""Half a stroke ends this share of its range from its beginning, and spans this share of the whole. The next one
+begins at its end, to within this share."""
+ALIKE = 0.9
+"""Share of the steps in which two lengths move alike, from which one is a copy of the other."""
+MANY = 100.0
+"""A range above is read as thousandths, since no press is so deep [mm]."""
+
+
+def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]]) -> str:
+    """Let an angle or a force stand for the depth where no file has one; return what to ask, "" if nothing stands in.
+
+    A hinge that bends a sensor, or a hand that presses it on a load cell, drives it as a stage does. How readings
+    follow the drive, late or by another way back, shows as well.
+    """
+    if any({"depth", "z"} & set(found) for found in roles.values()):
+        return ""
+    for role, unit in MEANT.items():
+        moving = [(alias, name) for alias, found in roles.items() for name in found.get(role, [])]
+        moving = [(alias, name) for alias, name in moving if _levels(tables[alias], name) > 2]
+        others = [name for found in roles.values() for name in found["channels"]]
+        if not moving or not others:
+            continue
+        alias, name = max(moving, key=lambda found: _levels(tables[found[0]], found[1]))
+        roles[alias]["depth"] = roles[alias]["stand_in"] = [name]
+        for found in roles.values():
+            found.pop(role, None)
+        unit = plain(tables[alias].units.get(name, "")) or unit
+        much = f"{1000 if length_of(tables[alias], name) == 'um' else 1} {unit}"
+        return (
+            f"no column is a position or a depth: {name} stands for one, {much} as 1 mm. So a verdict says how "
+            f"readings follow it, and its mm are {much}"
+        )
+    return ""
+
+
+def length_of(table: SourceTable, name: str) -> str:
+    """Return the unit in which what stands for a depth is read."""
+    return "um" if float(np.ptp(table.column(name)[np.isfinite(table.column(name))])) > MANY else "mm"
+
+
+def _levels(table: SourceTable, name: str) -> int:
+    """Return how many values a column takes."""
+    values = table.column(name)
+    return 0 if values.dtype == object or values.ndim > 1 else len(np.unique(values[np.isfinite(values)]))
+
+
+def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
+    """Return whether labels part strokes into their way in and their way back, as "1-Stretch" and "1-Recover" do.
+
+    Args:
+        labels: What the column says in each row, shape (rows,).
+        axis: What moves, shape (rows,).
+    """
+    edges = [0, *(np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist(), len(labels)]
+    runs = [axis[a:b][np.isfinite(axis[a:b])] for a, b in pairwise(edges)]
+    runs = [run for run in runs if len(run) > 2]
+    whole = float(np.nanmax(axis) - np.nanmin(axis))
+    if len(runs) < 4 or whole <= 0:
+        return False
+    net = np.array([run[-1] - run[0] for run in runs])
+    spans = np.array([np.ptp(run) for run in runs])
+    half = (np.abs(net) > ONE_WAY * spans) & (spans > WIDE * whole)
+    joined = np.abs([b[0] - a[-1] for a, b in pairwise(runs)]) < APART * whole
+    turns = net[1:] * net[:-1] < 0
+    return bool(half.mean() > ALIKE - 0.1 and joined.mean() > ALIKE - 0.1 and turns.mean() > ALIKE - 0.1)
+
+
+def is_copy(table: SourceTable, first: str, second: str) -> bool:
+    """Return whether two lengths move alike row by row: one is the other from another zero, and no gauge beside it."""
+    a, b = (np.diff(table.column(name).astype(float)) for name in (first, second))
+    moving = np.isfinite(a + b) & ((a != 0) | (b != 0))
+    if not moving.any():
+        return True
+    return bool((np.abs(a - b)[moving] <= 1e-6 * np.abs(a[moving]).max() + 1e-12).mean() > ALIKE)
