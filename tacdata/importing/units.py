@@ -87,7 +87,7 @@ def _factor(unit: str, wanted: str) -> float | None:
 
 
 def quantity_of(unit: str) -> str | None:
-    """Return our unit that ``unit`` converts to, or None. "MM" is mm; "IN" and "MIN" are rather words of a name."""
+    """Return our unit that ``unit`` converts to, or None. "MM" is mm."""
     spelled = {plain(unit), plain(unit.lower()) if len(unit) > 1 and unit.isupper() and unit not in WORDS else ""}
     return next((ours for ours, table in FACTORS.items() if spelled & table.keys()), None)
 

@@ -21,10 +21,9 @@ MANY = 100.0
 
 
 def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]]) -> str:
-    """Let an angle or a force stand for the depth where no file has one; return what to ask, "" if nothing stands in.
+    """Let another drive stand for a depth that no file has; return what to ask, or "".
 
-    A hinge that bends a sensor, or a hand that presses it on a load cell, drives it as a stage does. How readings
-    follow the drive, late or by another way back, shows as well.
+    A hinge drives a sensor as a stage does. So does a hand over a load cell.
     """
     if any({"depth", "z"} & set(found) for found in roles.values()):
         return ""
@@ -59,7 +58,7 @@ def _levels(table: SourceTable, name: str) -> int:
 
 
 def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
-    """Return whether labels part strokes into their way in and their way back, as "1-Stretch" and "1-Recover" do.
+    """Return whether labels part strokes into halves, as "1-Stretch" and "1-Recover" do.
 
     Args:
         labels: What the column says in each row, shape (rows,).
@@ -80,7 +79,7 @@ def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
 
 
 def is_copy(table: SourceTable, first: str, second: str) -> bool:
-    """Return whether two lengths move alike row by row: one is the other from another zero, and no gauge beside it."""
+    """Return whether one length is the other from another zero, and no gauge beside it."""
     a, b = (np.diff(table.column(name).astype(float)) for name in (first, second))
     moving = np.isfinite(a + b) & ((a != 0) | (b != 0))
     if not moving.any():

@@ -116,7 +116,7 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
 
 
 def _rank(name: str) -> tuple[bool, bool]:
-    """Return where a length stands: a gauge behind the drive, any other length behind one that is named as a depth."""
+    """Return a length's place: depths first, then other lengths, gauges last."""
     bare = re.sub(r"\s+", "_", split_unit(name)[0].lower())
     return bool(re.search(GAUGE, name.lower())), not re.fullmatch(GUESSES["depth"], bare)
 
