@@ -52,7 +52,7 @@ class Cleaned:
         begins = np.flatnonzero(np.diff(episode, prepend=-1))
         relative = None if noise.relative_scale is None else noise.relative_scale[:, :channels]
         missing = None if noise.missing is None else noise.missing[:, :channels]
-        own = Noise(noise.scale[:channels], noise.memory, relative_scale=relative, missing=missing)
+        own = Noise(noise.scale[:channels], noise.memory, noise.step, relative_scale=relative, missing=missing)
         return cls(problem, left[:, :channels].astype(float), rise, course.speed[course.read], begins,
                    episode[begins], own)  # fmt: skip
 

@@ -16,7 +16,9 @@ class Noise:
     scale: np.ndarray
     """Standard deviation of the innovations [each stream's unit], shape (streams,)."""
     memory: float
-    """Correlation of successive rows at the median step [1]."""
+    """Correlation of rows that are `step` apart [1]."""
+    step: float
+    """Median time between rows of the recordings it was estimated from [s]: others may be spaced otherwise."""
     offsets: OffsetProcess | None = None
     """How episodes' offsets go on from one to the next; None leaves each free."""
     gain_error: np.ndarray | None = None

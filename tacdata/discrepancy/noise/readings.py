@@ -87,7 +87,9 @@ def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | Non
     missing = ~np.isfinite(residual)
     tag = np.inf if course.tag is not None else None
     found = np.maximum(scale, 1e-3 * whole + 1e-12)
-    return Noise(found, 0.0, missing=missing if missing.any() else None, tag=tag, relative_scale=relative)
+    return Noise(
+        found, 0.0, median_step(course), missing=missing if missing.any() else None, tag=tag, relative_scale=relative
+    )
 
 
 def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
@@ -105,9 +107,7 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
         scale = before.scale.copy()
         scale[seen] = estimate.scale
         return replace(before, scale=scale, memory=estimate.memory)
-    inside = ~course.first
-    median = float(np.median(course.step[inside])) if inside.any() else 1.0
-    pairs = inside & (course.step < 1.5 * median)
+    pairs = ~course.first & (course.step < 1.5 * before.step)
     later, earlier = leftover[pairs], leftover[np.flatnonzero(pairs) - 1]
     weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-24)
     products = float(np.nansum(later * earlier * weight))
@@ -116,6 +116,12 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
     spread = 1.4826 * np.nanmedian(np.abs(leftover - np.nanmedian(leftover, axis=0)), axis=0)
     mixed = np.maximum(0.5 * (spread + np.nanstd(leftover, axis=0)), before.scale * 0.3)
     return replace(before, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
+
+
+def median_step(course: Course) -> float:
+    """Return the median time between rows of an episode [s]; 1 where no episode has two rows."""
+    inside = ~course.first
+    return max(float(np.median(course.step[inside])), 1e-9) if inside.any() else 1.0
 
 
 def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -> float:

@@ -27,10 +27,8 @@ class Colour:
 
     @classmethod
     def of(cls, course: Course, noise: Noise) -> Colour:
-        """Return an AR(1) filter in episodes, phi^(dt / median dt) by time, between divisions by both scales."""
-        inside = course.step[~course.first]
-        median = float(np.median(inside)) if len(inside) else 1.0
-        decay = noise.memory ** np.clip(course.step / max(median, 1e-9), 0.0, 50.0)
+        """Return an AR(1) filter in episodes, phi^(dt / step) by time, between divisions by both scales."""
+        decay = noise.memory ** np.clip(course.step / noise.step, 0.0, 50.0)
         decay = np.where(course.first, 0.0, decay)
         spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
         own = 1 / ((spread / np.sqrt(np.minimum(course.averaged, 4.0)))[:, None] * noise.scale)

@@ -78,7 +78,7 @@ def own_histories(problem: Problem) -> np.ndarray:
     depth = course.reduced.tip[:, 2]
     share = np.clip((depth - max(0.0, float(depth.min()))) / course.span, 0, 1)[:, None]
     columns = np.column_stack([own * np.minimum(share * 10, 1), own * share])[:, None, :]
-    plain = Noise(np.ones(1), null.noise.memory, null.noise.offsets)
+    plain = Noise(np.ones(1), null.noise.memory, null.noise.step, null.noise.offsets)
     none = np.zeros((len(depth), 1, 1))
     made = Whitener(course.reduced, plain, null.context, null.features, none).whitened(columns)[:, 0].astype(float)
     return made / np.maximum(np.sqrt(np.mean(made**2, axis=0)), 1e-9)

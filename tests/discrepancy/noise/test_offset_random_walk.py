@@ -59,7 +59,8 @@ def test_what_is_slow_within_a_press_scatters_as_the_noise_says(told):
     rate = offset_random_walk.walk_rate(rest, reduced, np.ones(3), 0.0, reduced.site)
     modes = offset_random_walk.modes(rate, reduced, 0.0) if told else None
     none = np.zeros((reduced.rows, 1), dtype=np.int64)[:, 0]
-    whitener = Whitener(reduced, Noise(np.ones(3), 0.0, random_walk=modes), none, None, np.zeros((reduced.rows, 3, 1)))
+    known, alone = Noise(np.ones(3), 0.0, 1.0, random_walk=modes), np.zeros((reduced.rows, 3, 1))
+    whitener = Whitener(reduced, known, none, None, alone)
     begin = reduced.time[np.flatnonzero(reduced.first)][np.cumsum(reduced.first) - 1]
     slow = np.broadcast_to((reduced.time - begin)[:, None, None], (reduced.rows, 3, 1))
     gram = whitener.episode_grams(np.concatenate([rest[:, :, None], slow], axis=2)).gram
