@@ -107,6 +107,11 @@ class Decision:
     alarms: tuple[Alarm, ...] = ()
     """What the residual shows without a form."""
 
+    @property
+    def surest_first(self) -> list[Decided]:
+        """The effects in the order in which a reader meets them: named, ambiguous, suspected."""
+        return sorted(self.effects, key=lambda e: ("named", "ambiguous", "suspected").index(e.status))
+
 
 def decide(
     found: Findings, checks: DataChecks, beside: tuple[BesideRemainder, ...] = (), shown: Gap | None = None,

@@ -58,7 +58,7 @@ def document(
     return {
         "version": schemas.version("verdict"), "status": decision.status,
         "why": reason_in_words(decision, found, checks, shown),
-        "effects": [_effect(e) for e in decision.effects],
+        "effects": [_effect(e) for e in decision.surest_first],
         "gate": {"gap": found.gap, "p": float(tests.p.min(initial=1.0)), "p_generic": tests.p_generic,
                  "noise": [float(v) for v in noise.scale], "memory": noise.memory},
         "left": {"share": float(found.share_left), "t": float(np.clip(found.left.t, -99, 99)),

@@ -229,6 +229,8 @@ def test_what_stays_named_is_told_from_what_stands_in():
     decision = Decision(INCOMPLETE, Reason.INCOMPLETE, tuple(decided))
     found = cast(Findings, SimpleNamespace(until="decide", share_left=0.012, left=SimpleNamespace(t=3.0)))
     shown = Gap(np.full(4, 30.0), np.full(4, 7.0), np.full(4, 1.0), tuple("abcd"))
+    swapped = replace(decision, effects=tuple(decided[::-1]))
+    assert [e.status for e in swapped.surest_first] == ["named", "suspected"]
     assert reason_in_words(decision, found, DataChecks(8), shown) == (
         "relaxation is there and closes 79 % of the gap on sealed presses; hysteresis may be there, too; "
         "1 % of what could be explained has no name yet"
