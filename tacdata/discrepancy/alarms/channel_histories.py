@@ -89,7 +89,7 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
         root = np.cbrt(null)
         middle, spread = float(root.mean()), float(root.std()) + 1e-12
         z = (np.cbrt(seen) - middle) / spread
-        if seen - null.mean() < cleaned.least:
+        if seen - null.mean() < cleaned.least_of_channels:
             z = min(z, 0.0)
         drawn.append((root - middle) / spread)
         every = np.zeros(len(counts))
@@ -178,6 +178,8 @@ def _told(cleaned: Cleaned, best: Best) -> Alarm:
     else:
         seen = f"channels read more or less of a press by {best.history}, each its own way{changes}: {large}"
         following = "look at what lies over these channels (torn, loose, dirty), and press there slowly, down and up"
+        if "before" in best.history:
+            following = "hold at one depth for a minute, wait as long between presses: do channels settle apart?"
     if best.over == "the time":
         following = "make the same presses at the begin and the end of a session; say what was changed in between"
     elif best.over:

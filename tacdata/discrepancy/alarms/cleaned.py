@@ -35,10 +35,12 @@ class Cleaned:
     """Its episode, shape (presses,), int64."""
     noise: Noise
     """Of channels alone."""
+    loan: float = 0.0
+    """What the forms of its effects may leave, as half a whitened sum of squares [1]."""
 
     @classmethod
-    def of(cls, problem: Problem) -> Cleaned:
-        """Return what a problem's model leaves."""
+    def of(cls, problem: Problem, loan: float = 0.0) -> Cleaned:
+        """Return what a problem's model leaves, of which the forms of its effects may have left some."""
         null, setting = problem.null, problem.setting
         course, placed = setting.course, [*setting.given, *problem.placed]
         whitener = null.whitener_for(setting, placed)
@@ -54,7 +56,7 @@ class Cleaned:
         missing = None if noise.missing is None else noise.missing[:, :channels]
         own = Noise(noise.scale[:channels], noise.memory, noise.step, relative_scale=relative, missing=missing)
         return cls(problem, left[:, :channels].astype(float), rise, course.speed[course.read], begins,
-                   episode[begins], own)  # fmt: skip
+                   episode[begins], own, loan)  # fmt: skip
 
     @property
     def course(self) -> Course:
@@ -71,6 +73,11 @@ class Cleaned:
         """What the response may be off about by itself, as a sum of squares [1]: less is no alarm."""
         share = SPLINE_ERROR if self.problem.setting.response.fitted else TABLE_ERROR
         return float((share * self.problem.rise) ** 2)
+
+    @property
+    def least_of_channels(self) -> float:
+        """The same, with what the forms of effects may leave: no channel creeps by quite the law of another."""
+        return max(self.least, 2 * self.loan)
 
     def whitened(self, column: np.ndarray) -> np.ndarray:
         """Return a column of each channel (m, channels) as noise is whitened, but for what a press errs by."""

@@ -34,8 +34,13 @@ def stands_in(found: Findings, finding: FoundEffect, lacking: Mapping[Family, La
 
 def lent(found: Findings, finding: FoundEffect) -> bool:
     """Return whether an effect explains no more than another's form may leave."""
+    return finding.bought < loan(found)
+
+
+def loan(found: Findings) -> float:
+    """Return what the form of an effect of the answer may leave, as half a whitened sum of squares [1]."""
     raced = [f for f in found.effects if f.corrected_p is not None]
-    return finding.bought < max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)
+    return max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)
 
 
 def beside_open(found: Findings, answer: list[FoundEffect], levels: list[Level | None]) -> list[Level | None]:
