@@ -25,14 +25,12 @@ class HeatMap:
     columns: tuple[str, ...]
     """Depths."""
     before: np.ndarray
-    """[1], shape (rows, columns); NaN where too little was read."""
-    after: np.ndarray
-    """The same with the effects [1], shape (rows, columns)."""
+    """Of the model as it was [1], shape (rows, columns); NaN where too little was read."""
 
 
 def heat_map(found: Residuals) -> HeatMap:
     """Return the map of all presses, an offset a press taken off."""
-    first, last = (np.nanmean(np.square(found.standardized(p)), axis=1) for p in (found.before, found.after))
+    each = np.nanmean(np.square(found.standardized(found.before)), axis=1)
     inside = found.phase > 0
     edges = np.quantile(found.depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
     said = [f"{edge:.2g}" if edge >= AT_TOUCH * edges[-1] else "0" for edge in edges]
@@ -52,9 +50,9 @@ def heat_map(found: Residuals) -> HeatMap:
         for name, part in (("slow", own & (rate <= middle)), ("fast", own & (rate > middle))):
             rows.append(f"{phase}, {name}")
             fields.append(part)
-    maps = [np.array([[_mean(each, row & column) for column in within] for row in fields]) for each in (first, last)]
-    read = np.flatnonzero(np.isfinite(maps[0]).any(axis=1))
-    return HeatMap(tuple(rows[k] for k in read), columns, *(each[read] for each in maps))
+    before = np.array([[_mean(each, row & column) for column in within] for row in fields])
+    read = np.flatnonzero(np.isfinite(before).any(axis=1))
+    return HeatMap(tuple(rows[k] for k in read), columns, before[read])
 
 
 def _mean(each: np.ndarray, rows: np.ndarray) -> float:

@@ -20,7 +20,12 @@ MOST_RIVALS = 4
 """Rivals of an effect that have a line, the nearest."""
 LOOPS = {Family.SKIN_MEMORY.value, Family.FRICTION_AND_PLAY.value, Family.DELAY_AND_FILTER.value}
 """Families whose effects show as loops over depth."""
-REST, NOISE = "no name yet", "noise"
+REST, NOISE = "left: a press's own pose and gain, and what has no name", "noise"
+PARTED = ("phase", "depth", "rate")
+"""Kinds of slices that stand before and after beside the map."""
+TAKEN_OUT = "each press's own pose and gain taken out"
+FILLED = 0.5
+"""Share of its fields in which a map has readings enough, at least."""
 
 
 @dataclass(frozen=True)
@@ -121,13 +126,22 @@ def _shares(verdict: dict[str, Any]) -> Part:
 def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     made = heat_map(found)
     most = max(float(np.nanmax(made.before, initial=1.0)), 2.0)
-    pictures = [charts.map_of("before, mean square over the noise", made.rows, made.columns, made.before, most)]
-    if verdict["effects"] and not between_specimens(verdict):
-        pictures.append(charts.map_of("with the effects", made.rows, made.columns, made.after, most))
+    added = bool(verdict["effects"]) and not between_specimens(verdict)
+    parts = [part for part in verdict["slices"] if part["by"] in PARTED] if added else []
+    title = "before, each press's own pose and gain left in" if parts else "mean square over the noise"
+    pictures, said = [], verdict["located"]
+    if not parts or np.isfinite(made.before).mean() >= FILLED:
+        pictures.append(charts.map_of(title, made.rows, made.columns, made.before, most))
+    if parts:
+        # Under poses and gains that effects do not explain, the map would hardly change.
+        square = np.array([[part["before"], part["after"]] for part in parts])
+        names, most = [part["name"] for part in parts], max(float(square.max()), 2.0)
+        pictures.append(charts.map_of(TAKEN_OUT, names, ("before", "with the effects"), square, most))
+        said = [words for words in said if words.split(":")[0] not in PARTED]
     after = verdict.get("located_after", ())
     rest = [f"without a name yet: {words}" for words in after if list(after) != verdict["located"]]
     beside = "the map holds each press's own pose and gain, too; these mean squares over the noise leave that out"
-    located = (beside, *verdict["located"]) if verdict["located"] else ()
+    located = (*(() if parts else (beside,)), *said) if said else ()
     title = "Where the gap lives" if verdict["gate"]["gap"] else "Where the residual is largest"
     return Part(title, tuple(pictures), (*located, *rest))
 

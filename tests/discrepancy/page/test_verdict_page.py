@@ -15,7 +15,7 @@ from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.page import charts
 from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.telling import telling
-from tacdata.discrepancy.page.verdict_page import verdict_page
+from tacdata.discrepancy.page.verdict_page import TAKEN_OUT, verdict_page
 from tacdata.discrepancy.verdict.before_and_after import beside_model
 from tacdata.discrepancy.verdict.sealed import chosen
 from tacdata.discrepancy.verdict.text import in_text
@@ -91,11 +91,27 @@ def test_telling_presses_are_sealed_ones(judged):
 def test_the_map_is_the_mean_square_over_the_noise(judged):
     _, residuals = judged
     made = heat_map(residuals)
-    assert made.before.shape == (len(made.rows), len(made.columns)) == made.after.shape
+    assert made.before.shape == (len(made.rows), len(made.columns))
     known = np.isfinite(made.before)
     assert known.sum() >= 9
     whole = np.nanmean(np.square(residuals.standardized(residuals.before))[residuals.phase > 0])
     assert made.before[known].min() <= whole <= made.before[known].max()
+
+
+def test_what_the_effects_change_is_shown_without_what_a_press_has_of_its_own(judged):
+    """A map under poses and gains of single presses hardly changes, whatever is explained."""
+    verdict, residuals = judged
+    told = {
+        "effect": "creep", "mechanism": "creep", "family": "memory of the skin", "status": "named",
+        "alternatives": [], "margins": {}, "confidence": 0.9,
+    }  # fmt: skip
+    parts = [{"by": "phase", "name": "unloading", "before": 21.5, "after": 4.25}]
+    page = verdict_page(verdict | {"effects": [told], "slices": parts, "path": []}, residuals)
+    where = page[page.index(TAKEN_OUT.split("'")[1]) :]
+    assert "own pose and gain left in" in page
+    assert ">unloading<" in where and ">21.5<" in where and ">4.25<" in where
+    assert not re.search("<li>(phase|depth|rate): ", page), "it stands in the picture"
+    assert "pose and gain taken out" not in verdict_page(verdict | {"effects": []}, residuals)
 
 
 def test_a_bar_of_shares_is_as_long_as_they_are():
