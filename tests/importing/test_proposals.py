@@ -189,10 +189,14 @@ def test_a_temperature_is_no_time(tmp_path):
     assert found.mapping["files"]["log"]["time"]["column"] == "t_s"
 
 
-def test_a_file_without_times_is_asked_about(tmp_path):
-    written(tmp_path / "log.csv", "depth (mm),cap1", STROKE, 2 * STROKE)
+@pytest.mark.parametrize(("thinned", "rate"), [(1, 50), (4, 10), (7, 5)])
+def test_a_file_without_times_is_asked_about_and_its_presses_take_some_seconds(tmp_path, thinned, rate):
+    """70, 18 or 10 rows a press, three presses: at 100 rows a second no press would be so short."""
+    rows = np.tile(STROKE[::thinned], 3)
+    written(tmp_path / "log.csv", "depth (mm),cap1", rows, 2 * rows)
     found, _ = proposed(tmp_path)
-    assert any("no column of times" in question for question in found.questions)
+    assert found.mapping["files"]["log"]["time"] == {"rate": rate}
+    assert any(f"no column of times; {rate} rows a second is a guess" in question for question in found.questions)
 
 
 def test_a_copied_file_is_no_second_measurement(tmp_path):
@@ -301,7 +305,7 @@ def test_a_clock_in_capitals_is_a_time_and_a_copy_of_the_depth_is_no_gauge(tmp_p
 
 @pytest.mark.parametrize(("header", "unit", "much"), [
     ("load_g", "um", "1000 g as 1 mm"), ("Force (N)", "mm", "1 N as 1 mm"), ("Bend (deg)", "mm", "1 deg as 1 mm"),
-    ("Strain [%]", "mm", "1 % as 1 mm"), ("stretch", "mm", "1 of strain as 1 mm"),
+    ("Strain [%]", "mm", "1 % as 1 mm"), ("stretch", "mm", "1 of its units as 1 mm"),
 ])  # fmt: skip
 def test_a_force_or_an_angle_stands_for_a_depth_that_nobody_measured(tmp_path, header, unit, much):
     size = 400.0 if unit == "um" else 8.0
@@ -316,6 +320,15 @@ def test_a_force_or_an_angle_stands_for_a_depth_that_nobody_measured(tmp_path, h
     presses = imported(tmp_path, found.mapping, tmp_path / "made")
     assert [press.press.x for press in presses] == [-5, 0, 5]
     assert max(press.press.depth for press in presses) == pytest.approx(size * 1.2 * (1e-3 if unit == "um" else 1))
+
+
+@pytest.mark.parametrize(("header", "factor"), [("depth_um", 1000.0), ("depth_mm", 1.0), ("load_g", 400.0)])
+def test_presses_are_cut_at_a_depth_in_mm_whatever_the_files_unit(tmp_path, header, factor):
+    rows = np.tile(STROKE, 3)
+    written(tmp_path / "log.csv", f"t_s,{header},cap1", 0.05 * np.arange(len(rows)), factor * rows, rows)
+    found, _ = proposed(tmp_path)
+    assert 0 < found.mapping["trials"]["press_above"] < 0.5
+    assert len(imported(tmp_path, found.mapping, tmp_path / "made")) == 3
 
 
 def test_rows_of_a_map_are_no_clock(tmp_path):

@@ -7,17 +7,22 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.press_path import strokes
+from tacdata.importing.presses import DEEPEST
+from tacdata.importing.proposing.strokes import CLEAR
 from tacdata.importing.units import plain
 
-MEANT = {"strain": "of strain", "angle": "deg", "force": "N"}
-"""What may stand for a depth, best first, and its unit where the file gives none."""
+MEANT = ("strain", "angle", "force")
+"""What may stand for a depth, best first."""
 ONE_WAY, WIDE, APART = 0.8, 0.5, 0.2
 """Half a stroke ends this share of its range from its beginning, and spans this share of the whole. The next one
 begins at its end, to within this share."""
 ALIKE = 0.9
 """Share of the steps in which two lengths move alike, from which one is a copy of the other."""
-MANY = 100.0
-"""A range above is read as thousandths, since no press is so deep [mm]."""
+RATES = tuple(step * 10.0**power for power in (-1, 0, 1, 2) for step in (1, 2, 5))[:10]
+"""Rates that are guessed where no column is a time [1/s]."""
+LASTS = 2.0
+"""A press takes about so long [s]."""
 
 
 def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]]) -> str:
@@ -27,7 +32,7 @@ def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str
     """
     if any({"depth", "z"} & set(found) for found in roles.values()):
         return ""
-    for role, unit in MEANT.items():
+    for role in MEANT:
         moving = [(alias, name) for alias, found in roles.items() for name in found.get(role, [])]
         moving = [(alias, name) for alias, name in moving if _levels(tables[alias], name) > 2]
         others = [name for found in roles.values() for name in found["channels"]]
@@ -37,7 +42,7 @@ def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str
         roles[alias]["depth"] = roles[alias]["stand_in"] = [name]
         for found in roles.values():
             found.pop(role, None)
-        unit = plain(tables[alias].units.get(name, "")) or unit
+        unit = plain(tables[alias].units.get(name, "")) or "of its units"
         much = f"{1000 if length_of(tables[alias], name) == 'um' else 1} {unit}"
         return (
             f"no column is a position or a depth: {name} stands for one, {much} as 1 mm. So a verdict says how "
@@ -47,8 +52,20 @@ def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str
 
 
 def length_of(table: SourceTable, name: str) -> str:
-    """Return the unit in which what stands for a depth is read."""
-    return "um" if float(np.ptp(table.column(name)[np.isfinite(table.column(name))])) > MANY else "mm"
+    """Return the unit in which what stands for a depth is read: in thousandths where no press could be so deep."""
+    return "um" if float(np.nanmax(np.abs(table.column(name).astype(float)))) > DEEPEST else "mm"
+
+
+def rate_of(table: SourceTable, found: dict[str, list[str]]) -> float:
+    """Return a rate by which a press takes some seconds: rows have no times, and laws of memory have."""
+    rows = [float(table.rows)]
+    moving = found.get("depth") or found.get("z")
+    if "trial" in found:
+        _, rows = np.unique(table.column(found["trial"][0]).astype(str), return_counts=True)
+    elif moving and (axis := table.column(moving[0])).dtype != object:
+        way = np.abs(axis.astype(float) - axis[0])[np.isfinite(axis.astype(float))]
+        rows = [table.rows / max(strokes(way, CLEAR * float(way.max(initial=0.0))), 1)]
+    return min(RATES, key=lambda rate: abs(np.log(rate * LASTS / float(np.median(rows)))))
 
 
 def _levels(table: SourceTable, name: str) -> int:

@@ -11,14 +11,15 @@ import numpy as np
 
 import schemas
 from tacdata.errors import FormatError
+from tacdata.importing.columns import unit_of
 from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.proposing.description import FoundKind
-from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, stand_in
+from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
 from tacdata.importing.proposing.roles import roles_of
 from tacdata.importing.proposing.strokes import PressingAxis, pressing_axis
 from tacdata.importing.times import layouts_of, times
-from tacdata.importing.units import plain
+from tacdata.importing.units import factor, plain
 
 SHORT = ("s", "ms", "us", "ns", "min", "h", "d")
 """Units of time that a mapping may name; others stand in the header and are read from there."""
@@ -157,23 +158,28 @@ def _motion(
     if not is_depth and motion.at_zero:
         document["contact"] = {"z": 0.0, "known_from": "the zero of the machine"}
         asked.append(f"{name}: its zero is taken for the height at which the skin is touched (contact: {{z: 0}})")
+    elif not is_depth and "stand_in" in found:
+        asked.append(f"{name}: it does not rest at zero; depth is counted from where each trial is at rest")
     elif not is_depth:
         asked.append(
             f"{name}: a machine's height; where does it touch the skin? Give contact: {{z: ...}}, else depth is "
             "counted from the highest position of each trial"
         )
     if "trial" not in found and "trials" not in document:
-        _cut(document, motion, is_depth, asked)
+        entry = position["depth" if is_depth else "z"]
+        above = motion.above * factor(unit_of(table, entry, name) or "mm", "mm", name)
+        _cut(document, motion, above if is_depth else None, asked)
 
 
-def _cut(document: dict[str, Any], motion: PressingAxis, is_depth: bool, asked: list[str]) -> None:
+def _cut(document: dict[str, Any], motion: PressingAxis, above: float | None, asked: list[str]) -> None:
+    """Cut trials by pauses, or by a depth [mm] where the axis is one."""
     if motion.pause:
         document["trials"] = {"gap": motion.pause}
         asked.append(f"{motion.pauses} pauses of more than {motion.pause:g} s: each is taken for the end of a trial")
-    elif motion.strokes > 1 and is_depth:
-        document["trials"] = {"press_above": motion.above}
+    elif motion.strokes > 1 and above is not None:
+        document["trials"] = {"press_above": float(f"{above:.2g}")}
         asked.append(
-            f"{motion.strokes} presses without a pause: each stretch deeper than {motion.above:g} is taken for a trial"
+            f"{motion.strokes} presses without a pause: each stretch deeper than {above:.2g} mm is taken for a trial"
         )
 
 
@@ -232,8 +238,12 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[
     if "#" in inside:
         found["table"] = pattern(inside, parts)[0]
     if not roles.get("time"):
-        asked.append(f"{Path(outer).name}: no column of times; 100 rows a second is a guess, give time: {{rate: ...}}")
-        return found | {"time": {"rate": 100.0}}
+        rate = rate_of(table, roles)
+        asked.append(
+            f"{Path(outer).name}: no column of times; {rate:g} rows a second is a guess, by which a press takes some "
+            "2 s: give time: {rate: ...}"
+        )
+        return found | {"time": {"rate": rate}}
     if [table.column(name).dtype for name in roles["time"]] == [object, object]:
         # A date and a time of day.
         clock: dict[str, Any] = {"column": roles["time"]}
