@@ -52,12 +52,12 @@ def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str
 
 
 def length_of(table: SourceTable, name: str) -> str:
-    """Return the unit in which what stands for a depth is read: in thousandths where no press could be so deep."""
+    """Return the unit of what stands for a depth: um where no press is so deep."""
     return "um" if float(np.nanmax(np.abs(table.column(name).astype(float)))) > DEEPEST else "mm"
 
 
 def rate_of(table: SourceTable, found: dict[str, list[str]]) -> float:
-    """Return a rate by which a press takes some seconds: rows have no times, and laws of memory have."""
+    """Return a rate by which a press takes some seconds."""
     rows = [float(table.rows)]
     moving = found.get("depth") or found.get("z")
     if "trial" in found:

@@ -172,7 +172,7 @@ def _motion(
 
 
 def _cut(document: dict[str, Any], motion: PressingAxis, above: float | None, asked: list[str]) -> None:
-    """Cut trials by pauses, or by a depth [mm] where the axis is one."""
+    """Cut trials by pauses, or above a depth [mm]."""
     if motion.pause:
         document["trials"] = {"gap": motion.pause}
         asked.append(f"{motion.pauses} pauses of more than {motion.pause:g} s: each is taken for the end of a trial")
