@@ -16,7 +16,7 @@ def alarms(problem: Problem, loan: float = 0.0) -> tuple[Alarm, ...]:
 
     Args:
         problem: The model, with the effects of the answer.
-        loan: What their forms may leave, as half a whitened sum of squares [1].
+        loan: What their forms may leave: half a sum of squares [1].
     """
     cleaned = Cleaned.of(problem, loan)
     # What moves readings while the path moves shows in more than one test: the finest that sees it speaks.

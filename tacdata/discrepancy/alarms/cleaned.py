@@ -40,7 +40,7 @@ class Cleaned:
 
     @classmethod
     def of(cls, problem: Problem, loan: float = 0.0) -> Cleaned:
-        """Return what a problem's model leaves, of which the forms of its effects may have left some."""
+        """Return what a problem's model leaves, its effects' forms some of it."""
         null, setting = problem.null, problem.setting
         course, placed = setting.course, [*setting.given, *problem.placed]
         whitener = null.whitener_for(setting, placed)
@@ -76,7 +76,7 @@ class Cleaned:
 
     @property
     def least_of_channels(self) -> float:
-        """The same, with what the forms of effects may leave: no channel creeps by quite the law of another."""
+        """The same for single channels. None creeps by quite the law of another."""
         return max(self.least, 2 * self.loan)
 
     def whitened(self, column: np.ndarray) -> np.ndarray:

@@ -38,7 +38,7 @@ def lent(found: Findings, finding: FoundEffect) -> bool:
 
 
 def loan(found: Findings) -> float:
-    """Return what the form of an effect of the answer may leave, as half a whitened sum of squares [1]."""
+    """Return what an effect's form may leave: half a whitened sum of squares [1]."""
     raced = [f for f in found.effects if f.corrected_p is not None]
     return max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)
 

@@ -26,7 +26,7 @@ LASTS = 2.0
 
 
 def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]]) -> str:
-    """Let another drive stand for a depth that no file has; return what to ask, or "".
+    """Let another drive stand for a missing depth; return what to ask, or "".
 
     A hinge drives a sensor as a stage does. So does a hand over a load cell.
     """
@@ -96,7 +96,7 @@ def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
 
 
 def is_copy(table: SourceTable, first: str, second: str) -> bool:
-    """Return whether one length is the other from another zero, and no gauge beside it."""
+    """Return whether one length is the other from another zero."""
     a, b = (np.diff(table.column(name).astype(float)) for name in (first, second))
     moving = np.isfinite(a + b) & ((a != 0) | (b != 0))
     if not moving.any():
