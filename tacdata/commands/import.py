@@ -17,7 +17,7 @@ PANEL = PIPELINE
 
 def run(
     source: Annotated[
-        Path, typer.Argument(help="A folder or file of measured data: CSV, Excel, NumPy, MATLAB, Parquet.")
+        Path, typer.Argument(help="A folder or file of measured data: CSV, Excel, JSON, NumPy, MATLAB, Parquet.")
     ],
     mapping: Annotated[
         Path | None, typer.Option(help="Mapping file: columns, units, clocks. Left out: says what is in the source.")

@@ -128,7 +128,8 @@ def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
     """Return the unit of a column, by the mapping or the file; "" if neither gives one."""
     name = single(table, entry["column"], where)
     whole = inner[1] if (inner := INNER.fullmatch(name)) and table.inner(inner[1]) else name
-    return entry.get("unit") or table.units.get(whole) or split_unit(whole)[1]
+    inside = split_unit(whole)[1]
+    return entry.get("unit") or table.units.get(whole) or ("" if inside.isdigit() else inside)
 
 
 def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:

@@ -35,6 +35,12 @@ SAMPLE, TAIL = 2000, 100
 """Lines that are examined, and the last of them, which tell the layout."""
 
 
+LABELS = ("unit", "units", "einheit")
+"""What stands before the units of a line, and is none."""
+LINES_OF_HEADER = 6
+"""A header with numbers has hardly more lines."""
+
+
 @dataclass(frozen=True)
 class TextLayout:
     """The layout of a text file."""
@@ -198,6 +204,9 @@ def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
         # A word among the numbers of the first rows makes no header of them: one without numbers stands before.
         above = rows[number - 1] if number else []
         named = len(above) == width and not any(is_number(above[k], decimal) for k in numeric)
+        # A header of several lines may tell a rate or a date first: names without a number follow.
+        later = [other for other in rows[number + 1 : number + LINES_OF_HEADER] if len(other) == width]
+        named = named and all(any(is_number(other[k], decimal) for k in numeric) for other in later)
         if any(told) and (all(is_number(row[k], decimal) for k in numeric) or (named and 2 * sum(told) >= len(told))):
             return number
     return None
@@ -217,7 +226,7 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
             name += "'"
         names.append(name)
         unit = rows[1][k].strip("[]() ") if looks_like_units else split_unit(name)[1]
-        if unit:
+        if unit and not unit.isdigit() and unit.lower() not in LABELS:  # "pos (5)" is the fifth's
             units[name] = unit
     return tuple(names), units
 

@@ -1,5 +1,7 @@
 """Files as labs keep them are recognized by names, units and values; what they do not say is asked."""
 
+import json
+
 import numpy as np
 import openpyxl
 import pytest
@@ -347,3 +349,62 @@ def test_a_strain_beside_a_length_reads_nothing(tmp_path):
     found, _ = proposed(tmp_path)
     assert found.mapping["taxels"]["columns"] == ["Capacitance (pF)"]
     assert found.mapping["position"]["depth"]["column"] == "Extension (mm)"
+
+
+def test_a_header_of_several_lines_may_hold_numbers_and_the_time_has_no_name(tmp_path):
+    """As programs of National Instruments write it: a rate, names and units before pairs of times and values."""
+    lines = ["Timestamp,2020-03-16,Timestamp,2020-03-16", "Interval,0.05,Interval,0.05"]
+    lines += ['Channel name,"Force",Channel name,"Input 1"', 'Unit,"N",Unit,"mm"']
+    lines += [f"{t:.2f},{3 * s:.4f},{t:.2f},{s:.4f}" for t, s in zip(T, STROKE, strict=True)]
+    (tmp_path / "a3NI.csv").write_text("\n".join(lines))
+    found, _ = proposed(tmp_path)
+    (entry,) = found.mapping["files"].values()
+    assert entry["time"] == {"column": "Channel name"}
+    assert any("rises evenly, and is taken for the time" in question for question in found.questions)
+    assert found.mapping["taxels"]["columns"] == ["Force"]
+    assert imported(tmp_path, found.mapping, tmp_path / "made")[0].press.depth == pytest.approx(1)
+
+
+def test_numbers_in_brackets_are_no_units_and_states_read_nothing(tmp_path):
+    columns = T, 40 * STROKE, STROKE, 0 * T, np.round(STROKE)
+    written(tmp_path / "log.csv", "t_s,pos (5),current (5),SegmentID,moving (5)", *columns)
+    found, _ = proposed(tmp_path)
+    assert found.mapping["position"]["depth"] == {"column": "pos (5)", "unit": "mm"}
+    assert found.mapping["taxels"]["columns"] == ["current (5)"]
+    assert tried(tmp_path, found.mapping, tmp_path).startswith("tried: the source holds 1 recording")
+
+
+def test_a_depth_of_an_unknown_unit_stops_no_proposal(tmp_path):
+    rows = np.tile(STROKE, 3)
+    written(tmp_path / "log.csv", "t_s,depth (steps),cap1", 0.05 * np.arange(len(rows)), rows, rows)
+    found, _ = proposed(tmp_path)
+    assert "unit" in tried(tmp_path, found.mapping, tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["columns", "records", "rows", "lines"])
+def test_json_is_read_by_columns_by_records_and_by_rows(tmp_path, kind):
+    rows = [{"t_s": t, "tip": {"depth_mm": s}, "caps": [2 * s, None if k == 3 else s]}
+            for k, (t, s) in enumerate(zip(T.tolist(), STROKE.tolist(), strict=True))]  # fmt: skip
+    path = tmp_path / "source" / ("run_1.jsonl" if kind == "lines" else "run_1.json")
+    path.parent.mkdir()
+    if kind == "columns":
+        text = json.dumps(
+            {"meta": {"rig": "A"}, "t_s": T.tolist(), "depth_mm": STROKE.tolist(), "cap": STROKE.tolist()}
+        )
+    elif kind == "records":
+        text = json.dumps({"samples": rows})
+    elif kind == "rows":
+        text = json.dumps({"data": np.column_stack([T, STROKE, 2 * STROKE]).tolist()})
+    else:
+        text = "\n".join(json.dumps(row) for row in rows)
+    path.write_text(text)
+    (path.parent / "settings.json").write_text('{"speeds": [1, 2, 5]}')
+    found, described_as = proposed(path.parent)
+    assert "settings.json holds no 10 rows" in described_as
+    if kind == "rows":
+        assert found.mapping["files"]["run"]["time"] == {"column": "data[0]"}
+        assert any("no names" in question for question in found.questions)
+        return
+    (press,) = imported(path.parent, found.mapping, tmp_path / "made")
+    assert press.press.depth == pytest.approx(1)
+    assert press.taxels.counts.shape[1] == (1 if kind == "columns" else 2)

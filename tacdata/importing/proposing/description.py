@@ -71,7 +71,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     if not found:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
-            "CSV, Excel, NPZ, Parquet or MATLAB files, or bags of ROS 2", "check the path, or convert the files",
+            "CSV, Excel, JSON, NPZ, Parquet or MATLAB files, or bags of ROS 2", "check the path, or convert the files",
         )  # fmt: skip
     found = _of_same_columns(found)
     lines = []

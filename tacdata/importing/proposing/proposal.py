@@ -167,8 +167,16 @@ def _motion(
         )
     if "trial" not in found and "trials" not in document:
         entry = position["depth" if is_depth else "z"]
-        above = motion.above * factor(unit_of(table, entry, name) or "mm", "mm", name)
+        above = motion.above * _in_mm(unit_of(table, entry, name))
         _cut(document, motion, above if is_depth else None, asked)
+
+
+def _in_mm(unit: str) -> float:
+    """Return a unit's factor, 1 where it is no length: that is said when the mapping is tried."""
+    try:
+        return factor(unit or "mm", "mm", "")
+    except FormatError:
+        return 1.0
 
 
 def _cut(document: dict[str, Any], motion: PressingAxis, above: float | None, asked: list[str]) -> None:
@@ -218,7 +226,8 @@ def _place_in_path(kind: str) -> dict[str, str]:
 
 
 def _unnamed(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) -> None:
-    if any(name.endswith("'") for name in table.columns) and not any(name.endswith("'") for name in roles["channels"]):
+    again = [name for name in table.columns if name.endswith("'") and name.rstrip("'") not in roles.get("time", [])]
+    if again and not any(name.endswith("'") for name in roles["channels"]):
         asked.append(
             f"{table.path.name}: each name comes again, as in trials side by side; only the first is read. Put the "
             "others below it with a column that numbers them, into sheets or into files"
@@ -250,6 +259,8 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[
     else:
         unit = plain(table.units.get(roles["time"][0], ""))
         clock = {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}
+    if "by_values" in roles:
+        asked.append(f"{roles['time'][0]}: it rises evenly, and is taken for the time, in s where no unit is given")
     try:
         times(table, clock, Path(outer).name)
     except FormatError as error:
@@ -263,7 +274,8 @@ def _american(table: SourceTable, name: str, asked: list[str]) -> dict[str, str]
     """Return the format of dates with AM and PM, where month and day could change places: the month comes first."""
     values = table.column(name)
     known = [str(text).strip() for text in values.tolist() if text is not None] if values.dtype == object else []
-    layout = next((layout for layout in layouts_of(known) if layout.startswith("%m/") and "%p" in layout), None)
+    layouts = layouts_of(known) if known else []
+    layout = next((layout for layout in layouts if layout.startswith("%m/") and "%p" in layout), None)
     if layout is None:
         return {}
     asked.append(f"{name}: {known[0]!r} is read with the month first (format: {layout!r}); is it?")

@@ -36,6 +36,7 @@ GUESSES = {
     "number": r"(channel|ch|taxel|sensor)(_?(id|no|nr|number|index))?",
     "value": r"(value|val|reading|wert)",
     "setting": r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))|(set|target|cmd)_\w+",
+    "state": r"(segment|segm|state|status|moving|flag|block)(_?(id|no|nr|number|index))?",
     "derived": r"grad(ient)?|derivative|slope",
     "strain": (
         r"((true|eng(ineering)?|nominal|axial|tensile|compressive)_?)?(strain|stretch|elongation|dehnung|stauchung)(_?ratio)?"
@@ -77,6 +78,8 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
         _first_rising(table, roles)
     if not roles.get("time") and len(table.columns) == 1 and table.inner(next(iter(table.columns))):
         _first_rising_inside(table, roles)
+    if not roles.get("time"):
+        _evenly_rising(table, roles)
     _set_for_each_trial(table, roles)
     if not ("number" in roles and "value" in roles):
         # Without a column that numbers channels a value is a channel, and the other way round.
@@ -149,6 +152,22 @@ def _first_rising_inside(table: SourceTable, roles: dict[str, list[str]]) -> Non
     if rising is not None:
         roles["time"] = [columns.pop(rising)]
         roles["channels"] = columns
+
+
+def _evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None:
+    """Tell the time by its even steps, whatever it is called; no path rises throughout."""
+    found: list[str] = []
+    for name in roles["channels"]:
+        values = table.columns.get(name)
+        if values is None or values.ndim > 1 or len(values) < ROWS:
+            continue
+        steps = np.diff(values.astype(float))
+        usual = float(np.median(steps))
+        if usual > 0 and (np.abs(steps - usual) < 0.5 * usual).all():
+            found.append(name)
+    if found:
+        roles["time"] = roles["by_values"] = found[:1]
+        roles["channels"] = [name for name in roles["channels"] if name not in found]
 
 
 def _set_for_each_trial(table: SourceTable, roles: dict[str, list[str]]) -> None:

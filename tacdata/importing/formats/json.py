@@ -1,0 +1,70 @@
+"""JSON: columns by name, rows by name, or rows alone; JSON Lines with a row a line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.formats.npz import WHOLE, rows_of
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+
+LINES = (".jsonl", ".ndjson")
+FEWEST = 10
+"""Fewer rows are settings, and no recording."""
+
+
+class Json(SourceFormat):
+    """Lists as columns; a list of objects or of lists as rows. Objects inside objects become ``outer.inner``."""
+
+    endings = (".json", *LINES)
+
+    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+        """Read what has rows. See the base."""
+        text = path.read_text(encoding="utf-8-sig")
+        by_line = path.suffix.lower() in LINES
+        whole = [json.loads(line) for line in text.splitlines() if line.strip()] if by_line else json.loads(text)
+        arrays = {name: _array(values) for name, values in _lists(whole).items()}
+        table = rows_of(path, arrays, options)
+        if table.rows < FEWEST:
+            raise FormatError(
+                f"{path} holds no {FEWEST} rows: settings, as it seems", "lists of as many values, or rows",
+                "leave it out, or save what was recorded as a table",
+            )  # fmt: skip
+        return table
+
+
+def _lists(value: Any, name: str = "") -> dict[str, list[Any]]:
+    """Return the lists in a value by name."""
+    if isinstance(value, dict):
+        inside = [_lists(part, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
+        return {key: values for part in inside for key, values in part.items()}
+    if not isinstance(value, list) or not value:
+        return {}
+    if not any(isinstance(row, dict) for row in value):
+        return {name or WHOLE: value}
+    rows = [_flat(row) if isinstance(row, dict) else {} for row in value]
+    names = dict.fromkeys(key for row in rows for key in row)
+    return {f"{name}.{key}" if name else key: [row.get(key) for row in rows] for key in names}
+
+
+def _flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Return the values of an object with those of objects inside it."""
+    found: dict[str, Any] = {}
+    for key, value in row.items():
+        found |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
+    return found
+
+
+def _array(values: list[Any]) -> np.ndarray:
+    """Return a list as numbers, NaN for null, or as text; lists of one length inside it as a table."""
+    widths = {len(row) if isinstance(row, list) else -1 for row in values if row is not None}
+    if len(widths) == 1 and (width := widths.pop()) > 0:
+        values = [[None] * width if row is None else row for row in values]
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        return np.array([None if value is None else str(value) for value in values], dtype=object)
