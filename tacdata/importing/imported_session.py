@@ -10,11 +10,14 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
+import numpy as np
+
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.formats.source_format import SourceTable, read_table
+from tacdata.importing.press_path import below_zero
 from tacdata.importing.presses import centre_of, presses_of
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
@@ -95,6 +98,7 @@ class _Import:
         self.notes: list[str] = []
         self.seen: dict[tuple[Any, ...], str] = {}
         self.centre: tuple[float, float] | None = None
+        self.below = 0.0
 
     def add(self, files: FileSet) -> None:
         """Import one set of files."""
@@ -161,12 +165,21 @@ class _Import:
         recording_file.write(path, imported)
         trial = imported.record["trial"]
         self.notes += imported.record["notes"]
+        depth = imported.registration["origin"][2] - imported.position.values[:, 2]
+        at = np.interp(imported.taxels.time_ns, imported.position.time_ns, depth)
+        self.below = max(self.below, below_zero(at, imported.taxels.values))
         self.presses.append(replace(imported, taxels=None, position=None, measured=()))
         rows = len(imported.taxels.time_ns)
         self.progress(f"  {path.name}  {trial or self.mapping['name']}: {rows} rows, {press.depth:.2f} mm deep")
 
     def finish(self) -> None:
         """Write the session's document."""
+        if self.below:
+            lowest = np.ceil(1000 * self.below) / 1000
+            self.notes.append(
+                f"readings answer as much below zero, down to {self.below:.4g} mm, as above: does it touch there, too? "
+                f"Then count depth from the lowest (offset: {lowest:g} under depth, or contact); else that is no contact"
+            )
         first = self.presses[0]
         plan = plan_of(self.mapping["name"], [imported.press for imported in self.presses])
         document = {

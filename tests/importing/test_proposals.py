@@ -408,3 +408,28 @@ def test_json_is_read_by_columns_by_records_and_by_rows(tmp_path, kind):
     (press,) = imported(path.parent, found.mapping, tmp_path / "made")
     assert press.press.depth == pytest.approx(1)
     assert press.taxels.counts.shape[1] == (1 if kind == "columns" else 2)
+
+
+def test_a_piston_that_goes_to_both_sides_has_no_side_without_contact(tmp_path):
+    """Friction turns with the way, wherever the piston is: half of its strokes are no flight."""
+    way = 0.4 * np.sin(2 * np.pi * T / T[-1] * 3)
+    force = 30 * np.tanh(40 * np.gradient(way, T))
+    written(tmp_path / "log.csv", "t_s,disp_in,F_N", T, way, force)
+    found, _ = proposed(tmp_path)
+    low = -25.4 * way.min()
+    assert found.mapping["position"]["depth"]["offset"] == pytest.approx(low, abs=2e-3)
+    assert any("both sides" in question for question in found.questions)
+    assert min(press.tip[:, 2].min() for press in imported(tmp_path, found.mapping, tmp_path / "a")) > -1e-3
+    del found.mapping["position"]["depth"]["offset"], found.mapping["trials"]
+    path = tmp_path / "without.yaml"
+    documents.write(path, found.mapping, "import_mapping")
+    made = import_session(tmp_path / "log.csv", path, tmp_path / "session")
+    assert any("does it touch there, too?" in note and f"offset: {low:.2f}"[:-1] in note for note in made.notes)
+
+
+def test_a_tip_that_comes_from_the_air_and_one_that_sticks_have_a_side_without_contact(tmp_path):
+    depth = 3 * STROKE - 1.5 * (STROKE == 0)
+    stuck = np.where((depth < 0) & (np.arange(len(T)) > 40), -0.1, 0.0)
+    written(tmp_path / "log.csv", "t_s,depth_mm,F_N", T, depth, np.maximum(depth, 0) + stuck)
+    found, _ = proposed(tmp_path)
+    assert "offset" not in found.mapping["position"]["depth"]

@@ -13,6 +13,7 @@ import schemas
 from tacdata.errors import FormatError
 from tacdata.importing.columns import unit_of
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.press_path import below_zero
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
@@ -155,6 +156,8 @@ def _motion(
         position["depth" if is_depth else "z"]["scale"] = -1.0
         way = "falls" if motion.sign < 0 else "grows"
         asked.append(f"{name}: it {way} into the skin, so its sign is turned (scale: -1)")
+    if is_depth:
+        _from_the_lowest(position["depth"], table, name, channels, asked)
     if not is_depth and motion.at_zero:
         document["contact"] = {"z": 0.0, "known_from": "the zero of the machine"}
         asked.append(f"{name}: its zero is taken for the height at which the skin is touched (contact: {{z: 0}})")
@@ -169,6 +172,22 @@ def _motion(
         entry = position["depth" if is_depth else "z"]
         above = motion.above * _in_mm(unit_of(table, entry, name))
         _cut(document, motion, above if is_depth else None, asked)
+
+
+def _from_the_lowest(
+    entry: dict[str, Any], table: SourceTable, name: str, channels: list[str], asked: list[str]
+) -> None:
+    """Count a depth from its lowest where readings answer on both sides of zero."""
+    parts = [table.column(channel) for channel in channels if channel in table.columns]
+    if not parts:
+        return
+    depth = entry.get("scale", 1.0) * table.column(name).astype(float) * _in_mm(unit_of(table, entry, name))
+    if low := below_zero(depth, np.column_stack(parts).astype(float)):
+        entry["offset"] = float(np.ceil(1000 * low) / 1000)
+        asked.append(
+            f"{name}: readings answer on both sides of its zero, so depth is counted from the lowest "
+            f"(offset: {entry['offset']:g} mm); do other files go lower? Then take the lowest of all"
+        )
 
 
 def _in_mm(unit: str) -> float:
