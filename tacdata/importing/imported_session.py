@@ -178,7 +178,7 @@ class _Import:
             lowest = np.ceil(1000 * self.below) / 1000
             self.notes.append(
                 f"readings answer as much below zero, down to {self.below:.4g} mm, as above: does it touch there, too? "
-                f"Then count depth from the lowest (offset: {lowest:g} under depth, or contact); else that is no contact"
+                f"Then count depth from the lowest (offset: {lowest:g} under depth, or contact); else it is no contact"
             )
         first = self.presses[0]
         plan = plan_of(self.mapping["name"], [imported.press for imported in self.presses])
