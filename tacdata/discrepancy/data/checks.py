@@ -34,6 +34,8 @@ class DataChecks:
     """What idle stretches and single channels show that no effect of the library does."""
     clocks: tuple[str, ...] = ()
     """By how much readings follow the path late: said unless the verdict speaks of a delay."""
+    early: tuple[str, ...] = ()
+    """By how much they come early: said unless the verdict speaks of memory."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -50,9 +52,11 @@ def check(setting: Setting) -> DataChecks:
     """Check recordings against the model that they are to be held against."""
     course, response = setting.course, setting.response
     wiring = () if setting.given else tuple(miswired(course, response))
+    late, words = shifted(course)
     return DataChecks(
         course.episodes, wiring, tuple(shortcomings(course)),
-        _base(setting), (*idle_lines(course), *odd_channels(course, response)), tuple(shifted(course)),
+        _base(setting), (*idle_lines(course), *odd_channels(course, response)),
+        words if late else (), () if late else words,
     )  # fmt: skip
 
 

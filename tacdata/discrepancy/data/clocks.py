@@ -28,16 +28,16 @@ CLEARER = 0.3
 """Largest share of the unexplained variance that may be left at the best delay [1]."""
 
 
-def shifted(course: Course) -> list[str]:
-    """Return in words whether the readings follow the path at another time: their clocks were not one."""
+def shifted(course: Course) -> tuple[bool, tuple[str, ...]]:
+    """Return whether readings follow the path late, and in words by how much they are late or early."""
     lag, left, none = shift(course)
     if abs(lag) <= LEAST_SHIFT or left > CLEARER * none:
-        return []
-    return [
+        return lag > 0, ()
+    return lag > 0, (
         f"readings follow the path about {abs(lag):.1f} s {'later' if lag > 0 else 'earlier'} than their "
         f"times say ({100 * left:.0f} % of their change is left then, {100 * none:.0f} % as they are): were the "
-        "clocks one? Record both on one clock, or give the offset of one in the import's mapping"
-    ]
+        "clocks one? Record both on one clock, or give the offset of one in the import's mapping",
+    )
 
 
 def shift(course: Course) -> tuple[float, float, float]:

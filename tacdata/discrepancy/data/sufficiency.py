@@ -9,8 +9,8 @@ from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, speeds
 
 FEWEST_EPISODES = 8
 """Fewer episodes carry no name: a standard error over them is not known."""
-RATE_RATIO = 2.5
-"""Rates: least ratio that separates lags from play and friction [1]."""
+RATE_RATIO, ALIKE = 2.5, 1.3
+"""Rates: least ratio that tells lags from play, and largest one of a single rate [1]."""
 
 
 def shortcomings(course: Course) -> list[str]:
@@ -22,9 +22,9 @@ def shortcomings(course: Course) -> list[str]:
             "presses of several depths and rates (`tacdata plan diagnostic`)"
         )
     if course.episodes > 1 and one_rate(course):
-        remarks.append(
-            "one rate only: delay, filter, backlash and relaxation look alike; record three rates over a decade"
-        )
+        wide = max(_spread(rates) for rates in speeds(course))
+        what = "one rate only" if wide < ALIKE else f"rates differ by a factor of {wide:.1f} only"
+        remarks.append(f"{what}: delay, filter, backlash and relaxation look alike; record three rates over a decade")
     if longest_hold(course) < HOLD:
         remarks.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")
     elif not _recovers(course):
@@ -44,7 +44,7 @@ def shortcomings(course: Course) -> list[str]:
     remarks += units(course)
     remarks += stuck(course)
     if course.force is None:
-        remarks.append("no force: stiffness and gain, relaxing skin and relaxing taxel cannot be separated")
+        remarks.append("no force beside the readings: stiffness and gain, relaxing skin and taxel cannot be separated")
     if course.tag is None:
         remarks.append("no second observation of the pose: guide and skin are separated by their response alone")
     return remarks
@@ -55,13 +55,14 @@ def one_rate(course: Course) -> bool:
 
     How they come to the skin does not count.
     """
-    return not any(_varies(rates) for rates in speeds(course))
+    return not any(_spread(rates) >= RATE_RATIO for rates in speeds(course))
 
 
-def _varies(rates: np.ndarray) -> bool:
+def _spread(rates: np.ndarray) -> float:
+    """Return by which factor rates differ, the outermost tenths aside; 1 where none is known."""
     known = rates[np.isfinite(rates)]
     low, high = np.quantile(known, [0.1, 0.9]) if len(known) else (0.0, 0.0)
-    return bool(low > 0 and high >= RATE_RATIO * low)
+    return float(high / low) if low > 0 else 1.0
 
 
 STROKE, RATE, RADIUS, EVERY = 0.02, 500.0, 200.0, (2e-5, 5.0)

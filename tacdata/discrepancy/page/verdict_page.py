@@ -130,7 +130,7 @@ def _where(verdict: dict[str, Any], found: Residuals) -> Part:
     parts = [part for part in verdict["slices"] if part["by"] in PARTED] if added else []
     title = "before, each press's own pose and gain left in" if parts else "mean square over the noise"
     pictures, said = [], verdict["located"]
-    if not parts or np.isfinite(made.before).mean() >= FILLED:
+    if made.rows and (not parts or np.isfinite(made.before).mean() >= FILLED):
         pictures.append(charts.map_of(title, made.rows, made.columns, made.before, most))
     if parts:
         # Under poses and gains that effects do not explain, the map would hardly change.

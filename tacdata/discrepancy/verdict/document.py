@@ -48,8 +48,9 @@ def document(
     told = [p.effect.remark(p.values) for p in placed]
     if any(p.effect.in_series for p in placed) and (shared := series_compliance(course)) is not None:
         told.append(str(shared))
-    late = any(p.effect.family is Family.DELAY_AND_FILTER for p in placed)
-    clocks = () if late else checks.clocks
+    families = {p.effect.family for p in placed}
+    clocks = () if Family.DELAY_AND_FILTER in families else checks.clocks
+    clocks += () if Family.SKIN_MEMORY in families else checks.early
     spoken = decision.reason in (Reason.ALARM, Reason.UNEXPLAINED)
     alarms = () if spoken else decision.alarms
     seen = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]

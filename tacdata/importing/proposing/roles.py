@@ -51,6 +51,8 @@ GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 DEGREES = ("degc", "c", "k", "degf")
 ROWS = 50
 """Rows of a text column that are tried as times."""
+EVEN = 1e-3
+"""Steps that scatter by less are alike even [step]."""
 NAMED = re.compile(r"_?(id|no|nr|number|index)$")
 """Ends of names of columns that number things, and so read nothing."""
 
@@ -74,8 +76,7 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
             # One axis only: it is the one that presses.
             roles["depth"] = roles.pop("x")
     if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
-        # Without a header, the first increasing column is most likely the time.
-        _first_rising(table, roles)
+        _most_evenly_rising(table, roles)
     if not roles.get("time") and len(table.columns) == 1 and table.inner(next(iter(table.columns))):
         _first_rising_inside(table, roles)
     if not roles.get("time"):
@@ -134,13 +135,18 @@ def _are_times(table: SourceTable, name: str) -> bool:
     return True
 
 
-def _first_rising(table: SourceTable, roles: dict[str, list[str]]) -> None:
-    for name in list(roles["channels"]):
+def _most_evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None:
+    """Tell the time of a file without a header: on a way in, readings and depths rise as well, but less evenly."""
+    rising = {}
+    for name in roles["channels"]:
         steps = np.diff(table.columns[name])
         if (steps >= 0).all() and (steps > 0).mean() > 0.5:  # a row of places stands still for many rows
-            roles["time"] = [name]
-            roles["channels"].remove(name)
-            return
+            usual = float(np.median(steps))
+            rising[name] = float(np.median(np.abs(steps - usual))) / usual if usual > 0 else np.inf
+    if rising:
+        most = max(EVEN, 2 * min(rising.values()))
+        roles["time"] = [next(name for name, spread in rising.items() if spread <= most)]
+        roles["channels"].remove(roles["time"][0])
 
 
 def _first_rising_inside(table: SourceTable, roles: dict[str, list[str]]) -> None:

@@ -148,3 +148,11 @@ def test_maps_side_by_side_have_one_scale_of_colour():
     before, after = (float(m.split("fill-opacity:")[1].split('"')[0]) for m in maps)
     assert before > 0.8 and after < 0.15
     assert "1000<" in maps[0] and "e+" not in maps[0]
+
+
+def test_a_field_that_was_hardly_read_is_not_drawn_and_a_map_of_none_is_left_out(judged, monkeypatch):
+    whole = verdict_page(*judged)
+    monkeypatch.setattr("tacdata.discrepancy.page.heat_map.FEWEST", 10**9)
+    with np.errstate(all="raise"):
+        page = verdict_page(*judged)
+    assert "loading, slow" in whole and "loading, slow" not in page

@@ -53,3 +53,11 @@ def test_a_late_clock_is_asked_about_unless_the_answer_is_a_delay():
     assert any("were the clocks one" in words for words in asked["remarks"])
     assert "latency" in {e["mechanism"] for e in answered["effects"]}
     assert not any("were the clocks one" in words for words in answered["remarks"])
+
+
+def test_readings_that_come_early_are_asked_about_unless_the_answer_is_memory():
+    own = course(relaxed=0.75, rates=(0.15,), episodes=10)
+    asked, answered = (judge(own, read_spec(None), until=step).document for step in ("gate", "fit"))
+    assert any("earlier than their times" in words for words in asked["remarks"])
+    assert "relaxation" in {e["mechanism"] for e in answered["effects"]}
+    assert not any("earlier than their times" in words for words in answered["remarks"])

@@ -61,3 +61,5 @@ def test_a_fast_way_to_the_skin_does_not_hide_the_rates_of_pressing():
     own = course(episodes=12, rates=(0.5, 2.0))
     assert not any("one rate only" in words for words in shortcomings(own))
     assert any("one rate only" in words for words in shortcomings(course(episodes=12, rates=(1.0,))))
+    near = [words for words in shortcomings(course(episodes=12, rates=(1.0, 1.8))) if "rate" in words]
+    assert any("rates differ by a factor of 1.8 only" in words for words in near)

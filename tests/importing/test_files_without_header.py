@@ -1,0 +1,27 @@
+"""Files without a header: which column is the time."""
+
+import numpy as np
+import pytest
+
+from tacdata.importing.formats.source_format import read_table
+from tacdata.importing.proposing.roles import roles_of
+
+ROWS = np.arange(40)
+STRETCH = 1 + 0.01 * ROWS + 1e-4 * np.sin(7.0 * ROWS)
+STRESS = 10 * np.log(STRETCH)
+
+
+def time_of(path, columns):
+    np.savetxt(path, np.column_stack(columns))
+    return roles_of(read_table(path, {}))["time"]
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_a_way_in_alone_rises_throughout_but_less_evenly_than_a_clock(tmp_path, place):
+    columns = [STRESS, STRETCH]
+    columns.insert(place, 0.1 * (1 + ROWS))
+    assert time_of(tmp_path / "run.txt", columns) == [str(place)]
+
+
+def test_of_two_columns_that_rise_alike_evenly_the_first_one_is_the_time(tmp_path):
+    assert time_of(tmp_path / "run.txt", [0.1 * ROWS, 0.02 * ROWS, STRESS]) == ["0"]
