@@ -51,4 +51,6 @@ class Latency(Effect):
         late = self.delay(values)
         if abs(late) <= LONG:
             return ""
+        if late < 0:
+            return f"readings come {-late:.2f} s early, as no sensor does: does the skin relax, or were clocks not one?"
         return f"readings are {late:.2f} s late: more than a sensor is; were the clocks of path and readings one?"

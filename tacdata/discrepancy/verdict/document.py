@@ -50,7 +50,7 @@ def document(
         told.append(str(shared))
     families = {p.effect.family for p in placed}
     clocks = () if Family.DELAY_AND_FILTER in families else checks.clocks
-    clocks += () if Family.SKIN_MEMORY in families else checks.early
+    clocks += () if families & {Family.DELAY_AND_FILTER, Family.SKIN_MEMORY} else checks.early
     spoken = decision.reason in (Reason.ALARM, Reason.UNEXPLAINED)
     alarms = () if spoken else decision.alarms
     seen = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]

@@ -1,5 +1,6 @@
 """A long delay is tried from where readings and path show it; what does not come late brings none."""
 
+import numpy as np
 import pytest
 from pressing import course
 
@@ -61,3 +62,9 @@ def test_readings_that_come_early_are_asked_about_unless_the_answer_is_memory():
     assert any("earlier than their times" in words for words in asked["remarks"])
     assert "relaxation" in {e["mechanism"] for e in answered["effects"]}
     assert not any("earlier than their times" in words for words in answered["remarks"])
+
+
+@pytest.mark.parametrize(("late", "words"), [(0.6, "0.60 s late"), (-0.6, "0.60 s early, as no sensor does")])
+def test_a_long_delay_of_either_sign_is_said_as_it_is(late, words):
+    assert words in load("latency").remark({"L": np.array(late)})
+    assert load("latency").remark({"L": np.array(late / 100)}) == ""
