@@ -252,9 +252,10 @@ def _unnamed(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) 
             "others below it with a column that numbers them, into sheets or into files"
         )
     if (len(table.columns) == 1 and table.inner(next(iter(table.columns)))) or all(map(str.isdigit, table.columns)):
+        time = f", {roles['time'][0]} as the time by its steps" if roles.get("time") else ""
         asked.append(
             f"the columns of {table.path.name} have no names: which are position, force and channels? "
-            f"All but the time stand as channels, {', '.join(_short(roles['channels']))}"
+            f"{', '.join(_short(roles['channels']))} stand as channels{time}"
         )
 
 

@@ -51,7 +51,7 @@ GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 DEGREES = ("degc", "c", "k", "degf")
 ROWS = 50
 """Rows of a text column that are tried as times."""
-EVEN = 1e-3
+EVEN = 1e-4
 """Steps that scatter by less are alike even [step]."""
 NAMED = re.compile(r"_?(id|no|nr|number|index)$")
 """Ends of names of columns that number things, and so read nothing."""
