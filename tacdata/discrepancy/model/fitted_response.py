@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import BSpline
+from scipy.sparse import csr_array
 
 from tacdata.chain import Course, Response
 
@@ -153,18 +155,36 @@ class FittedResponse(Response):
                 stream, shape (m, streams, splines), where the force differs.
         """
         self._answers = []
+        for k, of, _, more in self._corrections(residual, features):
+            self._weights[k] = self._weights[k].copy()
+            self._weights[k][:, of] += more
+
+    def left_next(self, residual: np.ndarray, features: np.ndarray) -> np.ndarray:
+        """Return what the next correction would leave if effects were linear in load, shape (m, streams).
+
+        Args:
+            residual: As for `correct`.
+            features: As for `correct`.
+        """
+        left = np.nan_to_num(residual)
+        for k, of, own, more in self._corrections(residual, features):
+            left[self._within(k), of] -= own @ more
+        return left
+
+    def _corrections(
+        self, residual: np.ndarray, features: np.ndarray
+    ) -> Iterator[tuple[int, slice, np.ndarray, np.ndarray]]:  # fmt: skip
+        """Give places and streams with their features, shape (k, splines), and what to add to weights there."""
         last = residual.shape[1] - 1
         parts = [slice(None)] if features.ndim == 2 else [slice(0, last), slice(last, None)]
         for k, basis in enumerate(self._bases):
             rows, count = self._within(k), len(basis.t) - basis.k - 1
-            more = np.empty_like(self._weights[k])
             for of in parts:
-                own = features[rows] if features.ndim == 2 else features[rows, of.start]
-                more[:, of], _ = self._solve(
-                    rows, np.nan_to_num(residual[rows, of]), own[:, :count], basis, self._smooth[k][of],
-                    self._weights[k][:, of],
+                own = (features[rows] if features.ndim == 2 else features[rows, of.start])[:, :count]
+                more, _ = self._solve(
+                    rows, np.nan_to_num(residual[rows, of]), own, basis, self._smooth[k][of], self._weights[k][:, of]
                 )  # fmt: skip
-            self._weights[k] = self._weights[k] + more
+                yield k, of, own, more
 
     def _fit(self, streams: np.ndarray) -> None:
         depth, self._weights, self._smooth = self._course.reduced.tip[:, 2], [], []
@@ -350,6 +370,19 @@ def _shaken(left: np.ndarray, course: Course) -> np.ndarray:
     if not len(found):
         return np.zeros(left.shape[1])
     return 1.4826 * np.median(np.abs(found), axis=0) * np.sqrt(BLOCK / 6)
+
+
+def about_means(residual: np.ndarray, course: Course) -> np.ndarray:
+    """Return sums of squares about each episode's mean, shape (episodes, streams); what was not read counts as 0.
+
+    Args:
+        residual: Of the rows read, shape (m, streams); NaN where nothing was read.
+        course: Whose rows.
+    """
+    known, episode = np.nan_to_num(residual), course.reduced.episode
+    into = csr_array((np.ones(len(episode)), (episode, np.arange(len(episode)))), shape=(course.episodes, len(episode)))
+    mean = (into @ known) / np.maximum(into.sum(axis=1), 1)[:, None]
+    return into @ np.square(known - mean[episode])
 
 
 def contexts(course: Course) -> np.ndarray:

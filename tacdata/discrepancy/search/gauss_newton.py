@@ -9,9 +9,9 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from tacdata.chain import Chain, Response, predict
+from tacdata.chain import Chain, Course, Response, predict
 from tacdata.discrepancy.data.streams import Streams
-from tacdata.discrepancy.model.fitted_response import FittedResponse
+from tacdata.discrepancy.model.fitted_response import FittedResponse, about_means
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.gram import EpisodeGrams, episode_grams
@@ -31,6 +31,8 @@ KNOWN = 0.5
 """A shape is known if its standard error is smaller [its value]."""
 LARGEST_LEVERAGE = 0.9
 """CR3: largest leverage of an episode [1]."""
+UNREACHED = 1.1
+"""A fitted response has converged if it leaves at most so much of what its next correction would leave [1]."""
 
 
 @dataclass(frozen=True)
@@ -208,13 +210,31 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
     course, streams = setting.course, Streams.of(setting.course)
     chain = Chain(course, response, [*setting.given, *placed])
     predicted = chain.prediction
-    residual = (streams.measured(course) - streams.predicted(predicted))[:, :, None].astype(np.float32)
+    rest = streams.measured(course) - streams.predicted(predicted)
+    residual = rest[:, :, None].astype(np.float32)
     whitener = null.whitener_for(replace(setting, response=response), [*setting.given, *placed], predicted)
     clean = whitener.whitened(residual)
     found = episode_grams(clean, course.reduced, null.nuisances, null.inner)
     still = _without(found.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
     left = clean[:, :, 0] - null.nuisances @ still.astype(np.float32)
-    return _View(clean, whitener, _energy(found, still), left, chain)
+    energy = _energy(found, still) + _unreached(rest, course, response, whitener, null.noise.scale)
+    return _View(clean, whitener, energy, left, chain)
+
+
+def _unreached(
+    rest: np.ndarray, course: Course, response: Response, whitener: Whitener, scale: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """Return what a response should have taken up and did not: half the sum of squares, shape (episodes,).
+
+    What splines may take up is projected out of the residual, as if they had. Where effects are far from linear in
+    load, corrections need not converge. Then that counts.
+    """
+    if not isinstance(response, FittedResponse) or whitener.features is None:
+        return np.zeros(course.episodes)
+    keep = course.channels + (course.force is not None)
+    after = response.left_next(rest[:, :keep], whitener.features)
+    now, then = (about_means(own[:, :keep] / scale[:keep], course).sum(axis=1) for own in (rest, after))
+    return 0.5 * now * max(1 - UNREACHED * float(then.sum()) / max(float(now.sum()), 1e-300), 0.0)
 
 
 def _state(setting: Setting, response: Response, placed: list[Placed], view: _View, null: NullModel) -> _State:

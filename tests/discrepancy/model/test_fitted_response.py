@@ -138,18 +138,25 @@ def test_splines_that_go_through_an_effect_gain_no_freedom(name):
     assert np.abs(through - plain).max() > 1e-3
 
 
-@pytest.mark.parametrize("name", ["relaxation", "proportional_hysteresis", "baseline_tracking"])
-def test_a_fitted_response_that_is_corrected_leaves_as_much(name, monkeypatch):
-    """What splines can take up counts nowhere: a model's energy hardly depends on how far they have."""
+@pytest.mark.parametrize(("name", "never"), [("relaxation", 3.0), ("proportional_hysteresis", 1.8)])
+def test_what_splines_take_up_counts_nowhere_once_they_have(name, never, monkeypatch):
+    """A model's energy hardly depends on whether they are corrected once or twice. What they never took up counts."""
     made = course(relaxed=0.1)
     setting = Setting(made, FittedResponse(made), [])
-    null, model = null_model(setting), [placed(name, 0.3)]
+    null, model = null_model(setting), [placed(name, 1.0)]
     bare = refine(setting, [], null, steps=0).energy.sum()
-    told = [refine(setting, model, null, steps=0).energy.sum()]
-    monkeypatch.setattr(FittedResponse, "correct", lambda *_: None)
-    told.append(refine(setting, model, null, steps=0).energy.sum())
+    told, correct = [], FittedResponse.correct
+    for most in (2, 1, 0):
+        made_so_far = iter(range(most))
+
+        def counted(*given, left=made_so_far):
+            return correct(*given) if next(left, None) is not None else None
+
+        monkeypatch.setattr(FittedResponse, "correct", counted)
+        told.append(refine(setting, model, null, steps=0).energy.sum())
     assert told[0] < 0.95 * bare
     assert told[0] == pytest.approx(told[1], abs=1e-3 * bare)
+    assert told[2] > never * told[0]
 
 
 @pytest.mark.parametrize("name", ["relaxation_read", "hysteresis_read"])
