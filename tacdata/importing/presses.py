@@ -26,8 +26,9 @@ from tacdata.indenters import Indenter, from_document
 from tacdata.plans import Press
 from tacdata.rig import Registration
 
-DEEPEST = 100.0
-"""Largest plausible depth [mm]; beyond it a unit must be wrong. A plan allows no more."""
+DEEPEST, FARTHEST = 100.0, 1000.0
+"""Largest plausible depth where the unit is assumed, and where it is stated [mm]: strips are stretched far. A plan
+allows no more."""
 NO_INDENTER = {"shape": "sphere", "radius": 2.0}
 """Stand-in for an unknown indenter."""
 SLOWEST = 1e-4
@@ -113,10 +114,11 @@ def _imported(
         raise FormatError("no position", "a position", "add it to the mapping")
     tip = place.to_sensor(position.values)
     path = press_path(position.time_ns, tip)
-    if abs(path.depth) > DEEPEST:
+    most = DEEPEST if position.assumed else FARTHEST
+    if abs(path.depth) > most:
         raise FormatError(
             f"trial {record['trial'] or 'without a name'}: {path.depth:.4g} mm deep, as the mapping has it",
-            f"presses of at most {DEEPEST:g} mm",
+            f"presses of at most {most:g} mm",
             "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
         )  # fmt: skip
     indenter, name = _indenter(mapping)

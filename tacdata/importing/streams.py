@@ -33,6 +33,8 @@ class Stream:
     zero: str
     """Zero of the clock. Streams with the same zero share a clock; "aligned" fits all."""
     notes: tuple[str, ...] = ()
+    assumed: bool = False
+    """Whether no file and no mapping says the unit."""
 
     def within(self, begin_ns: int, end_ns: int) -> Stream:
         """Return the rows from a time [ns] to before another."""
@@ -212,8 +214,9 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     if not whole.any():
         raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
     kept = np.isfinite(stream.values).all(axis=1)
-    notes = (*stream.notes, *_taken_as_mm(table, entry))
-    return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept], notes=notes), depth_given
+    assumed = tuple(_taken_as_mm(table, entry))
+    stream = replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept], assumed=bool(assumed))
+    return replace(stream, notes=(*stream.notes, *assumed)), depth_given
 
 
 def _taken_as_mm(table: SourceTable, entry: dict[str, Any]) -> Iterator[str]:

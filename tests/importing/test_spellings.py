@@ -182,3 +182,25 @@ def test_a_file_that_is_called_compressed_and_is_not_is_to_be_renamed(tmp_path):
 )  # fmt: skip
 def test_what_is_no_table_is_called_what_it_is(tmp_path, data, given):
     assert given in refusal(tmp_path, data).given
+
+
+def stretched(header, unit):
+    """Return what a strip gives that is stretched by 240 of its unit."""
+    rows = [f"{t:.15g},{200 * d:.3f},{20 + d:.4f},{30 + d:.4f}" for t, d in zip(TIME, DEPTH, strict=True)]
+    return {
+        "data": "\n".join([f"t [s],{header},cap0,cap1", *rows]),
+        "position": {"file": "data", "depth": {"column": 1} | unit},
+    }
+
+
+@pytest.mark.parametrize(("header", "unit"), [("disp [mm]", {}), ("disp", {"unit": "mm"})])
+def test_a_long_stroke_is_believed_where_its_unit_is_stated(tmp_path, header, unit):
+    _, episode = brought(tmp_path, **stretched(header, unit))
+    assert episode.press.depth == pytest.approx(238)
+
+
+def test_a_long_stroke_without_a_unit_is_asked_for_it_and_none_is_of_metres(tmp_path):
+    error = refusal(tmp_path, **stretched("disp", {}))
+    assert "238 mm deep" in error.given and error.allowed == "presses of at most 100 mm"
+    error = refusal(tmp_path, **stretched("disp [cm]", {}))
+    assert error.allowed == "presses of at most 1000 mm"
