@@ -23,7 +23,7 @@ def shortcomings(course: Course) -> list[str]:
         )
     if course.episodes > 1 and one_rate(course):
         wide = max(_spread(rates) for rates in speeds(course))
-        what = "one rate only" if wide < ALIKE else f"rates differ by a factor of {wide:.1f} only"
+        what = "one rate only" if wide < ALIKE else f"most presses differ in rate by a factor of {wide:.1f} only"
         remarks.append(f"{what}: delay, filter, backlash and relaxation look alike; record three rates over a decade")
     if longest_hold(course) < HOLD:
         remarks.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")

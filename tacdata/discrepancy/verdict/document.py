@@ -50,7 +50,8 @@ def document(
         told.append(str(shared))
     families = {p.effect.family for p in placed}
     clocks = () if Family.DELAY_AND_FILTER in families else checks.clocks
-    clocks += () if families & {Family.DELAY_AND_FILTER, Family.SKIN_MEMORY} else checks.early
+    leads = {Family.DELAY_AND_FILTER, Family.SKIN_MEMORY, Family.FRICTION_AND_PLAY}
+    clocks += () if families & leads else checks.early
     spoken = decision.reason in (Reason.ALARM, Reason.UNEXPLAINED)
     alarms = () if spoken else decision.alarms
     seen = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]

@@ -11,7 +11,7 @@ from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.regressors.delays import delays
 from tacdata.discrepancy.search.gauss_newton import refine
-from tacdata.effects import load
+from tacdata.effects import Family, library, load
 
 
 def begun(**hidden):
@@ -56,8 +56,12 @@ def test_a_late_clock_is_asked_about_unless_the_answer_is_a_delay():
     assert not any("were the clocks one" in words for words in answered["remarks"])
 
 
-def test_readings_that_come_early_are_asked_about_unless_the_answer_is_memory():
+def test_readings_that_come_early_are_asked_about_unless_the_answer_is_a_loop():
+    """Friction stands in for a skin that relaxes where nothing else is asked."""
     own = course(relaxed=0.75, rates=(0.15,), episodes=10)
+    others = tuple(e.called for e in library() if e.family is not Family.FRICTION_AND_PLAY)
+    loop = judge(own, read_spec(None), without=others).document
+    assert loop["effects"] and not any("earlier than their times" in words for words in loop["remarks"])
     asked, answered = (judge(own, read_spec(None), until=step).document for step in ("gate", "fit"))
     assert any("earlier than their times" in words for words in asked["remarks"])
     assert "relaxation" in {e["mechanism"] for e in answered["effects"]}

@@ -62,4 +62,4 @@ def test_a_fast_way_to_the_skin_does_not_hide_the_rates_of_pressing():
     assert not any("one rate only" in words for words in shortcomings(own))
     assert any("one rate only" in words for words in shortcomings(course(episodes=12, rates=(1.0,))))
     near = [words for words in shortcomings(course(episodes=12, rates=(1.0, 1.8))) if "rate" in words]
-    assert any("rates differ by a factor of 1.8 only" in words for words in near)
+    assert any("most presses differ in rate by a factor of 1.8 only" in words for words in near)
