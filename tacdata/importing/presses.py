@@ -27,8 +27,7 @@ from tacdata.plans import Press
 from tacdata.rig import Registration
 
 DEEPEST, FARTHEST = 100.0, 1000.0
-"""Largest plausible depth where the unit is assumed, and where it is stated [mm]: strips are stretched far. A plan
-allows no more."""
+"""Largest plausible depth with an assumed unit, and with a stated one [mm]. A plan allows no more."""
 NO_INDENTER = {"shape": "sphere", "radius": 2.0}
 """Stand-in for an unknown indenter."""
 SLOWEST = 1e-4

@@ -35,7 +35,7 @@ class DataChecks:
     clocks: tuple[str, ...] = ()
     """By how much readings follow the path late: said unless the verdict speaks of a delay."""
     early: tuple[str, ...] = ()
-    """By how much they come early: said unless the verdict speaks of a loop."""
+    """By how much they come early. A loop explains it."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
