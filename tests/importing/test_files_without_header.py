@@ -33,3 +33,10 @@ def test_what_was_taken_for_the_time_is_said(tmp_path):
     np.savetxt(tmp_path / "run.txt", np.column_stack([STRESS, STRETCH, 0.1 * ROWS]))
     found = proposed_mapping(tmp_path, described(tmp_path)[0])
     assert any("0, 1 stand as channels, 2 as the time by its steps" in question for question in found.questions)
+
+
+def test_a_comma_at_the_end_of_each_row_makes_no_channel(tmp_path):
+    rows = [f"{0.1 * k:g}, {stress:.4f}," for k, stress in enumerate(STRESS)]
+    (tmp_path / "run.csv").write_text("\n".join(["# Made by a program", "# data-1-x, data-1-y,", *rows]))
+    table = read_table(tmp_path / "run.csv", {})
+    assert len(table.columns) == 3 and len([name for names in roles_of(table).values() for name in names]) == 2

@@ -61,6 +61,8 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     """Return the columns of each role; ``channels`` are those of no other."""
     roles: dict[str, list[str]] = {"channels": []}
     for name, values in table.columns.items():
+        if values.dtype.kind == "f" and np.isnan(values).all():
+            continue  # a comma at the end of each row makes one
         role = _role(table, name, values)
         if role == "place":
             for axis, number in zip("xyz", range(3), strict=True):
