@@ -307,7 +307,8 @@ def test_a_clock_in_capitals_is_a_time_and_a_copy_of_the_depth_is_no_gauge(tmp_p
 
 @pytest.mark.parametrize(("header", "unit", "much"), [
     ("load_g", "um", "1000 g as 1 mm"), ("Force (N)", "mm", "1 N as 1 mm"), ("Bend (deg)", "mm", "1 deg as 1 mm"),
-    ("Strain [%]", "mm", "1 % as 1 mm"), ("stretch", "mm", "1 of its units as 1 mm"),
+    ("Strain [%]", "mm", "1 % as 1 mm"), ("Shear strain [%]", "mm", "1 % as 1 mm"),
+    ("stretch", "mm", "1 of its units as 1 mm"),
 ])  # fmt: skip
 def test_a_force_or_an_angle_stands_for_a_depth_that_nobody_measured(tmp_path, header, unit, much):
     size = 400.0 if unit == "um" else 8.0

@@ -39,7 +39,8 @@ GUESSES = {
     "state": r"(segment|segm|state|status|moving|flag|block)(_?(id|no|nr|number|index))?",
     "derived": r"grad(ient)?|derivative|slope",
     "strain": (
-        r"((true|eng(ineering)?|nominal|axial|tensile|compressive)_?)?(strain|stretch|elongation|dehnung|stauchung)(_?ratio)?"
+        r"((true|eng(ineering)?|nominal|axial|tensile|compressive|compression|shear|hencky|log(arithmic)?|applied)_?)?"
+        r"(strain|stretch|elongation|dehnung|stauchung)(_?ratio)?"
     ),
     "angle": r"((rotary|joint|motor)_?)?(encoder|angle)(_?(pos(ition)?|counts?))?",
 }
