@@ -1,6 +1,8 @@
-"""Readings without contact: whether they tell a gain of whole readings from offsets and from a gain above idle."""
+"""Readings without contact: whether there are any, and what gains they tell."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 
@@ -8,6 +10,9 @@ from tacdata.chain.course import Course
 
 UNLIKE = 0.5
 """A gain is told from drifting offsets where readings differ by so much, over their mean [1]."""
+BELOW, CLEARLY, ANSWERED, FEWEST = 0.5, 0.2, 0.5, 20
+"""A path has no side without contact if it goes so far below zero, over its depth. Readings have to span so much of
+their range clearly below, that is, by such a share of the way, in so many rows."""
 AT_REST = 0.05
 """It is told from a gain above idle where readings without contact are so large [largest rise]."""
 
@@ -34,3 +39,44 @@ def told_at_rest(course: Course) -> tuple[np.ndarray | None, str]:
     if np.std(values) < UNLIKE * abs(float(np.mean(values))):
         return None, "all readings are about alike: offsets that drift look the same"
     return idle, ""
+
+
+def below_zero(depth: np.ndarray, readings: np.ndarray, whole: np.ndarray | None = None) -> float:
+    """Return how far a path goes below zero [mm] if readings answer there as they do above, else 0.
+
+    A damper's piston has no side on which nothing is touched.
+
+    Args:
+        depth: Along the path [mm], shape (n,).
+        readings: At the same times [any unit], shape (n, channels).
+        whole: Range of each channel [the same], shape (channels,); that of these readings, unless given.
+    """
+    known = np.isfinite(depth) & np.isfinite(readings).any(axis=1)
+    depth, readings = depth[known], readings[known]
+    if not len(depth) or depth.max() <= 0 or (low := -float(depth.min())) <= 0 or low < BELOW * float(depth.max()):
+        return 0.0
+    under = depth < -CLEARLY * low
+    if under.sum() < FEWEST:
+        return 0.0
+    whole = _range(readings) if whole is None else whole
+    return low if (_range(readings[under])[whole > 0] >= ANSWERED * whole[whole > 0]).any() else 0.0
+
+
+def always_touched(course: Course) -> float:
+    """Return how far below zero [mm] readings answer as they do above, in half of the episodes or more, else 0."""
+    course = course.reduced if len(course.read) < course.rows else course
+    edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
+    spans = [slice(a, b) for a, b in pairwise(edges) if np.isfinite(course.readings[a:b]).any()]
+    if not spans:
+        return 0.0
+    whole = np.max([_range(course.readings[rows]) for rows in spans], axis=0)
+    each = [below_zero(course.tip[rows, 2], course.readings[rows], whole) for rows in spans]
+    return max(each) if np.count_nonzero(each) >= 0.5 * len(each) else 0.0
+
+
+def _range(readings: np.ndarray) -> np.ndarray:
+    """Return the range of each channel without its outermost tenth, shape (channels,); 0 where nothing was read."""
+    there = np.isfinite(readings).any(axis=0)
+    result = np.zeros(readings.shape[1])
+    result[there] = np.ptp(np.nanquantile(readings[:, there], [0.05, 0.95], axis=0), axis=0)
+    return result

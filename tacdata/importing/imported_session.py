@@ -14,10 +14,10 @@ import numpy as np
 
 import schemas
 from tacdata import documents, provenance
+from tacdata.chain.at_rest import below_zero
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.formats.source_format import SourceTable, read_table
-from tacdata.importing.press_path import below_zero
 from tacdata.importing.presses import centre_of, presses_of
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash

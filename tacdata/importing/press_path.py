@@ -16,9 +16,6 @@ the ratio is two.
 """
 LOW = 0.02
 """Share of the stroke, from its highest point, at which loading begins [1]."""
-BELOW, CLEARLY, ANSWERED, FEWEST = 0.5, 0.2, 0.5, 20
-"""A path has no side without contact if it goes so far below zero, over its depth. Readings have to span so much of
-their range clearly below, that is, by such a share of the way, in so many rows."""
 SHORTEST_HOLD = 0.2
 """A rest at full depth shorter than this is not a hold [s]."""
 
@@ -71,26 +68,6 @@ def press_path(time_ns: np.ndarray, tip: np.ndarray) -> PressPath:
         hold = 0.0
     phases = () if strokes(depth, low) > 1 else _phases(time_ns, begin, first, last, end, hold)
     return PressPath(deepest, speed, hold, x, y, phases)
-
-
-def below_zero(depth: np.ndarray, readings: np.ndarray) -> float:
-    """Return how far a path goes below zero [mm] if readings answer there as they do above, else 0.
-
-    A damper's piston has no side on which nothing is touched.
-
-    Args:
-        depth: Along the path [mm], shape (n,).
-        readings: At the same times [any unit], shape (n, channels).
-    """
-    known = np.isfinite(depth) & np.isfinite(readings).any(axis=1)
-    depth, readings = depth[known], readings[known]
-    if not len(depth) or (low := -float(depth.min())) <= 0 or low < BELOW * float(depth.max()):
-        return 0.0
-    under = depth < -CLEARLY * low
-    if under.sum() < FEWEST:
-        return 0.0
-    whole, there = (np.ptp(np.nanquantile(part, [0.05, 0.95], axis=0), axis=0) for part in (readings, readings[under]))
-    return low if (there[whole > 0] >= ANSWERED * whole[whole > 0]).any() else 0.0
 
 
 def _run(mask: np.ndarray, at: int) -> tuple[int, int]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tacdata.chain import Course
+from tacdata.chain.at_rest import always_touched
 from tacdata.discrepancy.data.clocks import shifted
 from tacdata.discrepancy.data.idle_lines import idle_lines
 from tacdata.discrepancy.data.single_channels import odd_channels
@@ -34,13 +36,15 @@ class DataChecks:
     """What idle stretches and single channels show that no effect of the library does."""
     clocks: tuple[str, ...] = ()
     """By how much readings follow the path late: said unless the verdict speaks of a delay."""
+    touched: tuple[str, ...] = ()
+    """Readings that answer where nothing should press: no verdict."""
     early: tuple[str, ...] = ()
     """By how much they come early. A loop explains it."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
         """What keeps these recordings from any verdict. A unit that was stated is believed: a doubt is a remark."""
-        return self.wiring
+        return (*self.wiring, *self.touched)
 
     @property
     def too_few(self) -> bool:
@@ -56,8 +60,19 @@ def check(setting: Setting) -> DataChecks:
     return DataChecks(
         course.episodes, wiring, tuple(shortcomings(course)),
         _base(setting), (*idle_lines(course), *odd_channels(course, response)),
-        words if late else (), () if late else words,
+        words if late else (), _touched(course), () if late else words,
     )  # fmt: skip
+
+
+def _touched(course: Course) -> tuple[str, ...]:
+    """Return that no side is without contact, where readings say so: what is told of touch would be of half the way."""
+    low = always_touched(course)
+    if not low:
+        return ()
+    return (
+        f"readings answer as much below zero, down to {low:.3g} mm, as above: depth has no side without contact. Count "
+        f"it from the lowest (offset: {low:.3g} under depth, in the import's mapping)",
+    )
 
 
 def _base(setting: Setting) -> tuple[str, ...]:

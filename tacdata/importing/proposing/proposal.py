@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 import schemas
+from tacdata.chain.at_rest import below_zero
 from tacdata.errors import FormatError
 from tacdata.importing.columns import unit_of
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.press_path import below_zero
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
