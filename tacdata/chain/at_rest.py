@@ -10,7 +10,7 @@ from tacdata.chain.course import Course
 
 UNLIKE = 0.5
 """A gain is told from drifting offsets where readings differ by so much, over their mean [1]."""
-BELOW, CLEARLY, ANSWERED, FEWEST = 0.5, 0.2, 0.5, 20
+BELOW, CLEARLY, ANSWERED, FEWEST = 0.5, 0.2, 0.3, 10
 """A path has no side without contact if it goes so far below zero, over its depth. Readings have to span so much of
 their range clearly below, that is, by such a share of the way, in so many rows."""
 AT_REST = 0.05
