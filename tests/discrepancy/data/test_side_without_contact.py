@@ -29,10 +29,13 @@ def test_a_damper_touches_on_both_sides_of_its_zero():
 
 
 def test_the_air_is_no_contact():
-    """A skin is pressed; from far above; and not touched at all, with noise alone."""
+    """A skin is pressed; from far above; beside a loud channel that nothing presses; and not touched at all."""
     made = course(episodes=12)
     far = replace(made, tip=np.where(made.tip[:, 2:] < 0, made.tip * [1, 1, 20], made.tip))
-    assert always_touched(made) == always_touched(far) == 0.0
+    loud = np.column_stack([made.readings, 1e3 * np.random.default_rng(4).normal(size=made.rows)])
+    centers = None if made.centers is None else np.vstack([made.centers, made.centers[:1]])
+    loud = replace(made, readings=np.where(made.averaged[:, None] > 0, loud, np.nan), centers=centers)
+    assert always_touched(made) == always_touched(far) == always_touched(loud) == 0.0
     assert always_touched(replace(made, tip=made.tip - [0, 0, 5.0])) == 0.0
 
 
