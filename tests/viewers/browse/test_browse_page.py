@@ -114,6 +114,7 @@ def test_arrow_keys_work_although_the_viewer_grabs_the_keyboard(page, served):
     page.frames[1].wait_for_function("document.title === 'pressed'")
     assert opened(page) == 3
     page.mouse.move(200, 500)
+    page.wait_for_function("document.activeElement !== document.querySelector('iframe')")
     page.keyboard.press("ArrowUp")
     page.wait_for_function("document.querySelector('tr.open td').textContent === '2'")
 
