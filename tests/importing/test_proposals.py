@@ -434,3 +434,20 @@ def test_a_tip_that_comes_from_the_air_and_one_that_sticks_have_a_side_without_c
     written(tmp_path / "log.csv", "t_s,depth_mm,F_N", T, depth, np.maximum(depth, 0) + stuck)
     found, _ = proposed(tmp_path)
     assert "offset" not in found.mapping["position"]["depth"]
+
+
+def test_cycles_that_begin_at_once_keep_their_sign(tmp_path):
+    """The first rows of a long file hold a whole stroke: they are no rest."""
+    time = np.arange(0, 60, 0.02)
+    depth = 2 * np.clip(np.sin(2 * np.pi * time / 6), -0.3, 1)
+    written(tmp_path / "log.csv", "t_s,depth_mm,reading", time, depth, 50 * np.maximum(depth, 0) ** 1.3)
+    found, _ = proposed(tmp_path)
+    assert "scale" not in found.mapping["position"]["depth"]
+    assert "offset" not in found.mapping["position"]["depth"]
+
+
+def test_a_line_that_broke_off_is_told_by_its_number(tmp_path):
+    rows = [f'{{"t_s": {0.02 * k}, "depth_mm": {k % 9}, "r": {k}}}' for k in range(30)]
+    (tmp_path / "log.jsonl").write_text("\n".join([*rows, rows[0][:12]]))
+    with pytest.raises(FormatError, match=r"line 31: no JSON"):
+        described(tmp_path / "log.jsonl")

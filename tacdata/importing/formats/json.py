@@ -26,7 +26,7 @@ class Json(SourceFormat):
         """Read what has rows. See the base."""
         text = path.read_text(encoding="utf-8-sig")
         by_line = path.suffix.lower() in LINES
-        whole = [json.loads(line) for line in text.splitlines() if line.strip()] if by_line else json.loads(text)
+        whole = _by_line(path, text) if by_line else json.loads(text)
         arrays = {name: _array(values) for name, values in _lists(whole).items()}
         table = rows_of(path, arrays, options)
         if table.rows < FEWEST:
@@ -35,6 +35,20 @@ class Json(SourceFormat):
                 "leave it out, or save what was recorded as a table",
             )  # fmt: skip
         return table
+
+
+def _by_line(path: Path, text: str) -> list[Any]:
+    """Return what each line holds."""
+    rows = []
+    for number, line in enumerate(text.splitlines(), 1):
+        try:
+            rows += [json.loads(line)] if line.strip() else []
+        except json.JSONDecodeError as error:
+            raise FormatError(
+                f"{path}, line {number}: no JSON ({line[:40]})", "a value a line",
+                "take that line out of a copy, as a recording that broke off leaves one, and import the copy",
+            ) from error  # fmt: skip
+    return rows
 
 
 def _lists(value: Any, name: str = "") -> dict[str, list[Any]]:

@@ -18,7 +18,7 @@ from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
 from tacdata.importing.proposing.roles import roles_of
-from tacdata.importing.proposing.strokes import PressingAxis, pressing_axis
+from tacdata.importing.proposing.strokes import CLEAR, PressingAxis, pressing_axis
 from tacdata.importing.times import layouts_of, times
 from tacdata.importing.units import factor, plain
 
@@ -144,7 +144,8 @@ def _motion(
     clock = document["files"][position["file"]]["time"]
     try:
         time_ns, _ = times(table, clock, "")
-        motion = pressing_axis(time_ns, table.column(name).astype(float), _deviation(table, channels))
+        axis = table.column(name).astype(float)
+        motion = pressing_axis(time_ns, axis, _deviation(table, channels, axis))
     except (FormatError, ValueError):
         return  # said where the clock was read
     is_depth = "depth" in found
@@ -210,14 +211,20 @@ def _cut(document: dict[str, Any], motion: PressingAxis, above: float | None, as
         )
 
 
-def _deviation(table: SourceTable, channels: list[str]) -> np.ndarray | None:
-    """Return how far the readings are from their first rows, each by its own range, shape (rows,); None if unknown."""
+def _deviation(table: SourceTable, channels: list[str], axis: np.ndarray) -> np.ndarray | None:
+    """Return how far the readings are from their first rows, each by its own range, shape (rows,); None if unknown.
+
+    First rows end where the axis moves: cycles may begin at once.
+    """
     parts = [table.column(name) for name in channels if name in table.columns]
     if not parts:
         return None
     values = np.column_stack(parts).astype(float)
     spread = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
-    first = np.nanmedian(values[: max(len(values) // 50, 1)], axis=0)
+    known = np.flatnonzero(np.isfinite(axis))
+    way = np.abs(axis - axis[known[:1]].sum())
+    moved = np.flatnonzero(way > CLEAR * np.ptp(axis[known])) if len(known) else known
+    first = np.nanmedian(values[: max(min([len(values) // 50, *moved[:1].tolist()]), 1)], axis=0)
     return np.nanmean(np.abs(values - first) / np.where(spread > 0, spread, 1.0), axis=1)
 
 
