@@ -11,7 +11,7 @@ from tacdata.discrepancy.alarms.all_alarms import alarms
 from tacdata.discrepancy.data.checks import DataChecks, check
 from tacdata.discrepancy.levels.lack_of_fit import lack_of_fit, with_families
 from tacdata.discrepancy.levels.margins import beside_remainder
-from tacdata.discrepancy.levels.several_names import loan
+from tacdata.discrepancy.levels.several_names import form_error
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.search.find import find
@@ -78,7 +78,7 @@ def judge(
     beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
     note("the gap on sealed presses")
     shown = gap(course, found, sealed)
-    seen = alarms(found.final, loan(found)) if until == STEPS[-1] else ()
+    seen = alarms(found.final, form_error(found)) if until == STEPS[-1] else ()
     decision = decide(found, checks, beside, shown, lacking, seen)
     before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))
     written = document(decision, found, checks, (before, after), parents or {}, shown)

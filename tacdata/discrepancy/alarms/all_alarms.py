@@ -11,14 +11,14 @@ from tacdata.discrepancy.alarms.swings import swings
 from tacdata.discrepancy.search.problem import Problem
 
 
-def alarms(problem: Problem, loan: float = 0.0) -> tuple[Alarm, ...]:
+def alarms(problem: Problem, form_error: float = 0.0) -> tuple[Alarm, ...]:
     """Return what the residual of a problem's model shows without any form.
 
     Args:
         problem: The model, with the effects of the answer.
-        loan: What their forms may leave: half a sum of squares [1].
+        form_error: What their forms may leave: half a sum of squares [1].
     """
-    cleaned = Cleaned.of(problem, loan)
+    cleaned = Cleaned.of(problem, form_error)
     # What moves readings while the path moves shows in more than one test: the finest that sees it speaks.
     moving = channel_histories(cleaned) or swings(cleaned) or motor_lines(cleaned)
     return (*moving, *press_depths(cleaned))

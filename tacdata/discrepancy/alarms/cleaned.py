@@ -35,11 +35,11 @@ class Cleaned:
     """Its episode, shape (presses,), int64."""
     noise: Noise
     """Of channels alone."""
-    loan: float = 0.0
+    form_error: float = 0.0
     """What the forms of its effects may leave, as half a whitened sum of squares [1]."""
 
     @classmethod
-    def of(cls, problem: Problem, loan: float = 0.0) -> Cleaned:
+    def of(cls, problem: Problem, form_error: float = 0.0) -> Cleaned:
         """Return what a problem's model leaves, its effects' forms some of it."""
         null, setting = problem.null, problem.setting
         course, placed = setting.course, [*setting.given, *problem.placed]
@@ -56,7 +56,7 @@ class Cleaned:
         missing = None if noise.missing is None else noise.missing[:, :channels]
         own = Noise(noise.scale[:channels], noise.memory, noise.step, relative_scale=relative, missing=missing)
         return cls(problem, left[:, :channels].astype(float), rise, course.speed[course.read], begins,
-                   episode[begins], own, loan)  # fmt: skip
+                   episode[begins], own, form_error)  # fmt: skip
 
     @property
     def course(self) -> Course:
@@ -77,7 +77,7 @@ class Cleaned:
     @property
     def least_of_channels(self) -> float:
         """The same for single channels. None creeps by quite the law of another."""
-        return max(self.least, 2 * self.loan)
+        return max(self.least, 2 * self.form_error)
 
     def whitened(self, column: np.ndarray) -> np.ndarray:
         """Return a column of each channel (m, channels) as noise is whitened, but for what a press errs by."""

@@ -34,10 +34,10 @@ def stands_in(found: Findings, finding: FoundEffect, lacking: Mapping[Family, La
 
 def lent(found: Findings, finding: FoundEffect) -> bool:
     """Return whether an effect explains no more than another's form may leave."""
-    return finding.bought < loan(found)
+    return finding.bought < form_error(found)
 
 
-def loan(found: Findings) -> float:
+def form_error(found: Findings) -> float:
     """Return what an effect's form may leave: half a whitened sum of squares [1]."""
     raced = [f for f in found.effects if f.corrected_p is not None]
     return max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)

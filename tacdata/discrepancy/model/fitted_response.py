@@ -159,7 +159,7 @@ class FittedResponse(Response):
             self._weights[k] = self._weights[k].copy()
             self._weights[k][:, of] += more
 
-    def left_next(self, residual: np.ndarray, features: np.ndarray) -> np.ndarray:
+    def residual_after(self, residual: np.ndarray, features: np.ndarray) -> np.ndarray:
         """Return what the next correction would leave if effects were linear in load, shape (m, streams).
 
         Args:

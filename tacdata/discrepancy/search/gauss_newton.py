@@ -31,7 +31,7 @@ KNOWN = 0.5
 """A shape is known if its standard error is smaller [its value]."""
 LARGEST_LEVERAGE = 0.9
 """CR3: largest leverage of an episode [1]."""
-UNREACHED = 1.1
+CONVERGED = 1.1
 """A fitted response has converged if it leaves at most so much of what its next correction would leave [1]."""
 
 
@@ -217,11 +217,11 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
     found = episode_grams(clean, course.reduced, null.nuisances, null.inner)
     still = _without(found.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
     left = clean[:, :, 0] - null.nuisances @ still.astype(np.float32)
-    energy = _energy(found, still) + _unreached(rest, course, response, whitener, null.noise.scale)
+    energy = _energy(found, still) + _unconverged(rest, course, response, whitener, null.noise.scale)
     return _View(clean, whitener, energy, left, chain)
 
 
-def _unreached(
+def _unconverged(
     rest: np.ndarray, course: Course, response: Response, whitener: Whitener, scale: np.ndarray
 ) -> np.ndarray:  # fmt: skip
     """Return what a response should have taken up and did not: half the sum of squares, shape (episodes,).
@@ -232,9 +232,9 @@ def _unreached(
     if not isinstance(response, FittedResponse) or whitener.features is None:
         return np.zeros(course.episodes)
     keep = course.channels + (course.force is not None)
-    after = response.left_next(rest[:, :keep], whitener.features)
+    after = response.residual_after(rest[:, :keep], whitener.features)
     now, then = (about_means(own[:, :keep] / scale[:keep], course).sum(axis=1) for own in (rest, after))
-    return 0.5 * now * max(1 - UNREACHED * float(then.sum()) / max(float(now.sum()), 1e-300), 0.0)
+    return 0.5 * now * max(1 - CONVERGED * float(then.sum()) / max(float(now.sum()), 1e-300), 0.0)
 
 
 def _state(setting: Setting, response: Response, placed: list[Placed], view: _View, null: NullModel) -> _State:

@@ -19,10 +19,10 @@ IDLE = 5000.0
 MOVING = 0.05
 
 
-def seen(made, loan=0.0):
+def seen(made, form_error=0.0):
     """Return what the residual of a fitted response shows, in words."""
     setting = Setting(made, FittedResponse(made), library())
-    return [alarm.seen for alarm in alarms(prepare(setting, null_model(setting)), loan)]
+    return [alarm.seen for alarm in alarms(prepare(setting, null_model(setting)), form_error)]
 
 
 def changed(made, change):
