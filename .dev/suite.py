@@ -48,9 +48,11 @@ class Checks:
         # One thread a process: more would only wait for those of the others. Where a verb takes two, they sleep while
         # they wait: by default they spin, which costs three times the work on a machine whose cores are all taken.
         environment = {
-            **_compiling(), "OMP_NUM_THREADS": str(max(1, _cores() // MOST)), "OMP_WAIT_POLICY": "PASSIVE",
+            **_compiling(),
+            "OMP_NUM_THREADS": str(max(1, _cores() // MOST)),
+            "OMP_WAIT_POLICY": "PASSIVE",
             "PYTHONUNBUFFERED": "1",
-        }  # fmt: skip
+        }
         with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, env=environment) as done:
             # Piece by piece: pytest's dots come long before the end of their line.
             while piece := os.read(done.stdout.fileno(), 65536).decode(errors="replace"):
@@ -114,6 +116,7 @@ def main(arguments):
         for words in (["-m", "compileall", "-q", *PACKAGES], ["tests/running/rewritten.py"])
     ]
     checks.run("lint", [str(BIN / "ruff"), "check", "."])
+    checks.run("format", [str(BIN / "ruff"), "format", "--check", "--quiet", "."])
     checks.run("imports", [str(BIN / "lint-imports")])
     checks.run("types", [str(BIN / "ty"), "check", "--no-progress"])
     for process in compiling:

@@ -80,8 +80,10 @@ def error_classes(trees) -> set[str]:
     """Return the names of `TacdataError` and of all classes below it."""
     bases = {
         node.name: {ast.unparse(base).rsplit(".", 1)[-1] for base in node.bases}
-        for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)
-    }  # fmt: skip
+        for tree in trees
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+    }
     found = {BASE}
     while more := {name for name, above in bases.items() if above & found} - found:
         found |= more
@@ -130,8 +132,9 @@ def assignments(scope: ast.AST) -> list[tuple[int, str, ast.expr]]:
     return [
         (0 if top else node.lineno, target.id, node.value)
         for node in sorted(nodes, key=lambda node: node.lineno)
-        for target in node.targets if isinstance(target, ast.Name)
-    ]  # fmt: skip
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    ]
 
 
 def parts_of(node: ast.expr) -> list[ast.expr]:
@@ -149,8 +152,9 @@ def messages(parts: list[ast.expr], known: dict[str, ast.expr]) -> list[tuple[st
     every = itertools.islice(itertools.product(*spelled), MOST_VARIANTS) if spelled else ()
     return [
         (given, allowed if worded(allowed) else LISTED, remedy if worded(remedy) else SAID)
-        for given, allowed, remedy in every if worded(given)
-    ]  # fmt: skip
+        for given, allowed, remedy in every
+        if worded(given)
+    ]
 
 
 def worded(text: str) -> bool:

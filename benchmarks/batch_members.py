@@ -54,7 +54,10 @@ def plan(sensor: Sensor, count: int) -> list[PressRequest]:
     drawn, ladder = training_plan(sensor, 24, 0), Ladder()
     presses = [
         PressRequest(
-            from_document(drawn["indenters"][p["indenter"]], p["indenter"]), p["x"], p["y"], p["yaw"],
+            from_document(drawn["indenters"][p["indenter"]], p["indenter"]),
+            p["x"],
+            p["y"],
+            p["yaw"],
             ladder.depths(p["depth"]),
         )
         for p in drawn["presses"]
@@ -98,11 +101,15 @@ def main() -> None:
     last = [max(member.ended for member in some) for some in (alone, beside[:-1])]
     stalled = beside[-1]
     figures = {
-        "device": arguments.device, "presses": len(requests), "failed": sum(bool(one.failed) for one in alone),
-        "steps_median": float(np.median(steps)), "steps_slowest_over_median": float(steps.max() / np.median(steps)),
+        "device": arguments.device,
+        "presses": len(requests),
+        "failed": sum(bool(one.failed) for one in alone),
+        "steps_median": float(np.median(steps)),
+        "steps_slowest_over_median": float(steps.max() / np.median(steps)),
         "steps_a_state_median": float(np.median(share)),
         "steps_a_state_slowest_over_median": float(share.max() / np.median(share)),
-        "seconds_of_all": last[0], "seconds_until_the_others_are_done_beside_one_that_stalls": last[1],
+        "seconds_of_all": last[0],
+        "seconds_until_the_others_are_done_beside_one_that_stalls": last[1],
         "seconds_of_the_one_that_stalls_alone_at_the_end": max(0.0, stalled.ended - last[1]),
         "what_became_of_it": stalled.failed or f"found, {stalled.steps} steps",
     }

@@ -56,14 +56,23 @@ def main():
             off, spread = (np.array(part) for part in zip(*found, strict=True))
             outside = int((np.abs(off) > 3 * spread).any(axis=1).sum())
             deep = 1000 * np.abs(off[:, 5])
-            rows.append({
-                "turn": name, "distance": distance, "images": len(found), "outside": outside,
-                "median_mm": float(np.median(deep)), "worst_mm": float(deep.max()),
-                "stated_mm": float(1000 * np.median(spread[:, 5])),
-            })  # fmt: skip
+            rows.append(
+                {
+                    "turn": name,
+                    "distance": distance,
+                    "images": len(found),
+                    "outside": outside,
+                    "median_mm": float(np.median(deep)),
+                    "worst_mm": float(deep.max()),
+                    "stated_mm": float(1000 * np.median(spread[:, 5])),
+                }
+            )
             row = rows[-1]
-            print(f"{name:<30}{distance:>7.1f} m{len(found):>8}{outside:>9}{row['median_mm']:>19.3f}, "
-                  f"{row['worst_mm']:.3f}{row['stated_mm']:>9.3f} mm", flush=True)  # fmt: skip
+            print(
+                f"{name:<30}{distance:>7.1f} m{len(found):>8}{outside:>9}{row['median_mm']:>19.3f}, "
+                f"{row['worst_mm']:.3f}{row['stated_mm']:>9.3f} mm",
+                flush=True,
+            )
     if chosen.json:
         chosen.json.write_text(json.dumps(rows, indent=1) + "\n")
 

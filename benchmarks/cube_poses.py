@@ -100,12 +100,7 @@ def shadow(random: np.random.Generator, pose: np.ndarray) -> Look:
     along = random.uniform(0, 2 * np.pi)
     out, aside = np.array([np.cos(along), np.sin(along)]), np.array([-np.sin(along), np.cos(along)])
     middle = pixel_of(pose)
-    corners = (
-        middle - 400 * aside,
-        middle + 400 * aside,
-        middle + 400 * (aside + out),
-        middle + 400 * (out - aside),
-    )
+    corners = (middle - 400 * aside, middle + 400 * aside, middle + 400 * (aside + out), middle + 400 * (out - aside))
     return Look(shadow=tuple((float(x), float(y)) for x, y in corners))
 
 

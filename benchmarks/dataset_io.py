@@ -42,16 +42,21 @@ def episode(number: int, count: int, sensor: Sensor) -> Episode:
     times = number * 10**12 + np.arange(count) * (10**9 // RATE)
     counts = random.normal(5000, 30, (count, sensor.taxels.count))
     tip = np.stack([np.zeros(count), np.zeros(count), np.linspace(-1, 1.5, count)], axis=1)
-    press = Press(
-        number, from_document({"shape": "sphere", "radius": 3.0}), "sphere", 0.0, 0.0, 0.0, 1.5, 1.0, 0.1
-    )
+    press = Press(number, from_document({"shape": "sphere", "radius": 3.0}), "sphere", 0.0, 0.0, 0.0, 1.5, 1.0, 0.1)
     return Episode(
-        path=Path(f"episode-{number:06d}.mcap"), press=press, sensor=sensor, rig={"name": "none"},
+        path=Path(f"episode-{number:06d}.mcap"),
+        press=press,
+        sensor=sensor,
+        rig={"name": "none"},
         taxels=TaxelStream(times, times, np.arange(count), counts),
-        cnc=CncStream(times, times, tip, ("Run",) * count), tags=(),
-        phases=(Phase("rest", int(times[0]), int(times[count // 4])),), tip_ns=times, tip=tip,
-        complete=True, notes=(),
-    )  # fmt: skip
+        cnc=CncStream(times, times, tip, ("Run",) * count),
+        tags=(),
+        phases=(Phase("rest", int(times[0]), int(times[count // 4])),),
+        tip_ns=times,
+        tip=tip,
+        complete=True,
+        notes=(),
+    )
 
 
 def label(of: Episode) -> Label:
@@ -61,15 +66,19 @@ def label(of: Episode) -> Label:
     dent = np.exp(-(x**2 + y**2) / 4) - 0.1
     parents = {"sensor": sensor.content_hash, "recording": frames.recording_hash(of), "model": "0" * 64}
     return Label(
-        episode=of.number, time_ns=of.taxels.sample_ns, tip=of.tip,
+        episode=of.number,
+        time_ns=of.taxels.sample_ns,
+        tip=of.tip,
         signed=(of.tip[:, 2, None, None] * dent).astype(np.float32),
-        taxel_force=np.ones((count, sensor.taxels.count), np.float32), force=np.ones((count, 3), np.float32),
+        taxel_force=np.ones((count, sensor.taxels.count), np.float32),
+        force=np.ones((count, 3), np.float32),
         taxel_closure=np.ones((count, sensor.taxels.count), np.float32),
         taxel_area=np.ones((count, sensor.taxels.count), np.float32),
-        error_map=np.full((count, *sensor.map.shape), 0.01, np.float16), error=np.full(count, 0.01, np.float32),
+        error_map=np.full((count, *sensor.map.shape), 0.01, np.float16),
+        error=np.full(count, 0.01, np.float32),
         force_error=np.full(count, 0.01, np.float32),
         provenance=provenance.stamp("benchmark", parents, {}),
-    )  # fmt: skip
+    )
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -122,11 +131,7 @@ def measure(work: Path, episodes: int, count: int, large: int) -> Iterator[tuple
         shutil.rmtree(work / "ours", ignore_errors=True)
         pack([e for e, _ in pairs], lambda e: labels[e.number], work / "ours")
 
-    yield (
-        "write, lerobot add_frame",
-        total / seconds(lambda: write_by_lerobot(work / "theirs", pairs)),
-        "frames/s",
-    )
+    yield ("write, lerobot add_frame", total / seconds(lambda: write_by_lerobot(work / "theirs", pairs)), "frames/s")
     yield "write, ours", total / min(seconds(write_ours) for _ in range(3)), "frames/s"
 
     deltas = {features.STATE: [k / RATE for k in centred()]}
@@ -155,18 +160,10 @@ def measure(work: Path, episodes: int, count: int, large: int) -> Iterator[tuple
         yield f"cold maps, {many} frames", many / seconds(lambda: read_dataset(work / "large")), "frames/s"
         far = WindowDataset(work / "large", keys=[features.DEPTH])
         spread = np.random.default_rng(1).integers(0, many, 50_000)
-        yield (
-            f"windows, ours, batches of 256 of {many} frames",
-            rate_of(lambda: batches(far, spread)),
-            "windows/s",
-        )
+        yield (f"windows, ours, batches of 256 of {many} frames", rate_of(lambda: batches(far, spread)), "windows/s")
         held = replace(far.data, columns={key: np.array(values) for key, values in far.data.columns.items()})
         memory = WindowDataset(held, keys=[features.DEPTH])
-        yield (
-            f"the same from arrays in memory, {many} frames",
-            rate_of(lambda: batches(memory, spread)),
-            "windows/s",
-        )
+        yield (f"the same from arrays in memory, {many} frames", rate_of(lambda: batches(memory, spread)), "windows/s")
 
 
 def batches(dataset, chosen: np.ndarray) -> int:
@@ -178,9 +175,7 @@ def batches(dataset, chosen: np.ndarray) -> int:
 
 def main() -> None:
     """Measure, print a table and one line of JSON."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--episodes", type=int, default=20)
     parser.add_argument("--frames", type=int, default=300, help="frames an episode")
     parser.add_argument("--large", type=int, default=100, help="episodes of the larger dataset, 0 for none")
@@ -195,17 +190,21 @@ def main() -> None:
             print(f"{name:<58} {value:>12,.0f} {unit}", flush=True)
     ratios = {
         "writing, ours over lerobot": figures["write, ours"] / figures["write, lerobot add_frame"],
-        "windows, ours in batches over lerobot": figures["windows, ours, batches of 256"]
-        / figures["windows, lerobot"],
+        "windows, ours in batches over lerobot": figures["windows, ours, batches of 256"] / figures["windows, lerobot"],
     }
     for name, value in ratios.items():
         print(f"{name:<58} {value:>12,.1f} x")
     result = {
         "benchmark": "dataset_io",
-        "episodes": options.episodes, "frames": options.frames, "large": options.large,
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores", "python": platform.python_version(),
-        "code_version": provenance.code_version(), "figures": figures, "ratios": ratios,
-    }  # fmt: skip
+        "episodes": options.episodes,
+        "frames": options.frames,
+        "large": options.large,
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+        "python": platform.python_version(),
+        "code_version": provenance.code_version(),
+        "figures": figures,
+        "ratios": ratios,
+    }
     if options.json:
         options.json.write_text(json.dumps(result, indent=1))
     print(json.dumps(result), file=sys.stdout)

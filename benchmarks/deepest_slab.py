@@ -83,7 +83,8 @@ def solve(case: str, edge: float) -> dict:
     slab = sensor(friction)
     depth = edge / 2 if case == "A4" else edge
     axes = [
-        lines(request.x, SIZE[0] / 2, edge, request), lines(request.y, SIZE[1] / 2, edge, request),
+        lines(request.x, SIZE[0] / 2, edge, request),
+        lines(request.y, SIZE[1] / 2, edge, request),
         np.concatenate([outward(SIZE[2], 0.0, depth)[::-1], [SIZE[2]]]),
     ]
     model = SkinModel(slab, ModelSettings(error_estimate=False), mesh=kuhn_mesh(slab, axes))

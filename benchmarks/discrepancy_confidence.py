@@ -70,9 +70,11 @@ def main(folder, write):
     print(f"left out: Brier {brier:.3f} (constant {truth.var():.3f}), calibration error {error:.3f}")
     if write:
         given = {
-            **fit(rows, right), "command": "python benchmarks/discrepancy_confidence.py FOLDER --write",
-            "worlds": counted(folder, "block"), "engines": counted(folder, "engine"),
-        }  # fmt: skip
+            **fit(rows, right),
+            "command": "python benchmarks/discrepancy_confidence.py FOLDER --write",
+            "worlds": counted(folder, "block"),
+            "engines": counted(folder, "engine"),
+        }
         target = Path(__file__).parents[1] / "tacdata" / "discrepancy" / "verdict" / FILE
         target.write_text(json.dumps(given, indent=1) + "\n")
         print(f"written: {target}")

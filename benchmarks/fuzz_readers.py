@@ -76,11 +76,19 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
     book.save(folder / "a.xlsx")
     found["xlsx"] = (folder / "a.xlsx").read_bytes(), ".xlsx", table
     plan = {
-        "version": "1.0", "name": "p", "indenters": {"ball": {"shape": "sphere", "radius": 2.0}},
-        "motion": {"clearance": 2.0, "travel_speed": 10.0, "approach_speed": 2.0, "press_speed": 1.0, "hold": 0.5,
-                   "rest": 0.5},
+        "version": "1.0",
+        "name": "p",
+        "indenters": {"ball": {"shape": "sphere", "radius": 2.0}},
+        "motion": {
+            "clearance": 2.0,
+            "travel_speed": 10.0,
+            "approach_speed": 2.0,
+            "press_speed": 1.0,
+            "hold": 0.5,
+            "rest": 0.5,
+        },
         "presses": [{"indenter": "ball", "x": 0.0, "y": 0.0, "depth": 1.0}],
-    }  # fmt: skip
+    }
     documents.write(folder / "plan.yaml", plan, "plan")
     documents.write(folder / "sensor.json", default_sensor().document, "sensor")
     found["plan"] = (folder / "plan.yaml").read_bytes(), ".yaml", read_plan
@@ -93,11 +101,11 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
             return from_document({"shape": "mesh", "file": path.name}, "plan", path.parent)
 
         found[ending[1:]] = (folder / f"ball{ending}").read_bytes(), ending, solid
-    urdf = '<?xml version="1.0"?><robot name="a"><link name="b"/><link name="c"/><joint name="j" type="revolute">' \
-           '<parent link="b"/><child link="c"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
-    (folder / "robot.yaml").write_text(
-        "version: '1.0'\nname: a\nurdf: a.urdf\nfingers: {index: {link: c}}\n"
+    urdf = (
+        '<?xml version="1.0"?><robot name="a"><link name="b"/><link name="c"/><joint name="j" type="revolute">'
+        '<parent link="b"/><child link="c"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
     )
+    (folder / "robot.yaml").write_text("version: '1.0'\nname: a\nurdf: a.urdf\nfingers: {index: {link: c}}\n")
 
     def robot(path: Path) -> object:
         path.replace(folder / "a.urdf")
@@ -214,8 +222,11 @@ def main() -> None:
                     faults.setdefault(f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}", seed)
                 path.unlink(missing_ok=True)
             result[what] = {**counts, "faults": faults}
-            print(f"{what:<8} {chosen.tries} tries: {counts['read']} read, {counts['refused']} refused in words, "
-                  f"{counts['fault']} faults", flush=True)  # fmt: skip
+            print(
+                f"{what:<8} {chosen.tries} tries: {counts['read']} read, {counts['refused']} refused in words, "
+                f"{counts['fault']} faults",
+                flush=True,
+            )
             for words, seed in faults.items():
                 print(f"    {words} (first with seed {seed})", flush=True)
     if chosen.json:

@@ -48,18 +48,30 @@ def rig_of(seed):
         turn = Rotation.from_rotvec(rng.normal(0, SPREAD[1], 3)) * Rotation.from_matrix(pose[:3, :3])
         truth[name] = pose
         cameras[name] = {
-            "driver": "opencv_camera", "source": 0, "intrinsics": dict(INTRINSICS),
+            "driver": "opencv_camera",
+            "source": 0,
+            "intrinsics": dict(INTRINSICS),
             "world": {
-                "version": "1.0", "camera": name, "frame": "table",
-                "position": (pose[:3, 3] + rng.normal(0, SPREAD[0], 3)).tolist(), "quaternion": turn.as_quat().tolist(),
-                "method": "virtual board", "poses": 1, "residual": {"position": SPREAD[0], "rotation": SPREAD[1]},
-                "spread": {"position": SPREAD[0], "rotation": SPREAD[1]}, "date": "2026-01-01", "code_version": "",
+                "version": "1.0",
+                "camera": name,
+                "frame": "table",
+                "position": (pose[:3, 3] + rng.normal(0, SPREAD[0], 3)).tolist(),
+                "quaternion": turn.as_quat().tolist(),
+                "method": "virtual board",
+                "poses": 1,
+                "residual": {"position": SPREAD[0], "rotation": SPREAD[1]},
+                "spread": {"position": SPREAD[0], "rotation": SPREAD[1]},
+                "date": "2026-01-01",
+                "code_version": "",
             },
-        }  # fmt: skip
+        }
     document = {
-        "version": "1.0", "name": "bench", "fingers": FINGERS,
-        "boards": {n: {"driver": "capacitive_board", "port": "x"} for n in FINGERS["fingers"]}, "cameras": cameras,
-    }  # fmt: skip
+        "version": "1.0",
+        "name": "bench",
+        "fingers": FINGERS,
+        "boards": {n: {"driver": "capacitive_board", "port": "x"} for n in FINGERS["fingers"]},
+        "cameras": cameras,
+    }
     return demo_rig_of(document, "bench.yaml"), truth
 
 
@@ -84,10 +96,17 @@ def view(hand, finger, camera, eye, begin, seconds, rng, mirrored, hidden):
     seen = ~((times - begin > hidden[0]) & (times - begin < hidden[1])) & (rng.random(count) < 0.9)
     first = FINGERS["fingers"][finger]["cube"]["ids"]["+x"]
     stream = TagStream(
-        camera, START + np.rint((times - begin) * 1e9).astype(np.int64)[seen], position[seen], turns.as_quat()[seen],
-        np.full(count, 0.1)[seen], np.full(count, 2)[seen], covariance[seen], np.zeros(count, bool)[seen],
-        ((first, first + 1),) * int(seen.sum()), finger,
-    )  # fmt: skip
+        camera,
+        START + np.rint((times - begin) * 1e9).astype(np.int64)[seen],
+        position[seen],
+        turns.as_quat()[seen],
+        np.full(count, 0.1)[seen],
+        np.full(count, 2)[seen],
+        covariance[seen],
+        np.zeros(count, bool)[seen],
+        ((first, first + 1),) * int(seen.sum()),
+        finger,
+    )
     return stream, is_mirrored[seen]
 
 
@@ -116,14 +135,18 @@ def judged(seed, task, begin, seconds, mirrored):
         bridged |= (times > a) & (times < b)
     outside = (np.abs(off) > 3 * spread).any(axis=1) | (np.abs(turns) > 3 * turned).any(axis=1)
     return {
-        "right": int((~bad).sum()), "right_left_out": int((~bad & ~path.accepted).sum()), "mirrored": int(bad.sum()),
-        "mirrored_left_out": int((bad & ~path.accepted).sum()), "frames": int(inside.sum()),
-        "outside": int(outside.sum()), "bridged": int(bridged[inside].sum()),
+        "right": int((~bad).sum()),
+        "right_left_out": int((~bad & ~path.accepted).sum()),
+        "mirrored": int(bad.sum()),
+        "mirrored_left_out": int((bad & ~path.accepted).sum()),
+        "frames": int(inside.sum()),
+        "outside": int(outside.sum()),
+        "bridged": int(bridged[inside].sum()),
         "outside_bridged": int((outside & bridged[inside]).sum()),
         "error_mm": float(1000 * np.median(np.linalg.norm(off, axis=1))),
         "stated_mm": float(1000 * np.median(np.linalg.norm(spread, axis=1))),
         "worst_mm": float(1000 * np.linalg.norm(off, axis=1).max()),
-    }  # fmt: skip
+    }
 
 
 def moments(seed, starts, taken):
@@ -159,11 +182,15 @@ def report(task, rows, seconds):
     worst = max(row["right_left_out"] / row["right"] for row in rows)
     uncovered = np.array([row["outside"] / row["frames"] for row in rows])
     print(f"{task}: {len(rows)} recordings of {seconds:g} s")
-    print(f"  right sightings left out   {total['right_left_out'] / total['right']:.2%}, worst {worst:.2%}, "
-          f"above 1 % in {sum(row['right_left_out'] > 0.01 * row['right'] for row in rows)}")  # fmt: skip
+    print(
+        f"  right sightings left out   {total['right_left_out'] / total['right']:.2%}, worst {worst:.2%}, "
+        f"above 1 % in {sum(row['right_left_out'] > 0.01 * row['right'] for row in rows)}"
+    )
     print(f"  mirrored ones left out     {total['mirrored_left_out']} of {total['mirrored']}")
-    print(f"  frames outside of 3 sd     {total['outside'] / total['frames']:.2%}, worst {uncovered.max():.2%}, "
-          f"above 1 % in {(uncovered > 0.01).sum()}")  # fmt: skip
+    print(
+        f"  frames outside of 3 sd     {total['outside'] / total['frames']:.2%}, worst {uncovered.max():.2%}, "
+        f"above 1 % in {(uncovered > 0.01).sum()}"
+    )
     print(f"  the same in gaps           {total['outside_bridged']} of {total['bridged']}")
     error, stated = (np.median([row[key] for row in rows]) for key in ("error_mm", "stated_mm"))
     print(f"  error, stated [mm]         {error:.3f}, {stated:.3f}; worst {max(r['worst_mm'] for r in rows):.1f}")

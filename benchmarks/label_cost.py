@@ -32,8 +32,14 @@ def jobs(sensor: Sensor, count: int) -> list[Job]:
     plan, ladder = training_plan(sensor, 24, 0), Ladder()
     made = [
         Job(
-            sensor.content_hash, "benchmark", plan["indenters"][press["indenter"]], press["x"], press["y"],
-            press["yaw"], ladder.depths(press["depth"]), ladder.tolerance,
+            sensor.content_hash,
+            "benchmark",
+            plan["indenters"][press["indenter"]],
+            press["x"],
+            press["y"],
+            press["yaw"],
+            ladder.depths(press["depth"]),
+            ladder.tolerance,
         )
         for press in plan["presses"]
     ]

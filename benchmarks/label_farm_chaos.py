@@ -42,10 +42,16 @@ def main() -> None:
         in_peace = time.monotonic() - began
         again = chaos.compare(chaotic, peaceful, names, presses)
     figures = {
-        "jobs": SESSIONS * presses, "killed": dict(killed), "open_at_last_kill": left,
-        "seconds": round(seconds, 1), "seconds_in_peace_without_work": round(in_peace, 1), "solved_again": again,
-        "lost": 0, "doubled": 0, "different": 0,
-    }  # fmt: skip
+        "jobs": SESSIONS * presses,
+        "killed": dict(killed),
+        "open_at_last_kill": left,
+        "seconds": round(seconds, 1),
+        "seconds_in_peace_without_work": round(in_peace, 1),
+        "solved_again": again,
+        "lost": 0,
+        "doubled": 0,
+        "different": 0,
+    }
     print(json.dumps(figures))
 
 

@@ -108,8 +108,9 @@ class Race:
                 raise UsageError(
                     f"after {time.perf_counter() - began:.0f} s not every worker has solved a press: "
                     f"{[change.error for change in self._ledger.changes(0) if not change.done] or 'no failure'}",
-                    "workers that solve a press each", "see the reason above",
-                )  # fmt: skip
+                    "workers that solve a press each",
+                    "see the reason above",
+                )
             self._turn()
         self._wait()
         return time.perf_counter() - began
@@ -163,9 +164,15 @@ def compare(asked: argparse.Namespace, devices: list[str]) -> None:
     version = model.version(asked.factory, sensor).content_hash
     presses, single = Presses(sensor, version, asked.depth), 0.0
     report(
-        "machine", len(devices), "devices", devices=devices, cores=environment.cores(),
-        python=platform.python_version(), code=provenance.code_version(), model=version[:12],
-    )  # fmt: skip
+        "machine",
+        len(devices),
+        "devices",
+        devices=devices,
+        cores=environment.cores(),
+        python=platform.python_version(),
+        code=provenance.code_version(),
+        model=version[:12],
+    )
     for count in asked.counts or range(1, len(devices) + 1):
         with tempfile.TemporaryDirectory() as name:
             race = Race(Path(name) / "store", asked.factory, sensor, version, devices[:count])
@@ -177,9 +184,16 @@ def compare(asked: argparse.Namespace, devices: list[str]) -> None:
         rate = asked.each * count / seconds
         single = single or rate / count
         report(
-            "labels", rate, "labels/s", devices=count, labels=asked.each * count, failed=failed,
-            seconds=round(seconds, 1), warm_seconds=round(warm, 1), efficiency=round(rate / (count * single), 3),
-        )  # fmt: skip
+            "labels",
+            rate,
+            "labels/s",
+            devices=count,
+            labels=asked.each * count,
+            failed=failed,
+            seconds=round(seconds, 1),
+            warm_seconds=round(warm, 1),
+            efficiency=round(rate / (count * single), 3),
+        )
 
 
 if __name__ == "__main__":

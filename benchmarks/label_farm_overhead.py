@@ -46,9 +46,18 @@ def instant_path(sensor: Sensor, depths: tuple[float, ...]) -> PathSolution:
     taxels = depth[:, None] * np.ones(sensor.taxels.count)
     zero = np.zeros(len(depth))
     return PathSolution(
-        depth=depth, surface=surface, numerical=np.zeros_like(surface), taxel_force=taxels, taxel_force_error=taxels,
-        taxel_closure=taxels, taxel_area=taxels, force=depth[:, None] * np.ones(3), force_error=zero, residual=zero,
-        penetration=zero, provenance={},
+        depth=depth,
+        surface=surface,
+        numerical=np.zeros_like(surface),
+        taxel_force=taxels,
+        taxel_force_error=taxels,
+        taxel_closure=taxels,
+        taxel_area=taxels,
+        force=depth[:, None] * np.ones(3),
+        force_error=zero,
+        residual=zero,
+        penetration=zero,
+        provenance={},
     )
 
 
@@ -132,13 +141,7 @@ def main() -> None:
     asked = parser.parse_args()
     os.environ["PYTHONPATH"] = str(Path(__file__).resolve().parent)
     sensor = default_sensor()
-    report(
-        "machine",
-        environment.cores(),
-        "cores",
-        python=platform.python_version(),
-        code=provenance.code_version(),
-    )
+    report("machine", environment.cores(), "cores", python=platform.python_version(), code=provenance.code_version())
     wanted = jobs(asked.jobs, InstantModel(sensor).content_hash, sensor)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -38,8 +38,14 @@ def jobs(sensor: Sensor, count: int, seed: int, ladder: Ladder) -> list[Job]:
     presses = [plan["presses"][k] for k in np.random.default_rng(seed).permutation(24)[:count]]
     return [
         Job(
-            sensor.content_hash, "benchmark", plan["indenters"][press["indenter"]], press["x"], press["y"],
-            press["yaw"], ladder.depths(press["depth"]), ladder.tolerance,
+            sensor.content_hash,
+            "benchmark",
+            plan["indenters"][press["indenter"]],
+            press["x"],
+            press["y"],
+            press["yaw"],
+            ladder.depths(press["depth"]),
+            ladder.tolerance,
         )
         for press in presses
     ]
@@ -47,9 +53,7 @@ def jobs(sensor: Sensor, count: int, seed: int, ladder: Ladder) -> list[Job]:
 
 def solved(farm: FemModel, asked: list[Job]) -> dict[tuple[float, float], PathSolution]:
     """Return solutions by place."""
-    return {
-        (job.x, job.y): solution for job, solution in farm.solve_many(asked) if isinstance(solution, PathSolution)
-    }
+    return {(job.x, job.y): solution for job, solution in farm.solve_many(asked) if isinstance(solution, PathSolution)}
 
 
 def lost(known: PathSolution, truth: PathSolution, loading: bool) -> np.ndarray:
@@ -69,12 +73,15 @@ def lost(known: PathSolution, truth: PathSolution, loading: bool) -> np.ndarray:
     dented = own.states[new] > DENTED * at[:, None]
     count = np.maximum(dented.sum(axis=1), 1)
     peak = np.linalg.norm(own_force.states, axis=1).max()
-    return np.stack([
-        1e3 * np.sqrt((error**2 * dented).sum(axis=1) / count),
-        100 * np.linalg.norm(force.at(at) - own_force.states[new], axis=1) / peak,
-        ((error <= bound + 1e-4) & dented).sum(axis=1) / count,
-        ((error <= 2 * stated + 1e-4) & dented).sum(axis=1) / count,
-    ], axis=1)  # fmt: skip
+    return np.stack(
+        [
+            1e3 * np.sqrt((error**2 * dented).sum(axis=1) / count),
+            100 * np.linalg.norm(force.at(at) - own_force.states[new], axis=1) / peak,
+            ((error <= bound + 1e-4) & dented).sum(axis=1) / count,
+            ((error <= 2 * stated + 1e-4) & dented).sum(axis=1) / count,
+        ],
+        axis=1,
+    )
 
 
 def main() -> None:

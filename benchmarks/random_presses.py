@@ -151,13 +151,23 @@ def main() -> None:
                 if not possible(requests[index], sensor):
                     refused += 1
                     continue
-                lost.append({
-                    "skin": number, "press": mine[index], "friction": sensor.contact.friction,
-                    "nu": sensor.material.poisson_ratio,
-                    "thickness": sensor.skin.thickness, "indenter": press.indenter.document, "x": press.x, "y": press.y,
-                    "yaw": press.yaw, "tilt": [press.tilt_x, press.tilt_y], "depth": press.depth, "at": depth,
-                    "reason": state.given,
-                })
+                lost.append(
+                    {
+                        "skin": number,
+                        "press": mine[index],
+                        "friction": sensor.contact.friction,
+                        "nu": sensor.material.poisson_ratio,
+                        "thickness": sensor.skin.thickness,
+                        "indenter": press.indenter.document,
+                        "x": press.x,
+                        "y": press.y,
+                        "yaw": press.yaw,
+                        "tilt": [press.tilt_x, press.tilt_y],
+                        "depth": press.depth,
+                        "at": depth,
+                        "reason": state.given,
+                    }
+                )
             else:
                 steps.append(state.newton)
                 changed += state.changed
@@ -169,10 +179,14 @@ def main() -> None:
     print(f"{refused} presses refused before they were solved")
     low, high = binomtest(len(lost), count).proportion_ci(method="wilson")
     median, p95 = np.percentile(steps, [50, 95])
-    print(f"{len(lost)} of {count} presses without an equilibrium: {100 * len(lost) / count:.2f} %"
-          f" ({100 * low:.2f} to {100 * high:.2f} %)")
-    print(f"Newton steps a state: median {median:.0f}, 95th percentile {p95:.0f}; a press: median"
-          f" {np.median(of_press):.0f}, most {max(of_press)}")
+    print(
+        f"{len(lost)} of {count} presses without an equilibrium: {100 * len(lost) / count:.2f} %"
+        f" ({100 * low:.2f} to {100 * high:.2f} %)"
+    )
+    print(
+        f"Newton steps a state: median {median:.0f}, 95th percentile {p95:.0f}; a press: median"
+        f" {np.median(of_press):.0f}, most {max(of_press)}"
+    )
     print(f"{100 * changed / sum(steps):.0f} % of the steps changed the contact")
     if seconds:
         print(f"CPU seconds a press: median {np.median(seconds):.1f}, most {max(seconds):.1f}")
@@ -182,9 +196,13 @@ def main() -> None:
         print(f"  {entry['reason']}")
     if arguments.json:
         result = {
-            "presses": count, "refused": refused, "lost": lost,
+            "presses": count,
+            "refused": refused,
+            "lost": lost,
             "newton": {"median": median, "p95": p95, "most": max(of_press)},
-            "shapes": shapes, "device": arguments.device, "cpu_seconds": seconds,
+            "shapes": shapes,
+            "device": arguments.device,
+            "cpu_seconds": seconds,
         }
         arguments.json.write_text(json.dumps(result, indent=1))
 

@@ -113,12 +113,14 @@ def header() -> Header:
     """Return what a recording is headed with."""
     plan = Plan.from_document(
         {
-            "version": "1.0", "name": "load", "indenters": {"ball": {"shape": "sphere", "radius": 3.0}},
+            "version": "1.0",
+            "name": "load",
+            "indenters": {"ball": {"shape": "sphere", "radius": 3.0}},
             "motion": {"clearance": 3, "travel_speed": 20, "approach_speed": 5, "press_speed": 1, "hold": 1, "rest": 1},
             "presses": [{"indenter": "ball", "x": 0, "y": 0, "depth": 0.5}],
         },
         "load",
-    )  # fmt: skip
+    )
     rig = {"registration": {"origin": [0, 0, 0], "yaw": 0}, "cameras": {name: {} for name in CAMERAS}}
     return Header(plan.presses[0], default_sensor(), rig, plan.document or {}, {}, {})
 
@@ -167,13 +169,18 @@ def run(seconds: float, folder: Path) -> dict:
         path = writer.close(True, "", models, {"taxels": counts})
     emulator.terminate()
     return {
-        "seconds": round(took, 1), "cpu_percent_of_one_core": round(100 * spent / took, 1), **_file(path),
-        "frames_lost_by_counter": counts.lost, "frames_corrupt": counts.corrupt, "images_given": given,
+        "seconds": round(took, 1),
+        "cpu_percent_of_one_core": round(100 * spent / took, 1),
+        **_file(path),
+        "frames_lost_by_counter": counts.lost,
+        "frames_corrupt": counts.corrupt,
+        "images_given": given,
         "memory_mb": {"first": round(memory[0]), "last": round(memory[-1]), "slope_mb_per_min": _slope(memory)},
-        "most_waiting_for_disk_mb": round(max(waiting), 2), "jitter_ms": round(models["taxels"].jitter_ns / 1e6, 2),
+        "most_waiting_for_disk_mb": round(max(waiting), 2),
+        "jitter_ms": round(models["taxels"].jitter_ns / 1e6, 2),
         "peak_memory_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3),
         "load_average": round(os.getloadavg()[0], 2),
-    }  # fmt: skip
+    }
 
 
 def _slope(memory: list[float]) -> float | None:

@@ -53,9 +53,17 @@ def demonstration(seed, thing):
         truth = np.array([hand.press(name, t)[2] for t in seconds])
         felt = np.maximum(truth - rng.uniform(0, SHALLOW), 0) + (truth > 0) * rng.normal(0, SCATTER, count)
         tracks[name] = FingerTrack(
-            name, "right", name, path.position, turns, path.covariance, np.logical_not(known), len(seen), 0,
+            name,
+            "right",
+            name,
+            path.position,
+            turns,
+            path.covariance,
+            np.logical_not(known),
+            len(seen),
+            0,
             depth=np.maximum(felt, 0).astype(np.float32)[:, None, None] * np.ones((1, 4, 4), np.float32),
-        )  # fmt: skip
+        )
     identity = {"hash": f"{seed:064x}", "network": "errors as measured", "epoch": 0, "lookahead": 0, "sensor": ""}
     return Demonstration(f"hand-{seed}", f"{seed:064x}", task, "table", FRAMES, times, tracks, {}, {}, identity)
 

@@ -55,12 +55,17 @@ def main() -> None:
         shard = read_shard(path)
         states = sum(len(solution.depth) for solution in shard.solutions.values())
         figures = {
-            "device": arguments.device, "presses": arguments.presses, "given_up": len(shard.failed), "states": states,
-            "build_seconds": built, "seconds_a_press": solved / arguments.presses,
-            "presses_an_hour": 3600 * arguments.presses / solved, "frames": frames,
+            "device": arguments.device,
+            "presses": arguments.presses,
+            "given_up": len(shard.failed),
+            "states": states,
+            "build_seconds": built,
+            "seconds_a_press": solved / arguments.presses,
+            "presses_an_hour": 3600 * arguments.presses / solved,
+            "frames": frames,
             "write_seconds_a_press": wrote / arguments.presses,
             "kB_a_press": path.stat().st_size / arguments.presses / 1e3,
-        }  # fmt: skip
+        }
     for name, value in figures.items():
         print(f"{name:>22} {value:.4g}" if isinstance(value, float) else f"{name:>22} {value}")
     if arguments.json:

@@ -50,17 +50,21 @@ def compare(found: dict[int, Figures]) -> dict:
     for (_, coarse), (b, fine) in combinations(list(enumerate(coarser)), 2):
         stated = estimate(SENSOR, found[fine], found[coarse], max(reach(SENSOR, PRESS)), fine / coarse)
         off = np.abs(found[fine].surface - best.surface)
-        pairs.append({
-            "cells": [coarse, fine],
-            "force": (stated.force / force[b]).tolist(),
-            "map_rms": (np.sqrt((stated.surface**2).mean(axis=(1, 2))) / rms[b]).tolist(),
-            "pixels_within_two": (off <= 2 * stated.surface).mean(axis=(1, 2)).tolist(),
-        })  # fmt: skip
+        pairs.append(
+            {
+                "cells": [coarse, fine],
+                "force": (stated.force / force[b]).tolist(),
+                "map_rms": (np.sqrt((stated.surface**2).mean(axis=(1, 2))) / rms[b]).tolist(),
+                "pixels_within_two": (off <= 2 * stated.surface).mean(axis=(1, 2)).tolist(),
+            }
+        )
     return {
-        "force_error": (force / best.force[:, 2]).tolist(), "map_rms_over_depth": (rms / PRESS.depths).tolist(),
+        "force_error": (force / best.force[:, 2]).tolist(),
+        "map_rms_over_depth": (rms / PRESS.depths).tolist(),
         "force_order": [float(np.polyfit(edges, np.log(e), 1)[0]) for e in force.T],
-        "map_order": [float(np.polyfit(edges, np.log(e), 1)[0]) for e in rms.T], "stated_over_true": pairs,
-    }  # fmt: skip
+        "map_order": [float(np.polyfit(edges, np.log(e), 1)[0]) for e in rms.T],
+        "stated_over_true": pairs,
+    }
 
 
 def main() -> None:

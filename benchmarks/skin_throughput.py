@@ -66,10 +66,18 @@ def main() -> None:
         torch.cuda.synchronize()
     seconds = clock() - began
     figures = {
-        "device": arguments.device, "nodes": len(model.mesh.nodes), "presses": len(requests), "batch": arguments.batch,
-        "states": states, "failures": failures, "seconds": seconds, "states_per_second": states / seconds,
-        "newton_per_state": newton / max(states, 1), "changed_contact_per_state": changed / max(states, 1),
-        "largest_residual": max(residual), "build_seconds": built,
+        "device": arguments.device,
+        "nodes": len(model.mesh.nodes),
+        "presses": len(requests),
+        "batch": arguments.batch,
+        "states": states,
+        "failures": failures,
+        "seconds": seconds,
+        "states_per_second": states / seconds,
+        "newton_per_state": newton / max(states, 1),
+        "changed_contact_per_state": changed / max(states, 1),
+        "largest_residual": max(residual),
+        "build_seconds": built,
         **model.last_run,
     }
     for name, value in figures.items():

@@ -145,9 +145,7 @@ def rows_of(name: str, entry: Entry, answer: Answer, against: Reference) -> list
 
 def speed_and_error(rows: list[dict]) -> list[str]:
     """Return one table of all codes: CPU time of an equilibrium, and the worst errors but at the first depth."""
-    lines = [
-        "| press | code | CPU s | force % | top % | contact % | protrusion % |", "|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    lines = ["| press | code | CPU s | force % | top % | contact % | protrusion % |", "|---|---|---|---|---|---|---|"]
     for press, code in dict.fromkeys((r["press"], r["code"]) for r in rows):
         own = [r for r in rows if (r["press"], r["code"]) == (press, code)]
         later = own[1:] or own

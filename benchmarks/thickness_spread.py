@@ -35,8 +35,10 @@ def main(more, x, y, radius):
     skin, centers = SkinModel(sensor), np.asarray(sensor.taxels.centers)
     whole = loads(skin, radius, x, y)
     aside = [[loads(skin, radius, *(np.array([x, y]) + sign * ASIDE * axis)) for sign in (1, -1)] for axis in np.eye(2)]
-    along = sum((plus - minus) / (2 * ASIDE) * (at - centers[:, k])
-                for k, ((plus, minus), at) in enumerate(zip(aside, (x, y), strict=True)))  # fmt: skip
+    along = sum(
+        (plus - minus) / (2 * ASIDE) * (at - centers[:, k])
+        for k, ((plus, minus), at) in enumerate(zip(aside, (x, y), strict=True))
+    )
     thicker = replace(sensor, skin=replace(sensor.skin, thickness=sensor.skin.thickness * (1 + more)))
     change = (loads(SkinModel(thicker), radius, x, y) - whole) / more
     for depth, q, r, dq in zip(DEPTHS[1:], whole, along, change, strict=True):

@@ -65,9 +65,14 @@ def main() -> None:
     for name in given.only or RECIPES:
         recipe = replace(RECIPES[name], epochs=given.epochs, batch_size=given.batch, idle_share=given.idle)
         outcomes = generalize(
-            frames, recipe, tuple(given.split or ["indenter"]), given.seeds, given.out / name.replace(" ", "-"),
-            given.device, given.threads,
-        )  # fmt: skip
+            frames,
+            recipe,
+            tuple(given.split or ["indenter"]),
+            given.seeds,
+            given.out / name.replace(" ", "-"),
+            given.device,
+            given.threads,
+        )
         for outcome in outcomes:
             if outcome.evaluation is None:
                 print(f"{name}: {outcome.reason}", file=sys.stderr)

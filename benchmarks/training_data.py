@@ -65,16 +65,23 @@ def rates_recipe(path: Path) -> Path:
         "rest": 1.0,
     }
     block = {
-        "indenter": ["sphere_2", "punch"], "depths": [0.6, 1.0], "speeds": [0.25, 0.7, 3.0], "repeats": 2,
+        "indenter": ["sphere_2", "punch"],
+        "depths": [0.6, 1.0],
+        "speeds": [0.25, 0.7, 3.0],
+        "repeats": 2,
         "at": {"kind": "points", "points": [[0.0, 0.0], [-2.5, 1.2], [3.0, -1.6], [-4.2, -3.0]]},
-        "order": "random", "purpose": "rates",
-    }  # fmt: skip
+        "order": "random",
+        "purpose": "rates",
+    }
     from tacdata.plans.specimens import specimens
 
     recipe = {
-        "version": "1.0", "name": "rates", "indenters": specimens(("sphere_2", "punch")), "motion": motion,
+        "version": "1.0",
+        "name": "rates",
+        "indenters": specimens(("sphere_2", "punch")),
+        "motion": motion,
         "blocks": [block],
-    }  # fmt: skip
+    }
     path.write_text(yaml.safe_dump(recipe, sort_keys=False))
     return path
 
@@ -92,10 +99,20 @@ def wearing_plan(path: Path, trials: int) -> Path:
         "rest": 1.0,
     }
     recipe = {
-        "version": "1.0", "name": "wearing", "indenters": specimens(("prism",)), "motion": motion,
-        "blocks": [{"indenter": "prism", "at": {"kind": "center"}, "depths": [0.9], "repeats": trials,
-                    "purpose": "wearing trial"}],
-    }  # fmt: skip
+        "version": "1.0",
+        "name": "wearing",
+        "indenters": specimens(("prism",)),
+        "motion": motion,
+        "blocks": [
+            {
+                "indenter": "prism",
+                "at": {"kind": "center"},
+                "depths": [0.9],
+                "repeats": trials,
+                "purpose": "wearing trial",
+            }
+        ],
+    }
     path.write_text(yaml.safe_dump(recipe, sort_keys=False))
     return path
 

@@ -41,9 +41,10 @@ LINK = 4_000_000
 """Delay of every stream [ns]."""
 LENS = {"width": 640, "height": 480, "fx": 800.0, "fy": 800.0, "cx": 320.0, "cy": 240.0}
 RIG = {
-    "name": "made up", "registration": {"origin": [50.0, 40.0, -20.0], "yaw": 0.0},
+    "name": "made up",
+    "registration": {"origin": [50.0, 40.0, -20.0], "yaw": 0.0},
     "cameras": {"top": {"intrinsics": LENS, "cube": {"side": 20.0, "tag": 16.0, "ids": {"+x": 0}}}},
-}  # fmt: skip
+}
 
 
 def depth_at(seconds: np.ndarray) -> np.ndarray:
@@ -131,11 +132,19 @@ def made_label(episode) -> Label:
     none = np.zeros((frames, sensor.taxels.count), np.float32)
     parents = {"recording": "a" * 64, "sensor": sensor.content_hash, "model": "c" * 64}
     return Label(
-        0, time_ns, np.column_stack([np.full(frames, 1.0), np.full(frames, -0.5), deep]),
-        deep.astype(np.float32)[:, None, None] * shape, none, none, none, np.zeros((frames, 3), np.float32),
-        np.full((frames, *shape.shape), 0.004, np.float16), np.full(frames, 0.004, np.float32),
-        np.full(frames, 0.01, np.float32), provenance.stamp("benchmark", parents, {}),
-    )  # fmt: skip
+        0,
+        time_ns,
+        np.column_stack([np.full(frames, 1.0), np.full(frames, -0.5), deep]),
+        deep.astype(np.float32)[:, None, None] * shape,
+        none,
+        none,
+        none,
+        np.zeros((frames, 3), np.float32),
+        np.full((frames, *shape.shape), 0.004, np.float16),
+        np.full(frames, 0.004, np.float32),
+        np.full(frames, 0.01, np.float32),
+        provenance.stamp("benchmark", parents, {}),
+    )
 
 
 def opened(path: Path, target: Path) -> dict[str, float]:
@@ -167,10 +176,12 @@ def main() -> None:
 
         scene = scene_at(path)
         drawn = {
-            "frames": len(scene.frame_ns), "curve rows": max(len(c.time_ns) for c in scene.curves),
+            "frames": len(scene.frame_ns),
+            "curve rows": max(len(c.time_ns) for c in scene.curves),
             "maps": len(scene.maps[0].time_ns) if scene.maps else 0,
-            "images": sum(len(c.images) for c in scene.cameras), "recording MB": path.stat().st_size / 1e6,
-        }  # fmt: skip
+            "images": sum(len(c.images) for c in scene.cameras),
+            "recording MB": path.stat().st_size / 1e6,
+        }
         for run in runs:
             print("  ".join(f"{name} {value:.2f}" for name, value in run.items()))
         print(json.dumps({"cores": os.cpu_count(), "load": os.getloadavg()[0], "drawn": drawn, "runs": runs}))

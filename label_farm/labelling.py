@@ -340,9 +340,13 @@ class Labelling:
         while self._jobs:
             wanted = {version: self.sensors[version] for version in {job.model for job in self._jobs.values()}}
             pool = self.settings.engine(
-                self.store, self.settings.factory, wanted, self.settings.workers, self.settings.lease_seconds,
+                self.store,
+                self.settings.factory,
+                wanted,
+                self.settings.workers,
+                self.settings.lease_seconds,
                 self.settings.devices,
-            )  # fmt: skip
+            )
             try:
                 # A recording of another sensor ends this run: the next one has workers for it.
                 since = pool.run(

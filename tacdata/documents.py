@@ -21,14 +21,29 @@ from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.replacement import replacement
 
 BYTE_ORDER_MARKS = {
-    codecs.BOM_UTF32_LE: "utf-32", codecs.BOM_UTF32_BE: "utf-32", codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF32_BE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
-}  # fmt: skip
+}
 """First bytes of a text and its encoding; the longer ones first."""
 WRITTEN_BY_PEOPLE = {
-    "calibration_board", "case", "demo_rig", "fingers", "frame_format", "gains", "import_mapping", "model_spec",
-    "mounting", "plan", "plan_recipe", "rig", "robot", "sensor", "simulation_plan",
-}  # fmt: skip
+    "calibration_board",
+    "case",
+    "demo_rig",
+    "fingers",
+    "frame_format",
+    "gains",
+    "import_mapping",
+    "model_spec",
+    "mounting",
+    "plan",
+    "plan_recipe",
+    "rig",
+    "robot",
+    "sensor",
+    "simulation_plan",
+}
 """Documents in which a number that is not finite is a mistake; ours may state one."""
 
 
@@ -85,8 +100,9 @@ def _decoded(path: Path, schema: str) -> str:
         line = raw.count(b"\n", 0, error.start) + 1
         raise FormatError(
             f"{path} is no text in {encoding.removesuffix('-sig').upper()}: {error.reason} in line {line}",
-            f"a {schema} file in UTF-8", "save it as UTF-8",
-        ) from None  # fmt: skip
+            f"a {schema} file in UTF-8",
+            "save it as UTF-8",
+        ) from None
 
 
 def _json_fault(text: str) -> str:
@@ -304,9 +320,10 @@ def write_text(path: Path, text: str) -> None:
             stream.write(text.encode())
     except OSError as error:
         raise DeviceError(
-            f"writing {path} failed: {error}", "a folder that may be written, on a disk with room",
+            f"writing {path} failed: {error}",
+            "a folder that may be written, on a disk with room",
             "make room or choose another folder",
-        ) from error  # fmt: skip
+        ) from error
 
 
 def write(path: Path, document: dict[str, Any], schema: str) -> None:

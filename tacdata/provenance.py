@@ -23,17 +23,20 @@ _ALIKE = "12 presses, 180 arrays: equal to the last bit"
 EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {
     # tacdata.skin, tacdata.indenters
     "1977f9099c306f209979b6bbd5f0329011656853c4e2acb9abe8cbc672db5f61": (
-        "9d52ea98c6b708e1f5a724d14c8fcaf86a092e55882c91fa91b57574e8fd2629", _ALIKE,
+        "9d52ea98c6b708e1f5a724d14c8fcaf86a092e55882c91fa91b57574e8fd2629",
+        _ALIKE,
     ),
     "65b40bc2bdc5b0d813864cdb37cf5b8eb6c7e78bb328c3616f73e36a61b04e65": (
-        "e4c1d022f42d681255d4dc8438075601194e5828c16138807f71cbf19e06b149", f"{_ALIKE}; since then pair.py was added",
+        "e4c1d022f42d681255d4dc8438075601194e5828c16138807f71cbf19e06b149",
+        f"{_ALIKE}; since then pair.py was added",
     ),
     # label_farm.presses: without spreads, with them
     "6a824e685eab6018c2b9362d1e76e5fcf2462d494270c0515279cf2d2f2c510a": (_FARM, _ALIKE),
     "5df0c127767136566545f3c453699fe976d4d9e088e6685f98e81bf3cb451b62": (_FARM, _ALIKE),
     # label_farm.labels
     "ae5e19a9ac1b765ded74fd73b9aa57b12860dff27eb1fb23e442c8e192ae25e8": (
-        "c8cb8754334be9625504fedba56cf3dfe2f27bc6d95c42069666fca50d790fac", _ALIKE,
+        "c8cb8754334be9625504fedba56cf3dfe2f27bc6d95c42069666fca50d790fac",
+        _ALIKE,
     ),
 }
 """Version of code -> (what an older release called it, how it was shown that their results are identical).
@@ -130,7 +133,11 @@ def code_version() -> str:
     try:
         described = subprocess.run(
             ["git", "describe", "--always", "--dirty=.dirty", "--exclude=*"],
-            cwd=root, capture_output=True, text=True, check=True, timeout=10,
+            cwd=root,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10,
         ).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return release

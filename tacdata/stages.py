@@ -36,9 +36,7 @@ class StageError(TacdataError):
     def __init__(self, number: int, line: str, code: int, kept: str) -> None:
         self.exit_code = code if 0 < code < 256 else 1
         super().__init__(
-            f"stage {number} ended with exit code {code}: {line}",
-            "exit code 0",
-            f"see the message above; {kept}",
+            f"stage {number} ended with exit code {code}: {line}", "exit code 0", f"see the message above; {kept}"
         )
 
 

@@ -44,7 +44,7 @@ class Rehearsal:
                 f"{frames.origin} as simulated frames: it holds recorded ones",
                 "a dataset that `tacdata simulate` made",
                 "give the recorded dataset as the first argument, and the simulated one as --simulated",
-            )  # fmt: skip
+            )
         self._windows = Windows(frames, network.offsets, place)
         self._depth = label_tensor(frames.depth, torch.device(place))
         self._usable = torch.as_tensor(np.flatnonzero(frames.valid))

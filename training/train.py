@@ -94,8 +94,9 @@ class _Run:
             if (before := self.document.get(name)) != now and self.epoch:
                 raise UsageError(
                     f"resuming a run whose {name} is {(before or 'none')[:12]} with {(now or 'none')[:12]}",
-                    "what it was started with", "give the same --from and --simulated, or start a new run",
-                )  # fmt: skip
+                    "what it was started with",
+                    "give the same --from and --simulated, or start a new run",
+                )
         self.document |= {name: value for name, value in brought.items() if value}
         place = self.network.get_buffer("mean").device
         if settings.pull and pretrained:
@@ -215,9 +216,12 @@ def normalization(taxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _started(
-    frames: Frames, settings: TrainingSettings, split: Split, place: torch.device,
+    frames: Frames,
+    settings: TrainingSettings,
+    split: Split,
+    place: torch.device,
     pretrained: checkpoint.Checkpoint | None,
-) -> _Run:  # fmt: skip
+) -> _Run:
     torch.manual_seed(settings.seed)
     network = create(settings.network, frames.sensor, settings.arguments)
     readings, calibration = frames.taxels[frames.indices(split.train)], {}

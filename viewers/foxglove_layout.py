@@ -58,28 +58,35 @@ def foxglove_layout(recorded: set[str]) -> dict[str, Any]:
         panels[f"Plot!{_name(topic)}"] = _plot(f"{topic}: reprojection [px]", [f"{topic}.reprojection"])
     if topics.PHASE in recorded:
         panels["StateTransitions!phases"] = {
-            "isSynced": True, "paths": [{"value": f"{topics.PHASE}.name", "timestampMethod": "receiveTime"}],
-        }  # fmt: skip
+            "isSynced": True,
+            "paths": [{"value": f"{topics.PHASE}.name", "timestampMethod": "receiveTime"}],
+        }
     if topics.LOG in recorded:
         panels["RosOut!log"] = {"topicToRender": topics.LOG, "minLogLevel": 1, "searchTerms": []}
-    layout = {
-        "configById": panels, "globalVariables": {}, "userNodes": {}, "playbackConfig": {"speed": 1},
-    }  # fmt: skip
+    layout = {"configById": panels, "globalVariables": {}, "userNodes": {}, "playbackConfig": {"speed": 1}}
     return layout | ({"layout": _split(list(panels))} if panels else {})
 
 
 def _plot(title: str, paths: list[str]) -> dict[str, Any]:
     lines = [
         {
-            "value": path, "enabled": True, "timestampMethod": "receiveTime",
+            "value": path,
+            "enabled": True,
+            "timestampMethod": "receiveTime",
             "color": "#{:02x}{:02x}{:02x}".format(*HUES[k % len(HUES)]),
         }
         for k, path in enumerate(paths)
-    ]  # fmt: skip
+    ]
     return {
-        "title": title, "paths": lines, "xAxisVal": "timestamp", "isSynced": True, "showLegend": len(paths) > 1,
-        "showXAxisLabels": True, "showYAxisLabels": True, "legendDisplay": "floating",
-    }  # fmt: skip
+        "title": title,
+        "paths": lines,
+        "xAxisVal": "timestamp",
+        "isSynced": True,
+        "showLegend": len(paths) > 1,
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+        "legendDisplay": "floating",
+    }
 
 
 def _split(names: list[str], across: bool = True) -> Any:
@@ -88,9 +95,11 @@ def _split(names: list[str], across: bool = True) -> Any:
         return names[0]
     half = (len(names) + 1) // 2
     return {
-        "direction": "row" if across else "column", "splitPercentage": 50,
-        "first": _split(names[:half], not across), "second": _split(names[half:], not across),
-    }  # fmt: skip
+        "direction": "row" if across else "column",
+        "splitPercentage": 50,
+        "first": _split(names[:half], not across),
+        "second": _split(names[half:], not across),
+    }
 
 
 def _name(topic: str) -> str:

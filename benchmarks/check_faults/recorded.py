@@ -45,9 +45,7 @@ class Recorded(Press):
         self.driver, self.complete = StreamCounts(), True
         self.sampled(RATE)
         sent = np.arange(T0, self.end, 125 * MS)
-        self.statuses = [
-            CncStatus(int(t), int(t) + 8 * MS, "Run", self.report(int(t) + 4 * MS), 0.0) for t in sent
-        ]
+        self.statuses = [CncStatus(int(t), int(t) + 8 * MS, "Run", self.report(int(t) + 4 * MS), 0.0) for t in sent]
         self.views = []
 
     def sampled(self, rate):

@@ -91,9 +91,7 @@ def main():
         for name, (plant, group, sizes, whole) in KINDS.items():
             if given.kinds and name.replace(" ", "_") not in given.kinds:
                 continue
-            table = [
-                [clean[t].with_fault(plant, size, whole, t) for t in range(given.trials)] for size in sizes
-            ]
+            table = [[clean[t].with_fault(plant, size, whole, t) for t in range(given.trials)] for size in sizes]
             cells = [f"{sum(s > 0 for s in row)} of {len(row)}" for row in table]
             faulty = [value for row in table for value in row]
             everything += faulty if group != UNKNOWABLE else []

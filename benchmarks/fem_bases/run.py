@@ -61,8 +61,15 @@ def solved(unit, device, capacity, out):
             ready = replace(ready, grid=replace(ready.grid, depth=depth))
         print(f"{unit} {base}: {ready.presses} presses, {len(ready.missing)} to solve", flush=True)
         table, off = ready.done(lambda done, of, left: None)
-        table.write(target, {"unit": unit, "base": base, "mesh": asdict(ready.model.settings.mesh),
-                             "left_out": asdict(off) if off else None})  # fmt: skip
+        table.write(
+            target,
+            {
+                "unit": unit,
+                "base": base,
+                "mesh": asdict(ready.model.settings.mesh),
+                "left_out": asdict(off) if off else None,
+            },
+        )
         print(f"{unit} {base}: {time.time() - begun:.0f} s, {off}", flush=True)
 
 

@@ -81,7 +81,7 @@ def outcome(row):
             for e in named
         ),
         "suspected": any({e["mechanism"], *e["alternatives"]} & mechanisms for e in effects),
-    }  # fmt: skip
+    }
 
 
 def line(row):

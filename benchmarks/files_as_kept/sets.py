@@ -117,9 +117,11 @@ def capacitance(folder, rng):
     axes = {axis: {"column": f"array[{k}]", "unit": "mm"} for k, axis in enumerate("xyz", 1)}
     answers = {
         "taxels": {"file": "log_all", "columns": ["array[5-12]"], "unit": "pF"},
-        "position": {"file": "log_all", **axes}, "contact": {"x": 0, "y": 0, "z": 12.4}, "trials": {"gap": 5.0},
+        "position": {"file": "log_all", **axes},
+        "contact": {"x": 0, "y": 0, "z": 12.4},
+        "trials": {"gap": 5.0},
         "measured": {"force": {"file": "log_all", "columns": ["array[4]"], "unit": "N"}},
-    }  # fmt: skip
+    }
     return Kept("log_all.npy", ("relaxation",), (MEMORY,), answers)
 
 

@@ -38,10 +38,14 @@ class Files:
         """
         name = name or self.name
         document = {
-            "version": "1.1", "name": name, "source": "made up", "sensor": {"name": name},
+            "version": "1.1",
+            "name": name,
+            "source": "made up",
+            "sensor": {"name": name},
             "taxels": {"file": taxels, "columns": columns, "unit": unit},
-            "indenter": {"shape": "sphere", "radius": 4.0}, **parts,
-        }  # fmt: skip
+            "indenter": {"shape": "sphere", "radius": 4.0},
+            **parts,
+        }
         (self.folder / to).write_text(yaml.safe_dump(document, sort_keys=False))
 
 

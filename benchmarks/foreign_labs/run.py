@@ -22,9 +22,12 @@ HERE = Path(__file__).parent
 def tacdata(engine, *words):
     """Run a verb; a status of 3 is an import that left trials out."""
     done = subprocess.run(
-        [sys.executable, "-c", "from tacdata.cli import main; main()", *map(str, words)], capture_output=True,
-        text=True, check=False, env={**os.environ, "PYTHONPATH": str(engine), "OMP_NUM_THREADS": "1"},
-    )  # fmt: skip
+        [sys.executable, "-c", "from tacdata.cli import main; main()", *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(engine), "OMP_NUM_THREADS": "1"},
+    )
     if done.returncode not in (0, 3):
         raise SystemExit(f"tacdata {words[0]}: {done.stderr[-1500:] or done.stdout[-1500:]}")
 
@@ -60,10 +63,17 @@ def result(name, seed, verdict, seconds):
     lab = LABS[name]
     effects = [{k: e[k] for k in ("mechanism", "effect", "status", "alternatives")} for e in verdict["effects"]]
     return {
-        "version": "1.0", "name": name, "seed": seed, "hidden": lab.hidden, "truth": list(lab.truth.names),
-        "best": lab.truth.best, "status": verdict["status"], "effects": effects,
-        "outcome": outcome(verdict, lab.truth), "seconds": seconds,
-    }  # fmt: skip
+        "version": "1.0",
+        "name": name,
+        "seed": seed,
+        "hidden": lab.hidden,
+        "truth": list(lab.truth.names),
+        "best": lab.truth.best,
+        "status": verdict["status"],
+        "effects": effects,
+        "outcome": outcome(verdict, lab.truth),
+        "seconds": seconds,
+    }
 
 
 def row(found):

@@ -58,18 +58,26 @@ def written(folder, skin_name, protocol, effect_name, size, seed):
             head += ["laser_mm", "force_N"]
         head += [f"ch{c}" for c in range(skin.channels)]
         np.savetxt(
-            folder / f"trial_{k:03d}.csv", np.column_stack([*parts, said]), delimiter=",", fmt="%.5f",
-            header=",".join(head), comments="",
-        )  # fmt: skip
+            folder / f"trial_{k:03d}.csv",
+            np.column_stack([*parts, said]),
+            delimiter=",",
+            fmt="%.5f",
+            header=",".join(head),
+            comments="",
+        )
     mapping = {
-        "version": "1.0", "name": skin_name, "sensor": {"name": skin_name.replace(" ", "_")},
+        "version": "1.0",
+        "name": skin_name,
+        "sensor": {"name": skin_name.replace(" ", "_")},
         "files": {"all": {"path": "trial_{trial}.csv", "time": {"column": "time_s", "unit": "s", "zero": "shared"}}},
         "taxels": {"file": "all", "columns": "ch*", "unit": "counts"},
         "position": {
-            "file": "all", "x": {"column": "x_mm", "unit": "mm"}, "y": {"column": "y_mm", "unit": "mm"},
+            "file": "all",
+            "x": {"column": "x_mm", "unit": "mm"},
+            "y": {"column": "y_mm", "unit": "mm"},
             "depth": {"column": "depth_mm", "unit": "mm"},
         },
-    }  # fmt: skip
+    }
     if gauge:
         mapping["measured"] = {
             "laser": {"file": "all", "columns": ["laser_mm"], "unit": "mm"},
@@ -81,9 +89,12 @@ def written(folder, skin_name, protocol, effect_name, size, seed):
 def tacdata(engine, *words):
     """Run a verb; a status of 3 is an import that left trials out."""
     done = subprocess.run(
-        [sys.executable, "-c", "from tacdata.cli import main; main()", *map(str, words)], capture_output=True,
-        text=True, check=False, env={**os.environ, "PYTHONPATH": str(engine), "OMP_NUM_THREADS": "1"},
-    )  # fmt: skip
+        [sys.executable, "-c", "from tacdata.cli import main; main()", *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(engine), "OMP_NUM_THREADS": "1"},
+    )
     if done.returncode not in (0, 3):
         raise SystemExit(done.stderr[-1500:] or done.stdout[-1500:])
 
@@ -114,8 +125,15 @@ def main(out, engine, skins, protocols, effects, size, seed):
                 if not (folder / "verdict" / "verdict.json").exists():
                     shutil.rmtree(folder, ignore_errors=True)
                     written(folder / "files", skin, protocol, effect, size, seed)
-                    tacdata(engine, "import", folder / "files", "--mapping", folder / "files" / "mapping.yaml",
-                            "--out", folder / "session")  # fmt: skip
+                    tacdata(
+                        engine,
+                        "import",
+                        folder / "files",
+                        "--mapping",
+                        folder / "files" / "mapping.yaml",
+                        "--out",
+                        folder / "session",
+                    )
                     begun = time.perf_counter()
                     tacdata(engine, "discrepancy", folder / "session", "--out", folder / "verdict")
                     (folder / "seconds").write_text(f"{time.perf_counter() - begun:.1f}")

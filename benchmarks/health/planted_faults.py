@@ -112,9 +112,14 @@ def tool_too_low(rng: np.random.Generator) -> Planted:
 
 
 KINDS: dict[str, Callable[[np.random.Generator], Planted]] = {
-    "gain of one channel -20 %": gain_of_one, "gain of all channels -10 %": gain_of_all,
-    "a channel stands still": channel_stands_still, "a broken wire": wire_broken,
-    "two neighbours swapped": neighbours_swapped, "any two swapped": any_two_swapped,
-    "noise of all x 3": noise_of_all, "noise of one x 3": noise_of_one, "zero of one drifts": zero_drifts,
+    "gain of one channel -20 %": gain_of_one,
+    "gain of all channels -10 %": gain_of_all,
+    "a channel stands still": channel_stands_still,
+    "a broken wire": wire_broken,
+    "two neighbours swapped": neighbours_swapped,
+    "any two swapped": any_two_swapped,
+    "noise of all x 3": noise_of_all,
+    "noise of one x 3": noise_of_one,
+    "zero of one drifts": zero_drifts,
     "tool 0.15 mm too low": tool_too_low,
-}  # fmt: skip
+}

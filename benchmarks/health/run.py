@@ -83,8 +83,12 @@ def main() -> None:
                 rows[title][0] += right
                 rows[title][1] += more
                 if given.verbose and (more or not right):
-                    print(f"unit {seed}, {title} {sorted(planted.channels)}:", *(f"{a.do} {a.channels}: {a.why}"
-                          for a in said), sep="\n  ", flush=True)  # fmt: skip
+                    print(
+                        f"unit {seed}, {title} {sorted(planted.channels)}:",
+                        *(f"{a.do} {a.channels}: {a.why}" for a in said),
+                        sep="\n  ",
+                        flush=True,
+                    )
             shutil.rmtree(before.session.folder)
             if given.verbose:
                 print(f"unit {seed} is done", flush=True)

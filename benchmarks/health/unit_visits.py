@@ -50,9 +50,10 @@ class Recorded(Press):
         self.rng, self.number, self.camera = np.random.default_rng(number), number, False
         board = {"channels": SENSOR.taxels.count, "rate": {"nominal": RATE, "unit": "Hz"}}
         controller = {
-            "settings": {"banner": "emulated"}, "acceleration": LIMITS.acceleration.tolist(),
+            "settings": {"banner": "emulated"},
+            "acceleration": LIMITS.acceleration.tolist(),
             "max_rate": LIMITS.max_rate.tolist(),
-        }  # fmt: skip
+        }
         self.header = Header(plan.presses[number], SENSOR, rig_document(), plan.document, board, controller)
         bench = rig()
         self.commands, self.path, self.views = [], [], []
@@ -94,9 +95,13 @@ def visited(truth: Truth, seed: int, visit: int) -> Truth:
     gain = np.array(truth.gain) * rng.normal(1.0, WARMTH) * rng.normal(1.0, OWN, len(truth.gain))
     zero = np.array(truth.offset) + rng.normal(0.0, ZERO)
     return replace(
-        truth, seed=1000 * seed + visit, registration=replace(nominal, origin=origin, yaw=nominal.yaw
-        + float(rng.normal(0.0, YAW))), mount_yaw=float(rng.normal(0.0, 0.4)), gain=tuple(gain), offset=tuple(zero),
-    )  # fmt: skip
+        truth,
+        seed=1000 * seed + visit,
+        registration=replace(nominal, origin=origin, yaw=nominal.yaw + float(rng.normal(0.0, YAW))),
+        mount_yaw=float(rng.normal(0.0, 0.4)),
+        gain=tuple(gain),
+        offset=tuple(zero),
+    )
 
 
 def record(folder: Path, seed: int, visit: int, fault: Fault | None = None, plan: Plan = PLAN) -> Path:

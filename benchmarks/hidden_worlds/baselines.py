@@ -45,10 +45,13 @@ def answered(setting, method):
     ]
     status = "named" if members else "unknown" if method in ("affine", "nominal", "ridge") else "none"
     said = {
-        "time": course.time[rows], "episode": course.episode[rows], "before": before.signal[rows].astype(np.float32),
-        "after": after[rows].astype(np.float32), "pose": pose[rows].astype(np.float32),
+        "time": course.time[rows],
+        "episode": course.episode[rows],
+        "before": before.signal[rows].astype(np.float32),
+        "after": after[rows].astype(np.float32),
+        "pose": pose[rows].astype(np.float32),
         "nominal": before.pose[rows].astype(np.float32),
-    }  # fmt: skip
+    }
     return {"status": status, "effects": members}, said, seconds
 
 

@@ -42,12 +42,19 @@ def course_of(data):
         good = np.flatnonzero(np.isfinite(streams["temperature"]))
         streams["temperature"] = np.interp(np.arange(len(values)), good, streams["temperature"][good])
     return Course(
-        time=np.concatenate([p.time for p in parts]), episode=episode, tip=np.concatenate([p.tip for p in parts]),
-        tool=data["tool"].astype(int)[episode], readings=values[:, :channels],
-        averaged=np.concatenate([p.averaged for p in parts]), session=data["session"].astype(int),
-        site=data["site"].astype(int), tools=tuple(Tool(f"sphere_{r:g}", "sphere", float(r)) for r in data["radii"]),
-        names=tuple(f"episode {k}" for k in range(len(parts))), centers=data["centers"], **streams,
-    )  # fmt: skip
+        time=np.concatenate([p.time for p in parts]),
+        episode=episode,
+        tip=np.concatenate([p.tip for p in parts]),
+        tool=data["tool"].astype(int)[episode],
+        readings=values[:, :channels],
+        averaged=np.concatenate([p.averaged for p in parts]),
+        session=data["session"].astype(int),
+        site=data["site"].astype(int),
+        tools=tuple(Tool(f"sphere_{r:g}", "sphere", float(r)) for r in data["radii"]),
+        names=tuple(f"episode {k}" for k in range(len(parts))),
+        centers=data["centers"],
+        **streams,
+    )
 
 
 def setting_of(folder, course, without=(), **switches):
@@ -113,10 +120,13 @@ def answered(folder, without=(), **switches):
     before = predict(course, found.problem.setting.response, [])
     rows = course.read
     said = {
-        "time": course.time[rows], "episode": course.episode[rows], "before": before.signal[rows].astype(np.float32),
-        "after": after.signal[rows].astype(np.float32), "pose": after.pose[rows].astype(np.float32),
+        "time": course.time[rows],
+        "episode": course.episode[rows],
+        "before": before.signal[rows].astype(np.float32),
+        "after": after.signal[rows].astype(np.float32),
+        "pose": after.pose[rows].astype(np.float32),
         "nominal": before.pose[rows].astype(np.float32),
-    }  # fmt: skip
+    }
     return answer, said, seconds
 
 

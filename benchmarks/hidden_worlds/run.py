@@ -44,9 +44,14 @@ def judged(world, root, options):
         command = [sys.executable, str(HERE / "judge.py"), str(folder), json.dumps(options)]
         try:
             done = subprocess.run(
-                command, cwd=folder, env={**kept, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"},
-                capture_output=True, text=True, timeout=LONGEST, check=False,
-            )  # fmt: skip
+                command,
+                cwd=folder,
+                env={**kept, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"},
+                capture_output=True,
+                text=True,
+                timeout=LONGEST,
+                check=False,
+            )
             error = done.stderr[-2000:] if done.returncode else ""
         except subprocess.TimeoutExpired:
             error = f"stopped after {LONGEST} s"

@@ -82,7 +82,7 @@ INJECTIONS = {
     "channels swapped half way": Injection(_swapped, ()),
     "dead channel": Injection(_dead, ()),
     "one frame in five lost": Injection(_dropped, ()),
-}  # fmt: skip
+}
 
 
 def main(source, out, mapping, table, engine, only):

@@ -94,10 +94,19 @@ def rig_frames(folder: Path, rig: int, only: Callable[[Press], bool] = lambda pr
             start = stop
     taxels, maps, tips, times, force = (np.concatenate(part) for part in zip(*parts, strict=True))
     return Frames(
-        taxels.astype(np.float32), maps.astype(np.float32), tips.astype(np.float32), np.full(start, 2), times,
-        np.ones(start, bool), tuple(spans), sensor, f"{rig:064x}", f"virtual rig {rig}", True,
+        taxels.astype(np.float32),
+        maps.astype(np.float32),
+        tips.astype(np.float32),
+        np.full(start, 2),
+        times,
+        np.ones(start, bool),
+        tuple(spans),
+        sensor,
+        f"{rig:064x}",
+        f"virtual rig {rig}",
+        True,
         taxel_force=force.astype(np.float32),
-    )  # fmt: skip
+    )
 
 
 def part(frames: Frames, kept: list[EpisodeSpan]) -> Frames:
@@ -192,9 +201,16 @@ def main() -> None:
         others = rig_frames(arguments.contacts, rig) if arguments.contacts else None
         folder = arguments.out / f"rig-{rig}"
         document = learning_curve(
-            part(frames, rest), start, folder, numbers, (rig,), networks=arguments.network, simulated=simulated,
-            threads=1, told=lambda point: print(point, flush=True),
-        )  # fmt: skip
+            part(frames, rest),
+            start,
+            folder,
+            numbers,
+            (rig,),
+            networks=arguments.network,
+            simulated=simulated,
+            threads=1,
+            told=lambda point: print(point, flush=True),
+        )
         for run in sorted(folder.glob("*-*-*")):
             from training.inference import checkpoint
 

@@ -29,8 +29,14 @@ LIMITS = AxisLimits(np.full(3, 1e4), np.full(3, TRAVEL))
 def plan_for(course):
     """Return a plan as the lab's sessions have one: its tools, and how fast its guide is."""
     tools = {t.name: {"shape": "sphere", "radius": t.radius} for t in course.tools}
-    motion = {"clearance": 3.0, "travel_speed": TRAVEL, "approach_speed": 3.0, "press_speed": 1.0, "hold": 1.0,
-              "rest": 1.0}  # fmt: skip
+    motion = {
+        "clearance": 3.0,
+        "travel_speed": TRAVEL,
+        "approach_speed": 3.0,
+        "press_speed": 1.0,
+        "hold": 1.0,
+        "rest": 1.0,
+    }
     presses = [{"indenter": name, "x": 0.0, "y": 0.0, "depth": 1.0} for name in tools]
     document = {"version": "1.1", "name": "lab", "indenters": tools, "motion": motion, "presses": presses}
     return Plan.from_document(document, "lab")
@@ -48,11 +54,16 @@ def recommended(course, spec, verdict, count):
     # A plan changes tools as rarely as it can; here turns come one after the other, so that few presses hold all kinds.
     entries.sort(key=lambda e: e["repeat"])
     return [
-        {"tool": tools.index(e["indenter"]), "purpose": e["purpose"],
-         **{k: float(e.get(k, 0.0)) for k in ("x", "y", "depth", "speed", "hold", "recovery", "overshoot",
-                                           "strokes", "stroke")}}
+        {
+            "tool": tools.index(e["indenter"]),
+            "purpose": e["purpose"],
+            **{
+                k: float(e.get(k, 0.0))
+                for k in ("x", "y", "depth", "speed", "hold", "recovery", "overshoot", "strokes", "stroke")
+            },
+        }
         for e in entries
-    ][:count]  # fmt: skip
+    ][:count]
 
 
 def main(folder, count):

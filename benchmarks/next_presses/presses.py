@@ -36,9 +36,16 @@ def alike(rng, press, before):
     deepest = max(p["depth"] + p["overshoot"] for p in before)
     while True:
         at = before[rng.integers(len(before))]
-        drawn = {"x": float(at["x"]), "y": float(at["y"]), "tool": int(at["tool"]), "overshoot": 0.0,
-                 "depth": float(rng.uniform(0.3, 1.0) * deepest), "hold": 0.0, "recovery": LEAST,
-                 "speed": float(np.exp(rng.uniform(*np.log(SPEEDS))))}  # fmt: skip
+        drawn = {
+            "x": float(at["x"]),
+            "y": float(at["y"]),
+            "tool": int(at["tool"]),
+            "overshoot": 0.0,
+            "depth": float(rng.uniform(0.3, 1.0) * deepest),
+            "hold": 0.0,
+            "recovery": LEAST,
+            "speed": float(np.exp(rng.uniform(*np.log(SPEEDS)))),
+        }
         rest = wanted - length(drawn)
         if rest >= 0:
             share = rng.uniform()

@@ -31,10 +31,24 @@ from worlds.physics import KNOWN  # noqa: E402
 ENGINE = (*ROOMS, "revision")
 """What judges and recommends."""
 STEADY = (
-    "latency", "low_pass_filter", "servo_lag", "backlash", "hysteresis", "relaxation", "creep", "poroelasticity",
-    "nonlinear_relaxation", "baseline_tracking", "softening", "frame_compliance", "stiffening", "saturation",
-    "gap_curvature", "xy_offset", "tilt",
-)  # fmt: skip
+    "latency",
+    "low_pass_filter",
+    "servo_lag",
+    "backlash",
+    "hysteresis",
+    "relaxation",
+    "creep",
+    "poroelasticity",
+    "nonlinear_relaxation",
+    "baseline_tracking",
+    "softening",
+    "frame_compliance",
+    "stiffening",
+    "saturation",
+    "gap_curvature",
+    "xy_offset",
+    "tilt",
+)
 """Effects that do not depend on how long the session is: presses added change nothing of those before.
 
 Each in the library's own form: what is between two names is settled by no press.
@@ -58,8 +72,9 @@ def wanted(seed):
             case.settings["episodes"] = EPISODES
             for many in SIZES:
                 if many * size <= KNOWN[name].most:
-                    yield replace(case, name=f"{case.name} x {many:g}", effects={name: many * size},
-                                  times={name: many * times})  # fmt: skip
+                    yield replace(
+                        case, name=f"{case.name} x {many:g}", effects={name: many * size}, times={name: many * times}
+                    )
 
 
 def asked(case, more, table, count):
@@ -81,9 +96,13 @@ def answered(case, more, table, count):
         (folder / "table.npz").symlink_to(table)
         kept = {k: v for k, v in os.environ.items() if k in ("PATH", "HOME", "TMPDIR", "LANG")}
         subprocess.run(
-            [sys.executable, str(HERE / "ask.py"), str(folder), str(count)], cwd=folder, check=True,
-            env={**kept, "PYTHONPATH": str(REPOSITORY), "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
-        )  # fmt: skip
+            [sys.executable, str(HERE / "ask.py"), str(folder), str(count)],
+            cwd=folder,
+            check=True,
+            env={**kept, "PYTHONPATH": str(REPOSITORY), "OMP_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+        )
         told, following = json.loads((folder / "verdict.json").read_text()), folder / "next.json"
         return told["verdict"], json.loads(following.read_text()) if following.exists() else [], told["seconds"]
 
@@ -134,10 +153,14 @@ def line(case, table):
     """Return what came of one world; None of its counts where its first verdict is not ambiguous."""
     verdict, following, _ = asked(case, [], table, STEPS[-1])
     row = {
-        "id": case.identity, "name": case.name, "response": case.response, "seed": case.seed,
-        "engine": engine_of(REPOSITORY, ENGINE), "first": {"status": verdict["status"], "told": told(verdict)},
+        "id": case.identity,
+        "name": case.name,
+        "response": case.response,
+        "seed": case.seed,
+        "engine": engine_of(REPOSITORY, ENGINE),
+        "first": {"status": verdict["status"], "told": told(verdict)},
         "recommended": [[round(p["depth"], 2), p["speed"], p["hold"], p["purpose"]] for p in following[:4]],
-    }  # fmt: skip
+    }
     if verdict["status"] != "ambiguous" or not following:
         return row | {"open": verdict["status"] == "ambiguous", "asked": False}
     more, own, found = by_recommendation(case, following, table)
@@ -145,9 +168,15 @@ def line(case, table):
     like = more or following
     chance, others, other = by_chance(case, like, count, table)
     return row | {
-        "asked": True, "own": own, "settled": found, "presses": count, "random": others, "random_settled": other,
-        "random_presses": chance, "seconds": sum(length(p) for p in like[: count or len(like)]),
-    }  # fmt: skip
+        "asked": True,
+        "own": own,
+        "settled": found,
+        "presses": count,
+        "random": others,
+        "random_settled": other,
+        "random_presses": chance,
+        "seconds": sum(length(p) for p in like[: count or len(like)]),
+    }
 
 
 def names_left(stage):

@@ -11,9 +11,7 @@ from scipy.signal import lfilter
 
 STEP = 0.01
 """Rows lie so far apart [s]."""
-MEMORY, FRICTION, DELAY, KINEMATICS = (
-    "memory of the skin", "friction and play", "delay and filtering", "kinematics",
-)  # fmt: skip
+MEMORY, FRICTION, DELAY, KINEMATICS = ("memory of the skin", "friction and play", "delay and filtering", "kinematics")
 
 
 @dataclass(frozen=True)
@@ -173,13 +171,19 @@ def presses(speeds, depths, hold, places=1, repeats=2, specimens=("a",), rest=1.
     """Return a protocol of single presses."""
 
     def made(rng):
-        order = [(v, d, p, s) for _ in range(repeats) for p in range(places) for s in specimens for v in speeds
-                 for d in depths]  # fmt: skip
+        order = [
+            (v, d, p, s)
+            for _ in range(repeats)
+            for p in range(places)
+            for s in specimens
+            for v in speeds
+            for d in depths
+        ]
         rng.shuffle(order)
         order.sort(key=lambda o: o[3])
-        return in_turn(rng, [
-            (ramp([(-0.3, 0.4), (float(d), hold), (-0.3, rest)], float(v)), int(p), s) for v, d, p, s in order
-        ])  # fmt: skip
+        return in_turn(
+            rng, [(ramp([(-0.3, 0.4), (float(d), hold), (-0.3, rest)], float(v)), int(p), s) for v, d, p, s in order]
+        )
 
     return made
 
@@ -227,23 +231,56 @@ def sines(rng):
 
 SLOW = ((0.15, 0.25), (1.0, 0.25), (8.0, 0.25), (60.0, 0.25))
 KINDS = {
-    "frame and materials": Kind(("frame_compliance",), (KINEMATICS,), presses(
-        (0.5, 2.0), (1.0, 1.6), 1.0, specimens=("eco30", "ds10", "ds20", "ds30", "vytaflex")), complying, 1,
-        unit="N", gauge=True),
-    "delay, creep and recovery": Kind(("latency", "creep"), (DELAY, MEMORY), presses(
-        (0.6, 1.5, 4.0), (1.0, 1.6), 3.0, places=2, repeats=2, rest=5.0), late_and_creeping, 8, unit="counts"),
+    "frame and materials": Kind(
+        ("frame_compliance",),
+        (KINEMATICS,),
+        presses((0.5, 2.0), (1.0, 1.6), 1.0, specimens=("eco30", "ds10", "ds20", "ds30", "vytaflex")),
+        complying,
+        1,
+        unit="N",
+        gauge=True,
+    ),
+    "delay, creep and recovery": Kind(
+        ("latency", "creep"),
+        (DELAY, MEMORY),
+        presses((0.6, 1.5, 4.0), (1.0, 1.6), 3.0, places=2, repeats=2, rest=5.0),
+        late_and_creeping,
+        8,
+        unit="counts",
+    ),
     "capacitive staircase": Kind(("creep",), (MEMORY,), staircases, creeping, 2, unit="pF"),
-    "rates and stretches": Kind(("relaxation",), (MEMORY,), stretches(30.0), relaxing(0.55, SLOW), 1, unit="N",
-        fair=("viscosity",)),
-    "loops at three rates": Kind(("relaxation", "viscosity"), (MEMORY,), stretches(0.0), relaxing(0.55, SLOW), 1,
-        unit="N"),
-    "capacitance beside force": Kind(("hysteresis",), (FRICTION,), presses(
-        (0.5, 1.5, 5.0), (0.8, 1.5), 1.0, repeats=4), rubbing, 1, unit="pF", force=True),
-    "barometric": Kind(("relaxation",), (MEMORY,), presses(
-        (0.5, 2.0, 6.0), (1.0, 2.0), 4.0, places=2, rest=3.0), relaxing(0.18, SLOW[:3]), 5, unit="hPa"),
+    "rates and stretches": Kind(
+        ("relaxation",), (MEMORY,), stretches(30.0), relaxing(0.55, SLOW), 1, unit="N", fair=("viscosity",)
+    ),
+    "loops at three rates": Kind(
+        ("relaxation", "viscosity"), (MEMORY,), stretches(0.0), relaxing(0.55, SLOW), 1, unit="N"
+    ),
+    "capacitance beside force": Kind(
+        ("hysteresis",),
+        (FRICTION,),
+        presses((0.5, 1.5, 5.0), (0.8, 1.5), 1.0, repeats=4),
+        rubbing,
+        1,
+        unit="pF",
+        force=True,
+    ),
+    "barometric": Kind(
+        ("relaxation",),
+        (MEMORY,),
+        presses((0.5, 2.0, 6.0), (1.0, 2.0), 4.0, places=2, rest=3.0),
+        relaxing(0.18, SLOW[:3]),
+        5,
+        unit="hPa",
+    ),
     "magnetic": Kind(("softening",), (MEMORY,), sines, softening, 12, unit="uT"),
     "piston": Kind(("dry_friction",), (FRICTION,), strokes, dry, 1, 50.0, (0.9, 1.2), unit="N"),
-    "decoy for backlash": Kind(("latency",), (DELAY,), presses((1.0,), (0.8, 1.6), 1.0, places=2, repeats=6), late_only,
-        3, fair=("low_pass_filter", "servo_lag", "backlash", "hysteresis")),
+    "decoy for backlash": Kind(
+        ("latency",),
+        (DELAY,),
+        presses((1.0,), (0.8, 1.6), 1.0, places=2, repeats=6),
+        late_only,
+        3,
+        fair=("low_pass_filter", "servo_lag", "backlash", "hysteresis"),
+    ),
     "nothing": Kind((), (), presses((0.5, 1.5, 5.0), (1.0, 1.8), 2.0, places=2), plain, 4),
-}  # fmt: skip
+}

@@ -79,11 +79,13 @@ def outcome(row):
     sets = [{e["mechanism"], *e["alternatives"]} for e in effects if e["status"] in ("named", "ambiguous")]
     wrong = [e for e in named if e["family"] not in fair]
     wrong += [
-        e for e in named
-        if e.get("level") != "family" and e["mechanism"] not in mechanisms
+        e
+        for e in named
+        if e.get("level") != "family"
+        and e["mechanism"] not in mechanisms
         and (row["remainder"] not in LOOPS or e["family"] in families)
         and e not in wrong
-    ]  # fmt: skip
+    ]
     told = {
         e["family"] for e in (*named, *(e for e in effects if e["status"] == "ambiguous" and not e["alternatives"]))
     }

@@ -112,8 +112,12 @@ def write(folder, name, share, which, seed):
         values = 1000 * (np.stack(told_at, axis=1) + wander + noise)
         depth, true = (np.interp(at, np.arange(len(tip)), v) for v in (trial.depth, tip))
         depth, true = (v + rng.normal(0, ENCODER * stroke, len(at)) for v in (depth, true))
-        columns = {"trial": np.full(len(at), number), "t": trial.begin + at * STEP,
-                   "x": np.full(len(at), 6.0 * trial.place), "depth": depth}  # fmt: skip
+        columns = {
+            "trial": np.full(len(at), number),
+            "t": trial.begin + at * STEP,
+            "x": np.full(len(at), 6.0 * trial.place),
+            "depth": depth,
+        }
         if kind.gauge:
             columns["laser"] = true
         if kind.force:
@@ -129,14 +133,19 @@ def write(folder, name, share, which, seed):
             cells = zip(*(np.char.mod("%.5f", c) for c in columns.values()), specimen, strict=True)
             file.writelines(",".join(row) + "\n" for row in cells)
     mapping = {
-        "version": "1.3", "name": name, "sensor": {"name": name.replace(" ", "_").replace(",", "")},
+        "version": "1.3",
+        "name": name,
+        "sensor": {"name": name.replace(" ", "_").replace(",", "")},
         "files": {"all": {"path": "data.csv", "time": {"column": "t", "unit": "s", "zero": "shared"}}},
         "trials": {"column": "trial"},
         "taxels": {"file": "all", "columns": "s*", "unit": kind.unit},
         "position": {
-            "file": "all", "x": {"column": "x", "unit": "mm"}, "y": 0.0, "depth": {"column": "depth", "unit": "mm"},
+            "file": "all",
+            "x": {"column": "x", "unit": "mm"},
+            "y": 0.0,
+            "depth": {"column": "depth", "unit": "mm"},
         },
-    }  # fmt: skip
+    }
     if len({trial.specimen for trial in trials}) > 1:
         mapping["press"] = {"specimen": {"column": "material"}}
     measured = {}

@@ -14,9 +14,19 @@ import numpy as np
 from worlds import EFFECTS, FAMILIES, KINDS, REMAINDERS, made
 
 LIBRARY = (
-    "relaxation", "power_creep", "creep", "softening", "proportional_hysteresis", "bouc_wen", "backlash", "latency",
-    "low_pass_filter", "quantization_hysteresis", "drift", "gain_drift",
-)  # fmt: skip
+    "relaxation",
+    "power_creep",
+    "creep",
+    "softening",
+    "proportional_hysteresis",
+    "bouc_wen",
+    "backlash",
+    "latency",
+    "low_pass_filter",
+    "quantization_hysteresis",
+    "drift",
+    "gain_drift",
+)
 """Effects that are tried: enough to be confused, few enough for many worlds."""
 COLUMNS = ("family right", "family wrong", "mechanism right", "mechanism wrong")
 
@@ -33,12 +43,18 @@ def course_of(presses):
         sites.append(site)
     episode = np.repeat(np.arange(len(parts)), [len(p.time) for p in parts])
     return Course(
-        time=np.concatenate([p.time for p in parts]), episode=episode, tip=np.concatenate([p.tip for p in parts]),
-        tool=np.zeros(len(episode), dtype=int), readings=np.concatenate([p.values for p in parts]),
-        averaged=np.concatenate([p.averaged for p in parts]), session=np.zeros(len(parts), dtype=int),
-        site=np.array(sites), tools=(Tool("ball", "sphere", 4.0),),
-        names=tuple(f"press {k}" for k in range(len(parts))), centers=np.array([[0.0, 0], [2.5, 0], [5.0, 0]]),
-    )  # fmt: skip
+        time=np.concatenate([p.time for p in parts]),
+        episode=episode,
+        tip=np.concatenate([p.tip for p in parts]),
+        tool=np.zeros(len(episode), dtype=int),
+        readings=np.concatenate([p.values for p in parts]),
+        averaged=np.concatenate([p.averaged for p in parts]),
+        session=np.zeros(len(parts), dtype=int),
+        site=np.array(sites),
+        tools=(Tool("ball", "sphere", 4.0),),
+        names=tuple(f"press {k}" for k in range(len(parts))),
+        centers=np.array([[0.0, 0], [2.5, 0], [5.0, 0]]),
+    )
 
 
 def worlds(share, count, seed):
@@ -64,8 +80,14 @@ def judged(out, share, seed, kind, remainder):
         presses, strength = made(seed, kind, remainder, share)
         begun = time.process_time()
         verdict = workflow.judge(course_of(presses), read_spec(None)).document
-        row = {"share": share, "kind": kind, "remainder": remainder, "strength": strength,
-               "seconds": time.process_time() - begun, "verdict": verdict}  # fmt: skip
+        row = {
+            "share": share,
+            "kind": kind,
+            "remainder": remainder,
+            "strength": strength,
+            "seconds": time.process_time() - begun,
+            "verdict": verdict,
+        }
         path.write_text(json.dumps(row))
     return json.loads(path.read_text())
 

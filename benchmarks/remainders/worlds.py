@@ -75,10 +75,13 @@ def rate_filter(rig, trial, depth, load):
 
 REMAINDERS = {f.__name__: f for f in (viscous, late_release, cable, ageing, rate_filter, stick_slip)}
 FAMILIES = {
-    "viscous": ("memory of the skin",), "late_release": ("memory of the skin", "friction and play"),
-    "stick_slip": ("friction and play",), "ageing": ("memory of the skin",), "cable": (),
+    "viscous": ("memory of the skin",),
+    "late_release": ("memory of the skin", "friction and play"),
+    "stick_slip": ("friction and play",),
+    "ageing": ("memory of the skin",),
+    "cable": (),
     "rate_filter": ("delay and filtering", "memory of the skin"),
-}  # fmt: skip
+}
 """Families that a verdict may rightly give a remainder that stands alone."""
 KINDS = ("relaxation", "friction", "softening", "latency", "smoothing", "backlash", "stairs", "gain drift", "drift")
 

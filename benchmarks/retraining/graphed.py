@@ -35,9 +35,15 @@ _CALIBRATED = 300
 
 
 def train_graphed(
-    frames: Frames, settings: TrainingSettings, split: Split, run: Path, steps: int, until: float, lines: int = 20,
+    frames: Frames,
+    settings: TrainingSettings,
+    split: Split,
+    run: Path,
+    steps: int,
+    until: float,
+    lines: int = 20,
     shown: Callable[[str], None] = print,
-) -> Checkpoint:  # fmt: skip
+) -> Checkpoint:
     """Train for so many steps, or until a time, and write RUN/best.safetensors.
 
     Args:
@@ -115,9 +121,11 @@ def train_graphed(
             shown(f"step {done}: validation loss {told['validation_loss']:.6f}")
     state.epoch = 1
     line_of_document = {
-        "epoch": 1, "train_loss": float(total) / (done + _TRIAL + 6),
-        **loop._validate(network, windows, frames, validated, settings), "seconds": round(time.time() - began, 3),
-    }  # fmt: skip
+        "epoch": 1,
+        "train_loss": float(total) / (done + _TRIAL + 6),
+        **loop._validate(network, windows, frames, validated, settings),
+        "seconds": round(time.time() - began, 3),
+    }
     state.document["provenance"]["parameters"] |= {"steps": done}
     loop._keep(state, line_of_document, run)
     return load(run / BEST)

@@ -33,9 +33,14 @@ _HELD, _IDLE = 8, 3
 _HELD_MOST = 3
 """Frames of a hold that are learned from [count]."""
 _KEYS = {
-    "taxels": features.STATE, "depth": features.DEPTH, "tip": features.TIP, "phase": features.PHASE,
-    "time_ns": features.TIME, "valid": features.VALID, "taxel_force": features.TAXEL_FORCE,
-}  # fmt: skip
+    "taxels": features.STATE,
+    "depth": features.DEPTH,
+    "tip": features.TIP,
+    "phase": features.PHASE,
+    "time_ns": features.TIME,
+    "valid": features.VALID,
+    "taxel_force": features.TAXEL_FORCE,
+}
 
 
 @dataclass(frozen=True)
@@ -91,16 +96,29 @@ def read(solved: Path, packed: Path, files: int | None = None) -> Frames:
         press = simulation.press(number)
         spans.append(
             EpisodeSpan(
-                number, end - length, end, press.indenter_name, press.indenter.shape, press.x, press.y, press.depth,
-                press.speed, simulation.specimen(number).name,
+                number,
+                end - length,
+                end,
+                press.indenter_name,
+                press.indenter.shape,
+                press.x,
+                press.y,
+                press.depth,
+                press.speed,
+                simulation.specimen(number).name,
             )
-        )  # fmt: skip
+        )
     identity = provenance.content_hash({"simulation": simulation.content_hash, "presses": numbers})
     origin = f"{len(numbers)} presses of plan {simulation.plan.name}, seed {simulation.seed}"
     return Frames(
-        **arrays, episodes=tuple(spans), sensor=simulation.sensor, dataset_hash=identity, origin=origin, virtual=False,
+        **arrays,
+        episodes=tuple(spans),
+        sensor=simulation.sensor,
+        dataset_hash=identity,
+        origin=origin,
+        virtual=False,
         simulated=True,
-    )  # fmt: skip
+    )
 
 
 def thinned(frames: Frames) -> Frames:

@@ -93,9 +93,22 @@ def solve(work: Path, out: Path, seconds: float, device: str, scale: float, work
             print(f"no time for {one.name}", flush=True)
             continue
         command = [
-            sys.executable, "-m", "tacdata.cli", "simulate", str(one.plan), "--solved", str(folder), "--presses",
-            str(count), "--seed", str(one.seed), "--device", device, "--workers", str(workers),
-        ]  # fmt: skip
+            sys.executable,
+            "-m",
+            "tacdata.cli",
+            "simulate",
+            str(one.plan),
+            "--solved",
+            str(folder),
+            "--presses",
+            str(count),
+            "--seed",
+            str(one.seed),
+            "--device",
+            device,
+            "--workers",
+            str(workers),
+        ]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
         try:
             code = subprocess.run(command, env=environment, timeout=limit).returncode
@@ -147,9 +160,17 @@ def _train_one(name: str, work: Path, out: Path, until: float, device: str, batc
         print(line, flush=True)
 
     variants.train_one(
-        name, work / "solved" / TRAINING, work / "packed", work / "runs", out, until, device, batch,
-        pretrained(start) if start else None, shown,
-    )  # fmt: skip
+        name,
+        work / "solved" / TRAINING,
+        work / "packed",
+        work / "runs",
+        out,
+        until,
+        device,
+        batch,
+        pretrained(start) if start else None,
+        shown,
+    )
 
 
 def score(work: Path, out: Path, seconds: float, names: list[str], final: bool) -> None:
@@ -233,10 +254,11 @@ def chosen(found: dict[str, dict[str, Any]]) -> str:
     if not whole:
         raise SystemExit("no network has all its scores yet: call score again, or name one by --variants")
     kept = [
-        name for name in whole
+        name
+        for name in whole
         if on_rigs(name, "held out", "iou_deep") > on_rigs("shipped", "held out", "iou_deep") - 0.01
         and on_rigs(name, "held out", "centroid") < on_rigs("shipped", "held out", "centroid") + 0.03
-    ]  # fmt: skip
+    ]
     return max(kept or whole, key=gain)
 
 
@@ -258,10 +280,17 @@ def table(found: dict[str, dict[str, Any]]) -> None:
         forces = parts.get("forces", {})
         pairs = [forces.get("contacts", {}).get(kind, {}).get("all_found") for kind in ("balls_4mm", "unlike_4mm")]
         print(
-            name, pairs, [mean("contacts", kind, "all_found") for kind in ("balls_4mm", "unlike_4mm")],
-            forces.get("prism, aligned IoU"), parts.get("worn", {}).get("aligned_iou"), mean("held out", "centroid"),
-            mean("held out", "iou_deep"), mean("edge", "iou_mean"), mean("unseen shapes", "iou_mean"), flush=True,
-        )  # fmt: skip
+            name,
+            pairs,
+            [mean("contacts", kind, "all_found") for kind in ("balls_4mm", "unlike_4mm")],
+            forces.get("prism, aligned IoU"),
+            parts.get("worn", {}).get("aligned_iou"),
+            mean("held out", "centroid"),
+            mean("held out", "iou_deep"),
+            mean("edge", "iou_mean"),
+            mean("unseen shapes", "iou_mean"),
+            flush=True,
+        )
 
 
 def main() -> None:

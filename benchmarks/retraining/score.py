@@ -71,12 +71,14 @@ def on_forces(start: str, rig_presses: Path, contacts: Path) -> dict[str, Any]:
     frames = model_forces.exact(rig_presses)
     x, y = np.abs(frames.sensor.taxels.centers).max(axis=0)
     ridges = [
-        span for span in frames.episodes
+        span
+        for span in frames.episodes
         if span.indenter == "prism" and span.depth >= wearing.DEEP and abs(span.x) < x and abs(span.y) < y
-    ]  # fmt: skip
+    ]
     found: dict[str, Any] = {
-        "all presses": run.scores(network, frames), "contacts": run.contacts(network, model_forces.exact(contacts)),
-    }  # fmt: skip
+        "all presses": run.scores(network, frames),
+        "contacts": run.contacts(network, model_forces.exact(contacts)),
+    }
     if ridges:
         found["prism, aligned IoU"] = float(np.mean(wearing.overlaps(network, run.part(frames, ridges))))
     return found

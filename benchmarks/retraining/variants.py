@@ -51,16 +51,29 @@ _AROUND = 100.0
 def settings(name: str, epochs: int, batch: int, start: Checkpoint | None = None) -> TrainingSettings:
     """Return the recipe of a variant: large steps from random weights, smaller ones from a network, without a pull."""
     asked = {
-        "batch_size": batch, "idle_share": _IDLE, "epochs": epochs, "network": "pattern",
-        "learning_rate": 1e-3 if start else 1.5e-3, "pull": 0.0, **VARIANTS[name],
-    }  # fmt: skip
+        "batch_size": batch,
+        "idle_share": _IDLE,
+        "epochs": epochs,
+        "network": "pattern",
+        "learning_rate": 1e-3 if start else 1.5e-3,
+        "pull": 0.0,
+        **VARIANTS[name],
+    }
     return recipe(asked if start else {**asked, "arguments": {"hidden": 512, "layers": 4}}, start)
 
 
 def train_one(
-    name: str, solved: Path, packed: Path, runs: Path, out: Path, until: float, device: str, batch: int,
-    start: Checkpoint | None = None, shown: Callable[[str], None] = print,
-) -> None:  # fmt: skip
+    name: str,
+    solved: Path,
+    packed: Path,
+    runs: Path,
+    out: Path,
+    until: float,
+    device: str,
+    batch: int,
+    start: Checkpoint | None = None,
+    shown: Callable[[str], None] = print,
+) -> None:
     """Train a variant until a time; a trial tells how many epochs fit.
 
     Args:
@@ -92,9 +105,14 @@ def train_one(
         frames = presses.thinned(presses.read(solved, packed))
         split = _nearly_all(divide(frames, "episode", 0))
         best = graphed.train_graphed(
-            frames, settings(name, 1, batch), split, run, STEPS, until - _AFTER,
+            frames,
+            settings(name, 1, batch),
+            split,
+            run,
+            STEPS,
+            until - _AFTER,
             shown=lambda line: shown(f"{name}: {line}"),
-        )  # fmt: skip
+        )
         graphed.halved(best, out / f"{name}.safetensors")
         return
     resumed = (run / "last.safetensors").is_file()

@@ -17,9 +17,7 @@ LAWS = {
 }
 """Strain energy [MPa] of each law, of the deformation gradient F."""
 
-MIXED_LAWS = {
-    "neo_hookean": "mu/2*(pow(Det(F),-2/3)*Norm_sqr(F)-3)+hydro*(Det(F)-1)-sqr(hydro)/(2*kappa)",
-}
+MIXED_LAWS = {"neo_hookean": "mu/2*(pow(Det(F),-2/3)*Norm_sqr(F)-3)+hydro*(Det(F)-1)-sqr(hydro)/(2*kappa)"}
 """The same with a hydrostatic stress ``hydro`` [MPa] as an unknown of its own; stationary, not least, in it."""
 
 # Near its axis a shape is flat or round; 1e-18 mm^2 only keeps the root's derivative finite there.

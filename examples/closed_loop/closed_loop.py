@@ -61,8 +61,13 @@ def first_plan(path: Path) -> None:
         "hold": 0.6,
         "rest": 0.5,
     }
-    document = {"version": "1.1", "name": "one speed", "indenters": {"ball": {"shape": "sphere", "radius": 4.0}},
-                "motion": motion, "presses": presses}  # fmt: skip
+    document = {
+        "version": "1.1",
+        "name": "one speed",
+        "indenters": {"ball": {"shape": "sphere", "radius": 4.0}},
+        "motion": motion,
+        "presses": presses,
+    }
     path.write_text(yaml.safe_dump(document, sort_keys=False))
 
 

@@ -27,9 +27,13 @@ class DatasetFlow:
     """Appends one session's episodes to a dataset. Several processes may append to one: each append locks it."""
 
     def __init__(
-        self, out: Path, session: Path, recordings: Sequence[Path], sensor: Sensor | None = None,
+        self,
+        out: Path,
+        session: Path,
+        recordings: Sequence[Path],
+        sensor: Sensor | None = None,
         labels: Path | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Prepare; the dataset is made by the first episode.
 
         Args:

@@ -131,9 +131,7 @@ class Ledger:
 
     def _unusable(self, what: str, allowed: str) -> FormatError:
         return FormatError(
-            f"{self.path} {what}",
-            allowed,
-            f"delete {self.path} and its -wal and -shm: no result is lost, run again",
+            f"{self.path} {what}", allowed, f"delete {self.path} and its -wal and -shm: no result is lost, run again"
         )
 
     def close(self) -> None:

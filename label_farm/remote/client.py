@@ -37,9 +37,10 @@ class Client:
             )
         if not re.fullmatch("[!-~]*", token):
             raise UsageError(
-                "a token with blanks or letters beyond plain ones", "the token that `tacdata farm up` was started with",
+                "a token with blanks or letters beyond plain ones",
+                "the token that `tacdata farm up` was started with",
                 "give it with --token or TACDATA_FARM_TOKEN",
-            )  # fmt: skip
+            )
         self.url, self._token = url.rstrip("/"), token
 
     @staticmethod
@@ -84,9 +85,10 @@ class Client:
 
     def _stranger(self) -> UsageError:
         return UsageError(
-            f"what answers at {self.url} is no label farm of this version", "the address that `tacdata farm up` says",
+            f"what answers at {self.url} is no label farm of this version",
+            "the address that `tacdata farm up` says",
             "check --url",
-        )  # fmt: skip
+        )
 
     def content(self, path: str, known: str = "") -> bytes | None:
         """Return the bytes at a path; None if they are still those of a hash that is known (SHA-256, hex)."""

@@ -65,9 +65,12 @@ class Crew:
     def _start(self, number: int) -> subprocess.Popen[str]:
         device = self._devices[number % len(self._devices)]
         process = subprocess.Popen(
-            environment.python("label_farm.remote.worker"), env=environment.variables(device),
-            process_group=0, text=True, stdin=subprocess.PIPE,
-        )  # fmt: skip
+            environment.python("label_farm.remote.worker"),
+            env=environment.variables(device),
+            process_group=0,
+            text=True,
+            stdin=subprocess.PIPE,
+        )
         with suppress(BrokenPipeError):
             if process.stdin is not None:
                 process.stdin.write(json.dumps({**self._asked, "device": device}) + "\n")

@@ -74,9 +74,7 @@ class RemoteDesk:
 
     def finish(self, job: Job, seconds: float) -> None:
         """Send the result, repeatedly for a while if the connection is lost. A late result counts as well."""
-        headers = {
-            "Content-Type": "application/octet-stream", "X-Owner": self.owner, "X-Seconds": f"{seconds:.6f}"
-        }  # fmt: skip
+        headers = {"Content-Type": "application/octet-stream", "X-Owner": self.owner, "X-Seconds": f"{seconds:.6f}"}
         result, deadline = self._results.pop(job.key), time.monotonic() + PATIENCE_SECONDS
         while True:
             try:

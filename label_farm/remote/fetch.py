@@ -106,9 +106,10 @@ class Fetch:
                 self.fetched.current.append(number)
         except OSError as error:
             raise DeviceError(
-                f"cannot write {path}: {error.strerror}", "a disk with room that may be written",
+                f"cannot write {path}: {error.strerror}",
+                "a disk with room that may be written",
                 "make room and fetch again: what came is kept",
-            ) from None  # fmt: skip
+            ) from None
         finally:
             unread.unlink(missing_ok=True)
 

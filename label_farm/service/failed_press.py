@@ -59,8 +59,14 @@ def _place(axes, episode: Episode) -> None:
     if levels:
         axes.contour(at_x, at_y, np.nan_to_num(height, nan=1e9, posinf=1e9), levels=levels, colors="#c2412d")
     axes.plot([press.x], [press.y], "+", color="#c2412d", ms=10, label=f"{press.indenter_name}, as deep as planned")
-    axes.set(xlim=(-x - MARGIN, x + MARGIN), ylim=(-y - MARGIN, y + MARGIN), aspect="equal", xlabel="x [mm]",
-             ylabel="y [mm]", title=f"({press.x:g}, {press.y:g}) mm, yaw {press.yaw:g}°")  # fmt: skip
+    axes.set(
+        xlim=(-x - MARGIN, x + MARGIN),
+        ylim=(-y - MARGIN, y + MARGIN),
+        aspect="equal",
+        xlabel="x [mm]",
+        ylabel="y [mm]",
+        title=f"({press.x:g}, {press.y:g}) mm, yaw {press.yaw:g}°",
+    )
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), fontsize=8, frameon=False)
 
 

@@ -218,9 +218,7 @@ class Foreman:
 
     def _hire(self) -> Engine:
         chosen = self._settings
-        return chosen.engine(
-            self.store, chosen.factory, None, chosen.workers, chosen.lease_seconds, chosen.devices
-        )  # fmt: skip
+        return chosen.engine(self.store, chosen.factory, None, chosen.workers, chosen.lease_seconds, chosen.devices)
 
     def _plan_all(self) -> None:
         while not self._stop.is_set():

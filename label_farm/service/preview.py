@@ -34,8 +34,10 @@ def account(path: Path) -> str:
     job = made["parameters"].get("job") or {}
     lines = [f"label made {made['made_at']} by {made['made_by']} {made['code_version']}"]
     if solver:
-        lines.append(f"press solved {solver.get('made_at', '')} by worker {solver.get('worker', '?')} in "
-                     f"{solver.get('seconds', float('nan')):.1f} s, on {own.get('device', '?')}")  # fmt: skip
+        lines.append(
+            f"press solved {solver.get('made_at', '')} by worker {solver.get('worker', '?')} in "
+            f"{solver.get('seconds', float('nan')):.1f} s, on {own.get('device', '?')}"
+        )
     else:
         lines.append("no press was solved: the indenter never touches")
     if job:

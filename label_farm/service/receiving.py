@@ -54,8 +54,13 @@ def add_receiving(api: FastAPI, foreman: Foreman) -> None:
 class _Piece:
     def __init__(self, folder: str, name: str, size: int, sha256: str, offset: int, body: bytes) -> None:
         self.folder, self.name, self.size, self.sha256, self.offset, self.body = (
-            folder, name, size, sha256, offset, body,
-        )  # fmt: skip
+            folder,
+            name,
+            size,
+            sha256,
+            offset,
+            body,
+        )
 
 
 def _take(foreman: Foreman, piece: _Piece) -> dict[str, Any]:
@@ -64,9 +69,10 @@ def _take(foreman: Foreman, piece: _Piece) -> dict[str, Any]:
         if path.stat().st_size == piece.size and provenance.file_hash(path) == piece.sha256:
             return {"have": piece.size, "whole": True}
         raise UsageError(
-            f"another {piece.name} lies in {piece.folder}", "a new folder, or the very session that was sent before",
+            f"another {piece.name} lies in {piece.folder}",
+            "a new folder, or the very session that was sent before",
             "send it under another name with --to",
-        )  # fmt: skip
+        )
     unfinished = path.with_name(f".{piece.name}.{piece.sha256[:16]}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -82,9 +88,10 @@ def _take(foreman: Foreman, piece: _Piece) -> dict[str, Any]:
         unfinished.unlink()
     except OSError as error:
         raise DeviceError(
-            f"the service cannot keep {piece.name}: {error.strerror}", "a disk with room that may be written",
+            f"the service cannot keep {piece.name}: {error.strerror}",
+            "a disk with room that may be written",
             "make room there and send again: what came is kept",
-        ) from None  # fmt: skip
+        ) from None
     return {"have": piece.size, "whole": True}
 
 
@@ -121,9 +128,10 @@ def _append(unfinished: Path, piece: _Piece) -> int:
         )
     if shutil.disk_usage(unfinished.parent).free < piece.size - have + SPARE:
         raise UsageError(
-            f"no room for {piece.name} of {piece.size} bytes", f"{SPARE >> 30} GiB free beside it",
+            f"no room for {piece.name} of {piece.size} bytes",
+            f"{SPARE >> 30} GiB free beside it",
             "make room on the service's disk and send again: what came is kept",
-        )  # fmt: skip
+        )
     with unfinished.open("ab") as stream:
         stream.write(piece.body)
         stream.flush()

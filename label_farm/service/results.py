@@ -29,9 +29,10 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
         path = _labels(foreman, number).path(episode)
         if not foreman.is_labelled(number, episode) or not path.exists():
             raise UsageError(
-                f"no finished label of episode {episode} in submission {number}", "one that results lists",
+                f"no finished label of episode {episode} in submission {number}",
+                "one that results lists",
                 "see `tacdata farm status`",
-            )  # fmt: skip
+            )
         content = path.read_bytes()
         mark = f'"{hashlib.sha256(content).hexdigest()}"'
         if request.headers.get("if-none-match") == mark:

@@ -109,11 +109,14 @@ class Run:
         settings = replace(
             self._settings,
             ladder=Ladder(
-                load_step=wish.load_step, unload_step=wish.unload_step,
+                load_step=wish.load_step,
+                unload_step=wish.unload_step,
                 tolerance=Tolerance(least=wish.tolerance) if wish.tolerance else None,
             ),
-            uncertainty=wish.uncertainty, redo=wish.redo, priority=wish.priority,
-        )  # fmt: skip
+            uncertainty=wish.uncertainty,
+            redo=wish.redo,
+            priority=wish.priority,
+        )
         name = f"submission {wish.id}"
         self.labelling = Labelling(
             file_names.folder(session), self._store, settings, self._progress, self._deliver, name, self._versions

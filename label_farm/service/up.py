@@ -101,9 +101,10 @@ def _engine(dask: str) -> EngineMaker:
 def _check_token(asked: UpSettings) -> None:
     if asked.token and (len(asked.token) < SHORTEST_TOKEN or not asked.token.isascii() or " " in asked.token):
         raise UsageError(
-            f"a token of {len(asked.token)} characters", f"at least {SHORTEST_TOKEN}, plain letters and digits",
+            f"a token of {len(asked.token)} characters",
+            f"at least {SHORTEST_TOKEN}, plain letters and digits",
             "python -c 'import secrets; print(secrets.token_urlsafe())' makes one",
-        )  # fmt: skip
+        )
     if not asked.token and not _is_loopback(asked.host):
         raise UsageError(
             f"to listen on {asked.host} without a token",
@@ -129,7 +130,8 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         raise UsageError(
-            f"cannot listen on {host}:{port}: {error.strerror or error}", "an address of this computer, a free port",
+            f"cannot listen on {host}:{port}: {error.strerror or error}",
+            "an address of this computer, a free port",
             "name another with --host and --port; 0 takes any free port",
-        ) from None  # fmt: skip
+        ) from None
     return listener

@@ -66,8 +66,12 @@ class _Hand:
         self._errors: IO[bytes] = tempfile.TemporaryFile()
         self._process = subprocess.Popen(
             [*environment.python("label_farm.simulated.worker"), str(folder), str(presses), str(index), str(of)],
-            env=environment.variables(device), stdout=subprocess.PIPE, stderr=self._errors, text=True, process_group=0,
-        )  # fmt: skip
+            env=environment.variables(device),
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
+            process_group=0,
+        )
         self._thread = threading.Thread(target=self._listen, args=(settled,), daemon=True)
         self._thread.start()
 
@@ -90,7 +94,8 @@ class _Hand:
             self._errors.seek(0)
             words = self._errors.read().decode(errors="replace")[-2000:].strip()
             raise SolveError(
-                f"a process that solves presses ended with {code}:\n{words}", "processes that end well",
+                f"a process that solves presses ended with {code}:\n{words}",
+                "processes that end well",
                 "see the lines above; run again to go on: what was written is kept",
             )
 

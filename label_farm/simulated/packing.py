@@ -40,9 +40,15 @@ def simulated_episode(simulation: Simulation, number: int, solution: PathSolutio
     model = solution.provenance["parents"]["model"]
     times = episode.taxels.sample_ns
     request = LabelRequest(
-        number, recording_key(simulation, number), specimen, model, times, episode.tip_at(times),
-        int(episode.tip_ns[int(np.argmax(episode.tip[:, 2]))]), simulation.job(press, model),
-    )  # fmt: skip
+        number,
+        recording_key(simulation, number),
+        specimen,
+        model,
+        times,
+        episode.tip_at(times),
+        int(episode.tip_ns[int(np.argmax(episode.tip[:, 2]))]),
+        simulation.job(press, model),
+    )
     label = make_label(request, solution)
     ideal = np.asarray(label.taxel_counts, dtype=float)
     effects = simulation.effects[number % len(simulation.specimens)]
@@ -58,7 +64,10 @@ def recording_key(simulation: Simulation, number: int) -> str:
 
 
 def write_dataset(
-    simulation: Simulation, presses: int, out: Path, extra: Sequence[str] = (),
+    simulation: Simulation,
+    presses: int,
+    out: Path,
+    extra: Sequence[str] = (),
     done: Callable[[int, str], None] = lambda number, left_out: None,
 ) -> tuple[int, int]:
     """Append the solved presses that a dataset lacks; an interruption keeps what is finished.
@@ -114,13 +123,16 @@ def _record(simulation: Simulation, episode: Episode, label: Label) -> EpisodeRe
     made = found.label_provenance["parameters"]
     made = {**found.label_provenance, "parameters": {k: v for k, v in made.items() if k != "transduction"}}
     drawn = {
-        "plan": simulation.plan.name, "seed": simulation.seed, "press": number,
-        "simulation": simulation.content_hash, "specimen": differences(specimen, simulation.sensor),
+        "plan": simulation.plan.name,
+        "seed": simulation.seed,
+        "press": number,
+        "simulation": simulation.content_hash,
+        "specimen": differences(specimen, simulation.sensor),
         "effects": [
             {"effect": one.effect.name, "values": {name: value.tolist() for name, value in one.values.items()}}
             for one in simulation.effects[number % len(simulation.specimens)]
         ],
-    }  # fmt: skip
+    }
     return replace(found, specimen=specimen.name, label_provenance=made, simulated=drawn)
 
 

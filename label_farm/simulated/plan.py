@@ -117,20 +117,27 @@ class SimulationPlan:
             )
         shapes = tuple(
             DrawnShape(
-                name, {key: value for key, value in entry.items() if key == "shape" or key not in _OWN},
+                name,
+                {key: value for key, value in entry.items() if key == "shape" or key not in _OWN},
                 entry.get("weight", 1.0),
                 _above_zero(entry, "depth", f"{origin}: shapes/{name}") if "depth" in entry else depth,
             )
             for name, entry in document["shapes"].items()
-        )  # fmt: skip
+        )
         return cls(
-            document["name"], shapes, depth, speed, **times,
+            document["name"],
+            shapes,
+            depth,
+            speed,
+            **times,
             yaw=as_range(document.get("yaw", 0.0), f"{origin}: yaw"),
             tilt=as_range(document.get("tilt", 0.0), f"{origin}: tilt"),
-            rim=document.get("rim", 0.3), load_step=document.get("load_step", 0.25),
+            rim=document.get("rim", 0.3),
+            load_step=document.get("load_step", 0.25),
             specimens=SpecimenSpread(**document.get("specimens", {})),
-            noise=ReadingNoise(**document.get("noise", {})), document=document,
-        )  # fmt: skip
+            noise=ReadingNoise(**document.get("noise", {})),
+            document=document,
+        )
 
 
 def read_simulation_plan(path: Path) -> SimulationPlan:

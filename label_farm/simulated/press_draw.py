@@ -54,10 +54,21 @@ def _press(plan: SimulationPlan, drawn: DrawnShape, sensor: Sensor, rng: np.rand
     half = _room(indenter, depth, yaw, max(abs(tilt_x), abs(tilt_y)), sensor, plan.rim)
     x, y = (round(float(rng.uniform(-limit, limit)), 3) for limit in half)
     return Press(
-        index=number, indenter=indenter, indenter_name=drawn.name, x=x, y=y, yaw=yaw, depth=depth,
-        speed=_one(plan.speed, rng), hold=_one(plan.hold, rng), rest=_one(plan.rest, rng),
-        recovery=_one(plan.recovery, rng), purpose=_PURPOSE, tilt_x=tilt_x, tilt_y=tilt_y,
-    )  # fmt: skip
+        index=number,
+        indenter=indenter,
+        indenter_name=drawn.name,
+        x=x,
+        y=y,
+        yaw=yaw,
+        depth=depth,
+        speed=_one(plan.speed, rng),
+        hold=_one(plan.hold, rng),
+        rest=_one(plan.rest, rng),
+        recovery=_one(plan.recovery, rng),
+        purpose=_PURPOSE,
+        tilt_x=tilt_x,
+        tilt_y=tilt_y,
+    )
 
 
 def drawn_sizes(values: dict[str, Any], rng: np.random.Generator, origin: str) -> dict[str, Any]:
@@ -86,5 +97,5 @@ def _room(indenter: Indenter, depth: float, yaw: float, tilt: float, sensor: Sen
     if (skin < 0).any():
         raise FormatError(
             f"{indenter.shape} of {2 * max(reached):.1f} mm at {depth:g} mm depth", "one that fits", "shrink it"
-        )  # fmt: skip
+        )
     return np.minimum(skin, edge)

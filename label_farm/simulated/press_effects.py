@@ -56,9 +56,10 @@ class DrawnEffect:
         known = {parameter.name: parameter for parameter in effect.parameters}
         if unknown := sorted(set(document["values"]) - set(known)):
             raise FormatError(
-                f"{origin}: {effect.name} with {', '.join(unknown)}", f"parameters: {', '.join(known)}",
+                f"{origin}: {effect.name} with {', '.join(unknown)}",
+                f"parameters: {', '.join(known)}",
                 "correct values; `tacdata list effects` shows them",
-            )  # fmt: skip
+            )
         values = {name: _value(known[name], given, origin, effect) for name, given in document["values"].items()}
         return cls(effect, values)
 
@@ -77,8 +78,9 @@ class DrawnEffect:
             if given.ndim and len(given) != channels:
                 raise FormatError(
                     f"effect {self.effect.name}: {parameter.name} for {len(given)} channels",
-                    f"one number, or one for each of {channels} channels", "correct the effect's values",
-                )  # fmt: skip
+                    f"one number, or one for each of {channels} channels",
+                    "correct the effect's values",
+                )
             found[parameter.name] = np.broadcast_to(given, (channels,)) if parameter.per_channel else given
         return Placed(self.effect, found)
 
@@ -100,9 +102,10 @@ def effects_of(path: Path) -> list[dict[str, Any]]:
     named = [entry for entry in verdict["effects"] if entry["status"] == "named"]
     if not named:
         raise FormatError(
-            f"{path}: a verdict that names no effect ({verdict['status']})", "a verdict with a named effect",
+            f"{path}: a verdict that names no effect ({verdict['status']})",
+            "a verdict with a named effect",
             "record what it asks for next, or write the effect into the plan",
-        )  # fmt: skip
+        )
     return [{"effect": entry["effect"], "values": _from_verdict(entry)} for entry in named]
 
 
@@ -117,9 +120,10 @@ def drawn_effects(plan: SimulationPlan) -> tuple[DrawnEffect, ...]:
     names = [entry["effect"] for entry in entries]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise UsageError(
-            f"{origin}: effect {twice[0]} given twice", "each effect once",
+            f"{origin}: effect {twice[0]} given twice",
+            "each effect once",
             "give it in the plan or by --effects, not in both",
-        )  # fmt: skip
+        )
     return tuple(DrawnEffect.from_document(entry, origin) for entry in entries)
 
 
@@ -203,11 +207,19 @@ def _course(episode: Episode, label: Label) -> Course:
     frames, press = len(label.time_ns), episode.press
     none = np.zeros(1, dtype=np.int64)
     return Course(
-        time=(label.time_ns - label.time_ns[0]) / 1e9, episode=np.zeros(frames, dtype=np.int64), tip=label.tip,
-        tool=np.zeros(frames, dtype=np.int64), readings=np.zeros(label.taxel_force.shape), averaged=np.ones(frames),
-        session=none, site=none, tools=(Tool(press.indenter_name, press.indenter.shape, float("nan")),),
-        names=(str(episode.number),), centers=episode.sensor.taxels.centers, force=np.asarray(label.force[:, 2], float),
-    )  # fmt: skip
+        time=(label.time_ns - label.time_ns[0]) / 1e9,
+        episode=np.zeros(frames, dtype=np.int64),
+        tip=label.tip,
+        tool=np.zeros(frames, dtype=np.int64),
+        readings=np.zeros(label.taxel_force.shape),
+        averaged=np.ones(frames),
+        session=none,
+        site=none,
+        tools=(Tool(press.indenter_name, press.indenter.shape, float("nan")),),
+        names=(str(episode.number),),
+        centers=episode.sensor.taxels.centers,
+        force=np.asarray(label.force[:, 2], float),
+    )
 
 
 def _refuse_meaningless(effect: Effect, origin: str) -> None:
@@ -224,8 +236,9 @@ def _refuse_meaningless(effect: Effect, origin: str) -> None:
     if reason:
         raise FormatError(
             f"{origin}: effect {effect.name} ({effect.title}): {reason}",
-            "effects on forces and readings within a press: relaxation, hysteresis, delays, crosstalk", remedy,
-        )  # fmt: skip
+            "effects on forces and readings within a press: relaxation, hysteresis, delays, crosstalk",
+            remedy,
+        )
 
 
 def _value(parameter: Parameter, given: float | list[float], origin: str, effect: Effect) -> Value:

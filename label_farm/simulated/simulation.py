@@ -44,9 +44,13 @@ class Simulation:
     def document(self) -> dict[str, Any]:
         """The folder's `FILE`."""
         return {
-            "version": schemas.version("simulation"), "plan": self.plan.document, "sensor": self.sensor.document,
-            "seed": self.seed, "mesh_error": self.mesh_error, "code": provenance.code_hash(*_DRAWING),
-        }  # fmt: skip
+            "version": schemas.version("simulation"),
+            "plan": self.plan.document,
+            "sensor": self.sensor.document,
+            "seed": self.seed,
+            "mesh_error": self.mesh_error,
+            "code": provenance.code_hash(*_DRAWING),
+        }
 
     @cached_property
     def content_hash(self) -> str:
@@ -156,9 +160,17 @@ class Simulation:
         step, specimen = self.plan.load_step, self.specimen(press.index)
         ladder = Ladder(first_step=min(0.05, step), load_step=step, unload_step=3 * step, tolerance=None)
         return Job(
-            specimen.content_hash, model, press.indenter.document, press.x, press.y, press.yaw,
-            ladder.depths(press.depth, goes_up_otherwise(specimen.contact)), None, press.tilt_x, press.tilt_y,
-        )  # fmt: skip
+            specimen.content_hash,
+            model,
+            press.indenter.document,
+            press.x,
+            press.y,
+            press.yaw,
+            ladder.depths(press.depth, goes_up_otherwise(specimen.contact)),
+            None,
+            press.tilt_x,
+            press.tilt_y,
+        )
 
     def missing(self, presses: int, size: int) -> Iterator[tuple[int, list[int]]]:
         """Yield (specimen, numbers of presses) to solve together, ``size`` at most.

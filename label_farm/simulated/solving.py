@@ -33,7 +33,10 @@ class Share:
 
 
 def solve(
-    simulation: Simulation, presses: int, device: str, share: Share | None = None,
+    simulation: Simulation,
+    presses: int,
+    device: str,
+    share: Share | None = None,
     settled: Callable[[int, str], None] = lambda number, reason: None,
 ) -> None:
     """Solve the presses that are missing, and write each batch when it is done.
@@ -87,7 +90,10 @@ def _freed(kind: str) -> None:
 
 
 def solve_batch(
-    simulation: Simulation, model: SkinModel, numbers: list[int], device: str,
+    simulation: Simulation,
+    model: SkinModel,
+    numbers: list[int],
+    device: str,
     settled: Callable[[int, str], None] = lambda number, reason: None,
 ) -> Shard:
     """Solve presses of one specimen together.

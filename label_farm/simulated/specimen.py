@@ -57,7 +57,8 @@ def draw_specimen(sensor: Sensor, spread: SpecimenSpread, seed: int, number: int
     for name, share in sorted(spread.parameters.items()):
         if name not in known:
             raise FormatError(
-                f"specimens/parameters: {name}", f"parameters of {told['principle']}: {', '.join(known)}",
+                f"specimens/parameters: {name}",
+                f"parameters of {told['principle']}: {', '.join(known)}",
                 "name one of these, or leave it out",
             )
         value = np.asarray(known[name], dtype=float) * (1 + share * _normal(rng))

@@ -32,11 +32,14 @@ def timeline(press: Press, sensor: Sensor, rng: np.random.Generator) -> Episode:
         rng: Draws when within a frame's time the motion begins.
     """
     moves = [
-        ("rest", -CLEARANCE, press.rest or 0.0, 0.0), ("approach", -STANDOFF, 0.0, APPROACH_SPEED),
-        ("press", press.depth, 0.0, press.speed), ("hold", press.depth, press.hold, 0.0),
-        ("release", -STANDOFF, 0.0, press.speed), ("", -CLEARANCE, 0.0, APPROACH_SPEED),
+        ("rest", -CLEARANCE, press.rest or 0.0, 0.0),
+        ("approach", -STANDOFF, 0.0, APPROACH_SPEED),
+        ("press", press.depth, 0.0, press.speed),
+        ("hold", press.depth, press.hold, 0.0),
+        ("release", -STANDOFF, 0.0, press.speed),
+        ("", -CLEARANCE, 0.0, APPROACH_SPEED),
         ("", -CLEARANCE, press.recovery, 0.0),
-    ]  # fmt: skip
+    ]
     period = 1e9 / sensor.taxels.rate
     start = float(rng.uniform(0.0, period))
     times, depths, phases = [np.array([0.0, start])], [np.array([-CLEARANCE] * 2)], []
@@ -55,10 +58,19 @@ def timeline(press: Press, sensor: Sensor, rng: np.random.Generator) -> Episode:
     sample_ns = (np.arange(frames) * period).round().astype(np.int64)
     stream = TaxelStream(sample_ns, sample_ns, np.arange(frames), np.zeros((frames, sensor.taxels.count)))
     return Episode(
-        path=Path(f"press-{press.index:06d}"), press=press, sensor=sensor, rig={"name": RIG, "clock": {}},
-        taxels=stream, cnc=CncStream(tip_ns[:0], tip_ns[:0], tip[:0], ()), tags=(), phases=tuple(phases),
-        tip_ns=tip_ns, tip=tip, complete=True, notes=(),
-    )  # fmt: skip
+        path=Path(f"press-{press.index:06d}"),
+        press=press,
+        sensor=sensor,
+        rig={"name": RIG, "clock": {}},
+        taxels=stream,
+        cnc=CncStream(tip_ns[:0], tip_ns[:0], tip[:0], ()),
+        tags=(),
+        phases=tuple(phases),
+        tip_ns=tip_ns,
+        tip=tip,
+        complete=True,
+        notes=(),
+    )
 
 
 def _motion(start: float, end: float, pause: float, speed: float) -> tuple[np.ndarray, np.ndarray]:

@@ -17,9 +17,12 @@ def main() -> None:
     tell = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # what libraries print must not mix with it
     solve(
-        Simulation.read(Path(folder)), int(presses), os.environ.get(environment.DEVICE, "cpu"),
-        Share(int(index), int(of)), lambda number, reason: print(number, reason.replace("\n", " "), file=tell),
-    )  # fmt: skip
+        Simulation.read(Path(folder)),
+        int(presses),
+        os.environ.get(environment.DEVICE, "cpu"),
+        Share(int(index), int(of)),
+        lambda number, reason: print(number, reason.replace("\n", " "), file=tell),
+    )
 
 
 if __name__ == "__main__":

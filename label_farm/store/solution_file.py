@@ -130,8 +130,6 @@ def _array(archive: zipfile.ZipFile, name: str, entry: dict[str, Any], origin: s
     values = np.load(io.BytesIO(content), allow_pickle=False)
     if list(values.shape) != entry["shape"] or str(values.dtype) != entry["dtype"]:
         raise FormatError(
-            f"{origin}: {name} is {values.dtype} {values.shape}",
-            f"{entry['dtype']} {tuple(entry['shape'])}",
-            REMEDY,
+            f"{origin}: {name} is {values.dtype} {values.shape}", f"{entry['dtype']} {tuple(entry['shape'])}", REMEDY
         )
     return values

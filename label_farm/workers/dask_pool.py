@@ -179,17 +179,21 @@ class DaskPool(Engine):
             if self._address == "here":
                 # The ledger counts deaths and tries again; Dask need not.
                 self._cluster = LocalCluster(
-                    n_workers=self.workers, threads_per_worker=1, resources={RESOURCE: 1}, host="127.0.0.1",
+                    n_workers=self.workers,
+                    threads_per_worker=1,
+                    resources={RESOURCE: 1},
+                    host="127.0.0.1",
                     scheduler_kwargs={"allowed_failures": 0},
                     dashboard_address=None,
-                )  # fmt: skip
+                )
             self._client = Client(self._cluster or self._address, timeout=CONNECT_SECONDS, set_as_default=False)
             return self._client
         except (OSError, TimeoutError) as error:
             raise DeviceError(
-                f"no Dask scheduler answers at {self._address}: {error}", "tcp://HOST:PORT of one that runs",
+                f"no Dask scheduler answers at {self._address}: {error}",
+                "tcp://HOST:PORT of one that runs",
                 "start it with `dask scheduler`, and join workers with `tacdata farm worker tcp://HOST:PORT`",
-            ) from None  # fmt: skip
+            ) from None
 
     def _look(self, client: Client) -> None:
         """See which workers are there, and give back what those that are gone had."""
@@ -244,9 +248,17 @@ class DaskPool(Engine):
         version = leases[0].job.model
         documents = [lease.job.document for lease in leases]
         return client.submit(
-            solve_there, self._factory, version, self._ledger.sensor(version), documents,
-            resources={RESOURCE: 1}, workers=[address], allow_other_workers=False, pure=False, retries=0,
-        )  # fmt: skip
+            solve_there,
+            self._factory,
+            version,
+            self._ledger.sensor(version),
+            documents,
+            resources={RESOURCE: 1},
+            workers=[address],
+            allow_other_workers=False,
+            pure=False,
+            retries=0,
+        )
 
     def _give_back(self, task: _Task, began: bool) -> None:
         """Give back what a task did not settle; if it began and its worker died, that counts as a try."""
@@ -330,9 +342,13 @@ def dask_engine(address: str) -> EngineMaker:
         raise UsageError(f"the scheduler {address!r}", "tcp://HOST:PORT, tls://HOST:PORT or here", "correct --dask")
 
     def engine(
-        store: Store, factory: str, sensors: dict[str, Sensor] | None, workers: int, lease_seconds: float,
+        store: Store,
+        factory: str,
+        sensors: dict[str, Sensor] | None,
+        workers: int,
+        lease_seconds: float,
         devices: Sequence[str],
-    ) -> DaskPool:  # fmt: skip
+    ) -> DaskPool:
         return DaskPool(store, factory, sensors, workers, lease_seconds, devices, address)
 
     return engine
@@ -347,9 +363,16 @@ def join(address: str, processes: int | None, devices: tuple[str, ...]) -> None:
     for number in range(count):
         device = chosen[number % len(chosen)]
         command = [
-            *environment.python("distributed.cli.dask_worker"), address, "--nthreads", "1", "--no-dashboard",
-            "--resources", f"{RESOURCE}=1", "--name", f"{socket.gethostname()}-{os.getpid()}-{number}",
-        ]  # fmt: skip
+            *environment.python("distributed.cli.dask_worker"),
+            address,
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+            "--resources",
+            f"{RESOURCE}=1",
+            "--name",
+            f"{socket.gethostname()}-{os.getpid()}-{number}",
+        ]
         started.append(subprocess.Popen(command, env=environment.variables(device)))
     print(f"{count} workers for {address}; Ctrl-C stops them", flush=True)
     try:

@@ -37,7 +37,10 @@ class Engine(ABC):
             self._ledger.register({version: sensor.document for version, sensor in sensors.items()})
 
     def run(
-        self, keys: set[str], since: int, on_change: Callable[[JobOutcome], None],
+        self,
+        keys: set[str],
+        since: int,
+        on_change: Callable[[JobOutcome], None],
         grow: Callable[[], set[str] | None] = lambda: None,
     ) -> int:
         """Run until every job is solved or failed, by these workers or those of another run.

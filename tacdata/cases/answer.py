@@ -83,21 +83,29 @@ class CaseAnswer:
     def _result(self, k: int) -> dict[str, Any]:
         state = self.states[k]
         result = {
-            "depth": self.request.depths[k], "force_N": state.force.tolist(),
-            "protrusion_force_N": state.taxel_force.tolist(), "protrusion_closure_mm": state.taxel_closure.tolist(),
-            "protrusion_contact_area_mm2": state.taxel_area.tolist(), "residual": state.residual,
-            "misfit_um": 1e3 * state.penetration, "newton": state.newton, "seconds": round(self.seconds[k], 3),
+            "depth": self.request.depths[k],
+            "force_N": state.force.tolist(),
+            "protrusion_force_N": state.taxel_force.tolist(),
+            "protrusion_closure_mm": state.taxel_closure.tolist(),
+            "protrusion_contact_area_mm2": state.taxel_area.tolist(),
+            "residual": state.residual,
+            "misfit_um": 1e3 * state.penetration,
+            "newton": state.newton,
+            "seconds": round(self.seconds[k], 3),
         }
         if self.readings:
             result["readings"] = {
-                "counts": self.readings.counts[k].tolist(), "capacitance_pF": self.readings.capacitance[k].tolist(),
+                "counts": self.readings.counts[k].tolist(),
+                "capacitance_pF": self.readings.capacitance[k].tolist(),
                 "saturated": self.readings.saturated[k].tolist(),
             }
         if self.error is not None:
             surface = self.error.surface[k]
             result["numerical_error"] = {
-                "force_N": float(self.error.force[k]), "protrusion_force_N": self.error.taxel_force[k].tolist(),
-                "map_rms_mm": float(np.sqrt((surface**2).mean())), "map_max_mm": float(surface.max()),
+                "force_N": float(self.error.force[k]),
+                "protrusion_force_N": self.error.taxel_force[k].tolist(),
+                "map_rms_mm": float(np.sqrt((surface**2).mean())),
+                "map_max_mm": float(surface.max()),
             }
         return result
 
@@ -120,7 +128,10 @@ class CaseAnswer:
 
 
 def answer(
-    sensor: Sensor, request: PressRequest, settings: ModelSettings, error_estimate: bool,
+    sensor: Sensor,
+    request: PressRequest,
+    settings: ModelSettings,
+    error_estimate: bool,
     done: Callable[[float], None] = lambda depth: None,
 ) -> CaseAnswer:
     """Solve a press with a model of its own.

@@ -49,9 +49,13 @@ def read_case(path: Path) -> Case:
     else:
         sensor = Sensor.from_document(given, f"{path}: sensor", path.parent)
     request = PressRequest(
-        from_document(document["indenter"], f"{path}: indenter", path.parent), float(document.get("x", 0.0)),
-        float(document.get("y", 0.0)), float(document.get("yaw", 0.0)), tuple(float(d) for d in document["depths"]),
-        float(document.get("tilt_x", 0.0)), float(document.get("tilt_y", 0.0)),
+        from_document(document["indenter"], f"{path}: indenter", path.parent),
+        float(document.get("x", 0.0)),
+        float(document.get("y", 0.0)),
+        float(document.get("yaw", 0.0)),
+        tuple(float(d) for d in document["depths"]),
+        float(document.get("tilt_x", 0.0)),
+        float(document.get("tilt_y", 0.0)),
     )
     deepest, upright = max(request.depths), request.tilt_x == request.tilt_y == 0
     if upright and deepest > 0 and not sensor.skin.curved:

@@ -49,7 +49,8 @@ def mesh_for(sensor: Sensor, request: PressRequest) -> MeshSettings:
     if (hole := _flat(request.indenter) - _RIM) > fine:
         focus = (*focus, round(hole, 3))
     return MeshSettings(
-        outer=_OUTER, interior=_INTERIOR, focus=focus,
+        outer=_OUTER,
+        interior=_INTERIOR,
+        focus=focus,
         **({"protrusion": round(_PROTRUSION * radius, 3), "tip": round(_TIP * radius, 3)} if radius else {}),
     )
-

@@ -50,8 +50,14 @@ def _forces(figure: Any, axes: Any, answer: CaseAnswer, k: int) -> None:
     drawn = axes.scatter(x, y, c=force, s=420, cmap="magma", vmin=0.0, edgecolors="grey")
     for place_x, place_y, value in zip(x, y, force, strict=True):
         light = value < 0.6 * force.max()
-        axes.annotate(f"{1e3 * value:.0f}", (place_x, place_y), ha="center", va="center", fontsize=7,
-                      color="white" if light else "black")  # fmt: skip
+        axes.annotate(
+            f"{1e3 * value:.0f}",
+            (place_x, place_y),
+            ha="center",
+            va="center",
+            fontsize=7,
+            color="white" if light else "black",
+        )
     axes.plot(answer.request.x, answer.request.y, "+", color="tab:blue", markersize=12)
     axes.set_aspect("equal")
     axes.margins(0.12)
@@ -67,8 +73,9 @@ def _profile(axes: Any, answer: CaseAnswer, deepest: int) -> None:
         axes.plot(grid.x, height, color="tab:blue", alpha=shade, label=f"{answer.request.depths[k]:g} mm")
         if k == deepest and answer.error:
             off = answer.error.surface[k, :, row]
-            axes.fill_between(grid.x, height - off, height + off, color="tab:blue", alpha=0.3, linewidth=0,
-                              label="± numerical error")  # fmt: skip
+            axes.fill_between(
+                grid.x, height - off, height + off, color="tab:blue", alpha=0.3, linewidth=0, label="± numerical error"
+            )
     axes.axvline(answer.request.x, color="grey", linewidth=0.6, linestyle=":")
     axes.set(title=f"profile at y = {grid.y[row]:g} mm", xlabel="x [mm]", ylabel="height of the outer face [mm]")
     axes.legend(fontsize=7)

@@ -112,10 +112,19 @@ class Course:
         kept = {
             name: value[rows]
             for name in (
-                "time", "episode", "tip", "tool", "readings", "averaged", "force", "tag", "temperature", "clipped",
+                "time",
+                "episode",
+                "tip",
+                "tool",
+                "readings",
+                "averaged",
+                "force",
+                "tag",
+                "temperature",
+                "clipped",
             )
             if (value := getattr(self, name)) is not None
-        }  # fmt: skip
+        }
         return replace(self, **kept)
 
     @cached_property

@@ -107,11 +107,15 @@ def _steps(effects: Sequence[Acting]) -> list[Acting | str]:
     by_stage = {stage: [e for e in effects if e.stage == stage] for stage in STAGES}
     kinematic = by_stage["kinematics"]
     return [
-        *(e for e in kinematic if e.seen_by_tag), _TAG, *by_stage["view"],
-        *(e for e in kinematic if not e.seen_by_tag), _LOAD,
-        *(e for stage in STAGES[_AFTER_POSE:_BEFORE_SIGNAL] for e in by_stage[stage]), _SIGNAL,
+        *(e for e in kinematic if e.seen_by_tag),
+        _TAG,
+        *by_stage["view"],
+        *(e for e in kinematic if not e.seen_by_tag),
+        _LOAD,
+        *(e for stage in STAGES[_AFTER_POSE:_BEFORE_SIGNAL] for e in by_stage[stage]),
+        _SIGNAL,
         *(e for stage in STAGES[_BEFORE_SIGNAL:] for e in by_stage[stage]),
-    ]  # fmt: skip
+    ]
 
 
 def _after(run: _Run, step: Acting | str) -> _Run:

@@ -11,9 +11,13 @@ from tacdata.chain.lanes import Lanes, in_lanes, padded
 
 @wp.kernel(module="unique", enable_backward=False)
 def _filter(
-    values: wp.array2d(dtype=Lanes), decay: wp.array2d(dtype=wp.float64), weight: wp.array2d(dtype=wp.float64),
-    share: wp.array(dtype=wp.float64), now: wp.array2d(dtype=Lanes), result: wp.array2d(dtype=Lanes),
-):  # fmt: skip
+    values: wp.array2d(dtype=Lanes),
+    decay: wp.array2d(dtype=wp.float64),
+    weight: wp.array2d(dtype=wp.float64),
+    share: wp.array(dtype=wp.float64),
+    now: wp.array2d(dtype=Lanes),
+    result: wp.array2d(dtype=Lanes),
+):
     for i in range(1, values.shape[0]):
         for j in range(values.shape[1]):
             value, before, total = values[i, j], values[i - 1, j], Lanes()
@@ -27,9 +31,11 @@ def _filter(
 
 @wp.kernel(module="unique", enable_backward=False)
 def _play(
-    values: wp.array2d(dtype=wp.float64), width: wp.float64, anew: wp.array(dtype=wp.int8),
+    values: wp.array2d(dtype=wp.float64),
+    width: wp.float64,
+    anew: wp.array(dtype=wp.int8),
     result: wp.array2d(dtype=wp.float64),
-):  # fmt: skip
+):
     for j in range(values.shape[1]):
         result[0, j] = values[0, j] - width
     for i in range(1, values.shape[0]):
@@ -43,9 +49,11 @@ def _play(
 
 @wp.kernel(module="unique", enable_backward=False)
 def _between(
-    values: wp.array2d(dtype=wp.float64), right: wp.array(dtype=wp.int64), share: wp.array(dtype=wp.float64),
+    values: wp.array2d(dtype=wp.float64),
+    right: wp.array(dtype=wp.int64),
+    share: wp.array(dtype=wp.float64),
     result: wp.array2d(dtype=wp.float64),
-):  # fmt: skip
+):
     i = wp.tid()
     after, by = right[i], share[i]
     for j in range(values.shape[1]):

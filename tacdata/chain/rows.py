@@ -49,7 +49,7 @@ class Rows:
 
 def rows_of(
     time: np.ndarray, values: np.ndarray, path_time: np.ndarray, path: np.ndarray, channels: int | None = None
-) -> Rows:  # fmt: skip
+) -> Rows:
     """Lay out the rows of one episode.
 
     Args:

@@ -18,9 +18,11 @@ def _spline(t: wp.float64):
     square, cube = t * t, t * t * t
     back = one - t
     return wp.vec4d(
-        back * back * back / six, (three * cube - six * square + four) / six,
-        (three * square - three * cube + three * t + one) / six, cube / six,
-    )  # fmt: skip
+        back * back * back / six,
+        (three * cube - six * square + four) / six,
+        (three * square - three * cube + three * t + one) / six,
+        cube / six,
+    )
 
 
 @wp.func
@@ -39,9 +41,13 @@ def _weights(t: wp.float64, through_nodes: bool):
 
 @wp.kernel(module="unique", enable_backward=False)
 def _cubic(
-    place: wp.array2d(dtype=wp.float64), table: wp.array2d(dtype=Lanes), wide: int, deep: int, through_nodes: bool,
+    place: wp.array2d(dtype=wp.float64),
+    table: wp.array2d(dtype=Lanes),
+    wide: int,
+    deep: int,
+    through_nodes: bool,
     result: wp.array2d(dtype=Lanes),
-):  # fmt: skip
+):
     i = wp.tid()
     x, y, z = wp.floor(place[i, 0]), wp.floor(place[i, 1]), wp.floor(place[i, 2])
     a, b = _weights(place[i, 0] - x, through_nodes), _weights(place[i, 1] - y, through_nodes)
@@ -59,9 +65,13 @@ def _cubic(
 
 @wp.kernel(module="unique", enable_backward=False)
 def _at_places(
-    place: wp.array2d(dtype=wp.float64), table: wp.array2d(dtype=Lanes), wide: int, deep: int, through_nodes: bool,
+    place: wp.array2d(dtype=wp.float64),
+    table: wp.array2d(dtype=Lanes),
+    wide: int,
+    deep: int,
+    through_nodes: bool,
     result: wp.array2d(dtype=Lanes),
-):  # fmt: skip
+):
     i = wp.tid()
     x, y = wp.floor(place[i, 0]), wp.floor(place[i, 1])
     a, b = _weights(place[i, 0] - x, through_nodes), _weights(place[i, 1] - y, through_nodes)
@@ -77,9 +87,13 @@ def _at_places(
 
 @wp.kernel(module="unique", enable_backward=False)
 def _along_depth(
-    depth: wp.array(dtype=wp.float64), run: wp.array(dtype=wp.int32), table: wp.array2d(dtype=Lanes), deep: int,
-    through_nodes: bool, result: wp.array2d(dtype=Lanes),
-):  # fmt: skip
+    depth: wp.array(dtype=wp.float64),
+    run: wp.array(dtype=wp.int32),
+    table: wp.array2d(dtype=Lanes),
+    deep: int,
+    through_nodes: bool,
+    result: wp.array2d(dtype=Lanes),
+):
     i = wp.tid()
     z = wp.floor(depth[i])
     c = _weights(depth[i] - z, through_nodes)

@@ -26,10 +26,19 @@ class TableResponse(Response):
     """Loads solved on x, y, depth for each tool, and the curve from load to reading."""
 
     def __init__(
-        self, x: np.ndarray, y: np.ndarray, depth: np.ndarray, load: np.ndarray, force: np.ndarray,
-        curve_load: np.ndarray, curve_signal: np.ndarray, gain: np.ndarray, offset: np.ndarray, tools: tuple[str, ...],
+        self,
+        x: np.ndarray,
+        y: np.ndarray,
+        depth: np.ndarray,
+        load: np.ndarray,
+        force: np.ndarray,
+        curve_load: np.ndarray,
+        curve_signal: np.ndarray,
+        gain: np.ndarray,
+        offset: np.ndarray,
+        tools: tuple[str, ...],
         error: float = 0.0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Keep the table.
 
         Args:
@@ -151,9 +160,7 @@ class TableResponse(Response):
             self._kept[key] = _Answer(_locked(load), _locked(normal))
         return self._kept[key]
 
-    def _read(
-        self, pose: np.ndarray, tool: np.ndarray, force: bool = False
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:  # fmt: skip
+    def _read(self, pose: np.ndarray, tool: np.ndarray, force: bool = False) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Give rows in contact with loads and then the force, or the force alone, shape (m, channels + 1) or (m, 1)."""
         from tacdata.chain.table_kernels import cubic
 

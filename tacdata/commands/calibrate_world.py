@@ -50,9 +50,10 @@ def run(
         found = _by_board(board, images, calibration, camera, frame)
     else:
         raise UsageError(
-            "neither --pairs nor --board with --images and --calibration", "one of them",
+            "neither --pairs nor --board with --images and --calibration",
+            "one of them",
             "see tacdata calibrate-world --help",
-        )  # fmt: skip
+        )
     document = found.document(datetime.now(UTC).isoformat(timespec="seconds"))
     documents.write(out, document, "camera_world")
     x, y, z = found.matrix[:3, 3]

@@ -78,16 +78,7 @@ class _Place:
         # One approach to a place and two taxels: enough for this, and half of the time.
         register = ["register", "--rig", str(self.rig), "--yes", "--repeats", "1", "--taxel", "7", "--taxel", "16"]
         plan = ["plan", "--presses", str(presses), "--seed", str(seed), "--out", str(self.plan)]
-        record = [
-            "record",
-            "--rig",
-            str(self.rig),
-            "--plan",
-            str(self.plan),
-            "--out",
-            str(self.session),
-            "--yes",
-        ]
+        record = ["record", "--rig", str(self.rig), "--plan", str(self.plan), "--out", str(self.session), "--yes"]
         return [
             ("find where the sensor lies, by touching it", register),
             ("make a press plan", plan),
@@ -140,9 +131,7 @@ def _new_folder(wanted: Path) -> Path:
             continue
         except OSError as error:
             raise UsageError(
-                f"the folder {folder} cannot be made: {error.strerror}",
-                "a place to write",
-                "choose another --out",
+                f"the folder {folder} cannot be made: {error.strerror}", "a place to write", "choose another --out"
             ) from None
         if number > 1:
             print(f"{wanted} exists and is left as it is; this run goes into {folder}")

@@ -25,8 +25,7 @@ def run(
         typer.Option(help="Model spec (schemas/model_spec.schema.json); else a response fitted to the recordings."),
     ] = None,
     stop_after: Annotated[
-        str,
-        typer.Option(help="Last step: gate (is there a gap), locate (where), fit (what fits best), decide (all)."),
+        str, typer.Option(help="Last step: gate (is there a gap), locate (where), fit (what fits best), decide (all).")
     ] = "decide",
     fem: Annotated[
         bool, typer.Option("--fem", help="Start from finite elements: tacdata surrogate first, into OUT-base.")
@@ -64,8 +63,9 @@ def _solved(recordings: list[Path], spec: Path | None, out: Path) -> Path:
     if spec is not None or out.exists():
         raise UsageError(
             f"--fem with --spec {spec}" if spec is not None else f"{out} exists",
-            "one base, and a new folder", "leave one of them out" if spec is not None else "choose another --out",
-        )  # fmt: skip
+            "one base, and a new folder",
+            "leave one of them out" if spec is not None else "choose another --out",
+        )
     base = out.with_name(f"{out.name}-base")
     surrogate.run(recordings, base, None, False, None, "cpu", 1, False)
     return base / "spec.json"

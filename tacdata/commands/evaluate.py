@@ -20,8 +20,7 @@ def run(
         Path | None, typer.Option(help="Dataset folder; default: the one that the network was trained on.")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the scores; default: RUN/scores, predictions in RUN/predictions."),
+        Path | None, typer.Option(help="Folder of the scores; default: RUN/scores, predictions in RUN/predictions.")
     ] = None,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
@@ -49,11 +48,7 @@ def run(
     with progress.bars(transient=True) as bar:
         task = bar.add_task("predict", total=None)
         evaluation = evaluate(
-            trained,
-            frames,
-            device,
-            threads,
-            lambda done, total: bar.update(task, completed=done, total=total),
+            trained, frames, device, threads, lambda done, total: bar.update(task, completed=done, total=total)
         )
         report.write(place, evaluation, frames)
     print(markdown(evaluation.document))

@@ -39,5 +39,11 @@ def run(
         ("tacdata demo", f"run the whole pipeline ({install_line('all')})"),
     ):
         say(f"  {command:<{len(str(out)) + 18}}{purpose}")
-    return Result({"check": report.document, "press": {"number": DEEPEST, "found": scene.found}, "folder": out,
-                   "picture": out / PICTURE})  # fmt: skip
+    return Result(
+        {
+            "check": report.document,
+            "press": {"number": DEEPEST, "found": scene.found},
+            "folder": out,
+            "picture": out / PICTURE,
+        }
+    )

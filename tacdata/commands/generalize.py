@@ -52,9 +52,15 @@ def run(
     from training.splits.split import describe
 
     recipe = TrainingSettings(
-        network=network, epochs=epochs, batch_size=batch_size, learning_rate=learning_rate, schedule=schedule,
-        mirror=mirror, gain_jitter=gain_jitter, idle_share=idle_share,
-    )  # fmt: skip
+        network=network,
+        epochs=epochs,
+        batch_size=batch_size,
+        learning_rate=learning_rate,
+        schedule=schedule,
+        mirror=mirror,
+        gain_jitter=gain_jitter,
+        idle_share=idle_share,
+    )
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out} is a file", "a folder", "choose another --out")
     splits = tuple(split or DEFAULTS)

@@ -50,9 +50,13 @@ def run(
     trained = checkpoint.load(network or _trained(sensor, out / NETWORK, epochs, seed, threads))
     trained.check_sensor(sensor, "the study's fingertip")
     found = result.result(
-        Setup(repeats=repeats, seed=seed), read_presses(FOLDER / "orange.npz", sensor), sensor,
-        lambda readings: sequence_maps(trained, readings), identity(trained), _told,
-    )  # fmt: skip
+        Setup(repeats=repeats, seed=seed),
+        read_presses(FOLDER / "orange.npz", sensor),
+        sensor,
+        lambda readings: sequence_maps(trained, readings),
+        identity(trained),
+        _told,
+    )
     documents.write(out / RESULT, found, "grasp_study")
     picture.save(found, out / PICTURE)
     print("\n".join(result.lines(found)))
@@ -102,6 +106,15 @@ def _frames(found: list[Lesson], sensor: Sensor, origin: str) -> Frames:
     count = len(taxels)
     times = (np.arange(count) * 1e9 / sensor.taxels.rate).astype(np.int64)
     return Frames(
-        taxels, maps, tip, np.full(count, -1), times, np.ones(count, dtype=bool), tuple(spans), sensor, origin,
-        "presses that ship with tacdata.grasping", True,
-    )  # fmt: skip
+        taxels,
+        maps,
+        tip,
+        np.full(count, -1),
+        times,
+        np.ones(count, dtype=bool),
+        tuple(spans),
+        sensor,
+        origin,
+        "presses that ship with tacdata.grasping",
+        True,
+    )

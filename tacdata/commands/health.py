@@ -78,9 +78,10 @@ def _network_errors(model: Path, visits: list[Visit]) -> dict[str, NetworkError]
     labelled = [visit for visit in visits if file_names.present(file_names.folder(visit.session.folder))]
     if not labelled:
         raise UsageError(
-            f"--model {model} with sessions without labels", "labelled sessions: a network's error is against labels",
+            f"--model {model} with sessions without labels",
+            "labelled sessions: a network's error is against labels",
             "run `tacdata label` on each, or leave --model out",
-        )  # fmt: skip
+        )
     found = {}
     for visit in labelled:
         present = file_names.present(file_names.folder(visit.session.folder))

@@ -36,8 +36,9 @@ def run(
     if out is None or propose is not None:
         raise UsageError(
             "--mapping without --out" if out is None else "--mapping with --propose",
-            "--mapping FILE --out SESSION, or --propose FILE alone", "add --out, or leave --propose out",
-        )  # fmt: skip
+            "--mapping FILE --out SESSION, or --propose FILE alone",
+            "add --out, or leave --propose out",
+        )
     made = import_session(source, mapping, out, progress=say)
     for note in _together(made.notes):
         print(f"note: {note}")
@@ -55,10 +56,11 @@ def _together(notes: tuple[str, ...]) -> list[str]:
         name, colon, rest = note.partition(": ")
         files.setdefault(rest if colon and "." in name else note, []).append(name)
     return [
-        f"{names[0]} and {len(names) - 1} more files: {text}" if len(names) > 1
+        f"{names[0]} and {len(names) - 1} more files: {text}"
+        if len(names) > 1
         else next(note for note in notes if note.endswith(text))
         for text, names in files.items()
-    ]  # fmt: skip
+    ]
 
 
 def _inspect(source: Path, propose: Path | None) -> Result:

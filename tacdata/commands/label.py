@@ -24,8 +24,7 @@ def run(
     session: Annotated[Path, typer.Argument(help="Folder that `tacdata record` wrote.")],
     sensor: Annotated[Path | None, typer.Option(help="Sensor file, if not each recording's own.")] = None,
     store: Annotated[
-        Path | None,
-        typer.Option(help="Folder of solved presses, may serve many sessions; else SESSION/labels/store."),
+        Path | None, typer.Option(help="Folder of solved presses, may serve many sessions; else SESSION/labels/store.")
     ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one per core or GPU.")] = None,
     redo: Annotated[

@@ -55,9 +55,19 @@ def run(
     if not numbers or numbers[0] < 0:
         raise UsageError(f"--presses {presses}", "whole numbers with commas, 0,10,30", "correct the list")
     document = learning_curve(
-        read_frames(dataset), None if start == NONE else pretrained(start), out, numbers, tuple(range(seeds)), split,
-        tuple(network or ("pattern",)), read_frames(simulated) if simulated else None, device, threads, _told, _begun,
-    )  # fmt: skip
+        read_frames(dataset),
+        None if start == NONE else pretrained(start),
+        out,
+        numbers,
+        tuple(range(seeds)),
+        split,
+        tuple(network or ("pattern",)),
+        read_frames(simulated) if simulated else None,
+        device,
+        threads,
+        _told,
+        _begun,
+    )
     draw(out / PICTURE, document)
     print(table(document))
     print(f"curve   {out / FILE}\npicture {out / PICTURE}")

@@ -52,9 +52,14 @@ def run(
     trained.check_sensor(source.sensor, str(rig))
     offsets, known = trained.network.offsets, novelty.read(trained.path.parent, trained.content_hash)
     stream = DepthStream(
-        window_map(trained), offsets, source.sensor.map, stream_clock(source.board), round(tare * source.rate), causal,
+        window_map(trained),
+        offsets,
+        source.sensor.map,
+        stream_clock(source.board),
+        round(tare * source.rate),
+        causal,
         known.novelty if known else None,
-    )  # fmt: skip
+    )
     say(_mode(trained.network.name, max(offsets), causal, source.rate))
     if words := unfitted(trained):
         print(f"note: {words}", flush=True)

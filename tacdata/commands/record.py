@@ -158,9 +158,7 @@ def _mounting(rig: Rig, bar: _Bar) -> Callable[[Press], None]:
         print(f"\nMount {press.indenter_name} ({press.indenter.shape}; {sizes}) at {press.turned}.")
         if _answer("Mounted, and its tip zeroed? [y/N] ").lower() not in ("y", "yes"):
             raise UsageError(
-                f"{press.indenter_name} was not mounted",
-                "yes",
-                "continue later with --resume; nothing is lost",
+                f"{press.indenter_name} was not mounted", "yes", "continue later with --resume; nothing is lost"
             )
 
     return ask

@@ -72,8 +72,11 @@ def _specimen(name: str) -> dict[str, Any]:
 
     document = specimens((name,))[name]
     if document["shape"] != "sphere":
-        raise UsageError(f"indenter {name} ({document['shape']})", "a sphere: it touches a tilted skin with one point",
-                         "choose sphere_2 or sphere_4")  # fmt: skip
+        raise UsageError(
+            f"indenter {name} ({document['shape']})",
+            "a sphere: it touches a tilted skin with one point",
+            "choose sphere_2 or sphere_4",
+        )
     return document
 
 
@@ -88,14 +91,16 @@ def _check(settings: RegistrationSettings, sensor: Sensor, target: Path) -> None
     if max(settings.limit, settings.depth) > half:
         raise UsageError(
             f"--limit {settings.limit:g} mm, --depth {settings.depth:g} mm on a skin of {sensor.skin.thickness:g} mm",
-            f"at most {half:g} mm", "search less deep",
-        )  # fmt: skip
+            f"at most {half:g} mm",
+            "search less deep",
+        )
     wrong = [k for k in settings.taxels if not 0 <= k < sensor.taxels.count]
     if wrong or len(settings.taxels) == 1:
         raise UsageError(
-            f"--taxel {', '.join(map(str, settings.taxels))}", f"two or more of 0 to {sensor.taxels.count - 1}",
+            f"--taxel {', '.join(map(str, settings.taxels))}",
+            f"two or more of 0 to {sensor.taxels.count - 1}",
             "choose taxels that lie apart",
-        )  # fmt: skip
+        )
 
 
 def _measure(
@@ -120,9 +125,15 @@ def _measure(
 
 
 def _touch(
-    rig: Rig, sensor: Sensor, settings: RegistrationSettings, specimen: dict[str, Any], yes: bool,
-    devices: RigDevices, motion: GuardedMotion, interruption: Interruption,
-) -> tuple[dict[str, Any], str]:  # fmt: skip
+    rig: Rig,
+    sensor: Sensor,
+    settings: RegistrationSettings,
+    specimen: dict[str, Any],
+    yes: bool,
+    devices: RigDevices,
+    motion: GuardedMotion,
+    interruption: Interruption,
+) -> tuple[dict[str, Any], str]:
     from tacdata.errors import UsageError
     from tacdata.recording.live.lost_position import guard_homing, require_found, why_lost
     from tacdata.registration.guarded_probe import guarded_probe

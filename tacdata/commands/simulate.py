@@ -95,7 +95,8 @@ def run(
         episodes, total = write_dataset(simulation, presses, out, extra, done)
     if not total:
         raise SolveError(
-            f"none of {presses} presses is left: {left_out.most_common(1)[0][0]}", "presses that the skin can take",
+            f"none of {presses} presses is left: {left_out.most_common(1)[0][0]}",
+            "presses that the skin can take",
             "solve anew into another --solved folder, or narrow the plan",
         )
     if left_out:
@@ -104,9 +105,7 @@ def run(
     print(f"simulated dataset: {episodes} episodes, {total} frames, {len(simulation.specimens)} specimens in {out}")
     say(f"solved presses stay in {folder}")
     suggest("train", out, "--out NETWORK")
-    return Result(
-        {**figures, "dataset": out, "episodes": episodes, "frames": total, "left_out": left_out.total()}
-    )
+    return Result({**figures, "dataset": out, "episodes": episodes, "frames": total, "left_out": left_out.total()})
 
 
 class _Solving:

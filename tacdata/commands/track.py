@@ -68,13 +68,18 @@ def run(
                 f"  {name:<8} {found.sightings} sightings, {found.outliers} left out, "
                 f"{found.gap.mean():.1%} of the time in gaps{felt}"
             )
-        told.append({
-            "recording": recording.name, "frame": made.frame, "seconds": made.seconds[-1], "remarks": made.remarks,
-            "fingers": {
-                name: {"sightings": t.sightings, "left_out": t.outliers, "gap": t.gap.mean()}
-                for name, t in made.tracks.items()
-            },
-        })  # fmt: skip
+        told.append(
+            {
+                "recording": recording.name,
+                "frame": made.frame,
+                "seconds": made.seconds[-1],
+                "remarks": made.remarks,
+                "fingers": {
+                    name: {"sightings": t.sightings, "left_out": t.outliers, "gap": t.gap.mean()}
+                    for name, t in made.tracks.items()
+                },
+            }
+        )
         for remark in made.remarks:
             print(f"  note: {remark}")
     if any(words.startswith(UNSEARCHED) for one in told for words in one["remarks"]) and not every_image:
@@ -99,11 +104,14 @@ def _draw(made: Demonstration, recording: Path) -> None:
 
     strips = [
         Strip(
-            name, found.position, np.sqrt(np.trace(found.covariance[:, 3:, 3:], axis1=1, axis2=2) / 3), found.gap,
+            name,
+            found.position,
+            np.sqrt(np.trace(found.covariance[:, 3:, 3:], axis1=1, axis2=2) / 3),
+            found.gap,
             None if found.depth is None else contact_depth(found.depth),
         )
         for name, found in made.tracks.items()
-    ]  # fmt: skip
+    ]
     title = f"{recording.name}: {made.task}, frame {made.frame!r}"
     draw_tracks(recording.with_suffix(".tracks.png"), made.seconds, strips, title)
 

@@ -57,8 +57,7 @@ def run(
     precision: Annotated[str, typer.Option(help="float32 or bfloat16, for cards.")] = "float32",
     compiled: Annotated[bool, typer.Option("--compile", help="Let torch compile the network; for cards.")] = False,
     leave_out: Annotated[
-        int | None,
-        typer.Option("--leave-out", help="Intervals for unseen shapes: networks to train without some."),
+        int | None, typer.Option("--leave-out", help="Intervals for unseen shapes: networks to train without some.")
     ] = None,
     tensorboard: Annotated[bool, typer.Option("--tensorboard", help="Metrics for TensorBoard too, in RUN.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the run's last epoch.")] = False,
@@ -81,12 +80,22 @@ def run(
 
     begun = pretrained(start) if start else None
     asked = {
-        "network": network, "split": split, "seed": seed, "epochs": epochs, "batch_size": batch_size,
-        "learning_rate": learning_rate, "schedule": schedule, "mirror": mirror, "calibrate": calibrate,
-        "gain_jitter": gain_jitter, "scale_jitter": scale_jitter, "exponent_jitter": exponent_jitter,
+        "network": network,
+        "split": split,
+        "seed": seed,
+        "epochs": epochs,
+        "batch_size": batch_size,
+        "learning_rate": learning_rate,
+        "schedule": schedule,
+        "mirror": mirror,
+        "calibrate": calibrate,
+        "gain_jitter": gain_jitter,
+        "scale_jitter": scale_jitter,
+        "exponent_jitter": exponent_jitter,
         "spread_jitter": spread_jitter,
-        "idle_share": idle_share, "precision": precision,
-    }  # fmt: skip
+        "idle_share": idle_share,
+        "precision": precision,
+    }
     settings = recipe(asked, begun, simulated is not None)
     frames = read_frames(dataset)
     mixed = read_frames(simulated) if simulated else None

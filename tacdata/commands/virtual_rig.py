@@ -78,9 +78,16 @@ def run(
         from tacdata.virtual_rig.world.hand import RADIUS
 
         rig = VirtualDemo(
-            directory, 0.5 if speed is None else speed, seed, cameras, fault, skins, task,
-            RADIUS if nub is None else nub, thing,
-        )  # fmt: skip
+            directory,
+            0.5 if speed is None else speed,
+            seed,
+            cameras,
+            fault,
+            skins,
+            task,
+            RADIUS if nub is None else nub,
+            thing,
+        )
     else:
         rig = VirtualRig(directory, 8.0 if speed is None else speed, seed, camera, skins.get("thumb"), rough, secret)
     try:

@@ -70,12 +70,7 @@ def dataset_hash(root: Path, info: dict[str, Any], paths: list[Path], place: Pat
         digests[name] = fresh[name][1]
     if fresh != known:
         documents.write_text(memory, json.dumps(fresh))
-    content = {
-        "features": info["features"],
-        "fps": info["fps"],
-        "frames": info["total_frames"],
-        "files": digests,
-    }
+    content = {"features": info["features"], "fps": info["fps"], "frames": info["total_frames"], "files": digests}
     return provenance.content_hash(content)
 
 
@@ -151,16 +146,12 @@ def _fill(root: Path, info: dict[str, Any], paths: list[Path], target: Path) -> 
                 maps[key][at : at + counted] = column_values(table[key], feature)[:counted]
             except (ValueError, TypeError, pa.ArrowException) as error:
                 raise FormatError(
-                    f"{path}: {key}: {error}",
-                    f"{feature['dtype']} {feature['shape']}",
-                    "pack the session again",
+                    f"{path}: {key}: {error}", f"{feature['dtype']} {feature['shape']}", "pack the session again"
                 ) from None
         at += counted
     if at != total:
         raise FormatError(
-            f"{root}: the data files hold {at} frames",
-            f"{total} as {folder.INFO} counts",
-            "pack the session again",
+            f"{root}: the data files hold {at} frames", f"{total} as {folder.INFO} counts", "pack the session again"
         )
     for values in maps.values():
         values.flush()

@@ -70,14 +70,16 @@ def split(root: Path, parts: Mapping[str, Sequence[int]], out: Path) -> dict[str
     for name, episodes in parts.items():
         if not episodes or not name or Path(name).name != name:
             raise UsageError(
-                f"part {name!r} with {len(episodes)} episodes", "a plain name and one episode or more",
+                f"part {name!r} with {len(episodes)} episodes",
+                "a plain name and one episode or more",
                 "name it as in --part train=0-7",
-            )  # fmt: skip
+            )
         if (twice := next((number for number in episodes if number in seen), None)) is not None:
             raise UsageError(
-                f"episode {twice} in the parts {seen[twice]} and {name}", "each episode in one part at most",
+                f"episode {twice} in the parts {seen[twice]} and {name}",
+                "each episode in one part at most",
                 "take it out of one",
-            )  # fmt: skip
+            )
         seen |= dict.fromkeys(episodes, name)
     _check_numbers(root, list(seen))
 

@@ -51,8 +51,10 @@ def update(root: Path, session: LabelledSession, models: dict[str, str]) -> None
     document = read(root)
     document["models"] |= models
     document["sessions"][session.name] = {
-        "episodes": list(session.episodes), "packed": sorted(session.packed), "failed": dict(session.failed)
-    }  # fmt: skip
+        "episodes": list(session.episodes),
+        "packed": sorted(session.packed),
+        "failed": dict(session.failed),
+    }
     document["updated_at"] = datetime.now(UTC).isoformat(timespec="seconds")
     documents.write(root / FILE, document, "dataset_labels")
 

@@ -73,9 +73,10 @@ def add_note(folder: Path, recording: str, file: str, begin: float, end: float, 
     text = " ".join(text.split())
     if not 0 <= begin < end < float("inf"):
         raise UsageError(
-            f"a note on {begin:g} to {end:g} s", "a stretch that begins at 0 s or later and ends after that",
+            f"a note on {begin:g} to {end:g} s",
+            "a stretch that begins at 0 s or later and ends after that",
             "give both times in seconds after the first reading",
-        )  # fmt: skip
+        )
     if not text or len(text) > LONGEST:
         given = "a note without a text" if not text else f"a note of {len(text)} letters"
         raise UsageError(given, f"1 to {LONGEST} letters", "say in a sentence what is to be seen there")

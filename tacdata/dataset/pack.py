@@ -134,9 +134,7 @@ def refuse_existing(out: Path, append: bool) -> None:
                 "give --append: the unfinished episode is replaced",
             )
         raise UsageError(
-            f"{out} exists",
-            "a folder that does not exist yet",
-            "name another folder, or give --append to add to it",
+            f"{out} exists", "a folder that does not exist yet", "name another folder, or give --append to add to it"
         )
 
 

@@ -114,9 +114,7 @@ class Dataset:
         used = {episode.sensor for episode in self.episodes}
         if len(used) != 1:
             raise FormatError(
-                f"{self.root} holds episodes of {len(used)} sensors",
-                "one sensor",
-                "use `sensors` and `episodes`",
+                f"{self.root} holds episodes of {len(used)} sensors", "one sensor", "use `sensors` and `episodes`"
             )
         return self.sensors[used.pop()]
 

@@ -54,9 +54,7 @@ class DatasetWriter:
         return str(self.info["robot_type"]).endswith(SIMULATED)
 
     @classmethod
-    def create(
-        cls, root: Path, sensor: Sensor, extra: Iterable[str] = (), *, simulated: bool = False
-    ) -> DatasetWriter:
+    def create(cls, root: Path, sensor: Sensor, extra: Iterable[str] = (), *, simulated: bool = False) -> DatasetWriter:
         """Start a dataset, with some of `features.EXTRA` if asked for; its folder is made by the first append.
 
         A simulated one has a ``robot_type`` of its own, by which LeRobot's tools refuse to merge it with recordings.
@@ -66,9 +64,7 @@ class DatasetWriter:
         """
         if root.exists():
             raise UsageError(
-                f"{root} exists",
-                "a folder that does not exist yet",
-                "name another folder, or append to this dataset",
+                f"{root} exists", "a folder that does not exist yet", "name another folder, or append to this dataset"
             )
         return cls(root, sensor, _empty_info(sensor, extra, simulated))
 

@@ -48,10 +48,14 @@ class CameraWorld:
     def document(self, date: str) -> dict[str, Any]:
         """Return the document for a file; ``date`` is ISO 8601."""
         made: dict[str, Any] = {
-            "version": schemas.version("camera_world"), "camera": self.camera, "frame": self.frame,
-            **_flat(self.matrix), "method": self.method, "poses": self.poses,
+            "version": schemas.version("camera_world"),
+            "camera": self.camera,
+            "frame": self.frame,
+            **_flat(self.matrix),
+            "method": self.method,
+            "poses": self.poses,
             "residual": _errors(self.residual),
-        }  # fmt: skip
+        }
         if self.spread is not None:
             made["spread"] = _errors(self.spread)
         if self.cube is not None:
@@ -71,12 +75,17 @@ class CameraWorld:
         spread, cube = document.get("spread"), document.get("cube")
         _check_spread(spread, origin)
         return cls(
-            document["camera"], document["frame"], pose_matrix(document, origin), document["method"],
-            document["poses"], (document["residual"]["position"], document["residual"]["rotation"]),
+            document["camera"],
+            document["frame"],
+            pose_matrix(document, origin),
+            document["method"],
+            document["poses"],
+            (document["residual"]["position"], document["residual"]["rotation"]),
             (spread["position"], spread["rotation"]) if spread else None,
-            pose_matrix(cube, f"{origin}: cube") if cube else None, tuple(document.get("remarks", ())),
+            pose_matrix(cube, f"{origin}: cube") if cube else None,
+            tuple(document.get("remarks", ())),
             document.get("board"),
-        )  # fmt: skip
+        )
 
 
 def check_worlds(worlds: dict[str, CameraWorld], origin: str) -> None:

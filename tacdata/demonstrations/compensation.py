@@ -36,9 +36,10 @@ class Gains:
         """
         if task not in self.tasks:
             raise UsageError(
-                f"no gains for task {task!r} in {self.origin}", ", ".join(self.tasks),
+                f"no gains for task {task!r} in {self.origin}",
+                ", ".join(self.tasks),
                 "name one of them with --task, or add the task to a gains file",
-            )  # fmt: skip
+            )
         return self.tasks[task]
 
 
@@ -111,6 +112,7 @@ def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain
     if position.shape != normal.shape or len(depth) != len(position) or np.nanmax(np.abs(length - 1), initial=0) > 1e-3:
         raise UsageError(
             f"{len(position)} positions, {len(depth)} depths, normals of length {np.nanmin(length, initial=1):.3f}",
-            "the same number of each, normals of length 1", "give fingertip poses with their depths",
-        )  # fmt: skip
+            "the same number of each, normals of length 1",
+            "give fingertip poses with their depths",
+        )
     return position + gain * np.nan_to_num(np.asarray(depth, float))[:, None] * normal

@@ -63,9 +63,11 @@ def faults(name: str, stream: TaxelStream, begin_ns: int, end_ns: int) -> list[s
     edges = np.concatenate([[begin_ns], stream.sample_ns, [end_ns]])
     for a, b in pairwise(edges):
         if b - a > SILENT * 1e9:
-            when = f"from {(a - begin_ns) * 1e-9:.1f} s to the end" if b == end_ns else (
-                f"from {(a - begin_ns) * 1e-9:.1f} to {(b - begin_ns) * 1e-9:.1f} s"
-            )  # fmt: skip
+            when = (
+                f"from {(a - begin_ns) * 1e-9:.1f} s to the end"
+                if b == end_ns
+                else (f"from {(a - begin_ns) * 1e-9:.1f} to {(b - begin_ns) * 1e-9:.1f} s")
+            )
             remarks.append(f"{name}: its board is silent {when}")
     spread = np.ptp(stream.counts, axis=0)
     stuck = np.flatnonzero(spread == 0)

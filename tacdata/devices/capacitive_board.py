@@ -30,9 +30,7 @@ class CapacitiveBoard(TaxelBoard):
     - ``format``: path of a frame format file, or the format itself (default: tacdata/wire/cap24.yaml).
     """
 
-    def __init__(
-        self, clock: Clock, port: str, baud: int = 115200, format: str | dict[str, Any] | None = None
-    ) -> None:  # fmt: skip
+    def __init__(self, clock: Clock, port: str, baud: int = 115200, format: str | dict[str, Any] | None = None) -> None:
         """Keep the settings and read the format; see the class.
 
         Raises:
@@ -55,11 +53,17 @@ class CapacitiveBoard(TaxelBoard):
     def describe(self) -> dict[str, Any]:
         """Return channels, type, rate and the frame format."""
         return {
-            "kind": "taxel board", "driver": "capacitive_board", "port": self.port, "baud": self.baud,
-            "channels": self.format.channels, "unit": "counts", "shape": [self.format.channels],
-            "rate": {"nominal": self.format.rate, "unit": "Hz"}, "format": self.format.document,
+            "kind": "taxel board",
+            "driver": "capacitive_board",
+            "port": self.port,
+            "baud": self.baud,
+            "channels": self.format.channels,
+            "unit": "counts",
+            "shape": [self.format.channels],
+            "rate": {"nominal": self.format.rate, "unit": "Hz"},
+            "format": self.format.document,
             "clock": self._clock_axis(),
-        }  # fmt: skip
+        }
 
     def _clock_axis(self) -> str:
         # A counter is exact where sampling is regular; the board's own time stamp is better if its ticks are fine

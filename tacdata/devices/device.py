@@ -25,9 +25,21 @@ from tacdata.wire.delivered import CncStatus, OwesAnswer, StreamCounts, TaxelFra
 ROOM, BASE = "tacdata.devices", "device"
 
 __all__ = [
-    "BASE", "ROOM", "Camera", "CncStatus", "Device", "ImageFrame", "Motion", "MotionController", "OwesAnswer",
-    "StandsStill", "StreamCounts", "TaxelBoard", "TaxelFrame", "create",
-]  # fmt: skip
+    "BASE",
+    "ROOM",
+    "Camera",
+    "CncStatus",
+    "Device",
+    "ImageFrame",
+    "Motion",
+    "MotionController",
+    "OwesAnswer",
+    "StandsStill",
+    "StreamCounts",
+    "TaxelBoard",
+    "TaxelFrame",
+    "create",
+]
 
 
 class StandsStill(DeviceError):

@@ -45,9 +45,14 @@ class Grbl(MotionController):
     """
 
     def __init__(
-        self, clock: Clock, port: str, baud: int = 115200, poll_rate: float = 8.0, dtr: bool | None = None,
+        self,
+        clock: Clock,
+        port: str,
+        baud: int = 115200,
+        poll_rate: float = 8.0,
+        dtr: bool | None = None,
         home: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Keep the settings; see the class.
 
         Raises:
@@ -73,11 +78,15 @@ class Grbl(MotionController):
     def describe(self) -> dict[str, Any]:
         """Return what the status reports hold."""
         return {
-            "kind": "motion controller", "driver": "grbl", "port": self.port, "baud": self.baud,
+            "kind": "motion controller",
+            "driver": "grbl",
+            "port": self.port,
+            "baud": self.baud,
             "axes": ["x", "y", "z"],
-            "position": {"unit": "mm", "shape": [3], "frame": "machine"}, "feed": {"unit": "mm/min"},
+            "position": {"unit": "mm", "shape": [3], "frame": "machine"},
+            "feed": {"unit": "mm/min"},
             "status_rate": {"nominal": self.poll_rate, "unit": "Hz"},
-        }  # fmt: skip
+        }
 
     def open(self) -> None:
         """Open the port, wait for a sign of life, read the settings, begin to poll.
@@ -189,9 +198,7 @@ class Grbl(MotionController):
         """Queue a straight move; the line states every modal word, so that no earlier state changes it."""
         if not (np.all(np.isfinite(position)) and np.isfinite(speed) and speed > 0):
             raise UsageError(
-                f"a move to {position} mm at {speed} mm/s",
-                "finite positions and a speed above 0",
-                "correct the plan",
+                f"a move to {position} mm at {speed} mm/s", "finite positions and a speed above 0", "correct the plan"
             )
         x, y, z = position
         self._queue(self._duration(np.array(position), speed))
@@ -261,14 +268,18 @@ class Grbl(MotionController):
         stands, (x, y, z) = f"stands at {_text(status.position)} mm", status.position.tolist()
         if link.pendant:
             raise StandsStill(
-                f"a pendant has control of the machine, which {stands}", "one master",
-                "give control back at the pendant and look where the tip stands", (x, y, z),
-            )  # fmt: skip
+                f"a pendant has control of the machine, which {stands}",
+                "one master",
+                "give control back at the pendant and look where the tip stands",
+                (x, y, z),
+            )
         if status.state.startswith("Door") and status.state not in OPENED_AGAIN:
             raise StandsStill(
-                f"the safety door is open; the machine {stands}", "a closed door",
-                "close it; the next start lifts the tip first", (x, y, z),
-            )  # fmt: skip
+                f"the safety door is open; the machine {stands}",
+                "a closed door",
+                "close it; the next start lifts the tip first",
+                (x, y, z),
+            )
         try:
             link.soft_reset(ANSWER)
             link.rearm()
@@ -350,10 +361,11 @@ class Grbl(MotionController):
         version = self._answers.answers.get("VER", "nothing")
         self._found = {
             "banner": link.welcome or f"none, the board was not reset by opening; $I says {version}",
-            "reset_at_opening": "yes" if link.resets else "no", "state_at_opening": state,
+            "reset_at_opening": "yes" if link.resets else "no",
+            "state_at_opening": state,
             "homed_at_opening": "yes" if homed else "no",
             "position_at_opening": ",".join(f"{value:.3f}" for value in position + 0.0),
-        }  # fmt: skip
+        }
         if link.resets and not self._answers.homing:
             self._lost = "the controller was reset when its port was opened, so it counts from where it stands now"
 
@@ -379,8 +391,9 @@ class Grbl(MotionController):
             elif standing.over() and state != "Door":
                 raise StandsStill(
                     f"the controller stays in state {status.state}; the machine stands at {_text(place)} mm",
-                    "a controller that comes to rest", "look at it, then reset it and find its zero again",
-                )  # fmt: skip
+                    "a controller that comes to rest",
+                    "look at it, then reset it and find its zero again",
+                )
             if state in MOVING:
                 link.realtime(b"!")
             if self.clock.now_ns() > end:

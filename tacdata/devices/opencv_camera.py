@@ -25,9 +25,13 @@ WAITING = 120
 """Images kept until they are read; if there are more, the oldest are dropped and counted."""
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 BACKENDS = {
-    "any": "CAP_ANY", "v4l2": "CAP_V4L2", "dshow": "CAP_DSHOW", "msmf": "CAP_MSMF",
-    "avfoundation": "CAP_AVFOUNDATION", "ffmpeg": "CAP_FFMPEG",
-}  # fmt: skip
+    "any": "CAP_ANY",
+    "v4l2": "CAP_V4L2",
+    "dshow": "CAP_DSHOW",
+    "msmf": "CAP_MSMF",
+    "avfoundation": "CAP_AVFOUNDATION",
+    "ffmpeg": "CAP_FFMPEG",
+}
 """Name in a rig file -> OpenCV's name of the back-end."""
 MANUAL_AUTOMATIC = {"V4L2": (1, 3)}
 """A back-end's values of manual and automatic exposure; the others use 0.25 and 0.75."""
@@ -65,10 +69,18 @@ class OpencvCamera(Camera):
     """
 
     def __init__(
-        self, clock: Clock, source: str | int, intrinsics: dict[str, Any], rate: float | None = None,
-        cube: dict[str, Any] | None = None, fourcc: str = "MJPG", exposure: float | str = "auto",
-        gain: float | None = None, backend: str = "any", loop: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        clock: Clock,
+        source: str | int,
+        intrinsics: dict[str, Any],
+        rate: float | None = None,
+        cube: dict[str, Any] | None = None,
+        fourcc: str = "MJPG",
+        exposure: float | str = "auto",
+        gain: float | None = None,
+        backend: str = "any",
+        loop: bool = False,
+    ) -> None:
         """Keep the settings; see the class.
 
         Raises:
@@ -116,10 +128,12 @@ class OpencvCamera(Camera):
     def describe(self) -> dict[str, Any]:
         """Return size, rate and source."""
         return {
-            "kind": "camera", "driver": "opencv_camera", "source": self.source,
+            "kind": "camera",
+            "driver": "opencv_camera",
+            "source": self.source,
             "shape": [self.intrinsics["height"], self.intrinsics["width"]],
             "rate": {"nominal": self.rate, "unit": "Hz"},
-        }  # fmt: skip
+        }
 
     def open(self) -> None:
         """Open the source and wait for the first image.
@@ -277,8 +291,9 @@ class OpencvCamera(Camera):
         width, height = self.intrinsics["width"], self.intrinsics["height"]
         wanted: list[tuple[str, int, float]] = [
             ("fourcc", cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*self.fourcc)),
-            ("width", cv2.CAP_PROP_FRAME_WIDTH, width), ("height", cv2.CAP_PROP_FRAME_HEIGHT, height),
-        ]  # fmt: skip
+            ("width", cv2.CAP_PROP_FRAME_WIDTH, width),
+            ("height", cv2.CAP_PROP_FRAME_HEIGHT, height),
+        ]
         if self.rate:
             wanted.append(("rate", cv2.CAP_PROP_FPS, self.rate))
         name = capture.getBackendName()
@@ -341,7 +356,7 @@ class OpencvCamera(Camera):
                 f"no camera {index}",
                 f"a camera that exists: {', '.join(found) or 'this machine shows none'}",
                 "plug it in, or correct source in the rig file",
-            )  # fmt: skip
+            )
 
     def _error(self, what: str, remedy: str) -> DeviceError:
         return DeviceError(f"camera {self.source} {what}", "a source that delivers images", remedy)

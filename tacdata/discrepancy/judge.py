@@ -42,9 +42,14 @@ class Verdict:
 
 
 def judge(
-    course: Course, spec: Spec, note: Callable[[str], None] = lambda text: None,
-    parents: dict[str, str] | None = None, without: tuple[str, ...] = (), until: str = "decide", correct_p: bool = True,
-) -> Verdict:  # fmt: skip
+    course: Course,
+    spec: Spec,
+    note: Callable[[str], None] = lambda text: None,
+    parents: dict[str, str] | None = None,
+    without: tuple[str, ...] = (),
+    until: str = "decide",
+    correct_p: bool = True,
+) -> Verdict:
     """Judge recordings: which effect does the model lack?
 
     1. Seal some episodes: their readings are not looked at.

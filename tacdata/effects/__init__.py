@@ -17,6 +17,17 @@ from tacdata.effects.effect import (
 )
 
 __all__ = [
-    "BASE", "ROOM", "AtRest", "Effect", "Family", "GainKind", "Growth", "LikeGain", "Parameter", "Placed", "Scale",
-    "library", "load",
-]  # fmt: skip
+    "BASE",
+    "ROOM",
+    "AtRest",
+    "Effect",
+    "Family",
+    "GainKind",
+    "Growth",
+    "LikeGain",
+    "Parameter",
+    "Placed",
+    "Scale",
+    "library",
+    "load",
+]

@@ -43,9 +43,7 @@ class AdhesionPinned(Effect):
         if not sticks.any():
             return state
         response, tool, near = state.response, course.tool, NEAR * course.span
-        deeper, higher, as_is = (
-            np.column_stack([state.pose[:, :2], z]) for z in (wide + near, wide - near, depth)
-        )  # fmt: skip
+        deeper, higher, as_is = (np.column_stack([state.pose[:, :2], z]) for z in (wide + near, wide - near, depth))
         pulled = sticks * (wide - depth) / (2 * near)
 
         def change(above: np.ndarray, below: np.ndarray, there: np.ndarray) -> np.ndarray:

@@ -13,10 +13,7 @@ class CarriageComplianceRead(CarriageCompliance):
 
     title = "The frame gives way under load, and the tag with it"
     equation = "d = z - c (r(d) / max r(d))^(1/m), r the root mean square of the readings; seen by the tag"
-    parameters = (
-        Parameter("c", "mm per largest force", "deflection at the largest force", 0.05, 0.0, 2.0),
-        POWER,
-    )
+    parameters = (Parameter("c", "mm per largest force", "deflection at the largest force", 0.05, 0.0, 2.0), POWER)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         """Return why such recordings cannot show it; empty if they may."""

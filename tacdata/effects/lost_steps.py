@@ -27,13 +27,7 @@ class LostSteps(Effect):
     parameters = (
         Parameter("dz", "mm", "lost", 0.05, -1.0, 1.0),
         Parameter(
-            "s",
-            "1",
-            "share of the episodes before it",
-            0.3,
-            0.02,
-            0.98,
-            grid=tuple(0.05 * k for k in range(1, 20)),
+            "s", "1", "share of the episodes before it", 0.3, 0.02, 0.98, grid=tuple(0.05 * k for k in range(1, 20))
         ),
     )
     follows_clock = True

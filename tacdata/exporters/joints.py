@@ -121,17 +121,22 @@ def _header(targets: FingertipTargets, path: JointPath, robot: Robot, columns: d
     largest = [float(e[good].max()) if good.any() else None for e in (path.position_error, path.rotation_error)]
     parents = {"recording": targets.recording_hash, "urdf": robot.urdf_hash}
     return {
-        "version": schemas.version("joint_trajectory"), "targets": targets.header(columns), "robot": robot.document,
-        "urdf_hash": robot.urdf_hash, "joints": [asdict(joint) for joint in path.joints],
-        "tolerance": {"position": robot.tolerance[0], "rotation": robot.tolerance[1]}, "frames": len(path.values),
+        "version": schemas.version("joint_trajectory"),
+        "targets": targets.header(columns),
+        "robot": robot.document,
+        "urdf_hash": robot.urdf_hash,
+        "joints": [asdict(joint) for joint in path.joints],
+        "tolerance": {"position": robot.tolerance[0], "rotation": robot.tolerance[1]},
+        "frames": len(path.values),
         "unreached": {name: list(rows) for name, rows in path.unreached.items()},
         "too_fast": {name: list(rows) for name, rows in path.too_fast.items()},
         "too_abrupt": {name: list(rows) for name, rows in path.too_abrupt.items()},
-        "uncoupled": list(path.uncoupled), "other_posture": list(path.other_posture),
+        "uncoupled": list(path.uncoupled),
+        "other_posture": list(path.other_posture),
         "outside_workspace": {name: list(rows) for name, rows in path.outside_workspace.items()},
         "errors": {"position": largest[0], "rotation": largest[1]},
         "provenance": provenance.stamp("tacdata export", parents, {"robot": robot.name}),
-    }  # fmt: skip
+    }
 
 
 def _read(path: Path) -> tuple[FingertipTargets, dict[str, np.ndarray], dict[str, Any]]:

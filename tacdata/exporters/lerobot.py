@@ -53,10 +53,12 @@ class Lerobot(Exporter):
         for number, (targets, whole) in enumerate(zip(episodes, columns, strict=True)):
             count = len(targets.time_ns)
             whole |= {
-                "timestamp": (np.arange(count) / info["fps"]).astype(np.float32), "frame_index": np.arange(count),
-                "episode_index": np.full(count, number), "index": np.arange(first, first + count),
+                "timestamp": (np.arange(count) / info["fps"]).astype(np.float32),
+                "frame_index": np.arange(count),
+                "episode_index": np.full(count, number),
+                "index": np.arange(first, first + count),
                 "task_index": np.full(count, tasks.index(targets.task)),
-            }  # fmt: skip
+            }
             stats = {key: statistics.column_statistics(whole[key]) for key in features}
             parts.append(stats)
             folder.write_parquet(out / folder.data_path(number), _table(whole, features))
@@ -105,8 +107,10 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
         STATE: np.concatenate([targets.seen, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
         # LeRobot's statistics allow no NaN: 0 where nothing was felt; the column FELT marks it.
         DEPTH: np.nan_to_num(targets.depth).astype(np.float32),
-        FELT: np.isfinite(targets.depth), GAP: targets.gap, TIME: targets.time_ns,
-    }  # fmt: skip
+        FELT: np.isfinite(targets.depth),
+        GAP: targets.gap,
+        TIME: targets.time_ns,
+    }
     if len(targets.fingers) == 1:  # LeRobot stores a vector of length one as a number
         columns = {key: values[:, 0] if values.shape[1:] == (1,) else values for key, values in columns.items()}
     for name, track in () if made is None else ((name, made.tracks[name]) for name in targets.fingers):
@@ -170,7 +174,13 @@ def _read(out: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> Fingerti
     depth = np.where(column(FELT), column(DEPTH).astype(float), np.nan)
     named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
     return FingertipTargets(
-        **{name: header[name] for name in named}, fingers=fingers, time_ns=table[TIME].to_numpy(),
-        position=action[..., :3], quaternion=action[..., 3:], seen=state[..., :3], depth=depth, gap=column(GAP),
+        **{name: header[name] for name in named},
+        fingers=fingers,
+        time_ns=table[TIME].to_numpy(),
+        position=action[..., :3],
+        quaternion=action[..., 3:],
+        seen=state[..., :3],
+        depth=depth,
+        gap=column(GAP),
         remarks=tuple(header["remarks"]),
-    )  # fmt: skip
+    )

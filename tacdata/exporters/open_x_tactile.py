@@ -102,8 +102,12 @@ def _store(store: Path, listed: list[FingertipTargets], recordings: Path | None)
     if not all(pictures):
         return [f"{store.name} has no RGB stream, as a recording stores no images: FTP-1's loader wants one"]
     frames = [frame for part in pictures for frame in part]
-    _blocks(store / "data" / "camera_main_rgb", (len(frames), SIDE, SIDE, 3), np.dtype(np.uint8),
-            lambda begin, end: np.stack([_picture(data) for data in frames[begin:end]]))  # fmt: skip
+    _blocks(
+        store / "data" / "camera_main_rgb",
+        (len(frames), SIDE, SIDE, 3),
+        np.dtype(np.uint8),
+        lambda begin, end: np.stack([_picture(data) for data in frames[begin:end]]),
+    )
     return []
 
 
@@ -196,9 +200,15 @@ def _blocks(folder: Path, shape: tuple[int, ...], dtype: np.dtype, rows: Callabl
     """Write an array of Zarr version 2, given its rows from one number to before another."""
     chunks = (min(ROWS, max(shape[0], 1)), *shape[1:])
     described = {
-        "zarr_format": 2, "shape": shape, "chunks": chunks, "dtype": dtype.str, "order": "C", "fill_value": None,
-        "filters": None, "compressor": {"id": "zlib", "level": 1},
-    }  # fmt: skip
+        "zarr_format": 2,
+        "shape": shape,
+        "chunks": chunks,
+        "dtype": dtype.str,
+        "order": "C",
+        "fill_value": None,
+        "filters": None,
+        "compressor": {"id": "zlib", "level": 1},
+    }
     documents.write_text(folder / ".zarray", json.dumps(described))
     for number, begin in enumerate(range(0, shape[0], chunks[0])):
         block = np.zeros(chunks, dtype)
@@ -221,9 +231,11 @@ def _targets(store: Path) -> Iterator[FingertipTargets]:
         documents.check(header, "fingertip_targets", str(store))
         rows: dict[str, Any] = {key: values[begin:end] for key, values in columns.items()}
         yield FingertipTargets(
-            **{name: header[name] for name in named}, **rows, fingers=tuple(header["fingers"]),
+            **{name: header[name] for name in named},
+            **rows,
+            fingers=tuple(header["fingers"]),
             remarks=tuple(header["remarks"]),
-        )  # fmt: skip
+        )
 
 
 def _values(folder: Path) -> np.ndarray:

@@ -36,7 +36,8 @@ def bias(touch: OrangeTouch, presses: PressSet, maps: Maps, force: float, band: 
         "solved_map": [_x(map_centre(_solved(touch, presses, x, force), sensor)) for x in true.tolist()],
     }
     return {
-        "true": true.tolist(), **believed,
+        "true": true.tolist(),
+        **believed,
         "accepted_to": {name: _accepted(true, values, band) for name, values in believed.items()},
         "toward_interior": {
             name: {
@@ -44,7 +45,7 @@ def bias(touch: OrangeTouch, presses: PressSet, maps: Maps, force: float, band: 
             }
             for name, values in believed.items()
         },
-    }  # fmt: skip
+    }
 
 
 def _x(centre: np.ndarray | None) -> float | None:

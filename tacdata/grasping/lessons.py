@@ -61,10 +61,15 @@ def lessons(presses: PressSet, sensor: Sensor, spread: FingertipSpread, seed: in
 
 def _course(deepest: float, rng: np.random.Generator) -> np.ndarray:
     down, up = (int(rng.integers(RAMP[0], RAMP[1] + 1)) for _ in range(2))
-    return np.concatenate([
-        np.zeros(REST), np.linspace(0, deepest, down + 2)[1:-1], np.full(HELD, deepest),
-        np.linspace(deepest, 0, up + 2)[1:-1], np.zeros(REST),
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            np.zeros(REST),
+            np.linspace(0, deepest, down + 2)[1:-1],
+            np.full(HELD, deepest),
+            np.linspace(deepest, 0, up + 2)[1:-1],
+            np.zeros(REST),
+        ]
+    )
 
 
 def _between(levels: np.ndarray, values: np.ndarray, depth: np.ndarray) -> np.ndarray:

@@ -133,8 +133,9 @@ def lifting_grip(grip: Grip, lateral: float) -> Grip:
     if high is None:
         raise UsageError(
             f"an orange of {grip.mass:g} kg, {1000 * lateral:g} mm off, friction {grip.friction:g}",
-            "one that the fingers can hold at all", "make it lighter, or the friction larger",
-        )  # fmt: skip
+            "one that the fingers can hold at all",
+            "make it lighter, or the friction larger",
+        )
     low = 0.0 if high == tried[0] else high / GROWTH
     while high - low > FINEST:
         middle = (low + high) / 2
@@ -147,18 +148,32 @@ def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
     rate = grip.skin * (1 - IMPEDANCE) / reduced
     fingers = "".join(
         FINGER.format(
-            name=name, y=side * (grip.radius + grip.ridge), inwards=-side, ridge=grip.ridge, half=grip.half,
-            mass=FINGER_MASS, friction=grip.friction, torsion=TORSION, skin=rate, damping=2 * np.sqrt(rate),
+            name=name,
+            y=side * (grip.radius + grip.ridge),
+            inwards=-side,
+            ridge=grip.ridge,
+            half=grip.half,
+            mass=FINGER_MASS,
+            friction=grip.friction,
+            torsion=TORSION,
+            skin=rate,
+            damping=2 * np.sqrt(rate),
             d=IMPEDANCE,
         )
         for name, side in SIDES.items()
-    )  # fmt: skip
+    )
     critical = 2 * np.sqrt(grip.stiffness * FINGER_MASS)
     springs = "".join(f'<position name="{n}" joint="{n}" kp="{grip.stiffness}" kv="{critical}"/>' for n in SIDES)
     text = XML.format(
-        step=STEP, table=vertical - grip.radius, radius=grip.radius, mass=grip.mass, friction=grip.friction,
-        torsion=TORSION, fingers=fingers, springs=springs,
-    )  # fmt: skip
+        step=STEP,
+        table=vertical - grip.radius,
+        radius=grip.radius,
+        mass=grip.mass,
+        friction=grip.friction,
+        torsion=TORSION,
+        fingers=fingers,
+        springs=springs,
+    )
     engine = mujoco()
     model = engine.MjModel.from_xml_string(text)
     return model, engine.MjData(model)

@@ -69,9 +69,11 @@ class PressSet:
         values |= {name: values[name].astype(np.float32) for name in ("force", "closure", "area", "normal")}
         values["surface"] = np.round(self.surface / GRAIN).astype(np.int16)
         np.savez_compressed(
-            buffer, indenters=np.array(json.dumps(self.indenters)),
-            provenance=np.array(provenance.canonical(self.provenance)), **values,
-        )  # fmt: skip
+            buffer,
+            indenters=np.array(json.dumps(self.indenters)),
+            provenance=np.array(provenance.canonical(self.provenance)),
+            **values,
+        )
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacement(path) as stream:
             stream.write(buffer.getvalue())
@@ -92,9 +94,10 @@ def read_presses(path: Path, sensor: Sensor) -> PressSet:
         raise FormatError(f"{path}: {error}", "presses that pin_presses wrote", remedy) from None
     if stamp["parents"].get("sensor") != sensor.content_hash:
         raise FormatError(
-            f"{path}: presses of another sensor", f"sensor {sensor.content_hash[:12]} ({sensor.name})",
+            f"{path}: presses of another sensor",
+            f"sensor {sensor.content_hash[:12]} ({sensor.name})",
             "run python -m tacdata.grasping.pin_presses",
-        )  # fmt: skip
+        )
     values["surface"] = values["surface"].astype(np.float32) * GRAIN
     return PressSet(tuple(indenters), **values, provenance=stamp)
 

@@ -14,16 +14,7 @@ from tacdata.grasping.bias import bias
 from tacdata.grasping.centre import Maps
 from tacdata.grasping.lift import Grip, lift
 from tacdata.grasping.press_set import PressSet
-from tacdata.grasping.study import (
-    MARGIN,
-    OTHER_MARGINS,
-    PUBLISHED,
-    Setup,
-    configured,
-    lifted,
-    rates,
-    trials,
-)  # fmt: skip
+from tacdata.grasping.study import MARGIN, OTHER_MARGINS, PUBLISHED, Setup, configured, lifted, rates, trials
 from tacdata.grasping.touch import OrangeTouch
 from tacdata.sensor import Sensor
 
@@ -32,9 +23,13 @@ FINENESS = 0.25
 
 
 def result(
-    setup: Setup, presses: PressSet, sensor: Sensor, maps: Maps, network: dict[str, Any],
+    setup: Setup,
+    presses: PressSet,
+    sensor: Sensor,
+    maps: Maps,
+    network: dict[str, Any],
     progress: Callable[[int, int], None] = lambda done, of: None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Run a study.
 
     Args:
@@ -52,16 +47,24 @@ def result(
         other = configured(setup, margin)
         again = [replace(trial, held=lifted(trial, other.grip)) for trial in found]
         others.append({"margin": margin, **_lifting(other.grip), "rates": rates(again)})
-    parents = {"sensor": sensor.content_hash, "checkpoint": str(network["hash"]),
-               "presses": provenance.content_hash(presses.provenance["parents"])}  # fmt: skip
+    parents = {
+        "sensor": sensor.content_hash,
+        "checkpoint": str(network["hash"]),
+        "presses": provenance.content_hash(presses.provenance["parents"]),
+    }
     return {
-        "version": schemas.version("grasp_study"), "sensor": sensor.name, "network": network,
-        "setup": own.document, "lifting": {"margin": MARGIN, **_lifting(own.grip)}, "rates": rates(found),
-        "published": PUBLISHED, "other_lifting": others,
+        "version": schemas.version("grasp_study"),
+        "sensor": sensor.name,
+        "network": network,
+        "setup": own.document,
+        "lifting": {"margin": MARGIN, **_lifting(own.grip)},
+        "rates": rates(found),
+        "published": PUBLISHED,
+        "other_lifting": others,
         "bias": bias(touch, presses, maps, setup.protocol.force, setup.protocol.band),
         "trials": [trial.document for trial in found],
         "provenance": provenance.stamp("tacdata grasp-study", parents, {"repeats": setup.repeats, "seed": setup.seed}),
-    }  # fmt: skip
+    }
 
 
 def _lifting(grip: Grip) -> dict[str, float]:

@@ -67,9 +67,7 @@ class Setup:
     @property
     def document(self) -> dict[str, Any]:
         """The setup as plain data."""
-        return {
-            "places": list(PLACES), "edge": list(EDGE), **asdict(self), "grip": self.grip.document,
-        }  # fmt: skip
+        return {"places": list(PLACES), "edge": list(EDGE), **asdict(self), "grip": self.grip.document}
 
 
 @dataclass(frozen=True)
@@ -94,10 +92,16 @@ class GraspTrial:
         """The trial as plain data."""
         way = self.approach
         return {
-            "strategy": self.strategy, "position": self.position, "repeat": self.repeat, "held": self.held,
-            "adjustments": way.adjustments, "left_at": way.lateral, "stopped": way.stopped,
-            "estimates": list(way.estimates), "truths": list(way.truths),
-        }  # fmt: skip
+            "strategy": self.strategy,
+            "position": self.position,
+            "repeat": self.repeat,
+            "held": self.held,
+            "adjustments": way.adjustments,
+            "left_at": way.lateral,
+            "stopped": way.stopped,
+            "estimates": list(way.estimates),
+            "truths": list(way.truths),
+        }
 
 
 def trials(
@@ -155,11 +159,13 @@ def _rates(found: list[GraspTrial]) -> dict[str, Any]:
     edge = [t for t in found if t.position in EDGE]
     positions = sorted({t.position for t in found})
     return {
-        "overall": _share(found), "edge": _share(edge),
+        "overall": _share(found),
+        "edge": _share(edge),
         "by_position": {str(p): _share([t for t in found if t.position == p]) for p in positions},
-        "adjustments": _moves(found), "edge_adjustments": _moves(edge),
+        "adjustments": _moves(found),
+        "edge_adjustments": _moves(edge),
         "safety_stops": sum("safety" in t.approach.stopped for t in found),
-    }  # fmt: skip
+    }
 
 
 def _share(found: list[GraspTrial]) -> dict[str, Any]:

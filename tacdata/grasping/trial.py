@@ -54,9 +54,14 @@ def fused(fingers: Sequence[Fingertip], centres: Sequence[np.ndarray | None]) ->
 
 
 def approach(
-    fingers: Sequence[Fingertip], lateral: float, vertical: float, strategy: Strategy, protocol: Protocol,
-    rate: float, rng: np.random.Generator,
-) -> Approach:  # fmt: skip
+    fingers: Sequence[Fingertip],
+    lateral: float,
+    vertical: float,
+    strategy: Strategy,
+    protocol: Protocol,
+    rate: float,
+    rng: np.random.Generator,
+) -> Approach:
     """Close, measure and move until the contact is estimated to lie in the band.
 
     Args:

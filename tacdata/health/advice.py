@@ -18,11 +18,18 @@ MANY = 0.5
 PERCENT = {"common gain", "gain", "loop", "repeatability", "network error"}
 """Quantities that are told in percent."""
 CALLED = {
-    "common gain": "gain of all channels", "gain": "gain", "zero": "zero", "drift": "drift without contact",
-    "noise": "noise", "loop": "area of the hysteresis loop", "repeatability": "spread of a press repeated",
-    "depth": "depth of the tip at the same commanded depth", "x": "place of the tip along x",
-    "y": "place of the tip along y", "network error": "error of the network",
-}  # fmt: skip
+    "common gain": "gain of all channels",
+    "gain": "gain",
+    "zero": "zero",
+    "drift": "drift without contact",
+    "noise": "noise",
+    "loop": "area of the hysteresis loop",
+    "repeatability": "spread of a press repeated",
+    "depth": "depth of the tip at the same commanded depth",
+    "x": "place of the tip along x",
+    "y": "place of the tip along y",
+    "network error": "error of the network",
+}
 ABSOLUTE = {"drift", "repeatability"}
 """Quantities of one visit, which are compared with nothing."""
 
@@ -97,8 +104,9 @@ def _noise(history: History, changed: list[tuple[int, Change]]) -> list[Advice]:
     if len(changed) < MANY * history.last.sensor.taxels.count:
         return [
             Advice(WIRING, (change.channel,), _sentence(history, against, change))
-            for against, change in changed if change.channel is not None
-        ]  # fmt: skip
+            for against, change in changed
+            if change.channel is not None
+        ]
     middle = sorted(change.value for _, change in changed)[len(changed) // 2]
     where = history.visits[changed[0][0]].name
     why = f"noise of {len(changed)} channels is about {middle:.1f} times that at {where}: ground, shield or supply"
@@ -114,7 +122,7 @@ def _told(history: History, do: str, changed: list[tuple[int, Change]]) -> list[
     return [
         Advice(do, () if change.channel is None else (change.channel,), _sentence(history, against, change))
         for against, change in changed
-    ]  # fmt: skip
+    ]
 
 
 def _sentence(history: History, against: int, change: Change) -> str:

@@ -107,8 +107,9 @@ def compare(
     if enough:
         loops = np.array([a.loop - b.loop for a, b in zip(measured, reference, strict=True)])
         changes.append(_change("loop", None, mean(loops), "1", LOOP))
-    if network and (grown := growth(*network, [(now.responses[a].press.index, before.responses[b].press.index)
-                                              for a, b in pairs])):  # fmt: skip
+    if network and (
+        grown := growth(*network, [(now.responses[a].press.index, before.responses[b].press.index) for a, b in pairs])
+    ):
         found = _change("network error", None, grown, "1", float(np.log1p(NETWORK)))
         value, low, high = (float(np.expm1(v)) for v in (found.value, found.low, found.high))
         changes.append(replace(found, value=value, low=low, high=high, tolerance=NETWORK))
@@ -143,9 +144,13 @@ def _order(faults: Wiring, count: int) -> np.ndarray:
 
 
 def _gains(
-    measured: Sequence[PressResponse], reference: Sequence[PressResponse], now: Visit, before: Visit, faults: Wiring,
+    measured: Sequence[PressResponse],
+    reference: Sequence[PressResponse],
+    now: Visit,
+    before: Visit,
+    faults: Wiring,
     order: np.ndarray,
-) -> GainFit | None:  # fmt: skip
+) -> GainFit | None:
     noise = np.array([max(now.noise[order[k]].value, spread.value) for k, spread in before.noise.items()])
     sorted_back = [replace(p, levels=p.levels[:, order], slope=p.slope[:, order]) for p in measured]
     return fit_gains(reference, sorted_back, noise, now.sensor, faults.unfit)
@@ -199,9 +204,10 @@ def _channel_changes(now: Visit, before: Visit, faults: Wiring, order: np.ndarra
         if channel in faults.unfit or not strongest[taxel] > 0:
             continue
         moved = UncertainValue(
-            zero[channel].value - ahead[taxel].value, float(np.hypot(zero[channel].error, ahead[taxel].error)),
+            zero[channel].value - ahead[taxel].value,
+            float(np.hypot(zero[channel].error, ahead[taxel].error)),
             min(zero[channel].freedom, ahead[taxel].freedom),
-        )  # fmt: skip
+        )
         found.append(_change("zero", channel, moved, now.unit, ZERO * float(strongest[taxel])))
         found.append(_change("drift", channel, drift[channel], f"{now.unit}/min", DRIFT * float(strongest[taxel])))
         found.append(_louder(channel, noise[channel], noisy[taxel]))

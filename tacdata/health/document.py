@@ -57,12 +57,13 @@ def _visit(history: History, number: int) -> dict[str, Any]:
         "network_error": _estimate(errors.mean) if errors else None,
         "comparisons": [
             {
-                "against": history.visits[c.against].name, "presses": len(c.pairs),
+                "against": history.visits[c.against].name,
+                "presses": len(c.pairs),
                 "changes": [_change(change) for change in c.changes],
             }
             for c in history.comparisons[number]
         ],
-    }  # fmt: skip
+    }
 
 
 def _gains(fit: GainFit | None) -> dict[str, Any] | None:
@@ -87,10 +88,16 @@ def _spread(found: Spread) -> dict[str, Any]:
 
 def _change(change: Change) -> dict[str, Any]:
     return {
-        "quantity": change.quantity, "channel": change.channel, "value": _number(change.value),
-        "low": _number(change.low), "high": _number(change.high), "unit": change.unit,
-        "tolerance": _number(change.tolerance), "p": _number(change.corrected), "changed": change.changed,
-    }  # fmt: skip
+        "quantity": change.quantity,
+        "channel": change.channel,
+        "value": _number(change.value),
+        "low": _number(change.low),
+        "high": _number(change.high),
+        "unit": change.unit,
+        "tolerance": _number(change.tolerance),
+        "p": _number(change.corrected),
+        "changed": change.changed,
+    }
 
 
 def _number(value: float) -> float | None:

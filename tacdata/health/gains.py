@@ -72,8 +72,12 @@ class _Pair:
 
 
 def fit_gains(
-    reference: Sequence[PressResponse], measured: Sequence[PressResponse], noise: np.ndarray, sensor: Sensor,
-    left_out: frozenset[int] = frozenset(), predicted: bool = False,
+    reference: Sequence[PressResponse],
+    measured: Sequence[PressResponse],
+    noise: np.ndarray,
+    sensor: Sensor,
+    left_out: frozenset[int] = frozenset(),
+    predicted: bool = False,
 ) -> GainFit | None:
     """Return the gains; None with fewer than `FEWEST` sites or where no channel answers.
 
@@ -134,9 +138,8 @@ def _spreads(sensor: Sensor) -> list[float]:
 
 
 def _rows(
-    pair: _Pair, channels: list[int], value: np.ndarray, fall: FallOff, noise: np.ndarray, visits: float,
-    sensor: Sensor,
-) -> SiteRows:  # fmt: skip
+    pair: _Pair, channels: list[int], value: np.ndarray, fall: FallOff, noise: np.ndarray, visits: float, sensor: Sensor
+) -> SiteRows:
     """Return the observations of a site, linear about gains and shift as they are known."""
     found, count, levels = pair.channels, len(pair.channels), len(pair.before.spread)
     place, shift = [channels.index(k) for k in found], value[-2:]

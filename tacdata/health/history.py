@@ -71,8 +71,9 @@ def history(visits: Sequence[Visit], network: Mapping[str, NetworkError] | None 
         UsageError: If there are none, one is given twice, or they are of several units.
     """
     ordered = in_order(visits)
-    errors = {k: network[str(v.session.folder)] for k, v in enumerate(ordered) if network
-              and str(v.session.folder) in network}  # fmt: skip
+    errors = {
+        k: network[str(v.session.folder)] for k, v in enumerate(ordered) if network and str(v.session.folder) in network
+    }
     comparisons: list[tuple[VisitComparison, ...]] = [()]
     for number in range(1, len(ordered)):
         found = []

@@ -33,9 +33,7 @@ class SiteRows:
     """Covariance of a relative error of the site, for one of 1 [counts^2], shape (n, n)."""
 
 
-def solve(
-    rows: Sequence[SiteRows], precision: np.ndarray, errors: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def solve(rows: Sequence[SiteRows], precision: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the parameters, shape (p,), and their covariance, shape (p, p).
 
     Args:
@@ -61,9 +59,7 @@ def relative_errors(rows: Sequence[SiteRows], precision: np.ndarray) -> np.ndarr
     return np.maximum(np.exp(found.x), SMALLEST)
 
 
-def _sums(
-    rows: Sequence[SiteRows], precision: np.ndarray, errors: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
+def _sums(rows: Sequence[SiteRows], precision: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Return information, score, and twice the negative restricted log-likelihood but for the fit."""
     information, score, loss = np.diag(precision), np.zeros(len(precision)), 0.0
     for row in rows:

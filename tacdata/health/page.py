@@ -23,14 +23,17 @@ def page(history: History) -> str:
     picture.draw(history, stream)
     advised = advice(history)
     return _template().render(
-        unit=history.last.sensor.name, latest=history.last, visits=history.visits,
+        unit=history.last.sensor.name,
+        latest=history.last,
+        visits=history.visits,
         began=history.last.started[:16].replace("T", " at "),
         advised=[(a.do, named(a.channels) if a.channels else "", a.why) for a in advised],
-        well=advised[0].do in (NOTHING, FIRST), tiles=summary(history),
+        well=advised[0].do in (NOTHING, FIRST),
+        tiles=summary(history),
         picture=base64.b64encode(stream.getvalue()).decode("ascii"),
         tables=[(history.visits[c.against].name, len(c.pairs), _rows(c)) for c in history.comparisons[-1]],
         lines=[*not_assessed(history), *remarks(history)],
-    )  # fmt: skip
+    )
 
 
 def _rows(comparison: VisitComparison) -> list[tuple[str, str, str, str, bool]]:

@@ -28,8 +28,13 @@ def draw(history: History, out: Path | BinaryIO) -> None:
     _gains(axes[0, 0], history)
     _array(axes[0, 1], history)
     _channels(axes[0, 2], history)
-    _series(axes[1, 0], history, "noise", lambda k: [s.value for s in history.visits[k].noise.values()],
-            f"noise [{history.last.unit}]")  # fmt: skip
+    _series(
+        axes[1, 0],
+        history,
+        "noise",
+        lambda k: [s.value for s in history.visits[k].noise.values()],
+        f"noise [{history.last.unit}]",
+    )
     _series(axes[1, 1], history, "zero", lambda k: _moved(history, k), f"zero less the first [{history.last.unit}]")
     _loop(axes[1, 2], history)
     figure.savefig(out, dpi=100, format="png")
@@ -88,9 +93,13 @@ def _array(axes: Any, history: History) -> None:
         values[channel] = 100 * (gain.value - 1)
     most = max(float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0, 100 * OWN)
     image = axes.imshow(
-        values.reshape(taxels.rows, taxels.columns), cmap="RdBu", vmin=-most, vmax=most, origin="lower",
+        values.reshape(taxels.rows, taxels.columns),
+        cmap="RdBu",
+        vmin=-most,
+        vmax=most,
+        origin="lower",
         aspect=taxels.pitch_y / taxels.pitch_x,
-    )  # fmt: skip
+    )
     axes.figure.colorbar(image, ax=axes)
     dead, moved = set(history.wiring.unfit), dict(history.wiring.swapped)
     for k in range(taxels.count):

@@ -95,9 +95,14 @@ def press_response(episode: Episode, counts: np.ndarray | None = None) -> PressR
     levels, slope = at @ fitted, rising @ fitted[1:] / episode.press.deepest
     spread = np.concatenate([((at @ inverse) ** 2).sum(axis=1), [np.pi / 2 / held.sum()]])
     return PressResponse(
-        episode.press, episode.path.name, int(episode.taxels.sample_ns[0]), np.vstack([levels, hold]),
-        np.vstack([slope, slope[-1]]), spread, _loop(above.sum(axis=1), share, phase),
-    )  # fmt: skip
+        episode.press,
+        episode.path.name,
+        int(episode.taxels.sample_ns[0]),
+        np.vstack([levels, hold]),
+        np.vstack([slope, slope[-1]]),
+        spread,
+        _loop(above.sum(axis=1), share, phase),
+    )
 
 
 def _loop(strength: np.ndarray, share: np.ndarray, phase: np.ndarray) -> float:

@@ -70,8 +70,10 @@ class Visit:
     @property
     def noise(self) -> dict[int, Spread]:
         """Noise of each channel without contact [counts], over all rests."""
-        spreads = [np.array([np.nan if v is None else v for v in e.document["taxels"]["idle_noise"]], float)
-                   for e in self.entries]  # fmt: skip
+        spreads = [
+            np.array([np.nan if v is None else v for v in e.document["taxels"]["idle_noise"]], float)
+            for e in self.entries
+        ]
         frames = np.array([len(in_phase(e.recording.episode, "rest")) for e in self.entries], float)
         weight = np.isfinite(spreads) * frames[:, None]
         freedom = np.maximum(WHITE * (weight.sum(axis=0) - len(frames)), 1.0)

@@ -80,9 +80,10 @@ def single(table: SourceTable, selector: Selector, where: str) -> str:
         raise FormatError(f"{where}: {selector!r} means {len(names)} columns", "one column", "name one")
     if width := table.inner(names[0]):
         raise FormatError(
-            f"{where}: {selector!r} is an array of {width} columns", "one column",
+            f"{where}: {selector!r} is an array of {width} columns",
+            "one column",
             f"name one of them, {names[0]}[0] to {names[0]}[{width - 1}]",
-        )  # fmt: skip
+        )
     return names[0]
 
 
@@ -138,9 +139,10 @@ def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> Form
     given = f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}"
     if known and sum(bool(THOUSANDS.fullmatch(text)) for text in known) > len(known) / 2:
         return FormatError(
-            f"{given}: numbers with a sign between thousands, or with three decimal places, as text", "numbers",
+            f"{given}: numbers with a sign between thousands, or with three decimal places, as text",
+            "numbers",
             "save it again as numbers, without a sign between thousands",
-        )  # fmt: skip
+        )
     if known and sum(bool(WRITTEN.fullmatch(text)) for text in known) > len(known) / 2:
         return FormatError(f"{given}: numbers as text", "numbers", "save it again as numbers")
     return FormatError(
@@ -194,7 +196,8 @@ def _from_path(entry: dict[str, Any], parts: dict[str, str], where: str) -> str:
         raise FormatError(f"{where}: pattern {pattern!r}: {error}", "a regular expression", "correct it") from None
     if match is None or not match.groups():
         raise FormatError(
-            f"{where}: {pattern!r} finds nothing in {parts[name]!r}", "a pattern with one group, as in ([A-Za-z]+)",
+            f"{where}: {pattern!r} finds nothing in {parts[name]!r}",
+            "a pattern with one group, as in ([A-Za-z]+)",
             "correct pattern",
-        )  # fmt: skip
+        )
     return match[1]

@@ -29,16 +29,18 @@ def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rat
         if sensor.taxels.count != channels:
             raise FormatError(
                 f"{channels} channels in the data, {sensor.taxels.count} taxels in {entry}",
-                "the same number", "correct taxels/columns in the mapping, or the sensor file",
-            )  # fmt: skip
+                "the same number",
+                "correct taxels/columns in the mapping, or the sensor file",
+            )
         return sensor, []
     known = dict(entry)
     columns, rows = known.get("columns"), known.get("rows", 1)
     if columns is not None and columns * rows != channels:
         raise FormatError(
-            f"sensor of {columns} x {rows} channels, {channels} in the data", f"columns times rows = {channels}",
+            f"sensor of {columns} x {rows} channels, {channels} in the data",
+            f"columns times rows = {channels}",
             "correct sensor or taxels/columns in the mapping",
-        )  # fmt: skip
+        )
     stand_ins: dict[str, str] = {} if columns else {"taxels/columns": f"{UNKNOWN}: all channels in one row"}
 
     def value(field: str, path: str, otherwise: float) -> float:
@@ -51,16 +53,19 @@ def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rat
     size_x = value("size_x", "skin/size_x", (columns + 1) * pitch_x)
     size_y = value("size_y", "skin/size_y", (rows + 1) * pitch_y)
     document = {
-        "version": schemas.version("sensor"), "name": known["name"], "source": "imported",
+        "version": schemas.version("sensor"),
+        "name": known["name"],
+        "source": "imported",
         "taxels": {"columns": columns, "rows": rows, "pitch_x": pitch_x, "pitch_y": pitch_y, "rate": rate},
         "skin": {"size_x": size_x, "size_y": size_y, "thickness": value("thickness", "skin/thickness", 3.0)},
         "material": {
-            "law": "neo_hookean", "youngs_modulus": value("youngs_modulus", "material/youngs_modulus", 0.3),
+            "law": "neo_hookean",
+            "youngs_modulus": value("youngs_modulus", "material/youngs_modulus", 0.3),
             "poisson_ratio": value("poisson_ratio", "material/poisson_ratio", 0.45),
         },
         "contact": {"friction": 0.2, "bonded": ["bottom"]},
         "map": {"pixels_x": 32, "pixels_y": 32, "pixel_pitch": max(size_x, size_y) / 32, "depth_max": 3.0},
         "assumptions": {**stand_ins, "material/law": UNKNOWN, "contact": UNKNOWN, "map": UNKNOWN},
-    }  # fmt: skip
+    }
     sensor = Sensor.from_document(document, f"sensor {known['name']}")
     return sensor, [f"{path}: {why}" for path, why in sensor.assumptions.items()]

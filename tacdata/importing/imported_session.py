@@ -142,15 +142,18 @@ class _Import:
     ) -> Iterator[ImportedPress]:
         below = self.source.parent if is_one(self.source) else self.source
         record = {
-            "version": schemas.version("import_record"), "name": self.mapping["name"],
-            "source": self.mapping.get("source", ""), "trial": label,
+            "version": schemas.version("import_record"),
+            "name": self.mapping["name"],
+            "source": self.mapping.get("source", ""),
+            "trial": label,
             "files": [
-                {"path": path.relative_to(below).as_posix(), "sha256": source_hash(path),
-                 "rows": whole[name].rows}
+                {"path": path.relative_to(below).as_posix(), "sha256": source_hash(path), "rows": whole[name].rows}
                 for name, path in files.paths.items()
             ],
-            "mapping": self.mapping, "mapping_hash": self.hash, "code_version": provenance.code_version(),
-        }  # fmt: skip
+            "mapping": self.mapping,
+            "mapping_hash": self.hash,
+            "code_version": provenance.code_version(),
+        }
         if self.centre is None:
             self.centre = centre_of(self.mapping, whole)
         yield from presses_of(self.mapping, self.beside, rows, files.parts, record, self.centre)
@@ -183,11 +186,16 @@ class _Import:
         first = self.presses[0]
         plan = plan_of(self.mapping["name"], [imported.press for imported in self.presses])
         document = {
-            "version": "1.0", "code_version": provenance.code_version(),
-            "started": datetime.now(UTC).isoformat(timespec="seconds"), "rig": first.rig, "plan": plan,
-            "plan_hash": provenance.content_hash(plan), "sensor": first.sensor.document,
-            "sensor_hash": first.sensor.content_hash, "episodes": [],
-        }  # fmt: skip
+            "version": "1.0",
+            "code_version": provenance.code_version(),
+            "started": datetime.now(UTC).isoformat(timespec="seconds"),
+            "rig": first.rig,
+            "plan": plan,
+            "plan_hash": provenance.content_hash(plan),
+            "sensor": first.sensor.document,
+            "sensor_hash": first.sensor.content_hash,
+            "episodes": [],
+        }
         documents.write(self.work / FILE, document, "session")
         session.refresh(session.read_session(self.work))
 
@@ -197,15 +205,32 @@ def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:
     slowest = min(press.speed for press in presses)
     # A recording that touches nothing has a negative depth: the plan flies lower than that.
     clearance = 1.0 + max(0.0, *(-press.depth for press in presses))
-    motion = {"clearance": clearance, "travel_speed": slowest, "approach_speed": slowest, "press_speed": slowest,
-              "hold": 0.0, "rest": 0.0}  # fmt: skip
+    motion = {
+        "clearance": clearance,
+        "travel_speed": slowest,
+        "approach_speed": slowest,
+        "press_speed": slowest,
+        "hold": 0.0,
+        "rest": 0.0,
+    }
     entries = [
-        {"indenter": p.indenter_name, "x": p.x, "y": p.y, **p.angles, "depth": p.depth, "speed": p.speed,
-         "hold": p.hold}
+        {
+            "indenter": p.indenter_name,
+            "x": p.x,
+            "y": p.y,
+            **p.angles,
+            "depth": p.depth,
+            "speed": p.speed,
+            "hold": p.hold,
+        }
         for p in presses
-    ]  # fmt: skip
+    ]
     indenters = {press.indenter_name: press.indenter.document for press in presses}
     return {
-        "version": schemas.version("plan"), "name": name, "purpose": "told from imported data, not driven",
-        "indenters": indenters, "motion": motion, "presses": entries,
-    }  # fmt: skip
+        "version": schemas.version("plan"),
+        "name": name,
+        "purpose": "told from imported data, not driven",
+        "indenters": indenters,
+        "motion": motion,
+        "presses": entries,
+    }

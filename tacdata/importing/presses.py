@@ -46,9 +46,13 @@ UNITS = {
 
 
 def presses_of(
-    mapping: dict[str, Any], beside: Path, tables: dict[str, SourceTable], parts: dict[str, str],
-    record: dict[str, Any], centre: tuple[float, float] = (0.0, 0.0),
-) -> Iterator[ImportedPress]:  # fmt: skip
+    mapping: dict[str, Any],
+    beside: Path,
+    tables: dict[str, SourceTable],
+    parts: dict[str, str],
+    record: dict[str, Any],
+    centre: tuple[float, float] = (0.0, 0.0),
+) -> Iterator[ImportedPress]:
     """Yield the recordings that the rows of a trial hold.
 
     Args:
@@ -73,9 +77,10 @@ def presses_of(
     scheduled = read_schedule(mapping, tables, streams.taxels)
     if streams.position is None and not scheduled:
         raise FormatError(
-            "neither a position nor a press schedule", "one of them: without it the presses are unknown",
+            "neither a position nor a press schedule",
+            "one of them: without it the presses are unknown",
             "add position or schedule to the mapping; for a sensor left alone: position: {file: ..., depth: -1}",
-        )  # fmt: skip
+        )
     shift = max(-min(int(stream.time_ns[0]) for stream in streams.all if len(stream.time_ns)), 0)
     streams, scheduled = _shifted(streams, shift), [replace(s, start_ns=s.start_ns + shift) for s in scheduled]
     place, unsaid = _registration(mapping, streams, centre)
@@ -90,20 +95,34 @@ def presses_of(
             part = replace(part, position=_commanded(planned, begin, end))
         if part.position is None or not len(part.position.time_ns):
             raise FormatError(f"trial {trial or 'without a name'}: no position in it", "a position", "split otherwise")
-        yield _imported(mapping, beside, part, place, planned, known, [*unsaid], {
-            **record, "trial": trial.strip(), "time_shift_ns": shift, "notes": list(streams.notes),
-        })  # fmt: skip
+        yield _imported(
+            mapping,
+            beside,
+            part,
+            place,
+            planned,
+            known,
+            [*unsaid],
+            {**record, "trial": trial.strip(), "time_shift_ns": shift, "notes": list(streams.notes)},
+        )
     if short:
         raise FormatError(
-            f"{short} of {len(cuts)} stretches hold fewer than two rows of the channels", "two rows or more",
+            f"{short} of {len(cuts)} stretches hold fewer than two rows of the channels",
+            "two rows or more",
             "leave the file out, or split the trials otherwise",
-        )  # fmt: skip
+        )
 
 
 def _imported(
-    mapping: dict[str, Any], beside: Path, streams: ImportedStreams, place: Registration,
-    planned: ScheduledPress | None, known: dict[str, float], stand_ins: list[str], record: dict[str, Any],
-) -> ImportedPress:  # fmt: skip
+    mapping: dict[str, Any],
+    beside: Path,
+    streams: ImportedStreams,
+    place: Registration,
+    planned: ScheduledPress | None,
+    known: dict[str, float],
+    stand_ins: list[str],
+    record: dict[str, Any],
+) -> ImportedPress:
     taxels, lost = _without_counter(streams)
     spans = np.diff(taxels.time_ns)
     rate = float(1e9 / np.median(spans[spans > 0])) if (spans > 0).any() else 1.0
@@ -119,7 +138,7 @@ def _imported(
             f"trial {record['trial'] or 'without a name'}: {path.depth:.4g} mm deep, as the mapping has it",
             f"presses of at most {most:g} mm",
             "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
-        )  # fmt: skip
+        )
     indenter, name = _indenter(mapping)
     if name == "unknown":
         stand_ins.append("indenter: not said by the source; a sphere of 2 mm stands in")
@@ -129,17 +148,27 @@ def _imported(
     values = {"x": path.x, "y": path.y, "depth": path.depth, "speed": path.speed or 1.0, "hold": path.hold, **angles}
     values = {key: round(value, 4) for key, value in {**values, **known}.items()}
     press = Press(
-        index=0, indenter=indenter, indenter_name=name, x=values["x"], y=values["y"],
-        yaw=values["yaw"], tilt_x=values["tilt_x"], tilt_y=values["tilt_y"],
-        depth=values["depth"], speed=max(values["speed"], SLOWEST), hold=values["hold"],
-    )  # fmt: skip
+        index=0,
+        indenter=indenter,
+        indenter_name=name,
+        x=values["x"],
+        y=values["y"],
+        yaw=values["yaw"],
+        tilt_x=values["tilt_x"],
+        tilt_y=values["tilt_y"],
+        depth=values["depth"],
+        speed=max(values["speed"], SLOWEST),
+        hold=values["hold"],
+    )
     phases = planned.phases(int(taxels.time_ns[0])) if planned else path.phases
     notes = [*record["notes"], *_remarks(taxels, planned, path, lost), *stand_ins]
     registration = {
-        "origin": list(place.origin), "yaw": place.yaw, "tilt": list(place.tilt),
+        "origin": list(place.origin),
+        "yaw": place.yaw,
+        "tilt": list(place.tilt),
         "method": f"import: {mapping.get('contact', {}).get('known_from', 'as the mapping says')}",
         "date": datetime.now(UTC).date().isoformat(),
-    }  # fmt: skip
+    }
     record = {**record, "stand_ins": [*stand_ins, *unknown], "notes": notes}
     return ImportedPress(press, sensor, registration, taxels, position, streams.measured, phases, {}, record, lost)
 
@@ -194,9 +223,7 @@ def _registration(
     if position is None or streams.depth_given:
         return Registration((0.0, 0.0, 0.0), contact.get("yaw", 0.0)), []
     values = position.values
-    origin = (
-        contact.get("x", centre[0]), contact.get("y", centre[1]), contact.get("z", float(values[:, 2].max())),
-    )  # fmt: skip
+    origin = (contact.get("x", centre[0]), contact.get("y", centre[1]), contact.get("z", float(values[:, 2].max())))
     unsaid = []
     if "z" not in contact:
         unsaid.append("contact/z: not said by the source; depth is counted from the highest position")
@@ -270,16 +297,18 @@ def _part(parts: dict[str, str], entry: dict[str, Any], where: str) -> float:
             raise FormatError(f"{where}: pattern {pattern!r}: {error}", "a regular expression", "correct it") from None
         if match is None or not match.groups():
             raise FormatError(
-                f"{where}: {pattern!r} finds no number in {text!r}", "a pattern with one group, as in x([-0-9.]+)",
+                f"{where}: {pattern!r} finds no number in {text!r}",
+                "a pattern with one group, as in x([-0-9.]+)",
                 "correct pattern",
-            )  # fmt: skip
+            )
         text = match[1]
     # "1p5" and "1,5" are how file names write 1.5.
     digits = re.findall(r"[-+]?\d+(?:[.,p]\d+)?", text)
     if len(digits) != 1:
         raise FormatError(
-            f"{where}: {text!r} in the path holds {len(digits)} numbers", "one number",
+            f"{where}: {text!r} in the path holds {len(digits)} numbers",
+            "one number",
             "say which by pattern: a regular expression with one group",
-        )  # fmt: skip
+        )
     scale = factor(entry["unit"], UNITS[where.split(": ")[1]], where) if "unit" in entry else 1.0
     return float(digits[0].replace("p", ".").replace(",", ".")) * scale

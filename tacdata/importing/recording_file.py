@@ -62,12 +62,14 @@ class ImportedPress:
             "registration.json": self.registration,
             "plan.json": self.plan,
             "board.json": {
-                "channels": len(self.taxels.names), "names": list(self.taxels.names), "unit": self.taxels.unit,
+                "channels": len(self.taxels.names),
+                "names": list(self.taxels.names),
+                "unit": self.taxels.unit,
                 "rate": {"nominal": rate, "unit": "Hz"},
             },
             "controller.json": {"settings": {}, "acceleration": [1e6] * 3, "max_rate": [1e6] * 3},
             "import.json": self.record,
-        }  # fmt: skip
+        }
 
 
 def write(path: Path, imported: ImportedPress) -> None:
@@ -106,9 +108,10 @@ def write(path: Path, imported: ImportedPress) -> None:
 def _messages(imported: ImportedPress) -> Iterator[tuple[str, int, bytes]]:
     """Yield topic, time and bytes of every row of every stream, in the order of time."""
     makers: list[tuple[str, Stream, Callable[[int, list[float]], bytes]]] = [
-        (topics.TAXELS, imported.taxels, _taxels), (topics.STATUS, imported.position, _status),
+        (topics.TAXELS, imported.taxels, _taxels),
+        (topics.STATUS, imported.position, _status),
         *((topics.measured(stream.name), stream, _measured) for stream in imported.measured),
-    ]  # fmt: skip
+    ]
     marks = [(p.start_ns, p.name) for p in imported.phases]
     marks += [(imported.phases[-1].end_ns, "")] if imported.phases else []
     for time_ns, name in marks:

@@ -69,15 +69,17 @@ def read_schedule(mapping: dict[str, Any], tables: dict[str, SourceTable], taxel
         if before.knots[0][-1] > after.start_ns:
             raise FormatError(
                 f"schedule: the press at {after.start_ns / 1e9:.3f} s begins before the one before it ends",
-                "presses one after the other", "correct start, speed or hold",
-            )  # fmt: skip
+                "presses one after the other",
+                "correct start, speed or hold",
+            )
     inside = [p for p in presses if p.start_ns <= taxels.time_ns[-1] and p.knots[0][-1] >= taxels.time_ns[0]]
     if not inside:
         raise FormatError(
             "schedule: no press lies within the time of the channels, "
             f"{taxels.time_ns[0] / 1e9:.3f} to {taxels.time_ns[-1] / 1e9:.3f} s",
-            "presses within it", "correct start, or the schedule's time: {offset: SECONDS}",
-        )  # fmt: skip
+            "presses within it",
+            "correct start, or the schedule's time: {offset: SECONDS}",
+        )
     return inside
 
 
@@ -89,19 +91,26 @@ def _listed(entry: dict[str, Any], taxels: Stream) -> list[ScheduledPress]:
         zero += int(taxels.time_ns[0])
     return [
         ScheduledPress(
-            zero + round(p["start"] * 1e9), p["depth"], p["speed"], p.get("hold", 0.0), p.get("height", 0.0),
-            p.get("x", 0.0), p.get("y", 0.0), p.get("release_speed", p["speed"]),
+            zero + round(p["start"] * 1e9),
+            p["depth"],
+            p["speed"],
+            p.get("hold", 0.0),
+            p.get("height", 0.0),
+            p.get("x", 0.0),
+            p.get("y", 0.0),
+            p.get("release_speed", p["speed"]),
         )
         for p in entry["presses"]
-    ]  # fmt: skip
+    ]
 
 
 def _tabled(mapping: dict[str, Any], entry: dict[str, Any], tables: dict[str, SourceTable]) -> list[ScheduledPress]:
     if "file" not in entry or entry["file"] not in tables or "start" not in entry:
         raise FormatError(
             "schedule without presses, or without file and start",
-            "presses: a list, or file: NAME with start, depth and speed as columns", "complete the schedule",
-        )  # fmt: skip
+            "presses: a list, or file: NAME with start, depth and speed as columns",
+            "complete the schedule",
+        )
     table = tables[entry["file"]]
     start = entry["start"]
     clock = {**entry.get("time", {}), **({"column": start["column"]} if isinstance(start, dict) else {})}

@@ -76,17 +76,19 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
         if len({entry["path"] for entry in files.values()}) != 1:
             raise UsageError(
                 f"{source} is one file, the mapping names {len(files)} ({', '.join(files)})",
-                "the folder that holds them", "give the folder",
-            )  # fmt: skip
+                "the folder that holds them",
+                "give the folder",
+            )
         matches: dict[str, list[tuple[dict[str, str], Path]]] = {name: [({}, source)] for name in files}
     else:
         matches = {name: _matches(source, entry["path"]) for name, entry in files.items()}
     for name, found in matches.items():
         if not found:
             raise UsageError(
-                f"no file fits {files[name]['path']} below {source}", "one or more",
+                f"no file fits {files[name]['path']} below {source}",
+                "one or more",
                 f"correct files/{name}/path in the mapping; there is {_listing(source)}",
-            )  # fmt: skip
+            )
         if "{" in files[name].get("table", ""):
             matches[name] = _in_tables(found, files[name])
     keys = {name: tuple(found[0][0]) for name, found in matches.items()}
@@ -101,9 +103,10 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
             ]
             if len(fitting) != 1:
                 fault = FormatError(
-                    f"{len(fitting)} files {files[name]['path']} for {parts or 'the source'}", "exactly one",
+                    f"{len(fitting)} files {files[name]['path']} for {parts or 'the source'}",
+                    "exactly one",
                     "complete the source, or narrow the path with a {part} in the mapping",
-                )  # fmt: skip
+                )
                 break
             paths[name] = fitting[0]
         sets.append(FileSet(parts, paths, fault))

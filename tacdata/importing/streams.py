@@ -91,9 +91,10 @@ def _clock(mapping: dict[str, Any], entry: dict[str, Any]) -> dict[str, Any]:
     clock = entry.get("time") or mapping["files"][entry["file"]].get("time")
     if not clock:
         raise FormatError(
-            f"no clock for {entry['file']}", "time: {column: NAME} or time: {rate: HZ}",
+            f"no clock for {entry['file']}",
+            "time: {column: NAME} or time: {rate: HZ}",
             f"add time under files/{entry['file']} in the mapping",
-        )  # fmt: skip
+        )
     return clock
 
 
@@ -109,9 +110,14 @@ def _missing(mapping: dict[str, Any], entry: dict[str, Any]) -> list[float]:
 
 
 def _timed(
-    mapping: dict[str, Any], entry: dict[str, Any], table: SourceTable, name: str, values: np.ndarray,
-    names: tuple[str, ...], unit: str,
-) -> Stream:  # fmt: skip
+    mapping: dict[str, Any],
+    entry: dict[str, Any],
+    table: SourceTable,
+    name: str,
+    values: np.ndarray,
+    names: tuple[str, ...],
+    unit: str,
+) -> Stream:
     clock = _clock(mapping, entry)
     time_ns, zero = times(table, clock, f"{name}: time")
     zero = "aligned" if "offset" in clock else f"own: {entry['file']}" if zero == "own" else zero
@@ -267,5 +273,6 @@ def _check_overlap(streams: ImportedStreams) -> None:
             )
             raise FormatError(
                 f"streams that do not overlap in time: {spans}",
-                "streams of the same time", "correct the clocks' unit, zero or offset in the mapping",
-            )  # fmt: skip
+                "streams of the same time",
+                "correct the clocks' unit, zero or offset in the mapping",
+            )

@@ -14,17 +14,65 @@ from tacdata.importing.units import BRACKETED, OTHERS, plain, quantity_of, split
 
 COMMENTS = ("#", "%", "//")
 SHEET_ERRORS = (
-    "#N/A", "#DIV/0!", "#NAME?", "#NULL!", "#NUM!", "#REF!", "#VALUE!", "#SPILL!", "#CALC!", "#FIELD!", "#BLOCKED!",
-    "#CONNECT!", "#BUSY!", "#UNKNOWN!", "#GETTING_DATA", "#WERT!", "#ZAHL!", "#BEZUG!", "#NV", "#VALEUR!", "#NOMBRE!",
-    "#VALOR!", "#NUM.",
-)  # fmt: skip
+    "#N/A",
+    "#DIV/0!",
+    "#NAME?",
+    "#NULL!",
+    "#NUM!",
+    "#REF!",
+    "#VALUE!",
+    "#SPILL!",
+    "#CALC!",
+    "#FIELD!",
+    "#BLOCKED!",
+    "#CONNECT!",
+    "#BUSY!",
+    "#UNKNOWN!",
+    "#GETTING_DATA",
+    "#WERT!",
+    "#ZAHL!",
+    "#BEZUG!",
+    "#NV",
+    "#VALEUR!",
+    "#NOMBRE!",
+    "#VALOR!",
+    "#NUM.",
+)
 """What a spreadsheet writes for a cell without a value; it begins like a comment and is none."""
 MISSING = (
-    "", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "n.a.", "null", "NULL", "(null)", "None", "<NA>", "NaT", "-",
-    "--", "---", "?", "-nan", "-nan(ind)", "nan(ind)", "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND", "1.#INF", "-1.#INF",
+    "",
+    "nan",
+    "NaN",
+    "NAN",
+    "na",
+    "NA",
+    "n/a",
+    "N/A",
+    "n.a.",
+    "null",
+    "NULL",
+    "(null)",
+    "None",
+    "<NA>",
+    "NaT",
+    "-",
+    "--",
+    "---",
+    "?",
+    "-nan",
+    "-nan(ind)",
+    "nan(ind)",
+    "1.#QNAN",
+    "-1.#QNAN",
+    "1.#IND",
+    "-1.#IND",
+    "1.#INF",
+    "-1.#INF",
     *(f"{sign}1.#{word}" for sign in ("", "-") for word in ("IND0", "IND00", "INF0", "INF00", "QNAN0", "QNB", "J")),
-    *(f"Err:{number}" for number in range(501, 541)), *("*" * width for width in range(3, 25)), *SHEET_ERRORS,
-)  # fmt: skip
+    *(f"Err:{number}" for number in range(501, 541)),
+    *("*" * width for width in range(3, 25)),
+    *SHEET_ERRORS,
+)
 """Texts that stand for a missing value in any file: C, LibreOffice, Fortran and spreadsheets write some of them."""
 DELIMITERS = ("\t", ";", ",", "|", " ")
 GUESSED = ("delimiter", "decimal")
@@ -135,8 +183,9 @@ def _refuse_commas_for_both(
         raise FormatError(
             f"{origin}: {names} names in the header, and {width} whole numbers a row: its commas part the fields and "
             "stand for decimal points too",
-            "one sign for each", "save it again with semicolons or tabs between the fields, or with decimal points",
-        )  # fmt: skip
+            "one sign for each",
+            "save it again with semicolons or tabs between the fields, or with decimal points",
+        )
 
 
 def _commented_header(lines: list[str], first: str, delimiter: str, width: int) -> list[list[str]]:
@@ -234,8 +283,9 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
 def _are_units(fields: list[str]) -> bool:
     """Return whether a second header line gives units: short, and at least half of them in brackets or known."""
     given = [field for field in fields if field]
-    known = [bool(re.fullmatch(BRACKETED, field)) or quantity_of(field) or plain(field).lower() in OTHERS
-             for field in given]  # fmt: skip
+    known = [
+        bool(re.fullmatch(BRACKETED, field)) or quantity_of(field) or plain(field).lower() in OTHERS for field in given
+    ]
     return all(len(field.strip("[]() ")) <= 8 for field in given) and 2 * sum(map(bool, known)) >= max(len(given), 1)
 
 

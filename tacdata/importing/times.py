@@ -69,8 +69,9 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
     if zero == "unix" and not looks_unix:
         raise FormatError(
             f"{where}: {name} shows {middle:.6g} s in {unit}, no Unix time of this century",
-            "seconds since 1970 in the unit that is given", "correct unit, or give zero: shared or zero: own",
-        )  # fmt: skip
+            "seconds since 1970 in the unit that is given",
+            "correct unit, or give zero: shared or zero: own",
+        )
     if values.dtype.kind in "iu" and "drift" not in clock and scale < 1:
         nanoseconds = values.astype(np.int64) * round(scale * 1e9)
         return nanoseconds + round(clock.get("offset", 0.0) * 1e9), zero or ("unix" if looks_unix else "shared")
@@ -162,7 +163,7 @@ def _refuse_fast(values: np.ndarray, unit: str, scale: float, where: str) -> Non
         f"{where}: in {unit} the rows come at {(len(known) - 1) / span:.3g} Hz",
         f"times at no more than {FASTEST:.0f} Hz",
         f"correct unit under time in the mapping, to {dated or 'd'} for example",
-    )  # fmt: skip
+    )
 
 
 def _steps(values: np.ndarray) -> np.ndarray:
@@ -190,9 +191,22 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
 
 
 DATES = (
-    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%d-%b-%Y",
-    "%d %b %Y", "%b %d %Y", "%b %d, %Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y",
-)  # fmt: skip
+    "%Y-%m-%d",
+    "%Y/%m/%d",
+    "%Y.%m.%d",
+    "%Y%m%d",
+    "%d.%m.%Y",
+    "%d/%m/%Y",
+    "%m/%d/%Y",
+    "%d-%m-%Y",
+    "%d-%b-%Y",
+    "%d %b %Y",
+    "%b %d %Y",
+    "%b %d, %Y",
+    "%d.%m.%y",
+    "%d/%m/%y",
+    "%m/%d/%y",
+)
 CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%I:%M %p", "%H%M%S", "%H:%M:%S:%f")
 """Dates and times of day as instruments write them; the layout that fits all rows of a file decides."""
 
@@ -251,9 +265,10 @@ def _parsed(text: str, layout: str, where: str) -> datetime | None:
         return datetime.strptime(text, layout)
     except ValueError:
         raise FormatError(
-            f"{where}: {text!r} is not written as {layout}", "one way of writing dates for all rows",
+            f"{where}: {text!r} is not written as {layout}",
+            "one way of writing dates for all rows",
             "give format under time in the mapping, as Python's strptime has it, or correct the row",
-        ) from None  # fmt: skip
+        ) from None
 
 
 def layouts_of(known: list[str]) -> dict[str, list[datetime]]:
@@ -288,5 +303,6 @@ def _layout(texts: list[str], where: str) -> str:
         )
     raise FormatError(
         f"{where}: {example!r} can be read as {' or as '.join(sorted(fitting))}",
-        "dates that can be read in one way", "give format under time in the mapping",
-    )  # fmt: skip
+        "dates that can be read in one way",
+        "give format under time in the mapping",
+    )

@@ -54,9 +54,7 @@ def _kept(table: SourceTable, rows: np.ndarray) -> SourceTable:
     return replace(table, columns={name: values[rows] for name, values in table.columns.items()})
 
 
-def _by_column(
-    tables: dict[str, SourceTable], column: str | int
-) -> Iterator[tuple[str, dict[str, SourceTable]]]:
+def _by_column(tables: dict[str, SourceTable], column: str | int) -> Iterator[tuple[str, dict[str, SourceTable]]]:
     named: dict[str, np.ndarray] = {}
     refused = FormatError("no file to split by a column", "one or more", "correct the mapping")
     for alias, table in tables.items():
@@ -72,10 +70,7 @@ def _by_column(
         if all(mask.any() for mask in rows.values()):
             yield (
                 f"{label}",
-                {
-                    alias: _kept(table, rows[alias]) if alias in rows else table
-                    for alias, table in tables.items()
-                },
+                {alias: _kept(table, rows[alias]) if alias in rows else table for alias, table in tables.items()},
             )
 
 
@@ -114,8 +109,9 @@ def windows(
         if not len(begins):
             raise FormatError(
                 f"trials: press_above {trials['press_above']:g} mm, the deepest is {depth.max():.3f} mm",
-                f"less than {depth.max():.3f} mm", "correct press_above or the position's zero",
-            )  # fmt: skip
+                f"less than {depth.max():.3f} mm",
+                "correct press_above or the position's zero",
+            )
         ends[1:1] = [(int(time_ns[b]) + int(time_ns[e])) // 2 for e, b in zip(stops[:-1], begins[1:], strict=True)]
     return [(a, b) for a, b in pairwise(ends) if b > a]
 

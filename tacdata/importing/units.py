@@ -9,16 +9,35 @@ from tacdata.errors import FormatError
 GRAVITY = 9.80665
 """Standard gravity [m/s^2]: a load cell in grams was calibrated with weights (CGPM 1901)."""
 FACTORS: dict[str, dict[str, float]] = {
-    "mm": {"m": 1e3, "dm": 100.0, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "in": 25.4, "mil": 0.0254,
-           "ft": 304.8},
+    "mm": {
+        "m": 1e3,
+        "dm": 100.0,
+        "cm": 10.0,
+        "mm": 1.0,
+        "um": 1e-3,
+        "nm": 1e-6,
+        "in": 25.4,
+        "mil": 0.0254,
+        "ft": 304.8,
+    },
     "N": {
-        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "cN": 1e-2, "g": GRAVITY * 1e-3, "gf": GRAVITY * 1e-3,
-        "kg": GRAVITY, "kgf": GRAVITY, "lbf": 4.4482216152605, "lb": 4.4482216152605, "ozf": 0.27801385095378125,
+        "N": 1.0,
+        "mN": 1e-3,
+        "uN": 1e-6,
+        "kN": 1e3,
+        "cN": 1e-2,
+        "g": GRAVITY * 1e-3,
+        "gf": GRAVITY * 1e-3,
+        "kg": GRAVITY,
+        "kgf": GRAVITY,
+        "lbf": 4.4482216152605,
+        "lb": 4.4482216152605,
+        "ozf": 0.27801385095378125,
     },
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0},
     "mm/s": {"mm/s": 1.0, "mm/min": 1 / 60, "um/s": 1e-3, "m/s": 1e3, "cm/s": 10.0},
     "deg": {"deg": 1.0, "rad": 57.29577951308232},
-}  # fmt: skip
+}
 """Our unit -> the units that can be converted to it, and the factor."""
 _LENGTHS = ("", "milli", "micro", "nano", "centi")
 SPELLED = {
@@ -27,15 +46,41 @@ SPELLED = {
     **dict.fromkeys(("usec", "usecs", "micros", "microsec", "microsecs", "microsecond", "microseconds"), "us"),
     **dict.fromkeys(("nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"), "ns"),
     **dict.fromkeys(("mins", "minute", "minutes"), "min"),
-    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"), "day": "d", "days": "d",
-    **{f"{size}met{end}": unit for size, unit in zip(_LENGTHS, ("m", "mm", "um", "nm", "cm"), strict=True)
-       for end in ("er", "ers", "re", "res")},
-    "micron": "um", "microns": "um", "inch": "in", "inches": "in", "mils": "mil", "thou": "mil",
-    "foot": "ft", "feet": "ft",
-    "newton": "N", "newtons": "N", "millinewton": "mN", "millinewtons": "mN", "kilonewton": "kN", "gram": "g",
-    "grams": "g", "kilogram": "kg", "kilograms": "kg", "kp": "kgf", "lbs": "lb", "oz": "ozf",
-    "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "mm/sec": "mm/s", "m/sec": "m/s",
-}  # fmt: skip
+    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
+    "day": "d",
+    "days": "d",
+    **{
+        f"{size}met{end}": unit
+        for size, unit in zip(_LENGTHS, ("m", "mm", "um", "nm", "cm"), strict=True)
+        for end in ("er", "ers", "re", "res")
+    },
+    "micron": "um",
+    "microns": "um",
+    "inch": "in",
+    "inches": "in",
+    "mils": "mil",
+    "thou": "mil",
+    "foot": "ft",
+    "feet": "ft",
+    "newton": "N",
+    "newtons": "N",
+    "millinewton": "mN",
+    "millinewtons": "mN",
+    "kilonewton": "kN",
+    "gram": "g",
+    "grams": "g",
+    "kilogram": "kg",
+    "kilograms": "kg",
+    "kp": "kgf",
+    "lbs": "lb",
+    "oz": "ozf",
+    "degree": "deg",
+    "degrees": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "mm/sec": "mm/s",
+    "m/sec": "m/s",
+}
 """Other spellings, in lower case -> the unit."""
 SCALE = re.compile(
     r"[x\u00d7*]?\s*(?:10\^?([-+]\d+)|(1/)?(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?))\s*[*x\u00b7\u00d7]?\s*([^\d\s].*)"
@@ -48,8 +93,35 @@ WORDS = ("IN", "MIN")
 CLOCKS = r"(time|t|zeit|elapsed|timestamp|clock)"
 """Names behind which a capital S is seconds, and no siemens."""
 BRACKETED = r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*"
-OTHERS = {"pf", "ff", "nf", "v", "mv", "uv", "count", "counts", "lsb", "adc", "ut", "mt", "gauss", "kpa", "pa", "mpa",
-          "degc", "c", "k", "ohm", "kohm", "a", "ma", "hz", "1", "raw", "%"}  # fmt: skip
+OTHERS = {
+    "pf",
+    "ff",
+    "nf",
+    "v",
+    "mv",
+    "uv",
+    "count",
+    "counts",
+    "lsb",
+    "adc",
+    "ut",
+    "mt",
+    "gauss",
+    "kpa",
+    "pa",
+    "mpa",
+    "degc",
+    "c",
+    "k",
+    "ohm",
+    "kohm",
+    "a",
+    "ma",
+    "hz",
+    "1",
+    "raw",
+    "%",
+}
 """Units that are recognized behind a column's name but not converted."""
 
 

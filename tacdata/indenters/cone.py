@@ -113,9 +113,7 @@ def wedge_distance() -> Function:
     return wedge
 
 
-def wedge_height(
-    r: np.ndarray, angle: float, tip: np.ndarray | float, reach: np.ndarray | float
-) -> np.ndarray:
+def wedge_height(r: np.ndarray, angle: float, tip: np.ndarray | float, reach: np.ndarray | float) -> np.ndarray:
     """Return the lower height [mm] over r [mm] of a wedge rounded by ``tip`` [mm], as wide as ``reach`` [mm].
 
     The lowest point lies at height 0; ``inf`` beyond the reach. Arrays are broadcast.

@@ -73,7 +73,8 @@ class Mesh(Indenter):
         if wanted and digest != wanted:
             raise FormatError(
                 f"{origin}: {file} has changed: SHA-256 {digest[:12]}, {wanted[:12]} is named",
-                "the file that was named", "restore it, or remove sha256",
+                "the file that was named",
+                "restore it, or remove sha256",
             )
         found = cls(Path(file).name, digest or "0" * 64, values.get("scale", 1.0))
         _check_size(solid(path, float(found.scale)), found, origin)
@@ -172,9 +173,7 @@ class Mesh(Indenter):
         @wp.func
         def mesh_distance(p: wp.vec3d, q: wp.types.vector(8, wp.float64)):
             zero, two, three = wp.float64(0.0), wp.float64(2.0), wp.float64(3.0)
-            head = wp.array(
-                ptr=wp.uint64(q[0]) * wp.uint64(16777216) + wp.uint64(q[1]), shape=(8,), dtype=wp.float64
-            )
+            head = wp.array(ptr=wp.uint64(q[0]) * wp.uint64(16777216) + wp.uint64(q[1]), shape=(8,), dtype=wp.float64)
             nx, ny, nz = wp.int32(head[5]), wp.int32(head[6]), wp.int32(head[7])
             c = wp.array(ptr=wp.uint64(head[0]), shape=(nx, ny, nz), dtype=wp.float32)
             h = head[4]
@@ -225,8 +224,11 @@ def _check_size(body: Solid, indenter: Mesh, origin: str) -> None:
     extents = np.asarray(body.mesh.extents)
     if extents.max() < _SMALLEST or extents.min() > _LARGEST or extents.max() > 10 * _LARGEST:
         size = " x ".join(f"{v:.3g}" for v in extents)
-        fitting = [f"{scale * indenter.scale:g} ({unit})" for unit, scale in _UNITS.items()
-                   if _SMALLEST <= scale * extents.max() <= _LARGEST]  # fmt: skip
+        fitting = [
+            f"{scale * indenter.scale:g} ({unit})"
+            for unit, scale in _UNITS.items()
+            if _SMALLEST <= scale * extents.max() <= _LARGEST
+        ]
         raise FormatError(
             f"{origin}: {indenter.file} is {size} mm with scale {indenter.scale:g}",
             f"an indenter of {_SMALLEST:g} to {_LARGEST:g} mm",

@@ -47,7 +47,11 @@ def present(label: Label) -> tuple[str, ...]:
 def shape(name: str, frames: int, pixels: tuple[int, int], taxels: int) -> tuple[int, ...]:
     """Return a column's shape."""
     kinds = {
-        "frame": (), "vector": (3,), "taxels": (taxels,), "map": pixels, "vector map": (3, *pixels),
+        "frame": (),
+        "vector": (3,),
+        "taxels": (taxels,),
+        "map": pixels,
+        "vector map": (3, *pixels),
         "taxel maps": (taxels, PIXELS, PIXELS),
     }
     return (frames, *kinds[ALL[name][2]])
@@ -68,13 +72,15 @@ def check(label: Label, origin: str) -> None:
         )
     pixels, taxels = label.signed.shape[1:], label.taxel_force.shape[1]
     wrong = {
-        name: np.shape(getattr(label, name)) for name in present(label)
+        name: np.shape(getattr(label, name))
+        for name in present(label)
         if np.shape(getattr(label, name)) != shape(name, frames, pixels, taxels)
     }
     if wrong:
         raise FormatError(
             f"{origin}: {taxels} taxels, maps {label.signed.shape}, but {wrong}",
-            "the same number of taxels everywhere, one error a pixel", "correct the label",
+            "the same number of taxels everywhere, one error a pixel",
+            "correct the label",
         )
     if (np.diff(label.time_ns) <= 0).any():
         raise FormatError(f"{origin}: time_ns does not increase", "increasing times [ns]", "check the recording")
@@ -90,6 +96,7 @@ def _check_column(values: np.ndarray, name: str, frames: int, origin: str) -> No
         )
     if not np.isfinite(values).all():
         raise FormatError(
-            f"{origin}: label.{name} holds values that are not finite", "finite values only",
+            f"{origin}: label.{name} holds values that are not finite",
+            "finite values only",
             "a solve that failed is no label: store its reason instead",
         )

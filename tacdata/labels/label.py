@@ -137,4 +137,3 @@ class Label:
         """Pixels that lie deeper than a tenth of the nominal depth, in frames that touch, shape as `depth`, bool."""
         nominal = self.tip[:, 2, None, None]
         return (self.signed > 0.1 * nominal) & (nominal > 0)
-

@@ -28,9 +28,7 @@ class LabelVersionError(FormatError):
 
 def _column(values: np.ndarray) -> pa.Array:
     flat = pa.array(np.ascontiguousarray(values).reshape(-1))
-    return (
-        flat if values.ndim == 1 else pa.FixedSizeListArray.from_arrays(flat, int(np.prod(values.shape[1:])))
-    )
+    return flat if values.ndim == 1 else pa.FixedSizeListArray.from_arrays(flat, int(np.prod(values.shape[1:])))
 
 
 def write(path: Path, label: Label) -> None:
@@ -176,15 +174,11 @@ def _damaged(path: Path, error: Exception) -> FormatError:
 def _header(schema: pa.Schema, path: Path) -> dict[str, Any]:
     raw = (schema.metadata or {}).get(HEADER)
     if raw is None:
-        raise FormatError(
-            f"{path}: no key {HEADER.decode()} in its metadata", "a label file", "name a label file"
-        )
+        raise FormatError(f"{path}: no key {HEADER.decode()} in its metadata", "a label file", "name a label file")
     try:
         header = json.loads(raw)
     except ValueError as error:
-        raise FormatError(
-            f"{path}: unreadable header: {error}", "a label file", "run `tacdata label` again"
-        ) from None
+        raise FormatError(f"{path}: unreadable header: {error}", "a label file", "run `tacdata label` again") from None
     _check_version(header, path)
     documents.check(header, "label", str(path))
     return header

@@ -61,10 +61,15 @@ class DepthStream:
     """
 
     def __init__(
-        self, estimate: Callable[[np.ndarray], np.ndarray], offsets: Sequence[int], grid: DepthMap,
-        clock: StreamClock, tare_frames: int, causal: bool = False,
+        self,
+        estimate: Callable[[np.ndarray], np.ndarray],
+        offsets: Sequence[int],
+        grid: DepthMap,
+        clock: StreamClock,
+        tare_frames: int,
+        causal: bool = False,
         novelty: Callable[[np.ndarray], np.ndarray] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Begin without frames.
 
         Args:
@@ -132,9 +137,15 @@ class DepthStream:
         depth = self._estimate(np.array([self._frames[row][0] for row in rows]))
         novelty = float(self._novelty(self._frames[target][0][None])[0]) if self._novelty else None
         return Estimate(
-            self._sequence - 1, self._frames[target][1], frame.arrival_ns, depth, float(contact_depth(depth[None])[0]),
-            contact_centre(depth, self._grid), novelty, self._below_tare(),
-        )  # fmt: skip
+            self._sequence - 1,
+            self._frames[target][1],
+            frame.arrival_ns,
+            depth,
+            float(contact_depth(depth[None])[0]),
+            contact_centre(depth, self._grid),
+            novelty,
+            self._below_tare(),
+        )
 
     def _below_tare(self) -> float:
         """Return the deviation of the latest readings below the tare [counts], if they are at rest."""

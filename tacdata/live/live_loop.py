@@ -26,9 +26,14 @@ class LiveLoop:
     """Runs until it is stopped."""
 
     def __init__(
-        self, source: Source, stream: DepthStream, network: str, server: MessageServer | None = None,
-        watch: Callable[[str, int, Any], None] | None = None, maps: bool = True,
-    ) -> None:  # fmt: skip
+        self,
+        source: Source,
+        stream: DepthStream,
+        network: str,
+        server: MessageServer | None = None,
+        watch: Callable[[str, int, Any], None] | None = None,
+        maps: bool = True,
+    ) -> None:
         """Prepare.
 
         Args:
@@ -41,8 +46,11 @@ class LiveLoop:
         """
         self._source, self._stream, self._server, self._watch, self._maps = source, stream, server, watch, maps
         self._about = {
-            "finger": source.name, "network": network, "causal": stream.causal, "lookahead": stream.lookahead
-        }  # fmt: skip
+            "finger": source.name,
+            "network": network,
+            "causal": stream.causal,
+            "lookahead": stream.lookahead,
+        }
         self.meter = LatencyMeter()
         self.skipped = 0
         """Estimates left out because computing did not keep up."""

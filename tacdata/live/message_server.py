@@ -33,12 +33,17 @@ def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = T
         maps: Whether to include the whole map.
     """
     values: dict[str, Any] = {
-        "version": schemas.version("live_message"), "sequence": made.sequence, **source,
-        "sample_ns": made.sample_ns, "arrival_ns": made.arrival_ns, "sent_ns": sent_ns,
+        "version": schemas.version("live_message"),
+        "sequence": made.sequence,
+        **source,
+        "sample_ns": made.sample_ns,
+        "arrival_ns": made.arrival_ns,
+        "sent_ns": sent_ns,
         "age_ms": round((sent_ns - made.sample_ns) * 1e-6, 3),
-        "depth": round(made.largest, 4), "contact": made.centre is not None,
+        "depth": round(made.largest, 4),
+        "contact": made.centre is not None,
         "centre": None if made.centre is None else [round(value, 4) for value in made.centre],
-    }  # fmt: skip
+    }
     if made.novelty is not None:
         values["novelty"] = round(made.novelty, 3)
     if made.below_tare:

@@ -179,8 +179,9 @@ class Plan:
                 raise FormatError(
                     f"{origin}: presses/{index}: depth {entry['depth']:g} mm flies no lower than the clearance, "
                     f"{motion.clearance:g} mm",
-                    f"above -{motion.clearance:g} mm", "fly lower, or enlarge motion/clearance",
-                )  # fmt: skip
+                    f"above -{motion.clearance:g} mm",
+                    "fly lower, or enlarge motion/clearance",
+                )
             presses.append(_press(index, entry, indenters[name], motion))
         purpose, wanted = document.get("purpose", ""), document.get("on_bad_readings", "stop")
         return cls(document["name"], motion, tuple(presses), purpose, wanted, document)
@@ -213,14 +214,26 @@ class Plan:
 
 def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: MotionSettings) -> Press:
     return Press(
-        index=index, indenter=indenter, indenter_name=entry["indenter"], x=entry["x"], y=entry["y"],
-        yaw=entry.get("yaw", 0.0), depth=entry["depth"], speed=entry.get("speed", motion.press_speed),
-        hold=entry.get("hold", motion.hold), repeat=entry.get("repeat", 0), rest=entry.get("rest"),
-        recovery=entry.get("recovery", 0.0), approach_from=entry.get("approach_from", ""),
-        overshoot=entry.get("overshoot", 0.0), strokes=entry.get("strokes", 0), stroke=entry.get("stroke", 0.0),
+        index=index,
+        indenter=indenter,
+        indenter_name=entry["indenter"],
+        x=entry["x"],
+        y=entry["y"],
+        yaw=entry.get("yaw", 0.0),
+        depth=entry["depth"],
+        speed=entry.get("speed", motion.press_speed),
+        hold=entry.get("hold", motion.hold),
+        repeat=entry.get("repeat", 0),
+        rest=entry.get("rest"),
+        recovery=entry.get("recovery", 0.0),
+        approach_from=entry.get("approach_from", ""),
+        overshoot=entry.get("overshoot", 0.0),
+        strokes=entry.get("strokes", 0),
+        stroke=entry.get("stroke", 0.0),
         purpose=entry.get("purpose", ""),
-        tilt_x=entry.get("tilt_x", 0.0), tilt_y=entry.get("tilt_y", 0.0),
-    )  # fmt: skip
+        tilt_x=entry.get("tilt_x", 0.0),
+        tilt_y=entry.get("tilt_y", 0.0),
+    )
 
 
 def read_plan(path: Path) -> Plan:

@@ -46,9 +46,13 @@ def write_out(recipe: dict[str, Any], sensor: Sensor, origin: str, seed: int = 0
         mountings = list(dict.fromkeys(_mounting(press) for press in presses))
         presses.sort(key=lambda press: mountings.index(_mounting(press)))
     document = {
-        "version": schemas.version("plan"), "name": recipe["name"], "purpose": recipe.get("purpose", ""),
-        "indenters": recipe["indenters"], "motion": recipe["motion"], "presses": presses,
-    }  # fmt: skip
+        "version": schemas.version("plan"),
+        "name": recipe["name"],
+        "purpose": recipe.get("purpose", ""),
+        "indenters": recipe["indenters"],
+        "motion": recipe["motion"],
+        "presses": presses,
+    }
     Plan.from_document(document, origin).check_against(sensor)
     return document
 
@@ -75,9 +79,15 @@ def _block(block: dict[str, Any], sensor: Sensor, rng: np.random.Generator, orig
     copied = {key: block[key] for key in COPIED if key in block}
     entries = []
     for indenter, yaw, tilt, place, side, depth, speed, hold in product(
-        indenters, block.get("yaws", [0.0]), block.get("tilts", [[0.0, 0.0]]), places.tolist(),
-        block.get("approach_from", [None]), block["depths"], block.get("speeds", [None]), block.get("holds", [None]),
-    ):  # fmt: skip
+        indenters,
+        block.get("yaws", [0.0]),
+        block.get("tilts", [[0.0, 0.0]]),
+        places.tolist(),
+        block.get("approach_from", [None]),
+        block["depths"],
+        block.get("speeds", [None]),
+        block.get("holds", [None]),
+    ):
         x, y = (round(float(value), 3) for value in place)
         entry = {"indenter": indenter, "x": x, "y": y, "yaw": float(yaw)}
         entry |= {name: float(lean) for name, lean in zip(("tilt_x", "tilt_y"), tilt, strict=True) if lean}

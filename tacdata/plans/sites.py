@@ -37,13 +37,15 @@ def sites(description: dict[str, Any], sensor: Sensor, rng: np.random.Generator,
     except TypeError as error:
         raise FormatError(
             f"{origin}: at: kind {kind} with {', '.join(values) or 'nothing else'} ({error})",
-            NEEDS[kind], "correct the block's at",
-        ) from None  # fmt: skip
+            NEEDS[kind],
+            "correct the block's at",
+        ) from None
     except IndexError:
         raise FormatError(
             f"{origin}: at: taxels {values.get('only')}",
-            f"0 to {sensor.taxels.count - 1}", "name taxels that the sensor has",
-        ) from None  # fmt: skip
+            f"0 to {sensor.taxels.count - 1}",
+            "name taxels that the sensor has",
+        ) from None
 
 
 def clear_of_rim(presses: list[dict[str, Any]], indenters: dict[str, Any], sensor: Sensor, clearance: float) -> None:
@@ -114,11 +116,20 @@ def _edge(sensor: Sensor, rng: np.random.Generator, count: int, beyond: float = 
 
 
 KINDS: dict[str, Callable[..., Any]] = {
-    "points": _points, "center": _center, "grid": _grid, "taxels": _taxels, "between": _between,
-    "random": _random, "edge": _edge,
-}  # fmt: skip
+    "points": _points,
+    "center": _center,
+    "grid": _grid,
+    "taxels": _taxels,
+    "between": _between,
+    "random": _random,
+    "edge": _edge,
+}
 NEEDS = {
-    "points": "points: a list of [x, y] in mm", "center": "nothing else", "grid": "columns, rows, perhaps margin",
-    "taxels": "nothing else, or only: a list of taxels", "between": "nothing else, or count",
-    "random": "count, perhaps margin", "edge": "count, perhaps beyond",
-}  # fmt: skip
+    "points": "points: a list of [x, y] in mm",
+    "center": "nothing else",
+    "grid": "columns, rows, perhaps margin",
+    "taxels": "nothing else, or only: a list of taxels",
+    "between": "nothing else, or count",
+    "random": "count, perhaps margin",
+    "edge": "count, perhaps beyond",
+}

@@ -32,8 +32,6 @@ def specimens(names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         raise UsageError(
-            f"indenter {', '.join(unknown) or 'none'}",
-            ", ".join(known),
-            "choose among them, or write a plan by hand",
+            f"indenter {', '.join(unknown) or 'none'}", ", ".join(known), "choose among them, or write a plan by hand"
         )
     return {name: dict(STANDARD[name]) for name in names}

@@ -167,9 +167,15 @@ class Recorder:
             session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
             session = find_position(session)
             with RigStreams(
-                devices, self.rig.cameras, self._motion.stop, self._detect, self._watch, self.rig.fingers,
-                self._motion.off_path, self._say_bad if self.plan.on_bad_readings == "go on" else None,
-            ) as streams:  # fmt: skip
+                devices,
+                self.rig.cameras,
+                self._motion.stop,
+                self._detect,
+                self._watch,
+                self.rig.fingers,
+                self._motion.off_path,
+                self._say_bad if self.plan.on_bad_readings == "go on" else None,
+            ) as streams:
                 try:
                     with self._interruption.kept():
                         self._record_all(session, streams, limits, summary, wanted)
@@ -195,19 +201,12 @@ class Recorder:
             return resume_session(self.out, self.plan, self.sensor, self.rig.document)
         if self.out.exists():
             raise UsageError(
-                f"{self.out} exists",
-                "a new session folder",
-                "choose another --out, or continue it with --resume",
+                f"{self.out} exists", "a new session folder", "choose another --out, or continue it with --resume"
             )
         return None
 
     def _record_all(
-        self,
-        session: Session,
-        streams: RigStreams,
-        limits: AxisLimits,
-        summary: Preflight,
-        wanted: tuple[int, ...],
+        self, session: Session, streams: RigStreams, limits: AxisLimits, summary: Preflight, wanted: tuple[int, ...]
     ) -> None:
         self._wait_for_streams(streams)
         streams.set_latencies(self._latencies)

@@ -40,9 +40,15 @@ class Cross:
 
 
 def cross_scan(
-    probe: Probe, taxel: int, guess: tuple[float, float], axes: np.ndarray, pitch: tuple[float, float],
-    surface: Callable[[float, float], float], depth: float, noise: np.ndarray,
-) -> Cross:  # fmt: skip
+    probe: Probe,
+    taxel: int,
+    guess: tuple[float, float],
+    axes: np.ndarray,
+    pitch: tuple[float, float],
+    surface: Callable[[float, float], float],
+    depth: float,
+    noise: np.ndarray,
+) -> Cross:
     """Press along two lines over a taxel.
 
     Args:

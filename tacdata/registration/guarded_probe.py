@@ -50,9 +50,15 @@ class GuardedProbe(Probe):
     """Drives the devices of a rig; made by `guarded_probe`."""
 
     def __init__(
-        self, rig: Rig, devices: RigDevices, streams: RigStreams, motion: GuardedMotion, height: float,
-        interruption: Interruption, say: Callable[[str], None] = lambda words: None,
-    ) -> None:  # fmt: skip
+        self,
+        rig: Rig,
+        devices: RigDevices,
+        streams: RigStreams,
+        motion: GuardedMotion,
+        height: float,
+        interruption: Interruption,
+        say: Callable[[str], None] = lambda words: None,
+    ) -> None:
         """Use open devices and running streams; ``height`` [mm, machine] is a safe height."""
         self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
         self._height, self._sink, self._interruption = height, _Sink(), interruption
@@ -165,9 +171,14 @@ class GuardedProbe(Probe):
 
 @contextmanager
 def guarded_probe(
-    rig: Rig, devices: RigDevices, height: float, speed: float, interruption: Interruption | None = None,
-    motion: GuardedMotion | None = None, say: Callable[[str], None] = lambda words: None,
-) -> Iterator[GuardedProbe]:  # fmt: skip
+    rig: Rig,
+    devices: RigDevices,
+    height: float,
+    speed: float,
+    interruption: Interruption | None = None,
+    motion: GuardedMotion | None = None,
+    say: Callable[[str], None] = lambda words: None,
+) -> Iterator[GuardedProbe]:
     """Yield a probe on open devices, lifted to ``height`` [mm, machine] at ``speed`` [mm/s].
 
     On any fault the motion stops first; then the indenter is lifted straight up. A Ctrl-C held back by ``interruption``

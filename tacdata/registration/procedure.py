@@ -36,8 +36,12 @@ def reference_taxels(sensor: Sensor) -> tuple[int, ...]:
 def touch_sites(sensor: Sensor) -> dict[str, tuple[float, float]]:
     """Return the centre and three corners of the taxel array [mm, sensor frame] by their names."""
     a, b = np.abs(sensor.taxels.centers).max(axis=0).tolist()
-    return {"the centre": (0.0, 0.0), "the corner -x -y": (-a, -b), "the corner +x -y": (a, -b),
-            "the corner +x +y": (a, b)}  # fmt: skip
+    return {
+        "the centre": (0.0, 0.0),
+        "the corner -x -y": (-a, -b),
+        "the corner +x -y": (a, -b),
+        "the corner +x +y": (a, b),
+    }
 
 
 def described(sensor: Sensor, guess: Registration, settings: RegistrationSettings) -> str:
@@ -79,12 +83,15 @@ def register(
     say(f"noise without contact: {np.median(noise):.1f} counts (median of {len(noise)} channels)")
     touches = _with_one_power(_touches(probe, sensor, guess, settings, noise, say))
     plane = fit_plane(
-        np.array([(t.x, t.y) for t in touches]), np.array([t.onset.height for t in touches]),
+        np.array([(t.x, t.y) for t in touches]),
+        np.array([t.onset.height for t in touches]),
         np.array([t.onset.uncertainty for t in touches]),
-    )  # fmt: skip
+    )
     _check_plane(plane, touches, settings)
-    say(f"plane: tilted {np.degrees(np.hypot(*plane.slope)):.2f} deg, touches within "
-        f"{1000 * np.abs(plane.residual).max():.0f} um of it")  # fmt: skip
+    say(
+        f"plane: tilted {np.degrees(np.hypot(*plane.slope)):.2f} deg, touches within "
+        f"{1000 * np.abs(plane.residual).max():.0f} um of it"
+    )
     crosses = _crosses(probe, sensor, guess, settings, plane, noise, say)
     centers = sensor.taxels.centers[[cross.taxel for cross in crosses]]
     motion = fit_rigid_motion(
@@ -100,17 +107,22 @@ def _noise(probe: Probe, guess: Registration, settings: RegistrationSettings) ->
     reading = probe.read(IDLE_FRAMES)
     if not (reading.spread > 0).any():
         raise DeviceError(
-            "no channel changes at all while nothing is touched", "live channels with some noise",
+            "no channel changes at all while nothing is touched",
+            "live channels with some noise",
             "check that the board sends fresh readings",
-        )  # fmt: skip
+        )
     # A quiet channel may stay between two counts; the standard deviation of rounding alone is 0.3 counts.
     return np.maximum(reading.spread, 0.3)
 
 
 def _touches(
-    probe: Probe, sensor: Sensor, guess: Registration, settings: RegistrationSettings, noise: np.ndarray,
+    probe: Probe,
+    sensor: Sensor,
+    guess: Registration,
+    settings: RegistrationSettings,
+    noise: np.ndarray,
     say: Callable[[str], None],
-) -> list[Touch]:  # fmt: skip
+) -> list[Touch]:
     touches: list[Touch] = []
     for name, (x, y) in touch_sites(sensor).items():
         mx, my, expected = guess.to_machine(x, y, 0.0)
@@ -145,16 +157,18 @@ def _check_plane(plane: Plane, touches: list[Touch], settings: RegistrationSetti
     tilt = float(np.degrees(np.arctan(np.hypot(*plane.slope))))
     if tilt > settings.most_tilt:
         raise DeviceError(
-            f"the sensor is tilted by {tilt:.2f} deg against the guide", f"at most {settings.most_tilt:g} deg",
+            f"the sensor is tilted by {tilt:.2f} deg against the guide",
+            f"at most {settings.most_tilt:g} deg",
             "level its mount, then register again",
-        )  # fmt: skip
+        )
     worst = int(np.argmax(np.abs(plane.residual)))
     if abs(plane.residual[worst]) > settings.flatness:
         raise DeviceError(
             f"the sensor is not flat: {touches[worst].site} lies {1000 * plane.residual[worst]:+.0f} um off the plane "
-            "of the touches", f"at most {1000 * settings.flatness:g} um",
+            "of the touches",
+            f"at most {1000 * settings.flatness:g} um",
             "look for dirt, a lifted skin or a loose mount; a curved sensor cannot be registered to a plane",
-        )  # fmt: skip
+        )
     model = float(np.mean([touch.onset.model for touch in touches]))
     uncertainty = float(np.hypot(np.sqrt(plane.covariance[0, 0]), model))
     if uncertainty > settings.tolerance:
@@ -162,13 +176,18 @@ def _check_plane(plane: Plane, touches: list[Touch], settings: RegistrationSetti
             f"the skin's height has a standard uncertainty of {1000 * uncertainty:.0f} um",
             f"at most {1000 * settings.tolerance:g} um",
             "reduce the noise, or touch more often with --repeats",
-        )  # fmt: skip
+        )
 
 
 def _crosses(
-    probe: Probe, sensor: Sensor, guess: Registration, settings: RegistrationSettings, plane: Plane, noise: np.ndarray,
+    probe: Probe,
+    sensor: Sensor,
+    guess: Registration,
+    settings: RegistrationSettings,
+    plane: Plane,
+    noise: np.ndarray,
     say: Callable[[str], None],
-) -> list[Cross]:  # fmt: skip
+) -> list[Cross]:
     taxels = settings.taxels or reference_taxels(sensor)
     angle = np.radians(guess.yaw)
     axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -190,6 +209,7 @@ def _check_scale(scale: float, centers: np.ndarray) -> None:
     span = float(np.linalg.norm(centers - centers.mean(axis=0), axis=1).max())
     if span > 1.0 and abs(scale - 1) > 0.05:
         raise DeviceError(
-            f"the taxels lie {scale:.3f} times as far apart as the sensor file says", "0.95 to 1.05",
+            f"the taxels lie {scale:.3f} times as far apart as the sensor file says",
+            "0.95 to 1.05",
             "check the sensor file's pitch and the guide's steps per millimetre ($100, $101)",
-        )  # fmt: skip
+        )

@@ -55,8 +55,9 @@ class Found:
         height = float(np.hypot(self.plane.uncertainty_at(x, y), np.mean([t.onset.model for t in self.touches])))
         return {
             "origin": [*(float(np.hypot(u, lean)) for u in self.motion.shift_uncertainty), height],
-            "yaw": self.motion.yaw_uncertainty, "tilt": [slope] * 2,
-        }  # fmt: skip
+            "yaw": self.motion.yaw_uncertainty,
+            "tilt": [slope] * 2,
+        }
 
     @property
     def text(self) -> str:
@@ -78,32 +79,52 @@ def document_of(
     """Return the registration's document (`schemas/registration.schema.json`)."""
     place = found.registration
     return {
-        "version": schemas.version("registration"), "method": "touch-off and cross scan",
-        "date": datetime.now(UTC).isoformat(timespec="seconds"), "code_version": provenance.code_version(),
-        "rig": rig.name, "guess": dict(rig.document["registration"]), "sensor": sensor.name,
-        "sensor_hash": sensor.content_hash, "indenter": indenter,
+        "version": schemas.version("registration"),
+        "method": "touch-off and cross scan",
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "code_version": provenance.code_version(),
+        "rig": rig.name,
+        "guess": dict(rig.document["registration"]),
+        "sensor": sensor.name,
+        "sensor_hash": sensor.content_hash,
+        "indenter": indenter,
         "controller": {key: controller[key] for key in ("banner", "$20", "$22") if key in controller},
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in vars(found.settings).items()},
-        "origin": [round(value, 5) for value in place.origin], "yaw": round(place.yaw, 5),
+        "origin": [round(value, 5) for value in place.origin],
+        "yaw": round(place.yaw, 5),
         "tilt": [round(value, 7) for value in place.tilt],
         "uncertainty": found.uncertainty,
         "residuals": {
-            "touches": _numbers(found.plane.residual, 5), "taxels": _numbers(found.motion.residual, 5),
+            "touches": _numbers(found.plane.residual, 5),
+            "taxels": _numbers(found.motion.residual, 5),
             "scale": round(found.motion.scale, 5),
         },
         "noise": _numbers(found.noise, 3),
         "touches": [
-            {"site": t.site, "x": t.x, "y": t.y, "z": t.onset.height, "uncertainty": t.onset.uncertainty,
-             "model": t.onset.model, "power": t.onset.power,
-             "height": _numbers(t.height, 4), "answer": _numbers(t.answer, 3)}
+            {
+                "site": t.site,
+                "x": t.x,
+                "y": t.y,
+                "z": t.onset.height,
+                "uncertainty": t.onset.uncertainty,
+                "model": t.onset.model,
+                "power": t.onset.power,
+                "height": _numbers(t.height, 4),
+                "answer": _numbers(t.answer, 3),
+            }
             for t in found.touches
         ],
         "crosses": [
-            {"taxel": c.taxel, "x": c.x, "y": c.y, "uncertainty": list(c.uncertainty),
-             "lines": [{"place": _numbers(p, 4), "answer": _numbers(a, 3)} for p, a in c.lines]}
+            {
+                "taxel": c.taxel,
+                "x": c.x,
+                "y": c.y,
+                "uncertainty": list(c.uncertainty),
+                "lines": [{"place": _numbers(p, 4), "answer": _numbers(a, 3)} for p, a in c.lines],
+            }
             for c in found.crosses
         ],
-    }  # fmt: skip
+    }
 
 
 def _numbers(values: np.ndarray, digits: int) -> list[float]:

@@ -114,7 +114,7 @@ def search(probe: Probe, site: str, place: tuple[float, float], top: float, lowe
                     f"at machine height {first:.2f} mm",
                     "a search that begins clear of the skin",
                     "correct registration/origin (z) in the rig file, or start higher with --above",
-                )  # fmt: skip
+                )
             return first
         first = height if answers else None
     probe.go((*place, top), LIFT_SPEED)

@@ -37,8 +37,9 @@ def from_columns(header: dict[str, Any], columns: dict[str, np.ndarray], origin:
     if missing or lengths != {header["frames"]}:
         raise FormatError(
             f"{origin}: " + (f"no column {missing[0]}" if missing else f"columns of {sorted(lengths)} rows"),
-            f"{len(header['columns'])} columns of {header['frames']} rows, as its header says", "export again",
-        )  # fmt: skip
+            f"{len(header['columns'])} columns of {header['frames']} rows, as its header says",
+            "export again",
+        )
 
     def stacked(*endings: str) -> np.ndarray:
         parts = [[columns[f"{name}.{ending}"] for ending in endings] for name in header["fingers"]]
@@ -49,8 +50,13 @@ def from_columns(header: dict[str, Any], columns: dict[str, np.ndarray], origin:
         raise FormatError(f"{origin}: a pose that is no number", "finite poses", "export again")
     named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
     return FingertipTargets(
-        **{name: header[name] for name in named}, fingers=tuple(header["fingers"]),
-        time_ns=np.asarray(columns["time_ns"], np.int64), position=position, quaternion=quaternion,
-        seen=stacked(*(f"seen_{a}_m" for a in AXES)), depth=stacked("predicted_depth_mm")[..., 0],
-        gap=stacked("gap")[..., 0] > 0, remarks=tuple(header["remarks"]),
-    )  # fmt: skip
+        **{name: header[name] for name in named},
+        fingers=tuple(header["fingers"]),
+        time_ns=np.asarray(columns["time_ns"], np.int64),
+        position=position,
+        quaternion=quaternion,
+        seen=stacked(*(f"seen_{a}_m" for a in AXES)),
+        depth=stacked("predicted_depth_mm")[..., 0],
+        gap=stacked("gap")[..., 0] > 0,
+        remarks=tuple(header["remarks"]),
+    )

@@ -76,9 +76,13 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
     uncoupled = off > COUPLED
     reached = ~far.any(axis=1) & ~uncoupled
     values, served = without_jumps(
-        search, lambda row: search.aim(places[row], turns[row]), partial(_reached, search), values, reached,
+        search,
+        lambda row: search.aim(places[row], turns[row]),
+        partial(_reached, search),
+        values,
+        reached,
         targets.time_ns,
-    )  # fmt: skip
+    )
     # The chosen postures differ from the first solution, so their errors are computed again.
     for row in np.flatnonzero(served):
         search.aim(places[row], turns[row])
@@ -89,10 +93,18 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
         outside = np.any((places < robot.workspace[0]) | (places > robot.workspace[1]), axis=-1)
     values[outside.any(axis=1)] = np.nan
     return JointPath(
-        model.joints, targets.time_ns, values, errors, angles, _rows(far, targets.fingers),
-        _rows(outside, targets.fingers), *_limits(model.joints, values, targets.time_ns),
-        model.mimics, tuple(np.flatnonzero(uncoupled).tolist()), tuple(np.flatnonzero(reached & ~served).tolist()),
-    ), model  # fmt: skip
+        model.joints,
+        targets.time_ns,
+        values,
+        errors,
+        angles,
+        _rows(far, targets.fingers),
+        _rows(outside, targets.fingers),
+        *_limits(model.joints, values, targets.time_ns),
+        model.mimics,
+        tuple(np.flatnonzero(uncoupled).tolist()),
+        tuple(np.flatnonzero(reached & ~served).tolist()),
+    ), model
 
 
 def _search(

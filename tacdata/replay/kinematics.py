@@ -43,9 +43,10 @@ class Kinematics:
         missing = [name for name in fingers if name not in robot.tips]
         if missing:
             raise UsageError(
-                f"robot {robot.name} has no fingertip for {', '.join(missing)}", ", ".join(robot.tips),
+                f"robot {robot.name} has no fingertip for {', '.join(missing)}",
+                ", ".join(robot.tips),
                 "add it to the robot file, or export other fingers with --finger",
-            )  # fmt: skip
+            )
         self.robot, self.fingers = robot, fingers
         try:
             spec = engine.MjSpec.from_string(robot.urdf)

@@ -116,12 +116,19 @@ def replay_targets(targets: FingertipTargets, scene: ReplayScene, centre: np.nda
     pressing = path.force[rows].sum(axis=1)[touch[rows]] if touch[rows].any() else path.force[rows].sum(axis=1)
     names = targets.fingers
     return ReplayOutcome(
-        bool(held), lowest, dict(zip(names, path.force[high].mean(axis=0).tolist(), strict=True)),
+        bool(held),
+        lowest,
+        dict(zip(names, path.force[high].mean(axis=0).tolist(), strict=True)),
         dict(zip(names, (1000 * path.depth[high].mean(axis=0)).tolist(), strict=True)),
         float(scene.friction * np.median(pressing) / scene.load),
-        float(np.linalg.norm(path.slid[rows] - path.slid[rows.start], axis=-1).max()), float(behind[rows].max()),
-        float(seconds[end]), scene, names, seconds, path,
-    )  # fmt: skip
+        float(np.linalg.norm(path.slid[rows] - path.slid[rows.start], axis=-1).max()),
+        float(behind[rows].max()),
+        float(seconds[end]),
+        scene,
+        names,
+        seconds,
+        path,
+    )
 
 
 def _lift(pads: np.ndarray) -> float:

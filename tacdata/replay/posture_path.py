@@ -32,9 +32,13 @@ COST = 1e-3
 
 
 def without_jumps(
-    search: KinematicSearch, aim: Callable[[int], None], is_reached: Callable[[np.ndarray], bool], values: np.ndarray,
-    reached: np.ndarray, time_ns: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    search: KinematicSearch,
+    aim: Callable[[int], None],
+    is_reached: Callable[[np.ndarray], bool],
+    values: np.ndarray,
+    reached: np.ndarray,
+    time_ns: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """Return a joint path without jumps, and which rows it serves.
 
     Args:
@@ -76,9 +80,12 @@ def _jumps(joints: tuple[Joint, ...], values: np.ndarray, seconds: np.ndarray) -
 
 
 def _tracks(
-    search: KinematicSearch, aim: Callable[[int], None], is_reached: Callable[[np.ndarray], bool], found: np.ndarray,
+    search: KinematicSearch,
+    aim: Callable[[int], None],
+    is_reached: Callable[[np.ndarray], bool],
+    found: np.ndarray,
     jumps: np.ndarray,
-) -> Iterator[np.ndarray]:  # fmt: skip
+) -> Iterator[np.ndarray]:
     """Yield the postures found, each continued as far as it goes, shape (n, joints), NaN elsewhere."""
     joints, rng = search.model.joints, np.random.default_rng(0)
     rows = np.flatnonzero(np.isfinite(found).all(axis=1))
@@ -94,7 +101,8 @@ def _tracks(
         # A posture that another track holds over this row's neighbours too is not continued again.
         around = [r for r in (row - 1, row, row + 1) if 0 <= r < len(found)]
         if any(
-            np.isfinite(track[around]).all() and np.abs(_difference(joints, track[row], values)).max() < ALIKE
+            np.isfinite(track[around]).all()
+            and np.abs(_difference(joints, track[row], values)).max() < ALIKE
             and not len(np.intersect1d(around, jumps))
             for track in known
         ):
@@ -108,9 +116,13 @@ def _tracks(
 
 
 def _continue(
-    search: KinematicSearch, aim: Callable[[int], None], is_reached: Callable[[np.ndarray], bool], track: np.ndarray,
-    values: np.ndarray, way: range,
-) -> None:  # fmt: skip
+    search: KinematicSearch,
+    aim: Callable[[int], None],
+    is_reached: Callable[[np.ndarray], bool],
+    track: np.ndarray,
+    values: np.ndarray,
+    way: range,
+) -> None:
     missed = 0
     for row in way:
         aim(row)

@@ -25,11 +25,25 @@ def pressed(episode: Episode) -> Demonstration:
     times, count = episode.taxels.sample_ns, len(episode.taxels.sample_ns)
     place = episode.tip_at(times) * (1, 1, -1) / 1000  # a depth is a way down
     track = FingerTrack(
-        FINGER, "right", FINGER, place, np.tile(UPRIGHT, (count, 1)), np.zeros((count, 6, 6)), np.zeros(count, bool),
-        count, 0, (episode.taxels.counts - baseline(episode)).astype(np.float32),
-    )  # fmt: skip
+        FINGER,
+        "right",
+        FINGER,
+        place,
+        np.tile(UPRIGHT, (count, 1)),
+        np.zeros((count, 6, 6)),
+        np.zeros(count, bool),
+        count,
+        0,
+        (episode.taxels.counts - baseline(episode)).astype(np.float32),
+    )
     return Demonstration(
-        episode.path.name, recording_hash(episode), f"press the skin with {episode.press.indenter_name}",
-        "sensor", episode.sensor.taxels.rate, times, {FINGER: track}, {FINGER: episode.sensor},
+        episode.path.name,
+        recording_hash(episode),
+        f"press the skin with {episode.press.indenter_name}",
+        "sensor",
+        episode.sensor.taxels.rate,
+        times,
+        {FINGER: track},
+        {FINGER: episode.sensor},
         remarks=("poses are the nominal tip of the tool in the sensor's frame",),
-    )  # fmt: skip
+    )

@@ -126,7 +126,10 @@ def drawn(scene: ReplayScene, fingers: int, seed: int) -> ReplayScene:
 
     place, bias = (off("place"), off("place"), 0.0), rng.normal(0, SPREADS["bias"]["sd"], (fingers, 3))
     return replace(
-        scene, mass=scene.mass * (1 + off("mass")), stiffness=scene.stiffness * (1 + off("stiffness")),
-        friction=scene.friction * (1 + off("friction")), place=place,
+        scene,
+        mass=scene.mass * (1 + off("mass")),
+        stiffness=scene.stiffness * (1 + off("stiffness")),
+        friction=scene.friction * (1 + off("friction")),
+        place=place,
         bias=tuple((a, b, c) for a, b, c in bias.tolist()),
-    )  # fmt: skip
+    )

@@ -80,19 +80,38 @@ class SceneModel:
         rate = scene.skin * (1 - IMPEDANCE) / reduced
         tips = "".join(
             TIP.format(
-                k=k, x=place[0], y=place[1], z=place[2], pad=PAD, mass=TIP_MASS, friction=contact, torsion=TORSION,
-                skin=rate, damping=2 * np.sqrt(rate), impedance=IMPEDANCE,
+                k=k,
+                x=place[0],
+                y=place[1],
+                z=place[2],
+                pad=PAD,
+                mass=TIP_MASS,
+                friction=contact,
+                torsion=TORSION,
+                skin=rate,
+                damping=2 * np.sqrt(rate),
+                impedance=IMPEDANCE,
             )
             for k, place in enumerate(begin)
-        )  # fmt: skip
+        )
         joints = [f"tip{k}{axis}" for k in range(count) for axis in "xyz"]
         springs = "".join(SPRING.format(joint=joint, kp=scene.stiffness, kv=critical) for joint in joints)
         x, y, z = centre
         text = XML.format(
-            step=STEP, table=z - scene.body.height, x=x, y=y, z=z, kind=scene.body.geometry, mass=scene.mass,
-            friction=contact, size=" ".join(f"{v:.6g}" for v in scene.body.sizes), board=scene.board_friction,
-            torsion=TORSION, tips=tips, springs=springs,
-        )  # fmt: skip
+            step=STEP,
+            table=z - scene.body.height,
+            x=x,
+            y=y,
+            z=z,
+            kind=scene.body.geometry,
+            mass=scene.mass,
+            friction=contact,
+            size=" ".join(f"{v:.6g}" for v in scene.body.sizes),
+            board=scene.board_friction,
+            torsion=TORSION,
+            tips=tips,
+            springs=springs,
+        )
         self._begin, self._model = begin, engine.MjModel.from_xml_string(text)
         self._data = engine.MjData(self._model)
         self._object = self._model.body("object").id
@@ -110,9 +129,12 @@ class SceneModel:
         flat = pads.reshape(rows, -1)
         wanted = np.stack([np.interp(moments, seconds, flat[:, c]) for c in range(flat.shape[1])], axis=1)
         found = Rollout(
-            np.empty((rows, 3)), np.empty((rows, count, 3)), np.zeros((rows, count)), np.zeros((rows, count)),
+            np.empty((rows, 3)),
+            np.empty((rows, count, 3)),
+            np.zeros((rows, count)),
+            np.zeros((rows, count)),
             np.zeros((rows, count, 3)),
-        )  # fmt: skip
+        )
         row, slid, data = 0, np.zeros((count, 3)), self._data
         for moment, command in zip(moments, wanted - self._begin.ravel(), strict=True):
             data.ctrl[:] = command

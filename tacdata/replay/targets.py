@@ -62,10 +62,14 @@ class FingertipTargets:
         """Return the header of a file (`schemas/fingertip_targets.schema.json`)."""
         names = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
         return {
-            "version": schemas.version("fingertip_targets"), **{name: getattr(self, name) for name in names},
-            "frames": len(self.time_ns), "fingers": list(self.fingers), "units": UNITS, "columns": list(columns),
+            "version": schemas.version("fingertip_targets"),
+            **{name: getattr(self, name) for name in names},
+            "frames": len(self.time_ns),
+            "fingers": list(self.fingers),
+            "units": UNITS,
+            "columns": list(columns),
             "remarks": list(self.remarks),
-        }  # fmt: skip
+        }
 
 
 def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Iterable[str] = ()) -> FingertipTargets:
@@ -101,9 +105,10 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
     if gains is not None:
         if made.network is None:
             raise UsageError(
-                "compensated targets without predicted depth", "demonstrations tracked with a network",
+                "compensated targets without predicted depth",
+                "demonstrations tracked with a network",
                 "run tacdata track with --network, or export --direct",
-            )  # fmt: skip
+            )
         for k, (name, track) in enumerate(zip(names, tracks, strict=True)):
             position[:, k] = compensate(seen[:, k], track.normal, depths[k], gains[name])
             away = float(np.nanmax(np.linalg.norm(position[rows, k] - seen[rows, k], axis=1)))
@@ -119,11 +124,26 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
     if made.network:
         parents["checkpoint"] = made.network["hash"]
     return FingertipTargets(
-        made.recording, made.recording_hash, made.task, made.frame, made.rate, names, kind, used,
-        made.time_ns[rows], position[rows], np.stack([t.quaternion for t in tracks], axis=1)[rows], seen[rows],
-        np.stack(depths, axis=1)[rows], np.stack([t.gap for t in tracks], axis=1)[rows], made.network,
-        tuple(remarks), provenance.stamp("tacdata export", parents, {"kind": kind, "gains": used}), made, rows,
-    )  # fmt: skip
+        made.recording,
+        made.recording_hash,
+        made.task,
+        made.frame,
+        made.rate,
+        names,
+        kind,
+        used,
+        made.time_ns[rows],
+        position[rows],
+        np.stack([t.quaternion for t in tracks], axis=1)[rows],
+        seen[rows],
+        np.stack(depths, axis=1)[rows],
+        np.stack([t.gap for t in tracks], axis=1)[rows],
+        made.network,
+        tuple(remarks),
+        provenance.stamp("tacdata export", parents, {"kind": kind, "gains": used}),
+        made,
+        rows,
+    )
 
 
 def doubts(targets: FingertipTargets) -> list[str]:

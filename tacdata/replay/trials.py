@@ -66,10 +66,21 @@ class Trials:
             for kind in self.paths:
                 end = self.one(kind, world)
                 found.append(
-                    {"recording": self.made.recording, "seed": seed, "kind": kind, "held": bool(end.held),
-                     "reason": end.reason, "decided": end.decided, "lift": end.lift, "slip": end.slip,
-                     "behind": end.behind, "grip": end.grip, "force": end.force, "depth": end.depth}
-                )  # fmt: skip
+                    {
+                        "recording": self.made.recording,
+                        "seed": seed,
+                        "kind": kind,
+                        "held": bool(end.held),
+                        "reason": end.reason,
+                        "decided": end.decided,
+                        "lift": end.lift,
+                        "slip": end.slip,
+                        "behind": end.behind,
+                        "grip": end.grip,
+                        "force": end.force,
+                        "depth": end.depth,
+                    }
+                )
         return found
 
     def _cut(self, gains: dict[str, float] | None) -> FingertipTargets:
@@ -92,20 +103,25 @@ def result(
     parents = {"recording": first.made.recording_hash, "checkpoint": (first.made.network or {}).get("hash", "")}
     gains = {kind: first.paths[kind].gains for kind in kinds if kind != DIRECT}
     return {
-        "version": schemas.version("replay_result"), "recording": first.made.recording, "task": first.made.task,
+        "version": schemas.version("replay_result"),
+        "recording": first.made.recording,
+        "task": first.made.task,
         "gains": gains["compensated"],
         "scene": {**scene.document, "spreads": SPREADS},
         **{kind: rate([t for t in found if t["kind"] == kind]) for kind in kinds},
         "recordings": [
-            {"name": one.made.recording, "hash": one.made.recording_hash,
-             "rates": {
-                 kind: rate([t for t in trials if t["kind"] == kind]) for kind in kinds
-             }}
-            for k, one in enumerate(tried) for trials in (found[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
+            {
+                "name": one.made.recording,
+                "hash": one.made.recording_hash,
+                "rates": {kind: rate([t for t in trials if t["kind"] == kind]) for kind in kinds},
+            }
+            for k, one in enumerate(tried)
+            for trials in (found[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
         ],
         **({"gain_chosen": _chosen(*chosen, gains["chosen"])} if chosen else {}),
-        "trials": found, "provenance": provenance.stamp("tacdata replay", parents, {"seeds": seeds}),
-    }  # fmt: skip
+        "trials": found,
+        "provenance": provenance.stamp("tacdata replay", parents, {"seeds": seeds}),
+    }
 
 
 def _chosen(made: Demonstration, found: FoundGain, gains: dict[str, float]) -> dict[str, Any]:

@@ -100,7 +100,14 @@ def _frame_of(whole: NullModel, course: Course, rows: np.ndarray, episodes: np.n
         episodes: The remaining episodes, if they are renumbered.
     """
     return NullModel.of(
-        course.reduced, whole.context[rows], None if whole.features is None else whole.features[rows],
-        whole.errors[rows], whole.ridge, whole.beside[rows], whole.noise.of(rows, episodes), whole.folds,
-        sizes=whole.sizes, spread=whole.spread,
-    )  # fmt: skip
+        course.reduced,
+        whole.context[rows],
+        None if whole.features is None else whole.features[rows],
+        whole.errors[rows],
+        whole.ridge,
+        whole.beside[rows],
+        whole.noise.of(rows, episodes),
+        whole.folds,
+        sizes=whole.sizes,
+        spread=whole.spread,
+    )

@@ -48,10 +48,14 @@ def part(course: Course, numbers: np.ndarray) -> Course:
     fields = ("time", "tip", "tool", "readings", "averaged", "force", "tag", "temperature")
     values = {name: value[rows] for name in fields if (value := getattr(course, name)) is not None}
     return replace(
-        course, **values, episode=np.searchsorted(keep, course.episode[rows]), session=course.session[keep],  # ty: ignore[invalid-argument-type]
+        course,
+        **values,
+        episode=np.searchsorted(keep, course.episode[rows]),
+        session=course.session[keep],  # ty: ignore[invalid-argument-type]
         recording=None if course.recording is None else np.unique(course.recording[keep], return_inverse=True)[1],  # ty: ignore[invalid-argument-type]
-        site=course.site[keep], names=tuple(course.names[k] for k in keep),  # ty: ignore[invalid-argument-type]
-    )  # fmt: skip
+        site=course.site[keep],  # ty: ignore[invalid-argument-type]
+        names=tuple(course.names[k] for k in keep),
+    )
 
 
 def groups(course: Course) -> list[tuple[str, np.ndarray]]:

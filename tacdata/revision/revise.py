@@ -39,8 +39,15 @@ from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.pressed import pressed
 
 REVISION, SPEC, CARD, PICTURE, TABLE, CSV, PLAN, LABELS = (
-    "revision.json", "spec.json", "card.html", "gap.png", "gap.md", "gap.csv", "next.yaml", "labels",
-)  # fmt: skip
+    "revision.json",
+    "spec.json",
+    "card.html",
+    "gap.png",
+    "gap.md",
+    "gap.csv",
+    "next.yaml",
+    "labels",
+)
 """Names of the folder's files."""
 
 KIND = "recording "
@@ -80,9 +87,13 @@ class Revised:
 
 
 def revise(
-    judged: Path, recordings: list[Path], spec: Spec, out: Path, wishes: RevisionOptions | None = None,
+    judged: Path,
+    recordings: list[Path],
+    spec: Spec,
+    out: Path,
+    wishes: RevisionOptions | None = None,
     note: Note = lambda text: None,
-) -> Revised:  # fmt: skip
+) -> Revised:
     """Do everything that follows a verdict.
 
     Args:
@@ -106,8 +117,9 @@ def revise(
     if asked.retrain is not None and asked.relabel is None and moves_labels(answer) and status == "named":
         raise UsageError(
             "--retrain without --relabel: the effect moves labels, and a network needs the new ones",
-            "both", "add --relabel",
-        )  # fmt: skip
+            "both",
+            "add --relabel",
+        )
     note("reading")
     held = Comparison(course_of(recordings), spec, tuple(answer))
     out.mkdir(parents=True)
@@ -123,16 +135,21 @@ def revise(
     following = _next(recordings, held, verdict, asked, out, note)
     parents = {"verdict": provenance.content_hash(verdict), "spec": spec.content_hash}
     document = {
-        "version": schemas.version("revision"), "verdict": parents["verdict"], "status": status,
+        "version": schemas.version("revision"),
+        "verdict": parents["verdict"],
+        "status": status,
         "added": [e.effect.name for e in answer] if after else [],
-        "spec": {"before": spec.content_hash, "after": after}, "gap": _gap(found, slices),
-        "labels": [{"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}}
-                   for s, m in moved],
+        "spec": {"before": spec.content_hash, "after": after},
+        "gap": _gap(found, slices),
+        "labels": [
+            {"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}} for s, m in moved
+        ],
         "tips": [{"session": s, **asdict(t)} for s, t in tips],
         "retrained": None if trained is None else {**asdict(trained), "metrics": list(trained.metrics)},
-        "confirmed": [{**_finite(asdict(c)), "place": list(c.place)} for c in confirmed], "next": following,
+        "confirmed": [{**_finite(asdict(c)), "place": list(c.place)} for c in confirmed],
+        "next": following,
         "provenance": provenance.stamp("tacdata revise", parents, {"confirm": asked.confirm}),
-    }  # fmt: skip
+    }
     shown = _show(document, verdict, held, answer, found, out, note)
     documents.write(out / REVISION, document, "revision")
     return Revised(document, out, shown)
@@ -148,13 +165,14 @@ def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Pa
             f"{judged} was reached from other recordings than {', '.join(other or map(str, recordings))}",
             f"those that it was reached from, unchanged: {', '.join(told)}",
             "name them, or run `tacdata discrepancy` with the ones that there are",
-        )  # fmt: skip
+        )
     known = verdict["provenance"].get("parents", {}).get("spec")
     if known is not None and known != spec.content_hash:
         raise UsageError(
             f"{judged} was reached from another model ({known[:12]}… instead of {spec.content_hash[:12]}…)",
-            "the model spec that `tacdata discrepancy` was given", "name it with --spec, or leave --spec out as then",
-        )  # fmt: skip
+            "the model spec that `tacdata discrepancy` was given",
+            "name it with --spec, or leave --spec out as then",
+        )
 
 
 def _sessions(recordings: list[Path]) -> list[Path]:
@@ -285,14 +303,16 @@ def _next(
 def _gap(found: GapReduction | None, slices: list[ResidualChange]) -> dict[str, Any] | None:
     if found is None:
         return None
-    changes = {
-        "sealed": found.whole, "worst": found.worst,
-    }  # fmt: skip
+    changes = {"sealed": found.whole, "worst": found.worst}
     return {
-        "unseen": found.unseen, **{n: asdict(c) for n, c in changes.items()},
-        "closed": _or_none(found.whole.closed), "interval": [_or_none(v) for v in found.interval], "floor": 1.0,
-        "elsewhere": [asdict(c) for c in found.elsewhere], "slices": [asdict(c) for c in slices],
-    }  # fmt: skip
+        "unseen": found.unseen,
+        **{n: asdict(c) for n, c in changes.items()},
+        "closed": _or_none(found.whole.closed),
+        "interval": [_or_none(v) for v in found.interval],
+        "floor": 1.0,
+        "elsewhere": [asdict(c) for c in found.elsewhere],
+        "slices": [asdict(c) for c in slices],
+    }
 
 
 def _or_none(value: float) -> float | None:
@@ -304,9 +324,14 @@ def _finite(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _show(
-    document: dict[str, Any], verdict: dict[str, Any], held: Comparison, answer: list[Placed],
-    found: GapReduction | None, out: Path, note: Note,
-) -> tuple[EpisodeCurves, ...]:  # fmt: skip
+    document: dict[str, Any],
+    verdict: dict[str, Any],
+    held: Comparison,
+    answer: list[Placed],
+    found: GapReduction | None,
+    out: Path,
+    note: Note,
+) -> tuple[EpisodeCurves, ...]:
     note("picture, table, card")
     drawn, shown = None, []
     if found is not None:

@@ -116,14 +116,13 @@ class Rig:
             UsageError: If it belongs to another rig or sensor.
         """
         documents.check(document, "registration", origin)
-        for what, given, own in (
-            ("rig", document["rig"], self.name), ("sensor", document["sensor_hash"], sensor_hash),
-        ):  # fmt: skip
+        for what, given, own in (("rig", document["rig"], self.name), ("sensor", document["sensor_hash"], sensor_hash)):
             if given != own:
                 raise UsageError(
-                    f"{origin} was measured with another {what} ({document[what]})", f"this {what}",
+                    f"{origin} was measured with another {what} ({document[what]})",
+                    f"this {what}",
                     "run tacdata register again, or name the registration that belongs to it",
-                )  # fmt: skip
+                )
         kept = {k: document[k] for k in ("origin", "yaw", "tilt", "method", "date", "uncertainty", "sensor_hash")}
         residuals = document["residuals"]
         kept["residual"] = max(map(abs, [*residuals["touches"], *residuals["taxels"]]))

@@ -77,9 +77,7 @@ class OwnSurface:
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> Self:
         """Build a surface from `document`, complete with its hash."""
-        rules = {
-            part: tuple(_selector(rule) for rule in document[part]) for part in PARTS if part in document
-        }
+        rules = {part: tuple(_selector(rule) for rule in document[part]) for part in PARTS if part in document}
         return cls(document["file"], document["sha256"], float(document.get("scale", 1.0)), rules)
 
     def parts(self, centers: np.ndarray, normals: np.ndarray, protrusions: bool) -> np.ndarray:
@@ -116,7 +114,8 @@ def complete(document: dict[str, Any], origin: str, folder: Path | None) -> dict
     if given.get("sha256", digest) != digest:
         raise FormatError(
             f"{origin}: skin surface {given['file']} is not the file that is named: SHA-256 {digest[:12]}",
-            "the file that was named", "restore it, or remove skin/surface/sha256",
+            "the file that was named",
+            "restore it, or remove skin/surface/sha256",
         )
     _check_sizes(np.asarray(mesh.bounds), document, origin)
     return {**document, "surface": {**given, "file": path.name, "sha256": digest}}
@@ -135,9 +134,10 @@ def _check_sizes(bounds: np.ndarray, document: dict[str, Any], origin: str) -> N
     raise FormatError(
         f"{origin}: skin surface {document['surface']['file']} spans x {spans[0]}, y {spans[1]}, z {spans[2]} mm",
         f"as size_x, size_y, thickness and protrusions say: x {wanted[0]}, y {wanted[1]}, z {wanted[2]} mm",
-        f"set skin/surface/scale: {unit * float(document['surface'].get('scale', 1.0)):g}" if unit
+        f"set skin/surface/scale: {unit * float(document['surface'].get('scale', 1.0)):g}"
+        if unit
         else "move the surface to the sensor's frame (z = 0 under the slab), or correct the sizes",
-    )  # fmt: skip
+    )
 
 
 def _selector(rule: dict[str, Any]) -> Selector:

@@ -228,13 +228,15 @@ def _check_contact(sensor: Sensor, origin: str) -> None:
     if contact.board and "bottom" in contact.bonded:
         raise FormatError(
             f"{origin}: contact/bonded holds the underside in place and contact/board lets the protrusions carry it",
-            "a bonded bottom or a board, not both", "take bottom out of contact/bonded, or set contact/board: false",
+            "a bonded bottom or a board, not both",
+            "take bottom out of contact/bonded, or set contact/board: false",
         )
     smallest = min(sensor.skin.size_x, sensor.skin.size_y) / 2
     if "rim" in contact.bonded and contact.rim_width >= smallest:
         raise FormatError(
             f"{origin}: contact/rim_width {contact.rim_width:g} mm covers the whole underside",
-            f"less than {smallest:g} mm", "reduce contact/rim_width, or bond the bottom",
+            f"less than {smallest:g} mm",
+            "reduce contact/rim_width, or bond the bottom",
         )
     if contact.board and not sensor.skin.protrusion_radius:
         raise FormatError(

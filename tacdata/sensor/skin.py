@@ -126,19 +126,22 @@ class Skin:
         if self.protrusion_height is not None and not self.protrusion_radius:
             raise FormatError(
                 f"{origin}: skin/protrusion_height {self.protrusion_height:g} mm with protrusion_radius 0 mm",
-                "a height only with a positive protrusion_radius", "set skin/protrusion_radius or remove the height",
+                "a height only with a positive protrusion_radius",
+                "set skin/protrusion_radius or remove the height",
             )
         if not self.curved:
             return
         if self.surface is not None:
             raise FormatError(
-                f"{origin}: skin/surface and a curvature radius", "one of them",
+                f"{origin}: skin/surface and a curvature radius",
+                "one of them",
                 "remove skin/curvature_radius_x and _y: the surface in the file is taken as it is",
             )
         if board and self.underside != "flat":
             raise FormatError(
                 f"{origin}: a flat board under a bent underside touches no more than its lowest protrusions",
-                "underside: flat with a board, or board: false", "set skin/underside: flat or contact/board: false",
+                "underside: flat with a board, or board: false",
+                "set skin/underside: flat or contact/board: false",
             )
         self._check_bend(origin)
 
@@ -150,18 +153,22 @@ class Skin:
             if radius and radius < least:
                 raise FormatError(
                     f"{origin}: skin/curvature_radius_{axis} {radius:g} mm, the skin is {2 * half:g} mm wide and "
-                    f"{self.thickness:g} mm thick", f"at least {least:g} mm, or 0 for straight",
+                    f"{self.thickness:g} mm thick",
+                    f"at least {least:g} mm, or 0 for straight",
                     f"enlarge skin/curvature_radius_{axis}, or make the skin narrower or thinner",
                 )
         hx, hy = self.size_x / 2, self.size_y / 2
         if rx and ry and float(self._tube(np.array(hx))) <= 1.05 * hy:
             raise FormatError(
                 f"{origin}: radii {rx:g} and {ry:g} mm leave no outer face over the corners of {self.size_x:g} x "
-                f"{self.size_y:g} mm", "larger radii or a smaller skin", "enlarge skin/curvature_radius_x and _y",
+                f"{self.size_y:g} mm",
+                "larger radii or a smaller skin",
+                "enlarge skin/curvature_radius_x and _y",
             )
         left = float(self.outer_height(hx, hy))
         if self.underside == "flat" and left < _LEAST * self.thickness:
             raise FormatError(
                 f"{origin}: the outer face falls to z = {left:.2f} mm at the skin's corners, the underside is flat",
-                f"at least {_LEAST * self.thickness:g} mm left", "enlarge the radii or the thickness",
+                f"at least {_LEAST * self.thickness:g} mm left",
+                "enlarge the radii or the thickness",
             )

@@ -60,7 +60,11 @@ class SkinModel:
     """
 
     def __init__(
-        self, sensor: Sensor, settings: ModelSettings | None = None, device: str = "cpu", mesh: SkinMesh | None = None,
+        self,
+        sensor: Sensor,
+        settings: ModelSettings | None = None,
+        device: str = "cpu",
+        mesh: SkinMesh | None = None,
         companion: SkinMesh | None = None,
     ) -> None:
         """Mesh the skin (from the cache if possible).
@@ -112,8 +116,12 @@ class SkinModel:
         return provenance.content_hash(self.identity)
 
     def states_many(
-        self, requests: Iterable[PressRequest], capacity: int = 1, with_displacement: bool = True,
-        observe: PathRecorder | None = None, coarse: Sequence[CoarsePress | None] | None = None,
+        self,
+        requests: Iterable[PressRequest],
+        capacity: int = 1,
+        with_displacement: bool = True,
+        observe: PathRecorder | None = None,
+        coarse: Sequence[CoarsePress | None] | None = None,
     ) -> Iterator[tuple[int, float, Equilibrium | SolveError]]:
         """Solve presses, many at a time.
 
@@ -280,11 +288,18 @@ class SkinModel:
         self, request: PressRequest, states: list[Equilibrium], coarse: CoarsePress | None, seconds: float
     ) -> PathSolution:
         parameters = {
-            "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,
+            "indenter": request.indenter.document,
+            "x": request.x,
+            "y": request.y,
+            "yaw": request.yaw,
             **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(request, name))},
-            "depths": list(request.depths), "settings": asdict(self.settings), "law": self.sensor.material.law,
+            "depths": list(request.depths),
+            "settings": asdict(self.settings),
+            "law": self.sensor.material.law,
             **({"adhesion": adhesion.document} if (adhesion := self.sensor.contact.adhesion) else {}),
-            "device": self.device, "seconds": round(seconds, 3), "newton": sum(state.newton for state in states),
+            "device": self.device,
+            "seconds": round(seconds, 3),
+            "newton": sum(state.newton for state in states),
         }
         for depth, state in zip(request.depths, states, strict=True):
             self._stable.check(depth, state.displacement)

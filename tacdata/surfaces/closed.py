@@ -55,7 +55,8 @@ def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
     except Exception as error:  # trimesh's readers raise any of their parsers' errors
         raise FormatError(
             f"{what} surface {path.name} cannot be read: {error or type(error).__name__}",
-            f"a {path.suffix[1:].upper()} file of triangles", "export it again",
+            f"a {path.suffix[1:].upper()} file of triangles",
+            "export it again",
         ) from None
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise FormatError(
@@ -101,7 +102,8 @@ def check_closed(mesh: trimesh.Trimesh, name: str) -> None:
     if not mesh.is_winding_consistent or mesh.volume < 0:
         raise FormatError(
             f"{name} is inside out{'' if mesh.is_winding_consistent else ' in parts'}: volume {mesh.volume:.4g} mm^3",
-            "triangles counter-clockwise seen from outside", "flip the normals in the CAD program or MeshLab",
+            "triangles counter-clockwise seen from outside",
+            "flip the normals in the CAD program or MeshLab",
         )
     pairs = crossing_faces(np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces))
     if len(pairs):

@@ -30,7 +30,9 @@ def _pierces(p: wp.vec3d, q: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
 
 @wp.kernel(module="unique", enable_backward=False)
 def _cross(
-    mesh: wp.uint64, vertices: wp.array(dtype=wp.vec3d), faces: wp.array2d(dtype=wp.int32),
+    mesh: wp.uint64,
+    vertices: wp.array(dtype=wp.vec3d),
+    faces: wp.array2d(dtype=wp.int32),
     partner: wp.array(dtype=wp.int32),
 ):
     f = wp.tid()
@@ -70,7 +72,9 @@ def crossing_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     partner = wp.full(len(faces), -1, dtype=wp.int32, device="cpu")
     exact = wp.array(vertices, dtype=wp.vec3d, device="cpu")
     wp.launch(
-        _cross, len(faces), inputs=[mesh.id, exact, wp.array(indices, dtype=wp.int32, device="cpu"), partner],
+        _cross,
+        len(faces),
+        inputs=[mesh.id, exact, wp.array(indices, dtype=wp.int32, device="cpu"), partner],
         device="cpu",
     )
     found = partner.numpy()

@@ -12,7 +12,10 @@ import tacdata.warp_runtime  # noqa: F401 - starts Warp
 
 @wp.kernel(module="unique", enable_backward=False)
 def _query(
-    mesh: wp.uint64, points: wp.array(dtype=wp.vec3), face: wp.array(dtype=wp.int32), place: wp.array(dtype=wp.vec2),
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    face: wp.array(dtype=wp.int32),
+    place: wp.array(dtype=wp.vec2),
     side: wp.array(dtype=wp.float64),
 ):
     i = wp.tid()

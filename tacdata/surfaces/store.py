@@ -44,7 +44,8 @@ def find(file: str, digest: str, what: str) -> Path:
             if provenance.file_hash(path) != digest:
                 raise FormatError(
                     f"{what} surface {path} is not the file that was used (SHA-256 {digest[:12]} wanted)",
-                    "the same file, byte by byte", "put the original there",
+                    "the same file, byte by byte",
+                    "put the original there",
                 )
             return _kept(keep(path), file)
     raise UsageError(

@@ -173,9 +173,12 @@ class Work:
             return None
         wrong, force = np.concatenate(loads), np.concatenate(normals)
         return LeftOut(
-            float(np.sqrt(np.mean(wrong**2))), float(np.abs(wrong).max()), float(np.sqrt(squares[0] / squares[1])),
-            float(np.sqrt(np.mean(force**2))), len(loads),
-        )  # fmt: skip
+            float(np.sqrt(np.mean(wrong**2))),
+            float(np.abs(wrong).max()),
+            float(np.sqrt(squares[0] / squares[1])),
+            float(np.sqrt(np.mean(force**2))),
+            len(loads),
+        )
 
 
 def work(sensor: Sensor, reaches: dict[str, Reach], settings: TableSettings | None = None) -> Work:

@@ -114,9 +114,13 @@ def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor
     """Return the press at one position, as deep as possible there; None if none is possible."""
     for count in range(len(depths), 1, -1):
         wanted = PressRequest(
-            reach.indenter, round(float(x), 6), round(float(y), 6), reach.yaw,
-            tuple(round(float(d), 6) for d in depths[:count]), *reach.tilt,
-        )  # fmt: skip
+            reach.indenter,
+            round(float(x), 6),
+            round(float(y), 6),
+            reach.yaw,
+            tuple(round(float(d), 6) for d in depths[:count]),
+            *reach.tilt,
+        )
         try:
             check_press(wanted, sensor)
         except SolveError:

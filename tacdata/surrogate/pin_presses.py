@@ -61,12 +61,17 @@ def _write(
     stamp = provenance.stamp("tacdata.surrogate.pin_presses", dict(model.identity), asdict(model.settings))
     buffer = io.BytesIO()
     np.savez_compressed(
-        buffer, places=np.array([(p.x, p.y, p.yaw) for p in asked]), counts=np.array([len(s.depths) for s in kept]),
+        buffer,
+        places=np.array([(p.x, p.y, p.yaw) for p in asked]),
+        counts=np.array([len(s.depths) for s in kept]),
         ended=np.array([s.ended for s in kept]),
-        depths=depths, force=padded([s.loads.force for s in kept]), closure=padded([s.loads.closure for s in kept]),
-        area=padded([s.loads.area for s in kept]), normal=padded([s.normal for s in kept]),
+        depths=depths,
+        force=padded([s.loads.force for s in kept]),
+        closure=padded([s.loads.closure for s in kept]),
+        area=padded([s.loads.area for s in kept]),
+        normal=padded([s.normal for s in kept]),
         provenance=np.array(provenance.canonical(stamp)),
-    )  # fmt: skip
+    )
     shipped = Shipped.of(model.sensor, model.settings.mesh)
     path = shipped.path(asked[0].indenter.document)
     path.parent.mkdir(parents=True, exist_ok=True)

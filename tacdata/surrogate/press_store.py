@@ -49,10 +49,14 @@ class PressStore:
     def path(self, request: PressRequest) -> Path:
         """Return the path of a press: named by a hash of everything that decides it but its end (32 hex digits)."""
         parts = {
-            "indenter": request.indenter.document, "x": request.x, "y": request.y, "yaw": request.yaw,
+            "indenter": request.indenter.document,
+            "x": request.x,
+            "y": request.y,
+            "yaw": request.yaw,
             **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(request, name))},
-            "depths": list(request.depths[:3]), "model": self.model.content_hash,
-        }  # fmt: skip
+            "depths": list(request.depths[:3]),
+            "model": self.model.content_hash,
+        }
         return self.folder / f"{provenance.content_hash(parts)[:32]}.npz"
 
     def get(self, request: PressRequest) -> Solved | None:
@@ -73,9 +77,15 @@ class PressStore:
         self.folder.mkdir(parents=True, exist_ok=True)
         buffer, loads = io.BytesIO(), solved.loads
         np.savez_compressed(
-            buffer, depths=solved.depths, force=loads.force, closure=loads.closure, area=loads.area,
-            normal=solved.normal, seconds=np.array(solved.seconds), ended=np.array(solved.ended),
-        )  # fmt: skip
+            buffer,
+            depths=solved.depths,
+            force=loads.force,
+            closure=loads.closure,
+            area=loads.area,
+            normal=solved.normal,
+            seconds=np.array(solved.seconds),
+            ended=np.array(solved.ended),
+        )
         with written(self.path(request)) as stream:
             stream.write(buffer.getvalue())
 
@@ -91,9 +101,11 @@ class PressStore:
         return each * sum(len(r.depths) for r, s in zip(requests, found, strict=True) if s is None)
 
     def solve(
-        self, requests: Sequence[PressRequest], capacity: int = 1,
+        self,
+        requests: Sequence[PressRequest],
+        capacity: int = 1,
         progress: Callable[[int, int, float], None] = lambda *_: None,
-    ) -> list[Solved | SolveError]:  # fmt: skip
+    ) -> list[Solved | SolveError]:
         """Return presses; missing ones are solved now and stored at once.
 
         Args:
@@ -115,9 +127,11 @@ class PressStore:
                     continue
                 done += 1
                 passed = time.perf_counter() - begin
-                found[k] = answer if isinstance(answer, SolveError) else self._kept(
-                    requests[k], answer, passed / done, attempt > 0
-                )  # fmt: skip
+                found[k] = (
+                    answer
+                    if isinstance(answer, SolveError)
+                    else self._kept(requests[k], answer, passed / done, attempt > 0)
+                )
                 progress(before + done, len(requests), passed / done * (count - done))
             if not (asked := again):
                 break

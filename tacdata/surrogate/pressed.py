@@ -53,9 +53,10 @@ def pressed(paths: list[Path]) -> Pressed:
         episode = read_episode(file)
         if why := unmodelled(episode):
             raise FormatError(
-                f"{file}: no finite-element model of this sensor: {why}", "a sensor and indenters that are described",
+                f"{file}: no finite-element model of this sensor: {why}",
+                "a sensor and indenters that are described",
                 "start from a fitted response (no --fem), or import with sensor file, indenter and height of contact",
-            )  # fmt: skip
+            )
         if sensor is not None and episode.sensor.content_hash != sensor.content_hash:
             given = f"{file}: another sensor than the recordings before"
             raise FormatError(given, "recordings of one sensor", "run it alone")
@@ -75,16 +76,21 @@ def _reach(name: str, found: list[tuple[Episode, np.ndarray]]) -> Reach:
     ways = {(0.0 if round_one else round(p.yaw, 3), p.tilt_x, p.tilt_y): p.turned for p in (e.press for e, _ in found)}
     if len(ways) > 1:
         raise FormatError(
-            f"{name} mounted at {'; '.join(ways[way] for way in sorted(ways))}", "one way for each name",
+            f"{name} mounted at {'; '.join(ways[way] for way in sorted(ways))}",
+            "one way for each name",
             "run them one at a time, or give each its own name in the plan",
-        )  # fmt: skip
+        )
     [(yaw, *tilt)] = ways
     tips = np.concatenate([t for _, t in found])
     low, high = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
     return Reach(
-        first.indenter, yaw, (float(low[0]), float(low[1])), (float(high[0]), float(high[1])),
-        float(tips[:, 2].max()), (tilt[0], tilt[1]),
-    )  # fmt: skip
+        first.indenter,
+        yaw,
+        (float(low[0]), float(low[1])),
+        (float(high[0]), float(high[1])),
+        float(tips[:, 2].max()),
+        (tilt[0], tilt[1]),
+    )
 
 
 def _files(path: Path) -> list[Path]:

@@ -32,14 +32,19 @@ def written_spec(folder: Path, work: Work, table: LoadTable, off: LeftOut | None
             raise UsageError(f"{folder / name} exists", "a new folder; nothing is overwritten", "choose another --out")
     folder.mkdir(parents=True, exist_ok=True)
     parameters = {
-        "mesh": asdict(work.model.settings.mesh), "spacing": float(work.grid.x[1] - work.grid.x[0]),
-        "left_out": asdict(off) if off else None, "load": table.reading.by,
+        "mesh": asdict(work.model.settings.mesh),
+        "spacing": float(work.grid.x[1] - work.grid.x[0]),
+        "left_out": asdict(off) if off else None,
+        "load": table.reading.by,
         "tools": {name: r.indenter.document for name, r in zip(work.names, work.reaches, strict=True)},
-    }  # fmt: skip
+    }
     table.write(folder / TABLE, provenance.stamp("tacdata.surrogate", dict(work.model.identity), parameters))
     document: dict[str, Any] = {
-        "version": schemas.version("model_spec"), "name": f"{work.sensor.name}, finite elements", "parent": None,
-        "response": {"kind": "table", "file": TABLE}, "effects": [],
-    }  # fmt: skip
+        "version": schemas.version("model_spec"),
+        "name": f"{work.sensor.name}, finite elements",
+        "parent": None,
+        "response": {"kind": "table", "file": TABLE},
+        "effects": [],
+    }
     documents.write(folder / SPEC, document, "model_spec")
     return folder / SPEC

@@ -46,7 +46,16 @@ class LoadTable:
         """The response of the table."""
         g, r = self.grid, self.reading
         return TableResponse(
-            g.x, g.y, g.depth, self.load, self.normal, r.curve_load, r.curve_signal, r.gain, r.offset, self.tools,
+            g.x,
+            g.y,
+            g.depth,
+            self.load,
+            self.normal,
+            r.curve_load,
+            r.curve_signal,
+            r.gain,
+            r.offset,
+            self.tools,
             self.error,
         )
 
@@ -55,11 +64,21 @@ class LoadTable:
         g, r = self.grid, self.reading
         with replacement(path) as stream:
             np.savez_compressed(
-                stream, x=g.x, y=g.y, depth=g.depth, load=self.load.astype(np.float32),
-                force=self.normal.astype(np.float32), curve_load=r.curve_load, curve_signal=r.curve_signal,
-                gain=r.gain, offset=r.offset, tools=np.array(self.tools), solved=self.solved, error=self.error,
+                stream,
+                x=g.x,
+                y=g.y,
+                depth=g.depth,
+                load=self.load.astype(np.float32),
+                force=self.normal.astype(np.float32),
+                curve_load=r.curve_load,
+                curve_signal=r.curve_signal,
+                gain=r.gain,
+                offset=r.offset,
+                tools=np.array(self.tools),
+                solved=self.solved,
+                error=self.error,
                 provenance=np.array(json.dumps(provenance)),
-            )  # fmt: skip
+            )
 
     def uncovered(self, places: Sequence[tuple[str, np.ndarray, float]]) -> list[tuple[str, np.ndarray, float]]:
         """Return the presses (tool, x and y [mm], depth [mm]) that are not covered by solved nodes."""
@@ -84,9 +103,12 @@ class LoadTable:
 
 
 def assembled(
-    grid: Grid, presses: Sequence[dict[tuple[int, int], Solved]], tools: tuple[str, ...], reading: ReadingCurve,
+    grid: Grid,
+    presses: Sequence[dict[tuple[int, int], Solved]],
+    tools: tuple[str, ...],
+    reading: ReadingCurve,
     sensor: Sensor,
-) -> LoadTable:  # fmt: skip
+) -> LoadTable:
     """Return the table from the presses of each tool, by node.
 
     Args:
@@ -106,18 +128,25 @@ def assembled(
     for t, found in enumerate(presses):
         if not found:
             raise SolveError(
-                f"{tools[t]} can be pressed at none of the places", "places where it stays inside a bonded rim",
+                f"{tools[t]} can be pressed at none of the places",
+                "places where it stays inside a bonded rim",
                 "press elsewhere, or describe another bonding in the sensor file",
-            )  # fmt: skip
+            )
         _place(grid, found, reading, transducer, sensor, load[t], normal[t], solved[t])
         _continue(grid, load[t], normal[t], solved[t])
     return LoadTable(grid, tools, load, normal, solved, reading)
 
 
 def _place(
-    grid: Grid, found: dict[tuple[int, int], Solved], reading: ReadingCurve, transducer: Transducer, sensor: Sensor,
-    load: np.ndarray, normal: np.ndarray, solved: np.ndarray,
-) -> None:  # fmt: skip
+    grid: Grid,
+    found: dict[tuple[int, int], Solved],
+    reading: ReadingCurve,
+    transducer: Transducer,
+    sensor: Sensor,
+    load: np.ndarray,
+    normal: np.ndarray,
+    solved: np.ndarray,
+) -> None:
     times = np.zeros(normal.shape)
     for (i, j), press in found.items():
         values, count = reading.load(press.loads, transducer), len(press.normal)

@@ -9,7 +9,17 @@ from tacdata.tags.tips import TipPose, View, detect_fingers, look
 from tacdata.tags.tracker import FingerTracker
 
 __all__ = [
-    "Cube", "CubePose", "Finger", "FingerTracker", "Tag", "TipPose", "View",
-    "detect_cube", "detect_fingers", "detect_tags", "fingers_of", "look",
+    "Cube",
+    "CubePose",
+    "Finger",
+    "FingerTracker",
+    "Tag",
+    "TipPose",
+    "View",
+    "detect_cube",
+    "detect_fingers",
+    "detect_tags",
+    "fingers_of",
+    "look",
     "read_fingers",
-]  # fmt: skip
+]

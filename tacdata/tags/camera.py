@@ -57,8 +57,9 @@ class PinholeCamera:
         if not WIDEST * width <= min(fx, fy) or not max(fx, fy) <= LONGEST * width:
             raise FormatError(
                 f"{origin}: fx {fx}, fy {fy} px for an image {width} px wide: are these millimetres?",
-                f"{WIDEST * width:g} to {LONGEST * width:g} px", "calibrate the camera",
-            )  # fmt: skip
+                f"{WIDEST * width:g} to {LONGEST * width:g} px",
+                "calibrate the camera",
+            )
         distortion = np.array(document.get("distortion", ()), float)
         if len(distortion) not in (0, 4, 5, 8, 12, 14):
             given = f"{origin}: {len(distortion)} distortion coefficients"

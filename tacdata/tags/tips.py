@@ -49,9 +49,8 @@ class View:
 
 
 def detect_fingers(
-    image: np.ndarray, intrinsics: dict[str, Any], fingers: dict[str, Finger],
-    hints: dict[str, CubePose] | None = None,
-) -> View:  # fmt: skip
+    image: np.ndarray, intrinsics: dict[str, Any], fingers: dict[str, Finger], hints: dict[str, CubePose] | None = None
+) -> View:
     """Return the fingertips in an image; a finger needs one readable tag.
 
     Args:

@@ -53,9 +53,15 @@ class VirtualBoard:
     """Samples the world and streams frames, all on the time of ``clock``."""
 
     def __init__(
-        self, clock: Clock, layout: FrameFormat, timing: Timing, read: Callable[[int], np.ndarray],
-        baud: int = 115200, seed: int = 0, port: VirtualPort | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        clock: Clock,
+        layout: FrameFormat,
+        timing: Timing,
+        read: Callable[[int], np.ndarray],
+        baud: int = 115200,
+        seed: int = 0,
+        port: VirtualPort | None = None,
+    ) -> None:
         """Stream ``read(sample time [ns]) -> counts, shape (channels,)`` in the given frame format.
 
         ``port`` is the line to the host, by default a pseudo-terminal.

@@ -65,10 +65,17 @@ class VirtualDemo:
     """Emulated boards and cameras; the pipeline sees only the demo rig file and the wires."""
 
     def __init__(
-        self, directory: Path, speed: float = 1.0, seed: int = 0, cameras: int = 2, fault: str | None = None,
-        sensor: Sensor | Mapping[str, Sensor] | None = None, task: str = "grasp", nub: float = RADIUS,
+        self,
+        directory: Path,
+        speed: float = 1.0,
+        seed: int = 0,
+        cameras: int = 2,
+        fault: str | None = None,
+        sensor: Sensor | Mapping[str, Sensor] | None = None,
+        task: str = "grasp",
+        nub: float = RADIUS,
         thing: str | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Set up a hand whose clock runs ``speed`` times as fast as real time.
 
         Args:
@@ -115,10 +122,14 @@ class VirtualDemo:
         """The demo rig file's document (`schemas/demo_rig.schema.json`)."""
         worlds = np.random.default_rng([self.seed, 13])
         return {
-            "version": schemas.version("demo_rig"), "name": NAME, "clock": self.clock.document,
+            "version": schemas.version("demo_rig"),
+            "name": NAME,
+            "clock": self.clock.document,
             "boards": {
                 name: {
-                    "driver": "capacitive_board", "port": board.port.path, "baud": board.baud,
+                    "driver": "capacitive_board",
+                    "port": board.port.path,
+                    "baud": board.baud,
                     "format": self.layouts[name].document,
                 }
                 for name, board in self.boards.items()
@@ -126,7 +137,10 @@ class VirtualDemo:
             "sensors": {name: sensor.document for name, sensor in self.sensors.items()},
             "cameras": {
                 name: {
-                    "driver": "opencv_camera", "source": camera.url, "rate": RATE, "intrinsics": dict(INTRINSICS),
+                    "driver": "opencv_camera",
+                    "source": camera.url,
+                    "rate": RATE,
+                    "intrinsics": dict(INTRINSICS),
                     "world": _world(name, self.eyes[name], worlds),
                 }
                 for name, camera in self.cameras.items()
@@ -136,18 +150,19 @@ class VirtualDemo:
                 for name in self.cameras
             },
             "fingers": FINGERS,
-        }  # fmt: skip
+        }
 
     @property
     def emulates(self) -> list[str]:
         """What is emulated, one line each."""
         boards = [f"{name:<7} {board.port.path}  {self.layouts[name].rate:g} Hz" for name, board in self.boards.items()]
         return [
-            *boards, *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
+            *boards,
+            *(f"camera {name:<5} {camera.url}" for name, camera in self.cameras.items()),
             f"{self.hand.task} ({self.hand.thing}) every {PERIOD:g} s of its clock, which runs {self.clock.rate:g} "
             "times real time",
             *([f"fault: {self.fault}{_when(self.fault)}"] if self.fault else []),
-        ]  # fmt: skip
+        ]
 
     def seconds(self, time_ns: int) -> float:
         """Return the hand's time [s] at a time of the clock [ns]."""
@@ -163,9 +178,12 @@ class VirtualDemo:
             raise UsageError(f"{self.path} exists", "a directory without a demo rig", "choose another directory")
         self.directory.mkdir(parents=True, exist_ok=True)
         truth = {
-            "version": schemas.version("virtual_demo_truth"), "start_ns": self.start_ns, "fault": self.fault,
-            "hand": self.hand.document, "cameras": {name: pose.tolist() for name, pose in self.eyes.items()},
-        }  # fmt: skip
+            "version": schemas.version("virtual_demo_truth"),
+            "start_ns": self.start_ns,
+            "fault": self.fault,
+            "hand": self.hand.document,
+            "cameras": {name: pose.tolist() for name, pose in self.eyes.items()},
+        }
         documents.write(self.directory / "truth.yaml", truth, "virtual_demo_truth")
         for device in (*self.boards.values(), *self.cameras.values()):
             device.start()
@@ -251,9 +269,15 @@ def _world(camera: str, pose: np.ndarray, rng: np.random.Generator) -> dict[str,
     spread = 0.0002, float(np.radians(0.03))
     turn = Rotation.from_rotvec(rng.normal(0, spread[1], 3)) * Rotation.from_matrix(pose[:3, :3])
     return {
-        "version": schemas.version("camera_world"), "camera": camera, "frame": "table",
-        "position": (pose[:3, 3] + rng.normal(0, spread[0], 3)).tolist(), "quaternion": turn.as_quat().tolist(),  # ty: ignore[missing-union-attribute]
-        "method": "virtual board", "poses": 1, "residual": {"position": spread[0], "rotation": spread[1]},
-        "spread": {"position": spread[0], "rotation": spread[1]}, "date": "2026-01-01",
+        "version": schemas.version("camera_world"),
+        "camera": camera,
+        "frame": "table",
+        "position": (pose[:3, 3] + rng.normal(0, spread[0], 3)).tolist(),
+        "quaternion": turn.as_quat().tolist(),  # ty: ignore[missing-union-attribute]
+        "method": "virtual board",
+        "poses": 1,
+        "residual": {"position": spread[0], "rotation": spread[1]},
+        "spread": {"position": spread[0], "rotation": spread[1]},
+        "date": "2026-01-01",
         "code_version": provenance.code_version(),
-    }  # fmt: skip
+    }

@@ -54,9 +54,15 @@ class VirtualRig:
     """
 
     def __init__(
-        self, directory: Path, speed: float = 1.0, seed: int = 0, camera: bool = True,
-        sensor: Sensor | None = None, rough: bool = False, hidden: dict[str, float] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        directory: Path,
+        speed: float = 1.0,
+        seed: int = 0,
+        camera: bool = True,
+        sensor: Sensor | None = None,
+        rough: bool = False,
+        hidden: dict[str, float] | None = None,
+    ) -> None:
         """Set up a rig whose clock runs ``speed`` times as fast as real time; ``seed`` decides its world.
 
         With ``rough`` the sensor was put down by eye, up to a millimetre and some degrees off, and the rig file is not
@@ -102,7 +108,9 @@ class VirtualRig:
             "clock": self.clock.document,
             "cnc": {"driver": "grbl", "port": self.controller.port.path, "baud": 115200},
             "board": {
-                "driver": "capacitive_board", "port": self.board.port.path, "baud": self.board.baud,
+                "driver": "capacitive_board",
+                "port": self.board.port.path,
+                "baud": self.board.baud,
                 "format": self.layout.document,
             },
             "mounting": {"file": str(self.mounted.path.absolute())},
@@ -111,14 +119,17 @@ class VirtualRig:
                 "min": [x - half_x, y - half_y, z - 0.95 * self.sensor.skin.thickness],
                 "max": [x + half_x, y + half_y, z + PARKED + 5],
             },
-        }  # fmt: skip
+        }
         if self.camera:
             document["cameras"] = {
                 "side": {
-                    "driver": "opencv_camera", "source": self.camera.url, "rate": self.camera.rate,
-                    "intrinsics": dict(INTRINSICS), "cube": {**CUBE, "ids": dict(CUBE["ids"])},  # ty: ignore[no-matching-overload]
+                    "driver": "opencv_camera",
+                    "source": self.camera.url,
+                    "rate": self.camera.rate,
+                    "intrinsics": dict(INTRINSICS),
+                    "cube": {**CUBE, "ids": dict(CUBE["ids"])},  # ty: ignore[no-matching-overload]
                 }
-            }  # fmt: skip
+            }
         return document
 
     @property
@@ -151,9 +162,11 @@ class VirtualRig:
             {"rate": self.camera.rate, "start_ns": self.camera.start_ns, **self.scene.document} if self.camera else None
         )
         truth = {
-            "version": schemas.version("virtual_truth"), "world": {**self.truth.document, "hidden": self._hidden},
-            "board": asdict(self.board.timing), "camera": camera,
-        }  # fmt: skip
+            "version": schemas.version("virtual_truth"),
+            "world": {**self.truth.document, "hidden": self._hidden},
+            "board": asdict(self.board.timing),
+            "camera": camera,
+        }
         documents.write(self.directory / "truth.yaml", truth, "virtual_truth")
         self.mounted.start()
         for device in (self.controller, self.board, self.camera):
@@ -193,18 +206,20 @@ def _claim(directory: Path, path: Path) -> IO[str]:
     except OSError:
         lock.close()
         raise UsageError(
-            f"a virtual rig is running in {directory}",
-            "one rig per directory",
-            "stop it or choose another directory",
+            f"a virtual rig is running in {directory}", "one rig per directory", "stop it or choose another directory"
         ) from None
     return lock
 
 
 @contextmanager
 def running(
-    directory: Path, speed: float = 8.0, seed: int = 0, camera: bool = True, sensor: Sensor | None = None,
+    directory: Path,
+    speed: float = 8.0,
+    seed: int = 0,
+    camera: bool = True,
+    sensor: Sensor | None = None,
     rough: bool = False,
-) -> Iterator[Path]:  # fmt: skip
+) -> Iterator[Path]:
     """Run a virtual rig in threads of this process; yields the path of its ``rig.yaml``."""
     rig = VirtualRig(directory, speed, seed, camera, sensor, rough)
     try:

@@ -22,9 +22,8 @@ class Patience:
     """
 
     def __init__(
-        self, seconds: float, rate: float = 1.0, floor: float = REAL_FLOOR, step: float = STEP,
-        host: Host = COMPUTER,
-    ) -> None:  # fmt: skip
+        self, seconds: float, rate: float = 1.0, floor: float = REAL_FLOOR, step: float = STEP, host: Host = COMPUTER
+    ) -> None:
         """Allow ``seconds`` [s of a clock that runs at ``rate``], and never less than ``floor`` [s, real time].
 
         ``step`` [s, real time] should be longer than the time between two looks. ``host`` tells the time.

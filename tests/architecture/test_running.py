@@ -109,8 +109,9 @@ def test_pytest_takes_what_was_rewritten_before_it_started(tmp_path):
     rewritten.place(path).write_bytes(kept[:head] + rewritten.place(other).read_bytes()[head:])
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-c", "/dev/null", "--rootdir", str(tmp_path), str(path)],
-        capture_output=True, text=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+    )
     assert "1 passed" in done.stdout, done.stdout
 
 

@@ -11,19 +11,7 @@ from tacdata import cli, registry
 from tacdata.commands.command import PIPELINE, TOOLS
 
 VERBS = registry.names(cli.ROOM, cli.BASE)
-HEAVY = {
-    "torch",
-    "warp",
-    "lerobot",
-    "rerun",
-    "cv2",
-    "matplotlib",
-    "pyvista",
-    "pytetwild",
-    "scipy",
-    "pyarrow",
-    "mcap",
-}
+HEAVY = {"torch", "warp", "lerobot", "rerun", "cv2", "matplotlib", "pyvista", "pytetwild", "scipy", "pyarrow", "mcap"}
 
 
 def module(name):

@@ -12,9 +12,17 @@ ROOM = Path(__file__).parents[2] / "benchmarks" / "files_as_kept"
 ASKED = {"capacitance"}
 """An array without names: a person says what its columns are."""
 RECORDINGS = {
-    "strips": 27, "foam": 10, "capacitance": 24, "fluidic": 20, "barometric": 24, "magnetic": 36, "piston": 18,
-    "gel": 24, "frame": 18, "clean": 24,
-}  # fmt: skip
+    "strips": 27,
+    "foam": 10,
+    "capacitance": 24,
+    "fluidic": 20,
+    "barometric": 24,
+    "magnetic": 36,
+    "piston": 18,
+    "gel": 24,
+    "frame": 18,
+    "clean": 24,
+}
 
 
 @pytest.fixture(scope="module")
@@ -44,16 +52,20 @@ def test_each_set_comes_in_whole(bench, tmp_path, name):
 def row(mechanism, family, status, level="form", alternatives=()):
     effect = {"mechanism": mechanism, "family": family, "status": status, "level": level}
     return {
-        "mechanisms": ["adhesion"], "families": ["contact"],
+        "mechanisms": ["adhesion"],
+        "families": ["contact"],
         "verdict": {"effects": [{**effect, "alternatives": list(alternatives)}]},
-    }  # fmt: skip
+    }
 
 
-@pytest.mark.parametrize(("given", "right"), [
-    (row("adhesion", "contact", "named"), {"family", "mechanism", "suspected"}),
-    (row("hysteresis", "friction and play", "named"), {"wrong"}),
-    (row("hysteresis", "friction and play", "ambiguous", None, ["adhesion"]), {"mechanism", "suspected"}),
-    (row("adhesion", "contact", "suspected", None), {"suspected"}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("given", "right"),
+    [
+        (row("adhesion", "contact", "named"), {"family", "mechanism", "suspected"}),
+        (row("hysteresis", "friction and play", "named"), {"wrong"}),
+        (row("hysteresis", "friction and play", "ambiguous", None, ["adhesion"]), {"mechanism", "suspected"}),
+        (row("adhesion", "contact", "suspected", None), {"suspected"}),
+    ],
+)
 def test_a_name_is_right_only_where_it_is_there(bench, given, right):
     assert {name for name, true in bench.outcome(given).items() if true} == right

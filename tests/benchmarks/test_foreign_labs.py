@@ -56,10 +56,14 @@ def test_what_is_hidden_changes_what_is_read():
     _, depths = path.course(path.cycles((1.0, 2.0), (4.0,), 2, first=0.1))
     _, plain = Skin().pressed(depths)
     hidden = [
-        Skin(compliance=0.03), Skin(play=0.05), Skin(memory=Relaxation(((0.1, 1.0),))),
-        Skin(memory=Friction(0.1, 5.0)), Skin(memory=SmoothFriction(0.1, 0.25, 1.5)),
-        Skin(memory=Network(1.4, 0.175, 0.5, 9)), Skin(memory=Softening(2.5, 0.6, 0.1)),
-    ]  # fmt: skip
+        Skin(compliance=0.03),
+        Skin(play=0.05),
+        Skin(memory=Relaxation(((0.1, 1.0),))),
+        Skin(memory=Friction(0.1, 5.0)),
+        Skin(memory=SmoothFriction(0.1, 0.25, 1.5)),
+        Skin(memory=Network(1.4, 0.175, 0.5, 9)),
+        Skin(memory=Softening(2.5, 0.6, 0.1)),
+    ]
     for skin in hidden:
         _, loads = skin.pressed(depths)
         assert loads.min() == 0.0

@@ -165,10 +165,24 @@ def test_what_a_verdict_lacks_is_said_to_be_missing():
     from scoring.tables import document
 
     row = {
-        "id": "a", "block": "nulls", "name": "x", "response": "table", "effects": [], "times": {}, "facts": {},
-        "expected": "none", "settings": {}, "outcome": "right none", "engine": {"hash": "h", "commit": None},
-        "seconds": 1.0, "status": "none", "told": [], "parameters": [], "confidence": [], "found": {},
-    }  # fmt: skip
+        "id": "a",
+        "block": "nulls",
+        "name": "x",
+        "response": "table",
+        "effects": [],
+        "times": {},
+        "facts": {},
+        "expected": "none",
+        "settings": {},
+        "outcome": "right none",
+        "engine": {"hash": "h", "commit": None},
+        "seconds": 1.0,
+        "status": "none",
+        "told": [],
+        "parameters": [],
+        "confidence": [],
+        "found": {},
+    }
     text = document([row], "workflow")
     assert "| expected calibration error | at most 0.05 | not given | not measured |" in text
     assert "0.0 % (0/1, 0.0 to 97.5)" in text

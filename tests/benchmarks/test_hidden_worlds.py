@@ -15,9 +15,17 @@ from tacdata.effects import library
 
 FOLDER = Path(__file__).parents[2] / "benchmarks" / "hidden_worlds"
 TEN = {
-    "frame_compliance", "carriage_compliance", "backlash", "relaxation", "latency", "z_offset", "tilt", "modulus",
-    "gain", "drift",
-}  # fmt: skip
+    "frame_compliance",
+    "carriage_compliance",
+    "backlash",
+    "relaxation",
+    "latency",
+    "z_offset",
+    "tilt",
+    "modulus",
+    "gain",
+    "drift",
+}
 
 
 @pytest.fixture(scope="module", autouse=True)

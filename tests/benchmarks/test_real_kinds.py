@@ -32,8 +32,13 @@ def outcome():
 
 def row(mechanism, family, status, level, alternatives=()):
     """Return a verdict with one effect on a piston with dry friction."""
-    effect = {"mechanism": mechanism, "family": family, "status": status, "level": level,
-              "alternatives": list(alternatives)}  # fmt: skip
+    effect = {
+        "mechanism": mechanism,
+        "family": family,
+        "status": status,
+        "level": level,
+        "alternatives": list(alternatives),
+    }
     return {"kind": "piston", "share": 0.15, "remainder": "real bend", "verdict": {"effects": [effect]}}
 
 
@@ -47,7 +52,7 @@ def row(mechanism, family, status, level, alternatives=()):
         (row("hysteresis", PLAY, "named", "form"), {"family", "wrong"}),
         (row("hysteresis", PLAY, "named", "family"), {"family"}),
     ],
-)  # fmt: skip
+)
 def test_a_set_of_one_family_tells_the_family_and_answers_for_it(outcome, given, right):
     assert {name for name, true in outcome(given).items() if true} == right
 

@@ -9,8 +9,17 @@ import pytest
 
 ROOM = Path(__file__).parents[2] / "benchmarks" / "next_presses"
 NAMES = ("presses", "run")
-PRESS = {"x": 0.0, "y": 0.0, "tool": 0, "depth": 0.7, "speed": 2.0, "hold": 6.0, "recovery": 0.0, "overshoot": 0.1,
-         "purpose": "tells one from another"}  # fmt: skip
+PRESS = {
+    "x": 0.0,
+    "y": 0.0,
+    "tool": 0,
+    "depth": 0.7,
+    "speed": 2.0,
+    "hold": 6.0,
+    "recovery": 0.0,
+    "overshoot": 0.1,
+    "purpose": "tells one from another",
+}
 
 
 @pytest.fixture(scope="module")
@@ -29,8 +38,13 @@ def bench():
 
 
 def told(status, mechanism, level="form"):
-    effect = {"mechanism": mechanism, "status": "named" if status.startswith("named") else status, "level": level,
-              "family": "delay and filtering", "alternatives": []}  # fmt: skip
+    effect = {
+        "mechanism": mechanism,
+        "status": "named" if status.startswith("named") else status,
+        "level": level,
+        "family": "delay and filtering",
+        "alternatives": [],
+    }
     return {"status": status, "effects": [effect]}
 
 

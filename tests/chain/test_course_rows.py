@@ -95,11 +95,17 @@ def test_turns_of_a_path_are_no_noise_of_it(kind):
         depth = depth + np.random.default_rng(2).normal(0, 0.003, len(time))
     rows = len(time)
     course = Course(
-        time=time, episode=np.zeros(rows, dtype=int), tip=np.column_stack([0 * depth, 0 * depth, depth]),
-        tool=np.zeros(rows, dtype=int), readings=np.zeros((rows, 1)), averaged=np.ones(rows),
-        session=np.zeros(1, dtype=int), site=np.zeros(1, dtype=int), tools=(Tool("ball", "sphere", 4.0),),
+        time=time,
+        episode=np.zeros(rows, dtype=int),
+        tip=np.column_stack([0 * depth, 0 * depth, depth]),
+        tool=np.zeros(rows, dtype=int),
+        readings=np.zeros((rows, 1)),
+        averaged=np.ones(rows),
+        session=np.zeros(1, dtype=int),
+        site=np.zeros(1, dtype=int),
+        tools=(Tool("ball", "sphere", 4.0),),
         names=("one",),
-    )  # fmt: skip
+    )
     if kind == "commanded":
         assert course.dither == 0.0
     else:

@@ -80,8 +80,18 @@ def test_the_deepest_presses_of_a_table_are_as_right_as_the_others():
 def test_the_curve_goes_on_straight_beyond_its_ends():
     x = np.linspace(-3, 3, 5)
     load, at = np.zeros((1, 5, 5, 5, 2)), np.array([0.0, 1.0, 2.0])
-    made = TableResponse(x, x, np.linspace(0, 1, 5) ** 2, load, load[..., 0], at, np.array([0.0, 3.0, 4.0]),
-                         np.array([1.0, 10.0]), np.array([5.0, 0.0]), ("ball",))  # fmt: skip
+    made = TableResponse(
+        x,
+        x,
+        np.linspace(0, 1, 5) ** 2,
+        load,
+        load[..., 0],
+        at,
+        np.array([0.0, 3.0, 4.0]),
+        np.array([1.0, 10.0]),
+        np.array([5.0, 0.0]),
+        ("ball",),
+    )
     read = made.signal(np.array([[-0.5, 0.5], [3.0, 2.0], [200.0, -100.0]]))
     assert read == pytest.approx(np.array([[3.5, 15.0], [10.0, 40.0], [207.0, -3000.0]]), rel=1e-12)
 
@@ -103,9 +113,18 @@ def test_a_press_at_one_place_is_read_as_its_rows_would_be_by_themselves(rougher
 
 def written(path, **changes):
     made, curve = table(3), np.array([0.0, 2.0])
-    values = {"x": made.x, "y": made.y, "depth": made.depth, "load": np.zeros((1, 3, 3, 3, 1)),
-              "force": np.zeros((1, 3, 3, 3)), "curve_load": curve, "curve_signal": curve, "gain": np.ones(1),
-              "offset": np.zeros(1), "tools": np.array(["ball"])}  # fmt: skip
+    values = {
+        "x": made.x,
+        "y": made.y,
+        "depth": made.depth,
+        "load": np.zeros((1, 3, 3, 3, 1)),
+        "force": np.zeros((1, 3, 3, 3)),
+        "curve_load": curve,
+        "curve_signal": curve,
+        "gain": np.ones(1),
+        "offset": np.zeros(1),
+        "tools": np.array(["ball"]),
+    }
     np.savez(path, **{**values, **changes})
     return path
 

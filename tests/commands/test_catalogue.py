@@ -44,8 +44,6 @@ def test_a_wrong_name_is_answered_with_a_right_one():
 
 def test_listing_imports_no_member():
     code = "import sys; from tacdata import catalogue; catalogue.members('indenters'); print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout.split()
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert "tacdata.catalogue" in loaded
     assert "tacdata.indenters.sphere" not in loaded

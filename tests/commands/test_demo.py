@@ -75,8 +75,10 @@ def test_an_interrupt_while_recording_leaves_readable_files(tmp_path):
 def test_the_whole_job(tmp_path):
     done = subprocess.run(
         [*DEMO, "--out", str(tmp_path / "out"), "--presses", "8", "--epochs", "1"],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     assert done.returncode == 0, done.stdout
     left_behind(tmp_path / "out", done.stdout)
 

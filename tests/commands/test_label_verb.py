@@ -25,9 +25,7 @@ def label(tmp_path, monkeypatch):
     from farm_examples import press_episode
 
     monkeypatch.setenv("PYTHONPATH", str(FARM))
-    episodes = {
-        f"episode-{k:06d}.mcap": press_episode(tmp_path, k, x=float(k), depth=k - 0.5) for k in range(3)
-    }
+    episodes = {f"episode-{k:06d}.mcap": press_episode(tmp_path, k, x=float(k), depth=k - 0.5) for k in range(3)}
     session = SimpleNamespace(episodes=tuple(tmp_path / name for name in episodes))
     monkeypatch.setattr(sessions, "read_session", lambda folder: session)
     monkeypatch.setattr(reader, "read_episode", lambda path: episodes[path.name])
@@ -65,9 +63,7 @@ def test_it_says_how_well_the_labels_are_known(label):
 
 def test_a_store_elsewhere_serves_as_well(tmp_path, label):
     assert label("--store", str(tmp_path / "shared")).exit_code == 0
-    assert (
-        len(list((tmp_path / "shared").rglob("*.npz"))) == 2 and not (tmp_path / "labels" / "store").exists()
-    )
+    assert len(list((tmp_path / "shared").rglob("*.npz"))) == 2 and not (tmp_path / "labels" / "store").exists()
 
 
 def test_a_failed_press_is_named_and_ends_with_an_error(tmp_path, label, monkeypatch):

@@ -16,11 +16,36 @@ from tacdata.example.shipped import SESSION
 ROOT = Path(__file__).resolve().parents[2]
 APP = cli.application()
 REPORT = (
-    "browse", "check", "compare", "demo", "discrepancy", "evaluate", "example", "generalize", "label", "list", "pack",
-    "pictures", "plan", "protocols", "record", "register", "replay", "report", "revise", "solve", "success",
-    "surrogate", "train", "view",
-    "farm cancel", "farm dataset", "farm fetch", "farm status", "farm submit",
-)  # fmt: skip
+    "browse",
+    "check",
+    "compare",
+    "demo",
+    "discrepancy",
+    "evaluate",
+    "example",
+    "generalize",
+    "label",
+    "list",
+    "pack",
+    "pictures",
+    "plan",
+    "protocols",
+    "record",
+    "register",
+    "replay",
+    "report",
+    "revise",
+    "solve",
+    "success",
+    "surrogate",
+    "train",
+    "view",
+    "farm cancel",
+    "farm dataset",
+    "farm fetch",
+    "farm status",
+    "farm submit",
+)
 """Verbs that find something out."""
 
 

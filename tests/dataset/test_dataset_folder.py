@@ -96,10 +96,7 @@ def test_appending_later_adds_only_what_is_new(tmp_path: Path) -> None:
     assert stats(root).keys() == stats(tmp_path / "once").keys()
     for key, values in stats(root).items():
         for name in ("mean", "std", "min", "max", "count"):
-            assert np.allclose(values[name], stats(tmp_path / "once")[key][name], rtol=1e-12, atol=1e-12), (
-                key,
-                name,
-            )
+            assert np.allclose(values[name], stats(tmp_path / "once")[key][name], rtol=1e-12, atol=1e-12), (key, name)
 
 
 def stats(root: Path) -> dict:
@@ -142,9 +139,7 @@ def test_a_crash_costs_only_the_episode_being_written(tmp_path: Path, monkeypatc
         patch.setattr(shutil, "rmtree", lambda *_, **__: None)  # a power cut tidies nothing up
         if stage == "info":
             patch.setattr(
-                documents,
-                "write_text",
-                lambda path, text: crash() if path.name == "info.json" else real(path, text),
+                documents, "write_text", lambda path, text: crash() if path.name == "info.json" else real(path, text)
             )
         else:
             patch.setattr(*CRASHES[stage], crash)
@@ -193,9 +188,7 @@ def test_a_killed_process_leaves_a_readable_dataset(tmp_path: Path) -> None:
     )
     root = tmp_path / "d"
     process = subprocess.Popen(
-        [sys.executable, "-c", script, str(Path(__file__).parent), str(root)],
-        stdout=subprocess.PIPE,
-        text=True,
+        [sys.executable, "-c", script, str(Path(__file__).parent), str(root)], stdout=subprocess.PIPE, text=True
     )
     assert process.stdout is not None
     told = [process.stdout.readline() for _ in range(5)][-1]
@@ -335,20 +328,12 @@ def test_maps_are_made_once_and_anew_after_a_change(tmp_path: Path, own_cache: P
         (lambda root: edit_info(root, codebase_version="v1.6"), FormatError, "pack the session again"),
         (lambda root: edit_info(root, fps=29.97), FormatError, "29.97 frames a second"),
         (lambda root: edit_info(root, total_episodes=7), FormatError, "describes 3 episodes"),
-        (
-            lambda root: edit_info(root, features={"action": {}}),
-            FormatError,
-            "LeRobot dataset without observation",
-        ),
+        (lambda root: edit_info(root, features={"action": {}}), FormatError, "LeRobot dataset without observation"),
         (lambda root: cut(root / folder.data_path(1)), FormatError, "damaged"),
         (lambda root: flip(root / folder.data_path(1)), FormatError, "damaged"),
         (lambda root: (root / folder.data_path(1)).unlink(), FormatError, "is missing"),
         (lambda root: (root / folder.row_path(2)).unlink(), FormatError, "describes 2 episodes"),
-        (
-            lambda root: swap(root / folder.data_path(0), root / folder.data_path(1)),
-            FormatError,
-            "frames are not 0",
-        ),
+        (lambda root: swap(root / folder.data_path(0), root / folder.data_path(1)), FormatError, "frames are not 0"),
         (lambda root: edit_units(root), FormatError, r"observation\.state is in pF"),
     ],
 )

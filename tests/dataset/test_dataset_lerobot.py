@@ -184,10 +184,7 @@ def test_delete_split_merge(lerobot, packed: Path, tmp_path: Path) -> None:
 
 def test_removing_a_column_is_noticed(lerobot, packed: Path, tmp_path: Path) -> None:
     lerobot.tools.remove_feature(
-        lerobot.open(packed),
-        [features.FORCE, features.TIME],
-        output_dir=tmp_path / "less",
-        repo_id="local/less",
+        lerobot.open(packed), [features.FORCE, features.TIME], output_dir=tmp_path / "less", repo_id="local/less"
     )
     with pytest.raises(FormatError, match=r"without tacdata\.force, tacdata\.time_ns"):
         read_dataset(tmp_path / "less")
@@ -259,25 +256,38 @@ def test_a_dataset_that_lerobot_never_finished(lerobot, packed: Path, tmp_path: 
 def older(root: Path) -> None:
     """A folder as lerobot wrote it up to 0.3: a file an episode, its metadata as lines of JSON."""
     shapes = {"observation.state": 2, "timestamp": 1, "frame_index": 1, "episode_index": 1, "index": 1, "task_index": 1}
-    described = {k: {"dtype": "float32" if k[0] in "ot" and k != "task_index" else "int64", "shape": [n], "names": None}
-                 for k, n in shapes.items()}  # fmt: skip
+    described = {
+        k: {"dtype": "float32" if k[0] in "ot" and k != "task_index" else "int64", "shape": [n], "names": None}
+        for k, n in shapes.items()
+    }
     frames_of = np.arange(FRAMES)
     for number in range(2):
         table = {
             "observation.state": pa.FixedSizeListArray.from_arrays(pa.array(np.ones(2 * FRAMES, np.float32)), 2),
-            "timestamp": (frames_of / 30).astype(np.float32), "frame_index": frames_of,
-            "episode_index": np.full(FRAMES, number), "index": frames_of + number * FRAMES,
+            "timestamp": (frames_of / 30).astype(np.float32),
+            "frame_index": frames_of,
+            "episode_index": np.full(FRAMES, number),
+            "index": frames_of + number * FRAMES,
             "task_index": np.zeros(FRAMES, np.int64),
-        }  # fmt: skip
+        }
         path = root / f"data/chunk-000/episode_{number:06d}.parquet"
         path.parent.mkdir(parents=True, exist_ok=True)
         pq.write_table(pa.table(table), path)
     info = {
-        "codebase_version": "v2.1", "robot_type": "x", "total_episodes": 2, "total_frames": 2 * FRAMES,
-        "total_tasks": 1, "total_videos": 0, "total_chunks": 1, "chunks_size": 1000, "fps": 30,
-        "splits": {"train": "0:2"}, "video_path": None, "features": described,
+        "codebase_version": "v2.1",
+        "robot_type": "x",
+        "total_episodes": 2,
+        "total_frames": 2 * FRAMES,
+        "total_tasks": 1,
+        "total_videos": 0,
+        "total_chunks": 1,
+        "chunks_size": 1000,
+        "fps": 30,
+        "splits": {"train": "0:2"},
+        "video_path": None,
+        "features": described,
         "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
-    }  # fmt: skip
+    }
     stats = {k: {**{s: [0.5] * n for s in ("min", "max", "mean", "std")}, "count": [FRAMES]} for k, n in shapes.items()}
     lines = {
         "tasks": [{"task_index": 0, "task": "press"}],

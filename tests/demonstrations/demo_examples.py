@@ -21,14 +21,24 @@ NOISE = 0.0004, np.radians(0.3)
 def rig(cameras=("eye",), fingers=FINGERS, boards=("thumb", "index", "middle"), **more):
     entry = {"driver": "opencv_camera", "source": 0, "intrinsics": INTRINSICS}
     world = {
-        "version": "1.0", "frame": "table", "position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0],
-        "method": "none", "poses": 1, "residual": {"position": 0.0, "rotation": 0.0}, "date": "", "code_version": "",
-    }  # fmt: skip
+        "version": "1.0",
+        "frame": "table",
+        "position": [0.0, 0.0, 0.0],
+        "quaternion": [0.0, 0.0, 0.0, 1.0],
+        "method": "none",
+        "poses": 1,
+        "residual": {"position": 0.0, "rotation": 0.0},
+        "date": "",
+        "code_version": "",
+    }
     document = {
-        "version": "1.0", "name": "bench", "fingers": fingers,
+        "version": "1.0",
+        "name": "bench",
+        "fingers": fingers,
         "boards": {name: {"driver": "capacitive_board", "port": "x"} for name in boards},
-        "cameras": {name: {**entry, "world": {**world, "camera": name}} for name in cameras}, **more,
-    }  # fmt: skip
+        "cameras": {name: {**entry, "world": {**world, "camera": name}} for name in cameras},
+        **more,
+    }
     return demo_rig_of(document, "bench.yaml")
 
 
@@ -49,10 +59,17 @@ def view(finger, seconds=8.5, rate=25.0, camera="eye", seed=0, begin=0.0):
     first = FINGERS["fingers"][finger]["cube"]["ids"]["+x"]
     places = truth[:, :3, 3] + rng.normal(0, NOISE[0], (len(times), 3))
     return TagStream(
-        camera, START + np.rint(times * 1e9).astype(np.int64), places,
-        turns.as_quat(), np.full(len(times), 0.1), np.full(len(times), 2), np.tile(covariance, (len(times), 1, 1)),
-        np.zeros(len(times), bool), ((first, first + 1),) * len(times), finger,
-    )  # fmt: skip
+        camera,
+        START + np.rint(times * 1e9).astype(np.int64),
+        places,
+        turns.as_quat(),
+        np.full(len(times), 0.1),
+        np.full(len(times), 2),
+        np.tile(covariance, (len(times), 1, 1)),
+        np.zeros(len(times), bool),
+        ((first, first + 1),) * len(times),
+        finger,
+    )
 
 
 def taxels(finger, seconds=8.5, rate=30.0):

@@ -75,10 +75,11 @@ def test_cameras_that_stand_still_raise_no_alarm():
     bench, quiet = rig(**TWO), []
     for seed in range(20):
         seen = {
-            name: sightings_of(name, [view(name, camera=c, seed=10 * seed + k) for k, c in enumerate(TWO["cameras"])],
-                               bench)
+            name: sightings_of(
+                name, [view(name, camera=c, seed=10 * seed + k) for k, c in enumerate(TWO["cameras"])], bench
+            )
             for name in NAMES
-        }  # fmt: skip
+        }
         quiet.append(jumps(seen, START) == [])
     assert all(quiet)
 
@@ -127,9 +128,13 @@ def stored(tmp_path, shift_from):
     """A file with the images of one camera, and a demonstration whose other streams are arrays."""
     bench, noise = rig(), np.random.default_rng(1)
     writer = EpisodeWriter(
-        tmp_path / "episode-000000.mcap", DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"),
-        Clock(START, START, 1.0), ("eye",), tuple(bench.fingers), tuple(bench.boards),
-    )  # fmt: skip
+        tmp_path / "episode-000000.mcap",
+        DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"),
+        Clock(START, START, 1.0),
+        ("eye",),
+        tuple(bench.fingers),
+        tuple(bench.boards),
+    )
     for number, image in enumerate(pictures(shift_from, noise)):
         stamp = START + number * 100_000_000
         writer.image("eye", stamp, stamp, number, cv2.imencode(".jpg", image)[1].tobytes(), -1)
@@ -170,6 +175,9 @@ def test_tags_before_an_empty_table_are_no_background():
             image[top : top + 48, left : left + 48] = tag
         images.append((number * 100_000_000, np.clip(np.rint(image), 0, 255).astype(np.uint8)))
     assert _followed(images) == []
-    textured = [(time, np.roll(table, 3 if k > 2 else 0, 1)) for k, (time, _) in enumerate(images)
-                for table in [next(pictures(None, np.random.default_rng(1)))]]  # fmt: skip
+    textured = [
+        (time, np.roll(table, 3 if k > 2 else 0, 1))
+        for k, (time, _) in enumerate(images)
+        for table in [next(pictures(None, np.random.default_rng(1)))]
+    ]
     assert [round(look.shift) for look in _followed(textured)] == [0, 0, 0, 3, 3, 3]

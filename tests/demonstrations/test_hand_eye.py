@@ -154,10 +154,20 @@ def test_images_of_a_board_give_it_too(tmp_path):
         cv2.imwrite(str(tmp_path / "views" / f"{k}.png"), drawn)
     (tmp_path / "board.yaml").write_text(yaml.safe_dump({"version": "1.0", **board.document}))
     found = {
-        "version": "1.0", "date": "2026-01-01", "code_version": "0", "source": "a test", "model": "k1k2p1p2",
-        "intrinsics": intrinsics, "uncertainty": dict.fromkeys(("fx", "fy", "cx", "cy"), 1.0), "rms": 0.1,
-        "held_out_rms": 0.1, "coverage": 1.0, "tilt": 40.0, "board": {}, "views": [],
-    }  # fmt: skip
+        "version": "1.0",
+        "date": "2026-01-01",
+        "code_version": "0",
+        "source": "a test",
+        "model": "k1k2p1p2",
+        "intrinsics": intrinsics,
+        "uncertainty": dict.fromkeys(("fx", "fy", "cx", "cy"), 1.0),
+        "rms": 0.1,
+        "held_out_rms": 0.1,
+        "coverage": 1.0,
+        "tilt": 40.0,
+        "board": {},
+        "views": [],
+    }
     (tmp_path / "camera.yaml").write_text(yaml.safe_dump(found))
     files = {"board": "board.yaml", "calibration": "camera.yaml", "out": "eye.yaml"}
     given = [word for option, file in files.items() for word in (f"--{option}", tmp_path / file)]

@@ -15,10 +15,18 @@ from tacdata.errors import FormatError
 WORLD = rig().document["cameras"]["eye"]["world"]
 
 
-@pytest.mark.parametrize(("values", "seen"), [
-    ({"quaternion": np.nan}, False), ({"quaternion": 0.0}, False), ({"position": np.inf}, False),
-    ({"covariance": np.inf}, True), ({"covariance": np.diag([-1e-4] * 6)}, True), ({"covariance": 0.0}, True),
-], ids=["no number", "no length", "infinite place", "infinite doubt", "negative doubt", "no doubt"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("values", "seen"),
+    [
+        ({"quaternion": np.nan}, False),
+        ({"quaternion": 0.0}, False),
+        ({"position": np.inf}, False),
+        ({"covariance": np.inf}, True),
+        ({"covariance": np.diag([-1e-4] * 6)}, True),
+        ({"covariance": 0.0}, True),
+    ],
+    ids=["no number", "no length", "infinite place", "infinite doubt", "negative doubt", "no doubt"],
+)
 def test_a_pose_that_cannot_be_costs_its_image_alone(values, seen):
     stream = view("index", seconds=5.0)
     odd = np.zeros(len(stream.sample_ns), bool)
@@ -43,18 +51,24 @@ def index(what, **values):
     return {**rig().document, "fingers": fingers}
 
 
-@pytest.mark.parametrize(("document", "words"), [
-    (camera(world={"position": [100.0, -360.0, 360.0]}), "518.845 m away: are these millimetres"),
-    (camera(world={"position": [np.nan, 0.0, 0.0]}), "a position nan m away"),
-    (camera(world={"spread": {"position": 0.0002, "rotation": 2.0}}), "rotation of 2 rad: are these degrees"),
-    (camera(world={"spread": {"position": 0.2, "rotation": 0.001}}), "position of 0.2 m: are these millimetres"),
-    (camera(world={"spread": {"position": -0.001, "rotation": 0.001}}), "position of -0.001 m"),
-    (camera(intrinsics={"fx": -880.0}), "fx -880"),
-    (camera(intrinsics={"fx": 4.0, "fy": 4.0}), "fx 4.0, fy 4.0 px for an image 800 px wide: are these millimetres"),
-    (index("tip", position=[0.010, 0.0, -0.018]), "inside the cube of 20 mm: is it in metres"),
-    (index("tip", position=[10000.0, 0.0, -18000.0]), "away from its cube: is it in micrometres"),
-    (index("cube", side=0.020, tag=0.016), "a side of 0.02 mm: is it in another unit"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("document", "words"),
+    [
+        (camera(world={"position": [100.0, -360.0, 360.0]}), "518.845 m away: are these millimetres"),
+        (camera(world={"position": [np.nan, 0.0, 0.0]}), "a position nan m away"),
+        (camera(world={"spread": {"position": 0.0002, "rotation": 2.0}}), "rotation of 2 rad: are these degrees"),
+        (camera(world={"spread": {"position": 0.2, "rotation": 0.001}}), "position of 0.2 m: are these millimetres"),
+        (camera(world={"spread": {"position": -0.001, "rotation": 0.001}}), "position of -0.001 m"),
+        (camera(intrinsics={"fx": -880.0}), "fx -880"),
+        (
+            camera(intrinsics={"fx": 4.0, "fy": 4.0}),
+            "fx 4.0, fy 4.0 px for an image 800 px wide: are these millimetres",
+        ),
+        (index("tip", position=[0.010, 0.0, -0.018]), "inside the cube of 20 mm: is it in metres"),
+        (index("tip", position=[10000.0, 0.0, -18000.0]), "away from its cube: is it in micrometres"),
+        (index("cube", side=0.020, tag=0.016), "a side of 0.02 mm: is it in another unit"),
+    ],
+)
 def test_a_rig_file_in_another_unit_is_refused_with_its_figure(document, words):
     with pytest.raises(FormatError) as error:
         demo_rig_of(document, "bench.yaml")
@@ -73,13 +87,19 @@ def pair(**changes):
     return document
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"camera": "eye"}, "the world of camera other is a file of camera eye"),
-    ({"camera": "camera"}, "cameras eye and other stand in the same place: is one file named twice"),
-    ({"board": {**BOARD, "columns": 11}}, "different boards, of 9 x 6 squares of 25 mm and 11 x 6 squares of 25 mm"),
-    ({"board": {**BOARD, "square": 30.0}}, "9 x 6 squares of 30 mm"),
-    ({"frame": "robot"}, r"cameras in several worlds (robot, table)"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"camera": "eye"}, "the world of camera other is a file of camera eye"),
+        ({"camera": "camera"}, "cameras eye and other stand in the same place: is one file named twice"),
+        (
+            {"board": {**BOARD, "columns": 11}},
+            "different boards, of 9 x 6 squares of 25 mm and 11 x 6 squares of 25 mm",
+        ),
+        ({"board": {**BOARD, "square": 30.0}}, "9 x 6 squares of 30 mm"),
+        ({"frame": "robot"}, r"cameras in several worlds (robot, table)"),
+    ],
+)
 def test_the_file_of_another_camera_or_board_is_refused_by_name(changes, words):
     with pytest.raises(FormatError) as error:
         demo_rig_of(pair(**changes), "bench.yaml")

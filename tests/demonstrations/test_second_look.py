@@ -36,9 +36,13 @@ def recorded(tmp_path):
     bench, rng = rig(), np.random.default_rng(0)
     path = tmp_path / "episode-000000.mcap"
     writer = EpisodeWriter(
-        path, DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"), Clock(START, START, 1.0),
-        ("eye",), tuple(bench.fingers), tuple(bench.boards),
-    )  # fmt: skip
+        path,
+        DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"),
+        Clock(START, START, 1.0),
+        ("eye",),
+        tuple(bench.fingers),
+        tuple(bench.boards),
+    )
     for number, seconds in enumerate(TIMES.tolist()):
         stamp = START + round(seconds * 1e9)
         jpeg = cv2.imencode(".jpg", image(seconds, rng))[1].tobytes()
@@ -61,16 +65,24 @@ def aruco(_):
 
 @pytest.mark.parametrize(
     ("seen", "found", "remedy"),
-    [(mirror, "5 of 5 images show mirrored tags", "mirroring off"), (aruco, "family ArUco 5x5", "family 36h11"),
-     (lambda image: 255 - image, "white on black", "black on white"), (lambda image: image // 2 * 0, "", "light")],
+    [
+        (mirror, "5 of 5 images show mirrored tags", "mirroring off"),
+        (aruco, "family ArUco 5x5", "family 36h11"),
+        (lambda image: 255 - image, "white on black", "black on white"),
+        (lambda image: image // 2 * 0, "", "light"),
+    ],
     ids=["mirrored", "aruco", "inverted", "dark"],
-)  # fmt: skip
+)
 def test_why_no_tag_is_seen_is_looked_for_and_named(tmp_path, seen, found, remedy):
     bench, rng = rig(), np.random.default_rng(0)
     writer = EpisodeWriter(
-        tmp_path / "episode-000000.mcap", DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"),
-        Clock(START, START, 1.0), ("eye",), tuple(bench.fingers), tuple(bench.boards),
-    )  # fmt: skip
+        tmp_path / "episode-000000.mcap",
+        DemoHeader(bench.document, {name: {} for name in bench.boards}, "grasp"),
+        Clock(START, START, 1.0),
+        ("eye",),
+        tuple(bench.fingers),
+        tuple(bench.boards),
+    )
     picture = seen(image(TIMES[0], rng))
     for number in range(20):
         stamp = START + number * 50_000_000

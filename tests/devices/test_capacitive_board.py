@@ -26,9 +26,8 @@ def impatient(monkeypatch):
 def board():
     clock = Clock.start(RATE)
     emulated = VirtualBoard(
-        clock, default_format(), draw_timing(3, clock.now_ns(), 30.0),
-        lambda t: np.full(24, t // 1_000_000 % 50_000),
-    )  # fmt: skip
+        clock, default_format(), draw_timing(3, clock.now_ns(), 30.0), lambda t: np.full(24, t // 1_000_000 % 50_000)
+    )
     emulated.start()
     yield clock, emulated
     emulated.stop()
@@ -67,12 +66,15 @@ def test_description_needs_no_port():
     assert said["rate"] == {"nominal": 30.0, "unit": "Hz"}
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ({"sync": [1, 2]}, r"sync 01 02 is not among them"),
-    ({"channels": {"count": 16, "type": "uint16"}}, r"refused(.|\n)*16 channels"),
-    ({"checksum": {"kind": "crc16_modbus"}}, r"crc16_modbus checksum"),
-    ({"encoding": "ascii", "sync": "", "checksum": {"kind": "none"}}, r"25 numbers"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"sync": [1, 2]}, r"sync 01 02 is not among them"),
+        ({"channels": {"count": 16, "type": "uint16"}}, r"refused(.|\n)*16 channels"),
+        ({"checksum": {"kind": "crc16_modbus"}}, r"crc16_modbus checksum"),
+        ({"encoding": "ascii", "sync": "", "checksum": {"kind": "none"}}, r"25 numbers"),
+    ],
+)
 def test_wrong_format_says_what_came(board, change, words):
     clock, emulated = board
     layout = {**default_format().document, **change}

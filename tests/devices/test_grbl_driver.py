@@ -109,11 +109,7 @@ def test_dwell_lasts_its_time(rig):
 
 @pytest.mark.parametrize(
     "rig",
-    [
-        {"settings": {"$10": "0"}, "offset": (-10.0, 5.0, 2.5)},
-        {"settings": {"$13": "1"}},
-        {"settings": {"$10": "3"}},
-    ],
+    [{"settings": {"$10": "0"}, "offset": (-10.0, 5.0, 2.5)}, {"settings": {"$13": "1"}}, {"settings": {"$10": "3"}}],
     indirect=True,
 )
 def test_machine_position_whatever_the_report_settings(rig):
@@ -447,9 +443,10 @@ def test_overrides_are_set_back_at_opening_and_minded_after(rig):
         driver.check()
 
 
-@pytest.mark.parametrize(("lines", "state", "remedy"), [
-    (["$SLP"], "Sleep", "wake it"), (["$C"], "Check", "check mode"), (["$J=G91X-20F60"], "Jog", "let it finish"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("lines", "state", "remedy"),
+    [(["$SLP"], "Sleep", "wake it"), (["$C"], "Check", "check mode"), (["$J=G91X-20F60"], "Jog", "let it finish")],
+)
 def test_states_that_only_a_person_should_end(rig, lines, state, remedy):
     clock, controller, driver = rig
     for line in lines:

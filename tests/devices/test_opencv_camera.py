@@ -58,11 +58,10 @@ def test_size_must_be_that_of_the_intrinsics(tmp_path):
         OpencvCamera(CLOCK, str(tmp_path), INTRINSICS).open()
 
 
-@pytest.mark.parametrize(("source", "words"), [
-    ("missing.mp4", "does not exist"),
-    (97, "no camera 97"),
-    ("http://127.0.0.1:9/none.mjpg", "cannot be opened"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [("missing.mp4", "does not exist"), (97, "no camera 97"), ("http://127.0.0.1:9/none.mjpg", "cannot be opened")],
+)
 def test_missing_sources(source, words):
     with pytest.raises(DeviceError, match=words):
         OpencvCamera(CLOCK, source, INTRINSICS).open()
@@ -161,12 +160,15 @@ def test_damaged_jpegs_are_counted_and_many_are_a_fault():
     assert camera.damaged >= 3 and camera._sequence == 2
 
 
-@pytest.mark.parametrize(("setting", "words"), [
-    ({"backend": "gstream"}, "v4l2"),
-    ({"fourcc": "JPEG2"}, "four letters"),
-    ({"exposure": -3}, "exposure"),
-    ({"exposure": "long"}, "exposure"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ({"backend": "gstream"}, "v4l2"),
+        ({"fourcc": "JPEG2"}, "four letters"),
+        ({"exposure": -3}, "exposure"),
+        ({"exposure": "long"}, "exposure"),
+    ],
+)
 def test_settings_that_mean_nothing_are_refused(setting, words):
     with pytest.raises(UsageError, match=words):
         OpencvCamera(CLOCK, 0, INTRINSICS, **setting)

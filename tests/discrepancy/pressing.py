@@ -12,9 +12,23 @@ FINE = 200
 
 
 def course(
-    seed=0, episodes=24, rates=(0.5, 2.0), noise=1.0, lag=0.0, delay=0.0, relaxed=0.0, play=0.0, hold=1.5, pulls=True,
-    power=1.0, friction=0.0, recovery=None, times=((2.0, 1.0),), radii=(4.0,), by_radius=0.0,
-):  # fmt: skip
+    seed=0,
+    episodes=24,
+    rates=(0.5, 2.0),
+    noise=1.0,
+    lag=0.0,
+    delay=0.0,
+    relaxed=0.0,
+    play=0.0,
+    hold=1.5,
+    pulls=True,
+    power=1.0,
+    friction=0.0,
+    recovery=None,
+    times=((2.0, 1.0),),
+    radii=(4.0,),
+    by_radius=0.0,
+):
     """Return presses of three channels at two places; sizes in s, s, share, mm.
 
     What relaxes does so by ``times``, each with its share; under a tool they are longer by its radius over the mean of
@@ -57,14 +71,18 @@ def course(
     count = [len(rows.time) for _, rows in parts]
     episode = np.repeat(np.arange(episodes), count)
     return Course(
-        time=np.concatenate([begin + rows.time for begin, rows in parts]), episode=episode,
-        tip=np.concatenate([rows.tip for _, rows in parts]), tool=tools[episode],
+        time=np.concatenate([begin + rows.time for begin, rows in parts]),
+        episode=episode,
+        tip=np.concatenate([rows.tip for _, rows in parts]),
+        tool=tools[episode],
         readings=np.concatenate([rows.values for _, rows in parts]),
-        averaged=np.concatenate([rows.averaged for _, rows in parts]), session=np.zeros(episodes, dtype=int),
+        averaged=np.concatenate([rows.averaged for _, rows in parts]),
+        session=np.zeros(episodes, dtype=int),
         site=np.arange(episodes) % 2,
         tools=tuple(Tool(f"ball {k}" if k else "ball", "sphere", r) for k, r in enumerate(radii)),
-        names=tuple(f"press {k}" for k in range(episodes)), centers=np.array([[-1.0, 0], [0, 0], [1, 0]]),
-    )  # fmt: skip
+        names=tuple(f"press {k}" for k in range(episodes)),
+        centers=np.array([[-1.0, 0], [0, 0], [1, 0]]),
+    )
 
 
 def lagged(values, lag, before):

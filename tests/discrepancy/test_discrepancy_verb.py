@@ -87,8 +87,12 @@ def test_nothing_is_overwritten_and_bad_input_is_answered_in_words(session, tmp_
     (tmp_path / "spec.json").write_text(json.dumps({"version": "1.0", "name": "x"}))
     with pytest.raises(FormatError, match="response"):
         read_spec(tmp_path / "spec.json")
-    spec = {"version": "1.0", "name": "x", "response": {"kind": "fitted"},
-            "effects": [{"effect": "latency", "values": {"late": 1.0}}]}  # fmt: skip
+    spec = {
+        "version": "1.0",
+        "name": "x",
+        "response": {"kind": "fitted"},
+        "effects": [{"effect": "latency", "values": {"late": 1.0}}],
+    }
     (tmp_path / "spec.json").write_text(json.dumps(spec))
     with pytest.raises(FormatError, match="latency"):
         run([session], read_spec(tmp_path / "spec.json"), tmp_path / "new")

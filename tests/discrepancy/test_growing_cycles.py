@@ -39,11 +39,15 @@ def cycles(softened, seed=0, sets=3, count=6, touch=0.006):
         clock += PERIOD
     length = [len(rows.time) for _, rows in parts]
     return replace(
-        made, time=np.concatenate([begin + rows.time for begin, rows in parts]),
-        episode=np.repeat(np.arange(len(parts)), length), tip=np.concatenate([rows.tip for _, rows in parts]),
-        tool=np.zeros(sum(length), dtype=int), readings=np.concatenate([rows.values for _, rows in parts]),
-        averaged=np.concatenate([rows.averaged for _, rows in parts]), site=np.zeros(len(parts), dtype=int),
-    )  # fmt: skip
+        made,
+        time=np.concatenate([begin + rows.time for begin, rows in parts]),
+        episode=np.repeat(np.arange(len(parts)), length),
+        tip=np.concatenate([rows.tip for _, rows in parts]),
+        tool=np.zeros(sum(length), dtype=int),
+        readings=np.concatenate([rows.values for _, rows in parts]),
+        averaged=np.concatenate([rows.averaged for _, rows in parts]),
+        site=np.zeros(len(parts), dtype=int),
+    )
 
 
 @pytest.mark.parametrize(("softened", "status"), [(0.08, "named"), (0.0, "none")])

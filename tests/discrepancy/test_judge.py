@@ -219,11 +219,19 @@ def test_sealed_episodes_take_a_name_away_where_chance_is_no_reason(power, share
         course=course(episodes=8), channel_gain=None, response=FittedResponse(course(episodes=8)), nuisance={}
     )
     fields = {
-        "effects": (one,), "until": "decide", "gap": True, "tests": SimpleNamespace(p_generic=0.001),
-        "left": SimpleNamespace(t=0.0, gain=0.0), "share_left": 0.0, "loudness": 2.0, "explained": 400.0,
-        "values": np.ones(40), "gains": np.zeros(3), "energy": (np.ones(40),) * 2,
+        "effects": (one,),
+        "until": "decide",
+        "gap": True,
+        "tests": SimpleNamespace(p_generic=0.001),
+        "left": SimpleNamespace(t=0.0, gain=0.0),
+        "share_left": 0.0,
+        "loudness": 2.0,
+        "explained": 400.0,
+        "values": np.ones(40),
+        "gains": np.zeros(3),
+        "energy": (np.ones(40),) * 2,
         "problem": SimpleNamespace(setting=setting, null=SimpleNamespace(odd=())),
-    }  # fmt: skip
+    }
     found = cast(Any, SimpleNamespace(**fields))
     assert decide(found, DataChecks(44), (), sealed(power, share)).status == status
 
@@ -239,11 +247,20 @@ def test_behind_a_closed_gate_sealed_episodes_alone_bear_a_gain_out(gap, share, 
         course=made, channel_gain=load("channel_gain"), nuisance={"channel_gain": 0.05}, response=FittedResponse(made)
     )
     fields = {
-        "effects": (), "until": "decide", "gap": gap, "tests": SimpleNamespace(p_generic=0.6), "explained": 0.0,
-        "left": SimpleNamespace(t=0.0, gain=0.0), "share_left": 0.0, "loudness": 1.0, "values": np.ones(40),
-        "gains": gains, "halves": np.stack([gains, gains]), "energy": (np.ones(40),) * 2,
+        "effects": (),
+        "until": "decide",
+        "gap": gap,
+        "tests": SimpleNamespace(p_generic=0.6),
+        "explained": 0.0,
+        "left": SimpleNamespace(t=0.0, gain=0.0),
+        "share_left": 0.0,
+        "loudness": 1.0,
+        "values": np.ones(40),
+        "gains": gains,
+        "halves": np.stack([gains, gains]),
+        "energy": (np.ones(40),) * 2,
         "problem": SimpleNamespace(setting=setting, null=SimpleNamespace(odd=())),
-    }  # fmt: skip
+    }
     shown = None if share is None else sealed(40.0, share)
     assert decide(cast(Any, SimpleNamespace(**fields)), DataChecks(44), (), shown).status == status
 

@@ -40,13 +40,20 @@ def dent(episode):
     taxels, zero = (count, episode.sensor.taxels.count), np.zeros(count, np.float32)
     parents = {"sensor": episode.sensor.content_hash, "recording": frames.recording_hash(episode), "model": "0" * 64}
     return Label(
-        episode=episode.number, time_ns=times, tip=tip, signed=signed, error=zero, force_error=zero,
-        taxel_force=np.zeros(taxels, np.float32), taxel_closure=np.zeros(taxels, np.float32),
-        taxel_area=np.zeros(taxels, np.float32), force=np.zeros((count, 3), np.float32),
+        episode=episode.number,
+        time_ns=times,
+        tip=tip,
+        signed=signed,
+        error=zero,
+        force_error=zero,
+        taxel_force=np.zeros(taxels, np.float32),
+        taxel_closure=np.zeros(taxels, np.float32),
+        taxel_area=np.zeros(taxels, np.float32),
+        force=np.zeros((count, 3), np.float32),
         error_map=np.zeros(signed.shape, np.float16),
         traction=np.float16(0.1 * signed[:, None] * np.array([0.2, 0.0, 1.0])[:, None, None]),
         provenance=provenance.stamp("example", parents, {}),
-    )  # fmt: skip
+    )
 
 
 def foreign(folder):

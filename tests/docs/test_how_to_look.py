@@ -36,10 +36,16 @@ EPISODES, FRAMES = 20, 6
 def predicted(label, sensor, number, factor):
     """Return a network's maps of a label's frames."""
     return PredictedMaps(
-        episode=number, time_ns=label.time_ns, depth=np.float32(factor) * np.maximum(label.signed, 0), part="test",
-        checkpoint="ab" * 32, network="tacprint", dataset="cd" * 32, sensor=sensor.content_hash,
+        episode=number,
+        time_ns=label.time_ns,
+        depth=np.float32(factor) * np.maximum(label.signed, 0),
+        part="test",
+        checkpoint="ab" * 32,
+        network="tacprint",
+        dataset="cd" * 32,
+        sensor=sensor.content_hash,
         provenance=label.provenance,
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -139,9 +145,11 @@ def looked_at(monkeypatch):
 def datasets(address):
     """Ask a catalogue for its entries, by gRPC over HTTP; names stand in the answer as plain text."""
     request = urllib.request.Request(
-        f"{address}/rerun.cloud.v1alpha1.RerunCloudService/FindEntries", data=b"\0\0\0\0\0", method="POST",
+        f"{address}/rerun.cloud.v1alpha1.RerunCloudService/FindEntries",
+        data=b"\0\0\0\0\0",
+        method="POST",
         headers={"Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"},
-    )  # fmt: skip
+    )
     with urllib.request.urlopen(request, timeout=60) as answer:
         return answer.read().decode("latin-1")
 

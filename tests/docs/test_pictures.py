@@ -34,10 +34,16 @@ def drawn(tmp_path_factory):
         label = read_label(folder / "session" / "labels" / f"episode-{number:06d}.parquet")
         sensor = read_episode(folder / "session" / f"episode-{number:06d}.mcap").sensor
         maps = PredictedMaps(
-            episode=number, time_ns=label.time_ns, depth=np.float32(0.9) * np.maximum(label.signed, 0), part="test",
-            checkpoint="ab" * 32, network="paper", dataset="cd" * 32, sensor=sensor.content_hash,
+            episode=number,
+            time_ns=label.time_ns,
+            depth=np.float32(0.9) * np.maximum(label.signed, 0),
+            part="test",
+            checkpoint="ab" * 32,
+            network="paper",
+            dataset="cd" * 32,
+            sensor=sensor.content_hash,
             provenance=label.provenance,
-        )  # fmt: skip
+        )
         write_prediction(folder / "network" / "predictions" / f"episode-{number:06d}.parquet", maps)
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(film.MOST, ".gif", 2)

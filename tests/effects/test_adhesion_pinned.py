@@ -57,10 +57,17 @@ def test_pressed_again_before_it_lets_go_it_follows_the_same_line():
 def test_without_readings_above_the_touch_nothing_tells_it_from_friction():
     away = np.array([0.0, 1.0, 0.0])
     course = Course(
-        time=np.arange(3.0), episode=np.zeros(3, int), tip=np.column_stack([away, away, away]), tool=np.zeros(3, int),
-        readings=np.zeros((3, 1)), averaged=np.ones(3), session=np.zeros(1, int), site=np.zeros(1, int),
-        tools=(Tool("ball", "sphere", 4.0),), names=("press",),
-    )  # fmt: skip
+        time=np.arange(3.0),
+        episode=np.zeros(3, int),
+        tip=np.column_stack([away, away, away]),
+        tool=np.zeros(3, int),
+        readings=np.zeros((3, 1)),
+        averaged=np.ones(3),
+        session=np.zeros(1, int),
+        site=np.zeros(1, int),
+        tools=(Tool("ball", "sphere", 4.0),),
+        names=("press",),
+    )
     assert "friction" in STICKS.unjudgeable(course, None)
     course.tip[-1, 2] = -0.1
     course = Course(**{name: getattr(course, name) for name in course.__dataclass_fields__})

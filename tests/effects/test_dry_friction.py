@@ -43,13 +43,17 @@ def strokes(seal=0.0, skin=0.0, relaxed=0.0, seed=0):
     count = [len(rows.time) for _, rows in parts]
     episode = np.repeat(np.arange(18), count)
     return Course(
-        time=np.concatenate([begin + rows.time for begin, rows in parts]), episode=episode,
-        tip=np.concatenate([rows.tip for _, rows in parts]), tool=np.zeros(len(episode), dtype=int),
+        time=np.concatenate([begin + rows.time for begin, rows in parts]),
+        episode=episode,
+        tip=np.concatenate([rows.tip for _, rows in parts]),
+        tool=np.zeros(len(episode), dtype=int),
         readings=np.concatenate([rows.values for _, rows in parts]),
-        averaged=np.concatenate([rows.averaged for _, rows in parts]), session=np.zeros(18, dtype=int),
-        site=np.zeros(18, dtype=int), tools=(Tool("flat", "unknown", float("nan")),),
+        averaged=np.concatenate([rows.averaged for _, rows in parts]),
+        session=np.zeros(18, dtype=int),
+        site=np.zeros(18, dtype=int),
+        tools=(Tool("flat", "unknown", float("nan")),),
         names=tuple(f"stroke {k}" for k in range(18)),
-    )  # fmt: skip
+    )
 
 
 FRICTION = ("dry_friction", "bouc_wen", "proportional_hysteresis", "hysteresis", "backlash")

@@ -97,11 +97,20 @@ def read_with(effect, size, rates):
     depth, rows = np.concatenate([d for _, _, d in parts]), sum(len(t) for t, _, _ in parts)
     episode = np.concatenate([np.full(len(t), k) for t, k, _ in parts])
     course = replace(
-        made, time=np.concatenate([t for t, _, _ in parts]), episode=episode, averaged=np.ones(rows),
-        tip=np.column_stack([0 * depth + 0.3, 0 * depth + 0.2, depth]), tool=np.zeros(rows, dtype=int),
-        readings=np.zeros((rows, 9)), session=np.zeros(16, dtype=int), site=np.zeros(16, dtype=int),
-        names=tuple(f"press {k}" for k in range(16)), force=None, tag=None, temperature=None,
-    )  # fmt: skip
+        made,
+        time=np.concatenate([t for t, _, _ in parts]),
+        episode=episode,
+        averaged=np.ones(rows),
+        tip=np.column_stack([0 * depth + 0.3, 0 * depth + 0.2, depth]),
+        tool=np.zeros(rows, dtype=int),
+        readings=np.zeros((rows, 9)),
+        session=np.zeros(16, dtype=int),
+        site=np.zeros(16, dtype=int),
+        names=tuple(f"press {k}" for k in range(16)),
+        force=None,
+        tag=None,
+        temperature=None,
+    )
     truth = predict(course, response, [Placed(effect, {effect.parameters[0].name: np.array(size)})]).signal
     return replace(course, readings=truth + rng.normal(size=truth.shape)), response
 
@@ -204,10 +213,16 @@ def test_one_that_follows_the_clock_is_held_against_others_that_do(newcomer, clo
     def model(residual, *placed):
         episode = np.repeat(np.arange(12), 10)
         return SimpleNamespace(
-            left=residual, episode=episode, place=episode // 4, placed=placed, freedom=0.0, projected_draws=still,
-            energy=0.5 * np.bincount(episode, np.square(residual).sum(axis=1)), knobs=[],
+            left=residual,
+            episode=episode,
+            place=episode // 4,
+            placed=placed,
+            freedom=0.0,
+            projected_draws=still,
+            energy=0.5 * np.bincount(episode, np.square(residual).sum(axis=1)),
+            knobs=[],
             loss=0.5 * float(np.square(residual).sum()),
-        )  # fmt: skip
+        )
 
     rng, still = np.random.default_rng(0), np.zeros((120, 1, 2))
     noise = rng.normal(size=(120, 1))
@@ -258,9 +273,7 @@ def test_one_that_does_neither_leaves_the_labels(newcomer):
 @pytest.mark.parametrize("seen", [True, False])
 def test_a_tag_sees_what_it_can(newcomer, seen):
     effect = newcomer(f"seen_by_tag = {seen}", stage="kinematics")
-    before, after = (
-        predict(pressed(), Springs(), [Placed(effect, {"k": np.array(size)})]) for size in (0.0, 0.1)
-    )  # fmt: skip
+    before, after = (predict(pressed(), Springs(), [Placed(effect, {"k": np.array(size)})]) for size in (0.0, 0.1))
     assert not np.array_equal(after.pose, before.pose)
     assert np.array_equal(after.tag, before.tag) != seen
 

@@ -13,9 +13,19 @@ from tacdata.effects import Family, Placed, library, load
 
 EFFECTS = library()
 GROUPS = {
-    "amplitude", "hold time", "lag", "loading and unloading", "depth offset", "lateral", "depth curvature",
-    "lateral spread", "per channel", "clock", "temperature", "simulator",
-}  # fmt: skip
+    "amplitude",
+    "hold time",
+    "lag",
+    "loading and unloading",
+    "depth offset",
+    "lateral",
+    "depth curvature",
+    "lateral spread",
+    "per channel",
+    "clock",
+    "temperature",
+    "simulator",
+}
 
 
 class Springs(Response):
@@ -46,11 +56,21 @@ def pressed():
     tip = np.column_stack([xy, depth])
     n = len(time)
     return Course(
-        time=time, episode=episode, tip=tip, tool=(episode % 2).astype(int), readings=np.zeros((n, 9)),
-        averaged=np.ones(n), session=np.array([0, 0, 1, 2, 2, 3]), site=site,
-        tools=(Tool("a", "sphere", 4.0), Tool("b", "sphere", 2.0)), names=tuple("abcdef"), centers=Springs.places,
-        force=np.zeros(n), tag=tip + 0.02, temperature=20 + time / time[-1] * 5,
-    )  # fmt: skip
+        time=time,
+        episode=episode,
+        tip=tip,
+        tool=(episode % 2).astype(int),
+        readings=np.zeros((n, 9)),
+        averaged=np.ones(n),
+        session=np.array([0, 0, 1, 2, 2, 3]),
+        site=site,
+        tools=(Tool("a", "sphere", 4.0), Tool("b", "sphere", 2.0)),
+        names=tuple("abcdef"),
+        centers=Springs.places,
+        force=np.zeros(n),
+        tag=tip + 0.02,
+        temperature=20 + time / time[-1] * 5,
+    )
 
 
 def values(effect, size):

@@ -15,8 +15,15 @@ from tacdata.discrepancy.verdict.decide import decide
 from tacdata.effects import Placed, load
 
 FEW = (
-    "hysteresis_apart", "hysteresis", "hysteresis_read", "dry_friction", "backlash", "creep", "relaxation", "latency",
-)  # fmt: skip
+    "hysteresis_apart",
+    "hysteresis",
+    "hysteresis_read",
+    "dry_friction",
+    "backlash",
+    "creep",
+    "relaxation",
+    "latency",
+)
 RATE = 20
 
 
@@ -48,12 +55,18 @@ def foam(share=0.2, seed=0, episodes=12):
     time, depth, read, force = (np.concatenate(column) for column in zip(*parts, strict=True))
     episode = np.repeat(np.arange(episodes), [len(part[0]) for part in parts])
     return Course(
-        time=time, episode=episode, tip=np.column_stack([0 * depth, 0 * depth, depth]),
-        tool=np.zeros(len(time), dtype=int), readings=read[:, None], averaged=np.ones(len(time)),
-        session=np.zeros(episodes, dtype=int), site=np.zeros(episodes, dtype=int),
-        tools=(Tool("flat", "unknown", float("nan")),), names=tuple(f"stroke {k}" for k in range(episodes)),
+        time=time,
+        episode=episode,
+        tip=np.column_stack([0 * depth, 0 * depth, depth]),
+        tool=np.zeros(len(time), dtype=int),
+        readings=read[:, None],
+        averaged=np.ones(len(time)),
+        session=np.zeros(episodes, dtype=int),
+        site=np.zeros(episodes, dtype=int),
+        tools=(Tool("flat", "unknown", float("nan")),),
+        names=tuple(f"stroke {k}" for k in range(episodes)),
         force=force,
-    )  # fmt: skip
+    )
 
 
 def named(made):

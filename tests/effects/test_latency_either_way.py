@@ -15,10 +15,17 @@ def late(onset, recovery, sign=1.0):
     triangle = sign * np.interp(time, [1.0, 3.0, 5.0], [0.0, 2.0, 0.0])
     n = len(time)
     course = Course(
-        time=time, episode=np.zeros(n, dtype=int), tip=np.zeros((n, 3)), tool=np.zeros(n, dtype=int),
-        readings=np.zeros((n, 1)), averaged=np.ones(n), session=np.zeros(1, dtype=int), site=np.zeros(1, dtype=int),
-        tools=(), names=("one",),
-    )  # fmt: skip
+        time=time,
+        episode=np.zeros(n, dtype=int),
+        tip=np.zeros((n, 3)),
+        tool=np.zeros(n, dtype=int),
+        readings=np.zeros((n, 1)),
+        averaged=np.ones(n),
+        session=np.zeros(1, dtype=int),
+        site=np.zeros(1, dtype=int),
+        tools=(),
+        names=("one",),
+    )
     signal = 7.0 + triangle[:, None]
     state = State(course, cast(Any, None), np.zeros((n, 3)), triangle[:, None], triangle, signal)
     values = {"L_in": np.array(onset), "L_out": np.array(recovery)}

@@ -21,9 +21,10 @@ def test_a_held_load_relaxes_as_a_gel_under_a_sphere(tool, slower):
     time = np.concatenate([[0.0, 1e-9], np.logspace(-3, 2.5, 400)])  # at once, then held
     one = np.where(time > 0, 1.0, 0.0)
     course = SimpleNamespace(
-        tool=np.full(len(time), tool), step=np.diff(time, prepend=0.0),
+        tool=np.full(len(time), tool),
+        step=np.diff(time, prepend=0.0),
         tools=(SimpleNamespace(radius=2.0), SimpleNamespace(radius=4.0)),
-    )  # fmt: skip
+    )
     after = load("poroelasticity").apply(
         Held(one[:, None], 5 * one, course), {"f": np.array(0.3), "tau": np.array(4.0)}
     )
@@ -46,11 +47,18 @@ def test_what_one_tool_pressed_out_comes_back_while_another_presses():
         return load("poroelasticity").apply(Held(one[:, None], one, course), values).load[:, 0]
 
     same, larger = after((2.0, 2.0)), after((2.0, 4.0))
-    alone = load("poroelasticity").apply(
-        Held(one[:, None], one, SimpleNamespace(
-            tool=0 * tool, step=np.diff(time, prepend=0.0), tools=(SimpleNamespace(radius=2.0),))),
-        {"f": np.array(0.3), "tau": np.array(4.0)},
-    ).load[:, 0]  # fmt: skip
+    alone = (
+        load("poroelasticity")
+        .apply(
+            Held(
+                one[:, None],
+                one,
+                SimpleNamespace(tool=0 * tool, step=np.diff(time, prepend=0.0), tools=(SimpleNamespace(radius=2.0),)),
+            ),
+            {"f": np.array(0.3), "tau": np.array(4.0)},
+        )
+        .load[:, 0]
+    )
     assert same == pytest.approx(alone)  # which of two equal tools it is makes no difference
     assert larger[1100] < -0.05  # a second after, the skin is still pressed in
     assert larger[-1] == pytest.approx(0.0, abs=0.05 * abs(larger[1100]))

@@ -9,9 +9,11 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[2] / "examples"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
 JUDGED = pytest.mark.long(
-    "examples/hidden_delay.py", "tacdata/commands/import.py", "tacdata/commands/discrepancy.py",
+    "examples/hidden_delay.py",
+    "tacdata/commands/import.py",
+    "tacdata/commands/discrepancy.py",
     reason="a verdict among all effects",
-)  # fmt: skip
+)
 RUN = [pytest.param(path, marks=JUDGED) if path.stem == "hidden_delay" else path for path in EXAMPLES]
 
 

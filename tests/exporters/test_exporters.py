@@ -36,10 +36,19 @@ def demonstration(rows=40, network=NETWORK, number=0):
         depth[20:21] = np.nan
         place[:2] = turns[:2] = np.nan  # not yet seen
         tracks[name] = FingerTrack(
-            name, "right", name, place, turns, np.tile(np.eye(6) * 1e-8, (rows, 1, 1)), gap, rows, 0,
-            rng.normal(0, 100, (rows, 24)).astype(np.float32), depth.astype(np.float32) if network else None,
+            name,
+            "right",
+            name,
+            place,
+            turns,
+            np.tile(np.eye(6) * 1e-8, (rows, 1, 1)),
+            gap,
+            rows,
+            0,
+            rng.normal(0, 100, (rows, 24)).astype(np.float32),
+            depth.astype(np.float32) if network else None,
             np.linspace(0, 2, rows, dtype=np.float32) if network else None,
-        )  # fmt: skip
+        )
     time_ns = 1_700_000_000_000_000_000 + np.rint(seconds * 1e9).astype(np.int64)
     name = f"episode-{number:06d}.mcap"
     sensors = dict.fromkeys(tracks, default_sensor())
@@ -76,11 +85,14 @@ def fingers_urdf(velocity=5.0, reach=0.5, mimic=""):
 def robot(tmp_path, text=None, **more):
     (tmp_path / "two.urdf").write_text(text or fingers_urdf())
     document = {
-        "version": "1.0", "name": "two", "urdf": "two.urdf",
+        "version": "1.0",
+        "name": "two",
+        "urdf": "two.urdf",
         "base": {"position": [0.1, 0.0, 0.05], "quaternion": [0.0, 0.0, 0.3826834, 0.9238795]},
         "fingers": {"thumb": {"link": "thumb_tip"}, "index": {"link": "index_tip", "position": [0.0, 0.0, 0.01]}},
-        "tolerance": {"position": 0.0001, "rotation": 0.001}, **more,
-    }  # fmt: skip
+        "tolerance": {"position": 0.0001, "rotation": 0.001},
+        **more,
+    }
     path = tmp_path / "robot.yaml"
     path.write_text(yaml.safe_dump(document))
     return path
@@ -228,12 +240,14 @@ def hinge(name, parent, child, x=0.0, axis="0 0 1", velocity=10):
 
 
 ARM = (
-    '<robot name="arm">' + "".join(f'<link name="{name}"/>' for name in ("base", "upper", "lower", "tip", "leg"))
-    + hinge("shoulder", "base", "upper") + hinge("elbow", "upper", "lower", 0.2)
+    '<robot name="arm">'
+    + "".join(f'<link name="{name}"/>' for name in ("base", "upper", "lower", "tip", "leg"))
+    + hinge("shoulder", "base", "upper")
+    + hinge("elbow", "upper", "lower", 0.2)
     + hinge("knee", "base", "leg", axis="0 1 0", velocity=1)
     + '<joint name="wrist" type="fixed"><parent link="lower"/><child link="tip"/><origin xyz="0.2 0 0"/></joint>'
     + "</robot>"
-)  # fmt: skip
+)
 
 
 def arm(tmp_path, **more):
@@ -319,9 +333,11 @@ def circling(tmp_path, urdf, seconds, places, **more):
     described = read_robot(robot(tmp_path, urdf, **more))
     made = demonstration(rows=len(seconds))
     track = replace(
-        made.tracks["index"], position=places, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (len(seconds), 1)),
+        made.tracks["index"],
+        position=places,
+        quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (len(seconds), 1)),
         gap=np.zeros(len(seconds), bool),
-    )  # fmt: skip
+    )
     return follow(described, targets_of(replace(made, tracks={"index": track}), None))[0]
 
 

@@ -19,10 +19,17 @@ from tacdata.recording.files.reader import read_episode
 from tacdata.replay.targets import targets_of
 
 STREAMS = {
-    "timestamps", "sub_task_instruction", "right_wrist_pose", "right_hand_joints", "right_hand_joints_idx",
-    *(f"right_tactile_{part}_{group}" for part in ("data", "area", "sensor", "type")
-      for group in ("fingertips", "predicteddepth")),
-}  # fmt: skip
+    "timestamps",
+    "sub_task_instruction",
+    "right_wrist_pose",
+    "right_hand_joints",
+    "right_hand_joints_idx",
+    *(
+        f"right_tactile_{part}_{group}"
+        for part in ("data", "area", "sensor", "type")
+        for group in ("fingertips", "predicteddepth")
+    ),
+}
 
 
 @pytest.fixture
@@ -53,8 +60,11 @@ def test_poses_openings_and_readings_are_those_of_the_targets(store):
     root, targets = zarr.open_group(str(folder), mode="r", zarr_format=2), episodes[1]
     pose = root["data/right_wrist_pose"][38:]
     assert np.allclose(pose[:, :3], targets.position.mean(axis=1), atol=1e-6)
-    assert np.allclose(Rotation.from_rotvec(pose[:, 3:]).as_matrix(),
-                       Rotation.from_quat(targets.quaternion[:, 0]).as_matrix(), atol=1e-6)  # fmt: skip
+    assert np.allclose(
+        Rotation.from_rotvec(pose[:, 3:]).as_matrix(),
+        Rotation.from_quat(targets.quaternion[:, 0]).as_matrix(),
+        atol=1e-6,
+    )
     opening = np.linalg.norm(targets.position[:, 0] - targets.position[:, 1], axis=1)
     assert np.allclose(root["data/right_hand_joints"][38:, 0], opening, atol=1e-6)
     assert set(root["data/right_hand_joints_idx"][:, 0]) == {28}
@@ -81,11 +91,19 @@ def test_a_store_is_imported(store, tmp_path):
     assert table.columns["right_tactile_data_fingertips"].shape == (76, 48)
     assert np.bincount(table.columns["episode"].astype(int)).tolist() == [38, 38]
     mapping = tmp_path / "mapping.yaml"
-    mapping.write_text(yaml.safe_dump({
-        "version": "1.2", "name": "public", "files": {"all": {"path": "grasp.zarr", "time": {"rate": 30.0}}},
-        "sensor": {"name": "fingertips"}, "trials": {"column": "episode"}, "position": {"file": "all", "depth": -1},
-        "taxels": {"file": "all", "columns": "right_tactile_data_fingertips", "unit": "counts"},
-    }))  # fmt: skip
+    mapping.write_text(
+        yaml.safe_dump(
+            {
+                "version": "1.2",
+                "name": "public",
+                "files": {"all": {"path": "grasp.zarr", "time": {"rate": 30.0}}},
+                "sensor": {"name": "fingertips"},
+                "trials": {"column": "episode"},
+                "position": {"file": "all", "depth": -1},
+                "taxels": {"file": "all", "columns": "right_tactile_data_fingertips", "unit": "counts"},
+            }
+        )
+    )
     for source in (folder, folder.parent):
         made = import_session(source, mapping, tmp_path / f"session_{source.suffix}")
         assert made.recordings == 2 and not made.refused

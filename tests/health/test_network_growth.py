@@ -13,8 +13,11 @@ BEFORE = {k: 0.05 + 0.01 * (k % 3) for k in range(11)}
 
 
 def test_growth_is_paired_by_press():
-    grown = growth(NetworkError("a" * 64, {k: 1.5 * v for k, v in BEFORE.items()}), NetworkError("a" * 64, BEFORE),
-                   [(k, k) for k in range(11)])  # fmt: skip
+    grown = growth(
+        NetworkError("a" * 64, {k: 1.5 * v for k, v in BEFORE.items()}),
+        NetworkError("a" * 64, BEFORE),
+        [(k, k) for k in range(11)],
+    )
     assert grown.value == pytest.approx(0.405, abs=1e-3) and grown.error < 1e-9
     assert growth(NetworkError("a" * 64, {}), NetworkError("a" * 64, BEFORE), [(0, 0)]) is None
 

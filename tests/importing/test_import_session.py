@@ -208,9 +208,12 @@ def test_matlab_and_parquet_hold_the_same(tmp_path):
     path = mapping(tmp_path, files={"data": {"path": "wide.parquet", "time": clock}}, **common)
     first = import_session(tmp_path, path, tmp_path / "a")
     path = mapping(
-        tmp_path, files={"data": {"path": "wide.mat", "time": clock}}, trials={"column": "element"},
-        press={"speed": {"column": "speed", "file": "data"}}, **common,
-    )  # fmt: skip
+        tmp_path,
+        files={"data": {"path": "wide.mat", "time": clock}},
+        trials={"column": "element"},
+        press={"speed": {"column": "speed", "file": "data"}},
+        **common,
+    )
     second = import_session(tmp_path, path, tmp_path / "b")
     assert (first.recordings, second.recordings) == (1, 2)
     episodes = [read_episode(p) for m in (first, second) for p in read_session(m.folder).episodes]
@@ -353,9 +356,12 @@ def test_clocks_of_every_kind_give_the_same_times(write, zero, tmp_path):
     rows = ["stamp,d,c", *(f"{write(t)},{d:.5f},{c[0]:.4f}" for t, d, c in zip(time, depth, signals, strict=True))]
     (tmp_path / "wide.csv").write_text("\n".join(rows))
     path = mapping(
-        tmp_path, files={"data": {"path": "wide.csv", "time": {"column": "stamp"}}}, measured=None,
-        taxels={"file": "data", "columns": "c"}, position={"file": "data", "depth": {"column": "d", "unit": "mm"}},
-    )  # fmt: skip
+        tmp_path,
+        files={"data": {"path": "wide.csv", "time": {"column": "stamp"}}},
+        measured=None,
+        taxels={"file": "data", "columns": "c"},
+        position={"file": "data", "depth": {"column": "d", "unit": "mm"}},
+    )
     _, (episode,) = imported(tmp_path, path)
     assert episode.taxels.sample_ns[0] / 1e9 == pytest.approx(zero, abs=1e-3)
     step = 1e-3 if zero == T0 else 1e-4
@@ -460,9 +466,11 @@ def test_one_damaged_file_of_a_series_leaves_the_good_ones_in(tmp_path):
     data[len(data) // 2 : len(data) // 2 + 16] = b"\xff" * 16
     (tmp_path / "run1.npz").write_bytes(data)
     path = mapping(
-        tmp_path, files={"data": {"path": "run{n}.npz", "time": {"column": "t", "unit": "s"}}},
-        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}}, measured=None,
-    )  # fmt: skip
+        tmp_path,
+        files={"data": {"path": "run{n}.npz", "time": {"column": "t", "unit": "s"}}},
+        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+        measured=None,
+    )
     made, episodes = imported(tmp_path, path)
     assert len(episodes) == 2
     assert "run1.npz" in " ".join(made.refused)
@@ -489,10 +497,12 @@ def test_columns_inside_arrays_are_named_by_their_numbers(tmp_path, kind):
         np.save(tmp_path / "a.npy", np.concatenate([stage, signals], axis=1))
     if kind == "npy":
         path = array_mapping(
-            tmp_path, "a.npy", taxels={"file": "data", "columns": "2-6", "unit": "pF"},
+            tmp_path,
+            "a.npy",
+            taxels={"file": "data", "columns": "2-6", "unit": "pF"},
             files={"data": {"path": "a.npy", "time": {"column": 0, "unit": "s"}}},
             position={"file": "data", "depth": {"column": "array[1]", "unit": "mm"}},
-        )  # fmt: skip
+        )
     else:
         path = array_mapping(tmp_path, f"a.{kind}")
     _, (episode,) = imported(tmp_path, path)
@@ -516,10 +526,13 @@ def test_trials_along_an_axis_of_an_array_become_recordings(tmp_path, axis):
     signals = np.stack([run[3] for run in runs])
     np.savez(tmp_path / "a.npz", t=time, disp=depth, cap=np.moveaxis(signals, 0, axis))
     path = array_mapping(
-        tmp_path, "a.npz", taxels={"file": "data", "columns": "cap", "unit": "pF"}, trials={"column": "trial"},
+        tmp_path,
+        "a.npz",
+        taxels={"file": "data", "columns": "cap", "unit": "pF"},
+        trials={"column": "trial"},
         position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
         files={"data": {"path": "a.npz", "trial_axis": axis, "time": {"column": "t", "unit": "s"}}},
-    )  # fmt: skip
+    )
     made, episodes = imported(tmp_path, path)
     assert made.recordings == 3
     for episode, run in zip(episodes, runs, strict=True):
@@ -534,10 +547,12 @@ def test_rows_with_more_words_than_numbers_are_data(tmp_path):
     (tmp_path / "wide.csv").write_text("\n".join(lines) + "\n")
     clock = {"column": "t", "unit": "s"}
     path = mapping(
-        tmp_path, files={"data": {"path": "wide.csv", "time": clock}}, measured=None,
+        tmp_path,
+        files={"data": {"path": "wide.csv", "time": clock}},
+        measured=None,
         taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
         position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
-    )  # fmt: skip
+    )
     _, (episode,) = imported(tmp_path, path)
     assert len(episode.taxels.counts) == len(time)
 
@@ -589,10 +604,12 @@ def test_dates_in_two_columns_and_of_any_land_are_read(tmp_path, layout, columns
     (tmp_path / "wide.csv").write_text("\n".join(lines) + "\n")
     column = ["day", "clock"] if columns == 2 else "when"
     path = mapping(
-        tmp_path, files={"data": {"path": "wide.csv", "time": {"column": column}}}, measured=None,
+        tmp_path,
+        files={"data": {"path": "wide.csv", "time": {"column": column}}},
+        measured=None,
         taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
         position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
-    )  # fmt: skip
+    )
     _, (episode,) = imported(tmp_path, path)
     first = begin.replace(tzinfo=UTC).timestamp()
     assert episode.taxels.sample_ns[0] * 1e-9 == pytest.approx(first, abs=1e-3)
@@ -619,12 +636,14 @@ def test_place_and_height_of_contact_of_each_press_come_from_paths_and_columns(t
         lines += [f"{a:.3f},{height - b:.4f},{height},{c:.4f}" for a, b, c in rows]
         (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n")
     path = mapping(
-        tmp_path, files={"data": {"path": "site_{place}.csv", "time": {"column": "t", "unit": "s"}}}, measured=None,
+        tmp_path,
+        files={"data": {"path": "site_{place}.csv", "time": {"column": "t", "unit": "s"}}},
+        measured=None,
         taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
         position={"file": "data", "z": {"column": "z", "unit": "mm"}},
         contact={"x": 0.0, "y": 0.0, "z": {"column": "touch", "file": "data"}, "known_from": "first reading"},
         press={"x": {"part": "place", "pattern": "x([-0-9p.]+)"}, "y": {"part": "place", "pattern": "y([-0-9p.]+)"}},
-    )  # fmt: skip
+    )
     _, episodes = imported(tmp_path, path)
     assert sorted((e.press.x, e.press.y) for e in episodes) == [(-3.0, 0.5), (1.5, -2.0)]
     assert [e.press.depth for e in episodes] == pytest.approx([depth.max()] * 2, abs=1e-3)
@@ -640,9 +659,13 @@ def test_a_schedule_may_go_up_at_another_speed(tmp_path):
     (tmp_path / "wide.csv").write_text("\n".join(["t,cap0", *rows]) + "\n")
     press = {"start": 1.0, "depth": 1.0, "speed": 0.5, "release_speed": 2.0, "hold": 1.0}
     path = mapping(
-        tmp_path, files={"data": {"path": "wide.csv", "time": {"column": "t", "unit": "s"}}}, measured=None,
-        taxels={"file": "data", "columns": ["cap0"], "unit": "pF"}, position=None, schedule={"presses": [press]},
-    )  # fmt: skip
+        tmp_path,
+        files={"data": {"path": "wide.csv", "time": {"column": "t", "unit": "s"}}},
+        measured=None,
+        taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
+        position=None,
+        schedule={"presses": [press]},
+    )
     _, (episode,) = imported(tmp_path, path)
     spans = {phase.name: (phase.end_ns - phase.start_ns) * 1e-9 for phase in episode.phases}
     assert spans["press"] == pytest.approx(2.0) and spans["release"] == pytest.approx(0.5)
@@ -655,11 +678,12 @@ def test_umlauts_that_look_the_same_are_the_same(tmp_path):
     lines += [f"{a:.3f},{b:.4f},{c:.4f}" for a, b, c in zip(time, depth, signals[:, 0], strict=True)]
     (tmp_path / "Pru\u0308fling_7.csv").write_text("\n".join(lines) + "\n")
     path = mapping(
-        tmp_path, measured=None,
+        tmp_path,
+        measured=None,
         files={"data": {"path": "Pr\u00fcfling_{n}.csv", "time": {"column": "t", "unit": "s"}}},
         taxels={"file": "data", "columns": ["cap0"], "unit": "pF"},
         position={"file": "data", "depth": {"column": "Weg_\u00fcber_Null", "unit": "mm"}},
-    )  # fmt: skip
+    )
     _, (episode,) = imported(tmp_path, path)
     assert episode.press.depth == pytest.approx(depth.max(), abs=1e-3)
 

@@ -168,12 +168,15 @@ def test_dates_with_am_and_pm_have_the_month_first_and_it_is_asked(tmp_path):
     assert any("month first" in question for question in found.questions)
 
 
-@pytest.mark.parametrize(("name", "values", "entry"), [
-    ("Extension (mm)", 2.6 + STROKE, {"z": {"column": "Extension (mm)", "scale": -1.0}}),
-    ("depth (mm)", -STROKE, {"depth": {"column": "depth (mm)", "scale": -1.0}}),
-    ("depth (mm)", STROKE, {"depth": {"column": "depth (mm)"}}),
-    ("z (mm)", 12.4 - STROKE, {"z": {"column": "z (mm)"}}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "values", "entry"),
+    [
+        ("Extension (mm)", 2.6 + STROKE, {"z": {"column": "Extension (mm)", "scale": -1.0}}),
+        ("depth (mm)", -STROKE, {"depth": {"column": "depth (mm)", "scale": -1.0}}),
+        ("depth (mm)", STROKE, {"depth": {"column": "depth (mm)"}}),
+        ("z (mm)", 12.4 - STROKE, {"z": {"column": "z (mm)"}}),
+    ],
+)
 def test_the_pressing_axis_is_told_from_where_a_trial_begins(tmp_path, name, values, entry):
     written(tmp_path / "log.csv", f"t (s),{name},cap1,cap2", T, values, STROKE, 2 * STROKE)
     found, _ = proposed(tmp_path)
@@ -305,11 +308,17 @@ def test_a_clock_in_capitals_is_a_time_and_a_copy_of_the_depth_is_no_gauge(tmp_p
     assert [press.press.depth for press in imported(tmp_path, found.mapping, tmp_path / "made")] == [1, 1, 1, 1]
 
 
-@pytest.mark.parametrize(("header", "unit", "much"), [
-    ("load_g", "um", "1000 g as 1 mm"), ("Force (N)", "mm", "1 N as 1 mm"), ("Bend (deg)", "mm", "1 deg as 1 mm"),
-    ("Strain [%]", "mm", "1 % as 1 mm"), ("Shear strain [%]", "mm", "1 % as 1 mm"),
-    ("stretch", "mm", "1 of its units as 1 mm"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("header", "unit", "much"),
+    [
+        ("load_g", "um", "1000 g as 1 mm"),
+        ("Force (N)", "mm", "1 N as 1 mm"),
+        ("Bend (deg)", "mm", "1 deg as 1 mm"),
+        ("Strain [%]", "mm", "1 % as 1 mm"),
+        ("Shear strain [%]", "mm", "1 % as 1 mm"),
+        ("stretch", "mm", "1 of its units as 1 mm"),
+    ],
+)
 def test_a_force_or_an_angle_stands_for_a_depth_that_nobody_measured(tmp_path, header, unit, much):
     size = 400.0 if unit == "um" else 8.0
     trial, place, deep = (np.repeat(values, len(T)) for values in ([1, 2, 3], [-5, 0, 5], [0.6, 0.9, 1.2]))
@@ -384,8 +393,10 @@ def test_a_depth_of_an_unknown_unit_stops_no_proposal(tmp_path):
 
 @pytest.mark.parametrize("kind", ["columns", "records", "rows", "lines"])
 def test_json_is_read_by_columns_by_records_and_by_rows(tmp_path, kind):
-    rows = [{"t_s": t, "tip": {"depth_mm": s}, "caps": [2 * s, None if k == 3 else s]}
-            for k, (t, s) in enumerate(zip(T.tolist(), STROKE.tolist(), strict=True))]  # fmt: skip
+    rows = [
+        {"t_s": t, "tip": {"depth_mm": s}, "caps": [2 * s, None if k == 3 else s]}
+        for k, (t, s) in enumerate(zip(T.tolist(), STROKE.tolist(), strict=True))
+    ]
     path = tmp_path / "source" / ("run_1.jsonl" if kind == "lines" else "run_1.json")
     path.parent.mkdir()
     if kind == "columns":

@@ -18,22 +18,26 @@ from tacdata.recording.files.reader import read_episode
 BEGIN = 1_743_486_221_000_000_000
 STORES = {"mcap": (StoragePlugin.MCAP, ".mcap"), "sqlite3": (StoragePlugin.SQLITE3, ".db3")}
 MAPPING = {
-    "version": "1.2", "name": "bag",
+    "version": "1.2",
+    "name": "bag",
     "files": {
         "board": {"path": "bag.mcap", "table": "/taxels", "time": {"column": "received", "unit": "ns"}},
         "stage": {"path": "bag.mcap", "table": "/stage", "time": {"column": "header.stamp", "unit": "ns"}},
     },
-    "sensor": {"name": "bag"}, "taxels": {"file": "board", "columns": "data", "unit": "pF"},
+    "sensor": {"name": "bag"},
+    "taxels": {"file": "board", "columns": "data", "unit": "pF"},
     "position": {"file": "stage", "depth": {"column": "point.x", "unit": "m"}},
-}  # fmt: skip
+}
 
 
 def bag(folder: Path, storage: str, late: float = 0.0) -> Path:
     """A board at 100 Hz beside a stage at 30 Hz, and a camera; as `ros2 bag record` writes it."""
     types = get_typestore(Stores.ROS2_HUMBLE)
     types.register(get_types_from_msg("float32[2] pair\nstring word", "lab_msgs/msg/Own"))
-    floats, point, own = (types.types[f"{n}"] for n in ("std_msgs/msg/Float32MultiArray",
-                          "geometry_msgs/msg/PointStamped", "lab_msgs/msg/Own"))  # fmt: skip
+    floats, point, own = (
+        types.types[f"{n}"]
+        for n in ("std_msgs/msg/Float32MultiArray", "geometry_msgs/msg/PointStamped", "lab_msgs/msg/Own")
+    )
     header, time = types.types["std_msgs/msg/Header"], types.types["builtin_interfaces/msg/Time"]
     layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
     image = types.types["sensor_msgs/msg/Image"]
@@ -41,8 +45,10 @@ def bag(folder: Path, storage: str, late: float = 0.0) -> Path:
     seconds, depth, _, signals = press_data(rate=100.0)
     messages = []
     with Writer(folder / "bag", version=9, storage_plugin=plugin) as writer:
-        topics = {n: writer.add_connection(f"/{n}", kind.__msgtype__, typestore=types)
-                  for n, kind in (("taxels", floats), ("stage", point), ("lab", own), ("eye", image))}  # fmt: skip
+        topics = {
+            n: writer.add_connection(f"/{n}", kind.__msgtype__, typestore=types)
+            for n, kind in (("taxels", floats), ("stage", point), ("lab", own), ("eye", image))
+        }
         for t, row in zip(seconds, signals, strict=True):
             messages.append((t, "taxels", floats(layout=layout, data=row.astype(np.float32))))
         for t in np.arange(0, seconds[-1], 1 / 30):
@@ -51,8 +57,21 @@ def bag(folder: Path, storage: str, late: float = 0.0) -> Path:
             place = types.types["geometry_msgs/msg/Point"](x=np.interp(t, seconds, depth) / 1000, y=0.0, z=0.0)
             messages.append((t + late, "stage", point(header=head, point=place)))
         messages.append((0.5, "lab", own(pair=np.array([1, 2], np.float32), word="a")))
-        messages.append((0.6, "eye", image(header=head, height=64, width=96, encoding="mono8", is_bigendian=0, step=96,
-                                           data=np.zeros(6144, np.uint8))))  # fmt: skip
+        messages.append(
+            (
+                0.6,
+                "eye",
+                image(
+                    header=head,
+                    height=64,
+                    width=96,
+                    encoding="mono8",
+                    is_bigendian=0,
+                    step=96,
+                    data=np.zeros(6144, np.uint8),
+                ),
+            )
+        )
         for t, name, message in sorted(messages, key=lambda entry: entry[0]):
             raw = types.serialize_cdr(message, message.__msgtype__)
             writer.write(topics[name], BEGIN + round(t * 1e9), raw)
@@ -123,8 +142,9 @@ def test_parts_of_a_message_that_are_not_taken_are_counted(tmp_path):
     types = get_typestore(Stores.ROS2_HUMBLE)
     named = {name.rsplit("/", 1)[-1]: kind for name, kind in types.types.items()}
     head = named["Header"](stamp=named["Time"](sec=1, nanosec=0), frame_id="hand")
-    pose = named["Transform"](translation=named["Vector3"](x=1.0, y=0.0, z=0.0),
-                              rotation=named["Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0))  # fmt: skip
+    pose = named["Transform"](
+        translation=named["Vector3"](x=1.0, y=0.0, z=0.0), rotation=named["Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    )
     links = [named["TransformStamped"](header=head, child_frame_id=f"link{k}", transform=pose) for k in range(40)]
     message = named["TFMessage"](transforms=links)
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:

@@ -20,8 +20,10 @@ DEPTH = np.interp(TIME, KNOTS, [-0.2, -0.2, 1.0, 1.0, -0.2, -0.2])
 def rows(number, material):
     """Two materials that are hardly apart."""
     stiff = 10.0 if material == "eco30" else 10.5
-    return [f"{number},{material},{t + 6 * number:.3f},{d:.4f},{20 + stiff * max(d, 0):.4f}"
-            for t, d in zip(TIME, DEPTH, strict=True)]  # fmt: skip
+    return [
+        f"{number},{material},{t + 6 * number:.3f},{d:.4f},{20 + stiff * max(d, 0):.4f}"
+        for t, d in zip(TIME, DEPTH, strict=True)
+    ]
 
 
 def in_a_column(folder, **changes):
@@ -30,9 +32,13 @@ def in_a_column(folder, **changes):
         lines += rows(number, material)
     (folder / "wide.csv").write_text("\n".join(lines) + "\n")
     return mapping(
-        folder, measured=None, trials={"column": "run"}, files={"data": {"path": "wide.csv", "time": {"column": "t"}}},
-        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}}, **changes,
-    )  # fmt: skip
+        folder,
+        measured=None,
+        trials={"column": "run"},
+        files={"data": {"path": "wide.csv", "time": {"column": "t"}}},
+        position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
+        **changes,
+    )
 
 
 def test_each_specimen_of_a_column_has_a_place_of_its_own(tmp_path):
@@ -54,10 +60,13 @@ def test_a_recording_holds_one_specimen_however_trials_are_cut(tmp_path, trials,
         lines += [block[0], *(line.replace(material, "") if once else line for line in block[1:])]
     (tmp_path / "wide.csv").write_text("\n".join(lines) + "\n")
     path = mapping(
-        tmp_path, measured=None, trials=trials, files={"data": {"path": "wide.csv", "time": {"column": "t"}}},
+        tmp_path,
+        measured=None,
+        trials=trials,
+        files={"data": {"path": "wide.csv", "time": {"column": "t"}}},
         position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
         press={"specimen": {"column": "material"}},
-    )  # fmt: skip
+    )
     made = import_session(tmp_path, path, tmp_path / "session")
     course = course_of([made.folder])
     assert made.recordings == 4 and sorted(np.bincount(course.site)) == [2, 2]
@@ -71,9 +80,12 @@ def test_a_path_says_it_too(tmp_path):
     entry = {"part": "who", "pattern": "spec([a-z]+)"}
     clock = {"path": "{who}_cyc{k}.csv", "time": {"column": "t", "zero": "shared"}}
     path = mapping(
-        tmp_path, measured=None, files={"data": clock}, press={"specimen": entry},
+        tmp_path,
+        measured=None,
+        files={"data": clock},
+        press={"specimen": entry},
         position={"file": "data", "depth": {"column": "disp", "unit": "mm"}},
-    )  # fmt: skip
+    )
     course = course_of([import_session(tmp_path, path, tmp_path / "session").folder])
     assert sorted(np.bincount(course.site)) == [2, 2]
 

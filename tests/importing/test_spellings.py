@@ -42,11 +42,32 @@ def refusal(folder, data, **changes):
 
 @pytest.mark.parametrize(
     ("header", "scale"),
-    [("t{ms}", 1e3), ("t<ms>", 1e3), ("t\uff08ms\uff09", 1e3), ("t\u3010ms\u3011", 1e3), ("t [ms] since start", 1e3),
-     ("t.ms", 1e3), ("t-ms", 1e3), ("tMs", 1e3), ("t_ms_rel", 1e3), ("t in ms", 1e3), ("ms", 1e3), ("millis", 1e3),
-     ("millis()", 1e3), ("micros", 1e6), ("t [\u00b5s]", 1e6), ("t [\u03bcs]", 1e6), ("time_10ms", 1e2), ("t [s.]", 1),
-     ("t [SEC]", 1), ("t [10^-3 s]", 1e3), ("t [x10 ms]", 1e2), ("t [1/20 s]", 20), ("t [Minutes]", 1 / 60)],
-)  # fmt: skip
+    [
+        ("t{ms}", 1e3),
+        ("t<ms>", 1e3),
+        ("t\uff08ms\uff09", 1e3),
+        ("t\u3010ms\u3011", 1e3),
+        ("t [ms] since start", 1e3),
+        ("t.ms", 1e3),
+        ("t-ms", 1e3),
+        ("tMs", 1e3),
+        ("t_ms_rel", 1e3),
+        ("t in ms", 1e3),
+        ("ms", 1e3),
+        ("millis", 1e3),
+        ("millis()", 1e3),
+        ("micros", 1e6),
+        ("t [\u00b5s]", 1e6),
+        ("t [\u03bcs]", 1e6),
+        ("time_10ms", 1e2),
+        ("t [s.]", 1),
+        ("t [SEC]", 1),
+        ("t [10^-3 s]", 1e3),
+        ("t [x10 ms]", 1e2),
+        ("t [1/20 s]", 20),
+        ("t [Minutes]", 1 / 60),
+    ],
+)
 def test_a_unit_is_understood_however_it_is_spelled(tmp_path, header, scale):
     _, episode = brought(tmp_path, text(f'"{header}",disp,cap0,cap1', scale))
     np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 50_000_000, atol=20_000)
@@ -60,12 +81,16 @@ def test_a_unit_that_is_not_understood_is_named_as_it_stands(tmp_path, unit):
 
 @pytest.mark.parametrize(
     ("scale", "begin", "given", "unit"),
-    [(1e3, 0, "a row comes every 50 s", "unit: ms or s"), (1e6, 0, "every 50000 s", "unit: us or s"),
-     (20, 0, "every 1 s", "of a counter of rows"), (1 / 3600, 0, "7.2e+04 Hz", "min or h or s"),
-     (20 / 86_400, 46_000.4, "8.64e+04 Hz", "unit: excel or s"),
-     (2000 / 86_400, 46_000.4, "864 Hz", "unit: excel or s"),
-     (20 / 86_400, 740_311.4, "8.64e+04 Hz", "unit: datenum or s")],
-)  # fmt: skip
+    [
+        (1e3, 0, "a row comes every 50 s", "unit: ms or s"),
+        (1e6, 0, "every 50000 s", "unit: us or s"),
+        (20, 0, "every 1 s", "of a counter of rows"),
+        (1 / 3600, 0, "7.2e+04 Hz", "min or h or s"),
+        (20 / 86_400, 46_000.4, "8.64e+04 Hz", "unit: excel or s"),
+        (2000 / 86_400, 46_000.4, "864 Hz", "unit: excel or s"),
+        (20 / 86_400, 740_311.4, "8.64e+04 Hz", "unit: datenum or s"),
+    ],
+)
 def test_times_without_a_unit_that_cannot_be_seconds_are_asked_for(tmp_path, scale, begin, given, unit):
     error = refusal(tmp_path, text("t,disp,cap0,cap1", scale, begin))
     assert "no unit is given" in error.given and given in error.given and unit in error.remedy
@@ -78,9 +103,17 @@ def test_a_unit_that_is_given_wrongly_is_held_against_the_rate(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "parts"),
-    [("Fz [N]", ("Fz", "N")), ("cap[3]", ("cap", "3")), ("force.min", ("force.min", "")), ("plug-in", ("plug-in", "")),
-     ("depth_d", ("depth_d", "")), ("Fz / N", ("Fz", "N")), ("disp {um} raw", ("disp raw", "um")), ("c0", ("c0", ""))],
-)  # fmt: skip
+    [
+        ("Fz [N]", ("Fz", "N")),
+        ("cap[3]", ("cap", "3")),
+        ("force.min", ("force.min", "")),
+        ("plug-in", ("plug-in", "")),
+        ("depth_d", ("depth_d", "")),
+        ("Fz / N", ("Fz", "N")),
+        ("disp {um} raw", ("disp raw", "um")),
+        ("c0", ("c0", "")),
+    ],
+)
 def test_a_name_is_parted_from_its_unit(name, parts):
     assert split_unit(name) == parts
 
@@ -135,8 +168,10 @@ def test_two_units_in_a_clocks_name_are_none():
 )
 def test_words_for_no_value_stand_in_any_row_the_first_too(tmp_path, word):
     lines = text().splitlines()
-    lines[1:] = [line.replace(f"{20 + d:.4f}", word) if k % 7 == 0 else line
-                 for k, (line, d) in enumerate(zip(lines[1:], DEPTH, strict=True))]  # fmt: skip
+    lines[1:] = [
+        line.replace(f"{20 + d:.4f}", word) if k % 7 == 0 else line
+        for k, (line, d) in enumerate(zip(lines[1:], DEPTH, strict=True))
+    ]
     _, episode = brought(tmp_path, "\n".join(lines))
     assert np.isnan(episode.taxels.counts).sum() == 18 and len(episode.taxels.counts) == ROWS
 
@@ -150,14 +185,19 @@ def test_an_unknown_word_is_named_with_its_column_and_row(tmp_path, word):
 
 @pytest.mark.parametrize(
     ("change", "note"),
-    [(lambda t: ("note\x85 by us\n" + t).encode("latin-1"), "Latin-1"), (lambda t: t.encode("utf-32"), ""),
-     (lambda t: t.encode() + bytes(5000), "5000 zero bytes"), (lambda t: t.replace("cap0", '"cap0\n[pF]"'), ""),
-     (lambda t: t.replace("cap1", "cap0", 1), "later columns are called cap0'"),
-     (lambda t: t.replace("0.5,0.100", "t [s],disp [mm],cap0,cap1\n0.5,0.100"), "1 repeated header lines"),
-     (lambda t: "".join(f"{k}: info\n" for k in range(700)) + t, ""),
-     (lambda t: "operator,Jane,,\n" + t, ""), (lambda t: t.replace("\n", "\r"), "")],
+    [
+        (lambda t: ("note\x85 by us\n" + t).encode("latin-1"), "Latin-1"),
+        (lambda t: t.encode("utf-32"), ""),
+        (lambda t: t.encode() + bytes(5000), "5000 zero bytes"),
+        (lambda t: t.replace("cap0", '"cap0\n[pF]"'), ""),
+        (lambda t: t.replace("cap1", "cap0", 1), "later columns are called cap0'"),
+        (lambda t: t.replace("0.5,0.100", "t [s],disp [mm],cap0,cap1\n0.5,0.100"), "1 repeated header lines"),
+        (lambda t: "".join(f"{k}: info\n" for k in range(700)) + t, ""),
+        (lambda t: "operator,Jane,,\n" + t, ""),
+        (lambda t: t.replace("\n", "\r"), ""),
+    ],
     ids=["x85", "utf-32", "zeros", "line break", "twice", "header again", "700 lines", "two heads", "cr"],
-)  # fmt: skip
+)
 def test_every_row_of_a_text_file_is_imported_or_counted(tmp_path, change, note):
     made, episode = brought(tmp_path, change(text()))
     assert len(episode.taxels.counts) == ROWS and not np.isnan(episode.taxels.counts).any()
@@ -174,12 +214,16 @@ def test_a_file_that_is_called_compressed_and_is_not_is_to_be_renamed(tmp_path):
 
 @pytest.mark.parametrize(
     ("data", "given"),
-    [(b"", "is empty"), (text().encode("utf-16-le"), "UTF-16 by all appearance"),
-     (text()[:500].encode() + bytes(99) + text()[500:].encode(), "99 zero bytes, the first in line"),
-     (gzip.compress(text().encode()), "is gzip"), (b"PK\x03\x04" + bytes(99), "is a zip archive"),
-     ("\n".join(text().splitlines()[:2]), "fewer than two rows")],
+    [
+        (b"", "is empty"),
+        (text().encode("utf-16-le"), "UTF-16 by all appearance"),
+        (text()[:500].encode() + bytes(99) + text()[500:].encode(), "99 zero bytes, the first in line"),
+        (gzip.compress(text().encode()), "is gzip"),
+        (b"PK\x03\x04" + bytes(99), "is a zip archive"),
+        ("\n".join(text().splitlines()[:2]), "fewer than two rows"),
+    ],
     ids=["empty", "utf-16", "zeros", "gzip", "zip", "one row"],
-)  # fmt: skip
+)
 def test_what_is_no_table_is_called_what_it_is(tmp_path, data, given):
     assert given in refusal(tmp_path, data).given
 

@@ -41,9 +41,12 @@ def indenter_of(mesh, folder, **more):
 def plan_of(indenter):
     motion = {"clearance": 2, "travel_speed": 10, "approach_speed": 5, "press_speed": 1, "hold": 1, "rest": 1}
     return {
-        "version": "1.0", "name": "own", "indenters": {"thumb": indenter}, "motion": motion,
+        "version": "1.0",
+        "name": "own",
+        "indenters": {"thumb": indenter},
+        "motion": motion,
         "presses": [{"indenter": "thumb", "x": 0, "y": 0, "depth": 0.5}],
-    }  # fmt: skip
+    }
 
 
 CASES = {

@@ -34,17 +34,33 @@ class Service:
         self.folder, self.workers, self.options, self.port = folder, workers, options, port
         path = os.pathsep.join([str(HERE), str(ROOT)])
         self.environment = {
-            **os.environ, "PYTHONPATH": path, "FAST_MODEL_SECONDS": str(seconds),
-            "FAST_MODEL_LOG": str(folder / "solves.log"), "OMP_NUM_THREADS": "1",
-            **(gate.variables if gate else {}), **variables,
-        }  # fmt: skip
+            **os.environ,
+            "PYTHONPATH": path,
+            "FAST_MODEL_SECONDS": str(seconds),
+            "FAST_MODEL_LOG": str(folder / "solves.log"),
+            "OMP_NUM_THREADS": "1",
+            **(gate.variables if gate else {}),
+            **variables,
+        }
         self.process = None
 
     def start(self):
         command = [
-            sys.executable, "-m", "tacdata.cli", "farm", "up", "--root", str(self.folder), "--port", str(self.port),
-            "--workers", str(self.workers), "--factory", "fast_model:FastModel", *self.options,
-        ]  # fmt: skip
+            sys.executable,
+            "-m",
+            "tacdata.cli",
+            "farm",
+            "up",
+            "--root",
+            str(self.folder),
+            "--port",
+            str(self.port),
+            "--workers",
+            str(self.workers),
+            "--factory",
+            "fast_model:FastModel",
+            *self.options,
+        ]
         with (self.folder / "service.log").open("a") as log:
             self.process = subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=log, text=True, env=self.environment, cwd=ROOT

@@ -80,7 +80,8 @@ def path(sensor, depths, answer, x=0.0, bad=False, numerical=0.0):
         traction=values[:, None, None, None] * np.maximum(bump - 0.8, 0.0) * np.array([0.1, 0.0, 1.0])[:, None, None],
         taxel_pressure=(
             values[:, None, None, None] * np.outer(*2 * [np.hanning(PIXELS)]) * taxels[:, None, None]
-            if sensor.contact.board else None
+            if sensor.contact.board
+            else None
         ),
         status_steps=np.full(len(depth), 2.0),
         equilibrium_steps=np.full(len(depth), 3.0),

@@ -19,14 +19,17 @@ class Recorded(examples.Press):
     def __init__(self, plan, number):
         self.rng, self.number, self.camera = np.random.default_rng(number), number, False
         self.header = examples.Header(
-            plan.presses[number], examples.SENSOR, examples.rig_document(), plan.document,
+            plan.presses[number],
+            examples.SENSOR,
+            examples.rig_document(),
+            plan.document,
             {"channels": 24, "rate": {"nominal": 30.0, "unit": "Hz"}},
             {
                 "settings": {"banner": "test"},
                 "acceleration": examples.LIMITS.acceleration.tolist(),
                 "max_rate": examples.LIMITS.max_rate.tolist(),
             },
-        )  # fmt: skip
+        )
         bench = examples.rig()
         self.commands, self.path = [], []
         self._carry_out(bench)

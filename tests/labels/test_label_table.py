@@ -46,8 +46,7 @@ def whole(frames: int = 7, **changes) -> Label:
 
 def test_round_trip_is_exact(tmp_path: Path) -> None:
     label = whole(
-        signed=np.nextafter(np.float32(0.1), np.float32(1), dtype=np.float32)
-        * np.ones((7, 35, 26), np.float32)
+        signed=np.nextafter(np.float32(0.1), np.float32(1), dtype=np.float32) * np.ones((7, 35, 26), np.float32)
     )
     write_label(tmp_path / "a" / "label.parquet", label)
     back = read_label(tmp_path / "a" / "label.parquet")

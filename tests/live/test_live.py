@@ -216,9 +216,8 @@ def test_an_estimate_from_readings_never_learnt_from_says_so():
     known = DepthStream(newest_of, (0,), SENSOR.map, StreamClock(), 3, novelty=lambda taxels: taxels[:, 0] / 10)
     parts = [[frame(k, 0 if k < 3 else k)] for k in range(20)]
     made = LiveLoop(
-        Source("index", Board(clock, parts), clock, SENSOR, 30.0), known, "f" * 64,
-        watch=lambda stream, ns, value: None,
-    )  # fmt: skip
+        Source("index", Board(clock, parts), clock, SENSOR, 30.0), known, "f" * 64, watch=lambda stream, ns, value: None
+    )
     words, about = made._words, {"finger": "index", "network": "f" * 64, "causal": False, "lookahead": 0}
     for part in parts:
         estimate = known.push(part[0])

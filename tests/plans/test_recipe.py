@@ -14,9 +14,7 @@ from tacdata.rig import Registration
 from tacdata.sensor import default_sensor
 
 SENSOR = default_sensor()
-MOTION = {
-    "clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 1.0, "hold": 0.5, "rest": 0.5,
-}  # fmt: skip
+MOTION = {"clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 1.0, "hold": 0.5, "rest": 0.5}
 
 
 def recipe(*blocks, **changes):
@@ -29,7 +27,7 @@ def recipe(*blocks, **changes):
         },
         "motion": MOTION,
         "blocks": list(blocks),
-    } | changes  # fmt: skip
+    } | changes
 
 
 def written(*blocks, seed=0, **changes):
@@ -38,9 +36,13 @@ def written(*blocks, seed=0, **changes):
 
 def test_a_block_is_every_combination_once():
     block = {
-        "indenter": "ball", "at": {"kind": "grid", "columns": 3, "rows": 2}, "depths": [0.3, 0.6], "speeds": [0.2, 2.0],
-        "holds": [0.5, 5.0], "repeats": 2,
-    }  # fmt: skip
+        "indenter": "ball",
+        "at": {"kind": "grid", "columns": 3, "rows": 2},
+        "depths": [0.3, 0.6],
+        "speeds": [0.2, 2.0],
+        "holds": [0.5, 5.0],
+        "repeats": 2,
+    }
     presses = written(block)
     assert len(presses) == 6 * 2 * 2 * 2 * 2
     assert len({(p.x, p.y, p.depth, p.speed, p.hold, p.repeat) for p in presses}) == len(presses)
@@ -55,9 +57,12 @@ def test_leaning_mountings_are_plan_entries_that_stay_together():
     block = {"indenter": "pin", "tilts": [[0, 0], [5, -3]], "at": {"kind": "center"}, "depths": [0.3]}
     presses = written(block, {"indenter": "ball", "at": {"kind": "center"}, "depths": [0.3]}, {**block, "yaws": [90]})
     assert [p.mounting for p in presses] == [
-        ("pin", 0.0, 0.0, 0.0), ("pin", 0.0, 5.0, -3.0), ("ball", 0.0, 0.0, 0.0),
-        ("pin", 90.0, 0.0, 0.0), ("pin", 90.0, 5.0, -3.0),
-    ]  # fmt: skip
+        ("pin", 0.0, 0.0, 0.0),
+        ("pin", 0.0, 5.0, -3.0),
+        ("ball", 0.0, 0.0, 0.0),
+        ("pin", 90.0, 0.0, 0.0),
+        ("pin", 90.0, 5.0, -3.0),
+    ]
     assert presses[1].turned == "0 deg, leaning 5 deg about x and -3 deg about y"
     assert presses[1].angles == {"yaw": 0.0, "tilt_x": 5.0, "tilt_y": -3.0} and presses[0].angles == {"yaw": 0.0}
     with pytest.raises(FormatError, match="tilts/0/1: 45 is greater than the maximum of 30"):
@@ -119,9 +124,14 @@ def test_bad_blocks_end_in_words(block, word):
 
 def test_sides_overshoot_and_recovery_are_driven():
     block = {
-        "indenter": "ball", "at": {"kind": "center"}, "depths": [0.5], "approach_from": ["-x"], "overshoot": 0.2,
-        "recovery": 4.0, "rest": 3.0,
-    }  # fmt: skip
+        "indenter": "ball",
+        "at": {"kind": "center"},
+        "depths": [0.5],
+        "approach_from": ["-x"],
+        "overshoot": 0.2,
+        "recovery": 4.0,
+        "rest": 3.0,
+    }
     plan = Plan.from_document(write_out(recipe(block), SENSOR, "mine"), "mine")
     path = steps(plan.presses[0], plan.motion, Registration((0.0, 0.0, 0.0), 0.0))
     moves = [step.target for step in path if step.target]
@@ -150,8 +160,9 @@ def test_strokes_are_driven_before_the_hold():
 
 
 def test_a_press_without_strokes_is_written_as_before():
-    press = Plan.from_document(write_out(recipe({"indenter": "ball", "at": {"kind": "center"}, "depths": [0.5]}),
-                                         SENSOR, "mine"), "mine").presses[0]  # fmt: skip
+    press = Plan.from_document(
+        write_out(recipe({"indenter": "ball", "at": {"kind": "center"}, "depths": [0.5]}), SENSOR, "mine"), "mine"
+    ).presses[0]
     assert not {"strokes", "stroke"} & press.document.keys()
 
 

@@ -85,9 +85,10 @@ def test_the_virgin_site_is_virgin():
 @pytest.mark.parametrize("name", NAMES)
 def test_they_fit_other_sensors_too(name):
     small = replace(
-        SENSOR, taxels=replace(SENSOR.taxels, columns=2, rows=2, pitch_x=4.0, pitch_y=4.0),
+        SENSOR,
+        taxels=replace(SENSOR.taxels, columns=2, rows=2, pitch_x=4.0, pitch_y=4.0),
         skin=replace(SENSOR.skin, size_x=14.0, size_y=14.0, thickness=2.0),
-    )  # fmt: skip
+    )
     plan(name, small).check_against(small)
 
 

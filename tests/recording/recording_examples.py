@@ -29,12 +29,7 @@ def rig_document(camera=False, **changes):
         "name": "bench",
         "cnc": {"driver": "grbl", "port": "/dev/null"},
         "board": {"driver": "capacitive_board", "port": "/dev/null"},
-        "registration": {
-            "origin": [10.0, 20.0, -30.0],
-            "yaw": 5.0,
-            "method": "by hand",
-            "date": "2026-01-01",
-        },
+        "registration": {"origin": [10.0, 20.0, -30.0], "yaw": 5.0, "method": "by hand", "date": "2026-01-01"},
         "envelope": {"min": [0.0, 5.0, -33.0], "max": [25.0, 35.0, 0.0]},
     }
     if camera:
@@ -50,9 +45,14 @@ def rig(**changes):
 def plan_document(presses=2, **motion):
     sites = [(1.0, 0.5), (-2.0, 1.5), (3.0, -2.0), (0.0, 0.0), (-4.0, -3.0), (4.0, 3.0)]
     settings = {
-        "clearance": 3.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 1.0,
-        "hold": 0.6, "rest": 1.0,
-    }  # fmt: skip
+        "clearance": 3.0,
+        "standoff": 0.3,
+        "travel_speed": 20.0,
+        "approach_speed": 5.0,
+        "press_speed": 1.0,
+        "hold": 0.6,
+        "rest": 1.0,
+    }
     return {
         "version": "1.0",
         "name": "two",
@@ -73,9 +73,13 @@ def recorder(virtual, out, **options):
     """A recorder of two presses, or those of the `plan` given, on an emulated rig."""
     bench = read_rig(virtual.path)
     return Recorder(
-        bench, SENSOR, options.pop("plan", plan(2)), out,
-        mount=lambda press: mount(bench.document, press.indenter.document, press.yaw), **options,
-    )  # fmt: skip
+        bench,
+        SENSOR,
+        options.pop("plan", plan(2)),
+        out,
+        mount=lambda press: mount(bench.document, press.indenter.document, press.yaw),
+        **options,
+    )
 
 
 def header(number=0, camera=False):

@@ -29,9 +29,23 @@ pytestmark = [
 ]
 START = (10.0, 20.0, -20.0)
 SET_UP = (
-    "$X", "$1=255", "$10=1", "$20=0", "$22=0", "$100=250", "$101=250", "$102=250", "$110=3000", "$111=3000",
-    "$112=900", "$120=200", "$121=200", "$122=150", "G53G90G94G21G1X10Y20Z-20F3000", "G4P0.01",
-)  # fmt: skip
+    "$X",
+    "$1=255",
+    "$10=1",
+    "$20=0",
+    "$22=0",
+    "$100=250",
+    "$101=250",
+    "$102=250",
+    "$110=3000",
+    "$111=3000",
+    "$112=900",
+    "$120=200",
+    "$121=200",
+    "$122=150",
+    "G53G90G94G21G1X10Y20Z-20F3000",
+    "G4P0.01",
+)
 WITHIN = 0.05
 """What a nominal position may be off a reported one [mm], by what is claimed: 5 mm/s for 10 ms."""
 
@@ -131,9 +145,14 @@ def session(firmware, folder, presses=1, **changes):
     cnc = Reported(clock, firmware.path)
     bench = replace(rig(), clock=clock)
     return Recorder(
-        bench, SENSOR, plan(presses, hold=0.3, rest=0.4), folder, mount=lambda press: None,
-        devices=RigDevices(cnc, Board(clock, cnc), {}), **changes,
-    )  # fmt: skip
+        bench,
+        SENSOR,
+        plan(presses, hold=0.3, rest=0.4),
+        folder,
+        mount=lambda press: None,
+        devices=RigDevices(cnc, Board(clock, cnc), {}),
+        **changes,
+    )
 
 
 def test_a_session_whose_nominal_path_agrees_with_the_reports(ready, tmp_path):

@@ -91,8 +91,12 @@ def test_a_sensor_of_ones_own_by_the_page(tmp_path):
     typed(tmp_path, plan)
     with emulated(tmp_path, rig):
         assert "8 of 8 presses recorded" in typed(tmp_path, record, answer="y\n")
-        refused = tacdata(*[w for w in record if w not in ("--sensor", "examples/own_sensor.yaml")][:-1], "other",
-                          folder=tmp_path, answer="y\n")  # fmt: skip
+        refused = tacdata(
+            *[w for w in record if w not in ("--sensor", "examples/own_sensor.yaml")][:-1],
+            "other",
+            folder=tmp_path,
+            answer="y\n",
+        )
     assert refused.returncode == 2 and "the board sends 16 channels" in refused.stderr
     assert not (tmp_path / "other").exists(), "nothing moved, nothing was written"
     assert len(read_session(tmp_path / "session").done) == 8
@@ -105,9 +109,13 @@ def test_the_firmware_page_starts_tests_that_are_there():
     line, port = blocks(HOW_TO / "testing_with_firmware.md", "sh")
     path = os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]])
     done = subprocess.run(
-        ["sh", "-c", f"{line.strip()} --collect-only -q"], cwd=ROOT, env={**os.environ, "PATH": path},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        ["sh", "-c", f"{line.strip()} --collect-only -q"],
+        cwd=ROOT,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "tests/recording/test_grbl_firmware.py" in done.stdout
     assert shlex.split(port)[0] == "socat"

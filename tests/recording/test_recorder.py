@@ -48,11 +48,16 @@ class Bench:
     def recorder(self, resume=False, **changes):
         cameras = {"side": Eye(self.clock)} if self.camera else {}
         return Recorder(
-            changes.get("rig", self.rig), SENSOR, changes.get("plan", self.plan), self.folder, resume=resume,
-            devices=RigDevices(self.cnc, self.board, cameras), mount=self.mounted.append,
+            changes.get("rig", self.rig),
+            SENSOR,
+            changes.get("plan", self.plan),
+            self.folder,
+            resume=resume,
+            devices=RigDevices(self.cnc, self.board, cameras),
+            mount=self.mounted.append,
             detect=changes.get("detect", found),
             progress=lambda *values: self.progress.append(values),
-        )  # fmt: skip
+        )
 
     def run(self, **changes):
         return self.recorder(**changes).run(lambda summary: True)

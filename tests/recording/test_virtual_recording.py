@@ -135,9 +135,9 @@ def test_solids_from_files_are_pressed_like_any_other(virtual, tmp_path, monkeyp
         ball.export(tmp_path / f"ball.{ending}")
         press["indenter"] = ending
         document["indenters"][ending] = {"shape": "mesh", "file": f"ball.{ending}"}
-    session = recorder(
-        virtual, tmp_path / "session", plan=Plan.from_document(document, "solids", tmp_path)
-    ).run(lambda summary: True)  # fmt: skip
+    session = recorder(virtual, tmp_path / "session", plan=Plan.from_document(document, "solids", tmp_path)).run(
+        lambda summary: True
+    )
     assert len(session.episodes) == 3
     for path in session.episodes:
         episode = read_recording(path).episode

@@ -47,6 +47,7 @@ def put_down(seed):
     rng = np.random.default_rng([seed, 5])
     shift = rng.uniform(-1, 1, 3) * (0.7, 0.7, 0.5)
     return Registration(
-        tuple((np.array(GUESS.origin) + shift).tolist()), GUESS.yaw + rng.uniform(-3, 3),
+        tuple((np.array(GUESS.origin) + shift).tolist()),
+        GUESS.yaw + rng.uniform(-3, 3),
         tuple(rng.uniform(-0.02, 0.02, 2).tolist()),
-    )  # fmt: skip
+    )

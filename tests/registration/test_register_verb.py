@@ -43,10 +43,15 @@ PLAN = {
     "name": "one",
     "indenters": {"ball": {"shape": "sphere", "radius": 2.0}},
     "motion": {
-        "clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 1.0, "hold": 0.3, "rest": 0.5,
+        "clearance": 3.0,
+        "travel_speed": 20.0,
+        "approach_speed": 5.0,
+        "press_speed": 1.0,
+        "hold": 0.3,
+        "rest": 0.5,
     },
     "presses": [{"indenter": "ball", "x": 3.8, "y": 2.5, "depth": 0.5}],
-}  # fmt: skip
+}
 
 
 def record(virtual, tmp_path, out, *more):
@@ -128,10 +133,13 @@ def test_nothing_moves_without_a_yes(virtual, monkeypatch, capfd):
 )
 def test_wrong_wishes_end_in_words_before_any_port_is_opened(arguments, word, tmp_path, monkeypatch, capfd):
     rig = {
-        "version": "1.0", "name": "none", "cnc": {"driver": "grbl", "port": "/nowhere"},
+        "version": "1.0",
+        "name": "none",
+        "cnc": {"driver": "grbl", "port": "/nowhere"},
         "board": {"driver": "capacitive_board", "port": "/nowhere"},
-        "registration": {"origin": [0, 0, 0], "yaw": 0}, "envelope": {"min": [-9, -9, -9], "max": [9, 9, 9]},
-    }  # fmt: skip
+        "registration": {"origin": [0, 0, 0], "yaw": 0},
+        "envelope": {"min": [-9, -9, -9], "max": [9, 9, 9]},
+    }
     (tmp_path / "rig.yaml").write_text(yaml.safe_dump(rig))
     code, _, loud = run(monkeypatch, capfd, "register", "--rig", tmp_path / "rig.yaml", "--yes", *arguments)
     assert code == 2
@@ -157,14 +165,26 @@ def test_a_registration_of_another_sensor_is_refused(virtual, tmp_path):
 
 def registration_of(rig, sensor):
     return {
-        "version": "1.0", "method": "touch-off and cross scan", "date": "2020-01-01T00:00:00+00:00",
-        "code_version": "0", "rig": rig.name, "guess": {}, "sensor": sensor.name,
-        "sensor_hash": sensor.content_hash, "indenter": {"shape": "sphere", "radius": 2.0},
-        "controller": {"$22": "0"}, "settings": {}, "origin": [1.0, 2.0, 3.0], "yaw": 0.0, "tilt": [0.01, -0.005],
+        "version": "1.0",
+        "method": "touch-off and cross scan",
+        "date": "2020-01-01T00:00:00+00:00",
+        "code_version": "0",
+        "rig": rig.name,
+        "guess": {},
+        "sensor": sensor.name,
+        "sensor_hash": sensor.content_hash,
+        "indenter": {"shape": "sphere", "radius": 2.0},
+        "controller": {"$22": "0"},
+        "settings": {},
+        "origin": [1.0, 2.0, 3.0],
+        "yaw": 0.0,
+        "tilt": [0.01, -0.005],
         "uncertainty": {"origin": [0.01, 0.01, 0.005], "yaw": 0.1, "tilt": [0.001, 0.001]},
-        "residuals": {"touches": [-0.012], "taxels": [0.004], "scale": 1.0}, "noise": [4.0], "touches": [],
+        "residuals": {"touches": [-0.012], "taxels": [0.004], "scale": 1.0},
+        "noise": [4.0],
+        "touches": [],
         "crosses": [],
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

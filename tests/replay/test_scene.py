@@ -26,9 +26,21 @@ def targets(gain=0.0, begin=0.0, seconds=8.4):
     moved = poses[..., :3, 3] + gain * depth[..., None] * poses[..., :3, 2]
     gains = dict.fromkeys(DIRECTIONS, gain) if gain else {}
     return FingertipTargets(
-        "x.mcap", "0", "grasp", "table", RATE, tuple(DIRECTIONS), "compensated" if gain else "direct", gains,
-        np.rint(times * 1e9).astype(np.int64), moved, turns, poses[..., :3, 3], depth, np.zeros(depth.shape, bool),
-    )  # fmt: skip
+        "x.mcap",
+        "0",
+        "grasp",
+        "table",
+        RATE,
+        tuple(DIRECTIONS),
+        "compensated" if gain else "direct",
+        gains,
+        np.rint(times * 1e9).astype(np.int64),
+        moved,
+        turns,
+        poses[..., :3, 3],
+        depth,
+        np.zeros(depth.shape, bool),
+    )
 
 
 def grasp(gain=0.0):

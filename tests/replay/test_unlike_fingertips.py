@@ -32,10 +32,15 @@ SIZES = {"thumb": (6, 4, 35, 26), "index": (4, 3, 24, 20), "middle": (5, 2, 30, 
 def skin(finger):
     columns, rows, wide, high = SIZES[finger]
     document = default_sensor().document
-    return Sensor.from_document({
-        **document, "name": f"{finger} tip", "taxels": {**document["taxels"], "columns": columns, "rows": rows},
-        "map": {**document["map"], "pixels_x": wide, "pixels_y": high},
-    }, finger)  # fmt: skip
+    return Sensor.from_document(
+        {
+            **document,
+            "name": f"{finger} tip",
+            "taxels": {**document["taxels"], "columns": columns, "rows": rows},
+            "map": {**document["map"], "pixels_x": wide, "pixels_y": high},
+        },
+        finger,
+    )
 
 
 SKINS = {finger: skin(finger) for finger in SIZES}
@@ -103,9 +108,10 @@ def test_the_ball_is_lifted_and_the_film_shows_three_maps(tracked):
 
 def test_a_network_of_another_finger_is_refused(tmp_path):
     made = recording(
-        tmp_path, streams={finger: felt(finger) for finger in SKINS},
+        tmp_path,
+        streams={finger: felt(finger) for finger in SKINS},
         sensors={finger: sensor.document for finger, sensor in SKINS.items()},
-    )  # fmt: skip
+    )
     with pytest.raises(FormatError, match=r"index wears sensor index tip .* trained for thumb tip"):
         track(made, estimator={finger: network("thumb") for finger in SKINS})
 

@@ -19,17 +19,34 @@ def tracks(folder, hand, task, digest, number=0):
         poses = np.array([hand.tip(name, t) for t in times])
         depth = np.array([hand.press(name, t)[2] for t in times], np.float32)
         found[name] = FingerTrack(
-            name, "right", name, poses[:, :3, 3], Rotation.from_matrix(poses[:, :3, :3]).as_quat(),
-            np.tile(1e-8 * np.eye(6), (count, 1, 1)), np.zeros(count, bool), count, 0,
+            name,
+            "right",
+            name,
+            poses[:, :3, 3],
+            Rotation.from_matrix(poses[:, :3, :3]).as_quat(),
+            np.tile(1e-8 * np.eye(6), (count, 1, 1)),
+            np.zeros(count, bool),
+            count,
+            0,
             np.zeros((count, 24), np.float32),
             np.repeat(depth, 35 * 26).reshape(count, 35, 26),
-        )  # fmt: skip
+        )
     network = {"hash": "f" * 64, "network": "none", "epoch": 0, "lookahead": 0, "sensor": "0"}
     name = f"episode-{number:06d}"
     made = Demonstration(
-        f"{name}.mcap", digest, task, "table", RATE, np.rint(times * 1e9).astype(np.int64), found,
-        dict.fromkeys(found, default_sensor()), {}, network, (), {"made_by": "a test"},
-    )  # fmt: skip
+        f"{name}.mcap",
+        digest,
+        task,
+        "table",
+        RATE,
+        np.rint(times * 1e9).astype(np.int64),
+        found,
+        dict.fromkeys(found, default_sensor()),
+        {},
+        network,
+        (),
+        {"made_by": "a test"},
+    )
     path = folder / f"{name}.tracks.parquet"
     write_tracks(path, made)
     return path

@@ -53,21 +53,37 @@ def verdict(folder, effect, values, status="named", alternatives=(), session=Non
     spec = read_spec(None)
     known = {} if session is None else {f"recording {session.name}": recording_hash(session)}
     entry = {
-        "mechanism": kind.called, "effect": effect, "title": kind.title, "stage": kind.stage,
+        "mechanism": kind.called,
+        "effect": effect,
+        "title": kind.title,
+        "stage": kind.stage,
         "moves": list(kind.moves),
         "status": "suspected" if status == "unknown" else "ambiguous" if alternatives else "named",
         "alternatives": list(alternatives),
-        "parameters": {n: {"value": v, "unit": "u", "error": 0.01, "interval": [v - 0.02, v + 0.02]}
-                       for n, v in values.items()},
-        "margins": {}, "necessity": 9.0, "at_bound": [], "experiment": kind.experiment,
-    }  # fmt: skip
+        "parameters": {
+            n: {"value": v, "unit": "u", "error": 0.01, "interval": [v - 0.02, v + 0.02]} for n, v in values.items()
+        },
+        "margins": {},
+        "necessity": 9.0,
+        "at_bound": [],
+        "experiment": kind.experiment,
+    }
     document = {
-        "version": schemas.version("verdict"), "status": status, "why": "made up for a test", "effects": [entry],
+        "version": schemas.version("verdict"),
+        "status": status,
+        "why": "made up for a test",
+        "effects": [entry],
         "gate": {"gap": True, "p": 0.001, "p_generic": 0.001, "noise": [0.1, 0.1], "memory": 0.0},
-        "left": {"share": 0.0, "t": 0.0, "before": 9.0, "after": 1.0, "floor": 1.0}, "located": [],
-        "unjudgeable": {}, "limits": {}, "untested": [], "data": {"episodes": 16}, "remarks": [], "next": [],
+        "left": {"share": 0.0, "t": 0.0, "before": 9.0, "after": 1.0, "floor": 1.0},
+        "located": [],
+        "unjudgeable": {},
+        "limits": {},
+        "untested": [],
+        "data": {"episodes": 16},
+        "remarks": [],
+        "next": [],
         "provenance": provenance.stamp("test", {"spec": spec.content_hash, **known}, {}),
-    }  # fmt: skip
+    }
     folder.mkdir()
     documents.write(folder / "verdict.json", document, "verdict")
     return folder

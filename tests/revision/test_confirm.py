@@ -29,10 +29,17 @@ def held(tmp_path, monkeypatch):
     rows = [(e, x, y, d) for e, (x, y) in enumerate(((0.0, 0.0), (1.0, 0.5), (-1.7, 0.9))) for d in (0.0, 0.4, 0.8)]
     number, x, y, d = map(np.array, zip(*rows, strict=True))
     course = Course(
-        time=np.arange(len(rows), dtype=float), episode=number, tip=np.column_stack([x, y, d]),
-        tool=np.zeros(len(rows), dtype=int), readings=np.zeros((len(rows), 24)), averaged=np.ones(len(rows)),
-        session=np.zeros(3, dtype=int), site=np.arange(3), tools=(Tool("ball", "sphere", 2.0),), names=("a", "b", "c"),
-    )  # fmt: skip
+        time=np.arange(len(rows), dtype=float),
+        episode=number,
+        tip=np.column_stack([x, y, d]),
+        tool=np.zeros(len(rows), dtype=int),
+        readings=np.zeros((len(rows), 24)),
+        averaged=np.ones(len(rows)),
+        session=np.zeros(3, dtype=int),
+        site=np.arange(3),
+        tools=(Tool("ball", "sphere", 2.0),),
+        names=("a", "b", "c"),
+    )
     monkeypatch.setattr(room, "SkinModel", lambda *_: FastModel())
     store = SimpleNamespace(of=lambda model: PressStore(model, tmp_path / "confirmed", Shipped(tmp_path / "none")))
     monkeypatch.setattr(room, "PressStore", store)

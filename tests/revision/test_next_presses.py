@@ -23,12 +23,22 @@ from tacdata.revision.next_presses.rivals import Rival
 from tacdata.revision.next_presses.trial import elsewhere, laid_out, trials
 
 PLAN = Plan.from_document(
-    {"version": "1.1", "name": "one speed", "indenters": {"ball": {"shape": "sphere", "radius": 4.0}},
-     "motion": {"clearance": 3.0, "travel_speed": 3.0, "approach_speed": 3.0, "press_speed": 1.0, "hold": 1.0,
-                "rest": 1.0},
-     "presses": [{"indenter": "ball", "x": 0.0, "y": 0.0, "depth": 1.0}]},
+    {
+        "version": "1.1",
+        "name": "one speed",
+        "indenters": {"ball": {"shape": "sphere", "radius": 4.0}},
+        "motion": {
+            "clearance": 3.0,
+            "travel_speed": 3.0,
+            "approach_speed": 3.0,
+            "press_speed": 1.0,
+            "hold": 1.0,
+            "rest": 1.0,
+        },
+        "presses": [{"indenter": "ball", "x": 0.0, "y": 0.0, "depth": 1.0}],
+    },
     "test",
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")

@@ -65,11 +65,12 @@ def test_effects_of_readings_alone_have_no_tip_to_tell_of(loose, truth):
 @pytest.mark.parametrize(
     ("text", "error", "words"),
     [
-        ("time_ns,x,y\n1,2,3\n", FormatError, "depth"), ("time_ns,x,y,depth\n", FormatError, "empty"),
+        ("time_ns,x,y\n1,2,3\n", FormatError, "depth"),
+        ("time_ns,x,y,depth\n", FormatError, "empty"),
         ("time_ns,x,y,depth\n1,0,0,zero\n", FormatError, "zero"),
         ("time_ns,x,y,depth\n1,0,0,0\n2,0,0,0\n", UsageError, "time_ns"),
     ],
-)  # fmt: skip
+)
 def test_a_truth_that_is_none_is_refused_in_words(loose, tmp_path, text, error, words):
     (tmp_path / "truth.csv").write_text(text)
     with pytest.raises(error, match=words):

@@ -38,8 +38,14 @@ def recorded(folder, late, episodes=7):
         load = np.maximum(np.interp(time - late, at, path), 0)[:, None] * near
         values = np.column_stack([clock + time, np.full(len(time), x), np.interp(time, at, path), 1e4 + 3e3 * load])
         values[:, 3:] += rng.normal(size=load.shape)
-        np.savetxt(folder / f"press_{k:02d}.csv", values, delimiter=",", header=",".join(["t", "x", "d", *names]),
-                   comments="", fmt="%.5f")  # fmt: skip
+        np.savetxt(
+            folder / f"press_{k:02d}.csv",
+            values,
+            delimiter=",",
+            header=",".join(["t", "x", "d", *names]),
+            comments="",
+            fmt="%.5f",
+        )
         clock += at[-1] + 2
     (folder / "sensor.yaml").write_text(yaml.safe_dump(sensor.document))
     position = {"file": "log", "x": {"column": "x", "unit": "mm"}, "depth": {"column": "d", "unit": "mm"}}

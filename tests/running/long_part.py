@@ -112,12 +112,13 @@ class Passed:
             if passed and self.whole:
                 rooms = tuple(sorted(file["rooms"]))
                 known[name] = {
-                    "inputs": inputs(name, rooms), "rooms": rooms, "on": time.strftime("%Y-%m-%d"),
+                    "inputs": inputs(name, rooms),
+                    "rooms": rooms,
+                    "on": time.strftime("%Y-%m-%d"),
                     "seconds": round(file["seconds"]),
-                }  # fmt: skip
+                }
         if self.whole:
             RECORD.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
-
 
     def left_as_passed(self, path):
         """Return whether a file with no report was asked for: then it was left out for its inputs alone."""

@@ -11,8 +11,16 @@ import pytest
 
 TESTS = Path(__file__).parents[1]
 ROOMS = (
-    "commands", "demonstrations", "devices", "label_farm", "live", "recording", "registration", "replay", "virtual_rig",
-)  # fmt: skip
+    "commands",
+    "demonstrations",
+    "devices",
+    "label_farm",
+    "live",
+    "recording",
+    "registration",
+    "replay",
+    "virtual_rig",
+)
 """Rooms whose tests hold emulated devices, hosts or processes against the clock; they wait more than they compute."""
 RIGS = ("test_closed_loop.py",)
 """Files of other rooms that do: a press that a late machine spoilt stands out there, and nothing is named."""

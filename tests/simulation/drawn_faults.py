@@ -315,12 +315,33 @@ def killed(faults):
 KINDS = {
     act.__name__: act
     for act in (
-        damaged_answer, damaged_command, lost_answer, lost_command, late_answers, controller_stalls, damaged_frame,
-        board_stalls, board_freezes, board_saturates, board_unplugged, controller_unplugged, controller_mute, alarm,
-        brown_out, foreign_hold, foreign_door, door, pendant, computer_stalls, disk_full, disk_slow, interrupted,
-        interrupted_at_a_line, killed,
+        damaged_answer,
+        damaged_command,
+        lost_answer,
+        lost_command,
+        late_answers,
+        controller_stalls,
+        damaged_frame,
+        board_stalls,
+        board_freezes,
+        board_saturates,
+        board_unplugged,
+        controller_unplugged,
+        controller_mute,
+        alarm,
+        brown_out,
+        foreign_hold,
+        foreign_door,
+        door,
+        pendant,
+        computer_stalls,
+        disk_full,
+        disk_slow,
+        interrupted,
+        interrupted_at_a_line,
+        killed,
     )
-}  # fmt: skip
+}
 """Name -> what happens."""
 
 

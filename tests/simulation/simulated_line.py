@@ -129,4 +129,3 @@ class HostPort:
     def _check(self):
         if not (self.is_open and self._line.plugged) or self._line.computer.killed:
             raise serial.SerialException("device reports readiness to read but returned no data (device disconnected?)")
-

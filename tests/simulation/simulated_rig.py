@@ -35,10 +35,17 @@ def plan(presses, **entries):
     """Return a plan of some seconds a press, with further entries."""
     return Plan.from_document(
         {
-            "version": "1.0", "name": "simulated", "indenters": {"ball": {"shape": "sphere", "radius": 3.0}},
+            "version": "1.0",
+            "name": "simulated",
+            "indenters": {"ball": {"shape": "sphere", "radius": 3.0}},
             "motion": {
-                "clearance": CLEARANCE, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0,
-                "press_speed": 0.5, "hold": 2.0, "rest": 1.0,
+                "clearance": CLEARANCE,
+                "standoff": 0.3,
+                "travel_speed": 20.0,
+                "approach_speed": 5.0,
+                "press_speed": 0.5,
+                "hold": 2.0,
+                "rest": 1.0,
             },
             "presses": [
                 {"indenter": "ball", "x": x, "y": y, "depth": 0.8 + 0.1 * k}
@@ -47,7 +54,7 @@ def plan(presses, **entries):
             **entries,
         },
         "simulated",
-    )  # fmt: skip
+    )
 
 
 class Calm:
@@ -62,8 +69,7 @@ class Calm:
 class World:
     """One computer, one controller, one board and their lines, driven by one seed."""
 
-    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, echo=False, camera=False,
-                 **entries):  # fmt: skip
+    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, echo=False, camera=False, **entries):
         """Switch everything on."""
         self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
         self.schedule = Schedule(seed, LIMIT)
@@ -112,8 +118,16 @@ class World:
         def work():
             with Interruption(self.computer) as interruption:
                 recorder = Recorder(
-                    rig, SENSOR, self.plan, self.folder, resume, devices, interruption=interruption, ask=self._asked,
-                    say=self.said.append, sync_tap=sync_tap,
+                    rig,
+                    SENSOR,
+                    self.plan,
+                    self.folder,
+                    resume,
+                    devices,
+                    interruption=interruption,
+                    ask=self._asked,
+                    say=self.said.append,
+                    sync_tap=sync_tap,
                 )
                 return recorder.run(lambda summary: True)
 
@@ -122,12 +136,13 @@ class World:
     def rig(self, **controller):
         """Return the rig as its file describes it, on this computer's clock."""
         document = {
-            "version": "1.0", "name": "simulated",
+            "version": "1.0",
+            "name": "simulated",
             "cnc": {"driver": "grbl", "port": self.cnc_line.path, **controller},
             "board": {"driver": "capacitive_board", "port": self.board_line.path},
             "registration": {"origin": [*ORIGIN], "yaw": 5.0, "method": "by hand", "date": "2026-01-01"},
             "envelope": ENVELOPE,
-        }  # fmt: skip
+        }
         clock = Clock(EPOCH + START, START, 1.0, self.computer)
         return replace(from_document(document, "simulated"), clock=clock)
 

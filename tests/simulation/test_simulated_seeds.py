@@ -5,9 +5,12 @@ from simulated_run import play
 
 
 @pytest.mark.long(
-    "tacdata/recording", "tacdata/wire", "tacdata/devices", "tacdata/virtual_rig",
+    "tacdata/recording",
+    "tacdata/wire",
+    "tacdata/devices",
+    "tacdata/virtual_rig",
     reason="a thousand recordings with drawn faults, some 25 simulated seconds each",
-)  # fmt: skip
+)
 @pytest.mark.parametrize("first", range(0, 1000, 50))
 def test_what_must_hold_holds_of_a_thousand_seeds(first):
     failed = {seed: found for seed in range(first, first + 50) if (found := play(seed)[1])}

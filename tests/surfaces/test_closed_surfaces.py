@@ -35,7 +35,8 @@ def test_a_hole_is_named_with_its_place():
 def test_an_edge_of_three_triangles_is_named():
     box = trimesh.creation.box()
     fin = trimesh.Trimesh(
-        np.vstack([box.vertices, [[2, 0, 0], [2, 0, 1]]]), np.vstack([box.faces, [[*box.faces[0, :2], 8]]]),
+        np.vstack([box.vertices, [[2, 0, 0], [2, 0, 1]]]),
+        np.vstack([box.faces, [[*box.faces[0, :2], 8]]]),
         process=False,
     )
     with pytest.raises(FormatError, match="not watertight"):

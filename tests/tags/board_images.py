@@ -8,9 +8,14 @@ from tacdata.virtual_rig.optics.sheet import render_sheet, whole_lens
 
 BOARD = Board(9, 6, 25.0, 18.0, "4X4_50")
 TRUTH = {
-    "width": 640, "height": 480, "fx": 605.0, "fy": 602.0, "cx": 325.5, "cy": 236.0,
+    "width": 640,
+    "height": 480,
+    "fx": 605.0,
+    "fy": 602.0,
+    "cx": 325.5,
+    "cy": 236.0,
     "distortion": [-0.25, 0.08, 0.001, -0.0007, 0.0],
-}  # fmt: skip
+}
 
 
 def images(count, tilt=40.0, spread=1.0, seed=0, truth=TRUTH):

@@ -14,8 +14,7 @@ DATA = Path(os.environ.get("TACDATA_SHARED_DATA", Path(__file__).resolve().paren
 PHOTOS = DATA / "apriltag_photos" / "april_robotics"
 
 pytestmark = pytest.mark.skipif(
-    not PHOTOS.is_dir(),
-    reason="no apriltag_photos/april_robotics in $TACDATA_SHARED_DATA or ../shared/data",
+    not PHOTOS.is_dir(), reason="no apriltag_photos/april_robotics in $TACDATA_SHARED_DATA or ../shared/data"
 )
 
 

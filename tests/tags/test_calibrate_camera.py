@@ -86,19 +86,22 @@ def test_a_film_gives_its_still_and_different_images(folder, tmp_path):
     assert "22 images, the board in 22, 10 views taken" in shown.output
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ({"source": "nothing"}, "no file or folder"),
-    ({"source": "text.mp4"}, "no video"),
-    ({"source": "mixed"}, "images of one size"),
-    ({"source": "broken"}, "cannot be read as an image"),
-    ({"source": "blank"}, "0 views"),
-    ({"source": "nobody"}, "holds no image"),
-    ({"model": "fisheye"}, "rational"),
-    ({"board": "none.yaml"}, "none.yaml"),
-    ({"source": "97"}, "no camera 97"),
-    ({"source": "0", "size": "large"}, "WIDTHxHEIGHT"),
-    ({"source": None}, "--source with --out"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"source": "nothing"}, "no file or folder"),
+        ({"source": "text.mp4"}, "no video"),
+        ({"source": "mixed"}, "images of one size"),
+        ({"source": "broken"}, "cannot be read as an image"),
+        ({"source": "blank"}, "0 views"),
+        ({"source": "nobody"}, "holds no image"),
+        ({"model": "fisheye"}, "rational"),
+        ({"board": "none.yaml"}, "none.yaml"),
+        ({"source": "97"}, "no camera 97"),
+        ({"source": "0", "size": "large"}, "WIDTHxHEIGHT"),
+        ({"source": None}, "--source with --out"),
+    ],
+)
 def test_what_cannot_be_used_is_refused_in_words(folder, tmp_path, monkeypatch, change, words):
     monkeypatch.chdir(tmp_path)
     grey = np.full((480, 640), 90, np.uint8)

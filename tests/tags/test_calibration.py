@@ -79,12 +79,15 @@ def test_single_corners_in_wrong_places_are_left_out(views):
     assert gap(result, TRUTH) < 0.5
 
 
-@pytest.mark.parametrize(("kind", "words"), [
-    ("few", "7 views"),
-    ("one corner", "of the image"),
-    ("never tilted", "tilted by at most"),
-    ("other board", "check columns"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("few", "7 views"),
+        ("one corner", "of the image"),
+        ("never tilted", "tilted by at most"),
+        ("other board", "check columns"),
+    ],
+)
 def test_views_that_tell_too_little_are_refused(views, kind, words):
     board = BOARD
     if kind == "few":
@@ -127,13 +130,16 @@ def test_a_printed_board_is_read_back_at_its_size():
     assert abs(board.square - 25.0) < 0.09, "a whole number of dots"
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ({"marker": 24.0}, "30 to 90 %"),
-    ({"columns": 20, "rows": 20}, "200 markers"),
-    ({"dictionary": "4X4_51"}, "dictionary"),
-    ({"square": 0.0}, "square"),
-    ({"rows": 2}, "rows"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"marker": 24.0}, "30 to 90 %"),
+        ({"columns": 20, "rows": 20}, "200 markers"),
+        ({"dictionary": "4X4_51"}, "dictionary"),
+        ({"square": 0.0}, "square"),
+        ({"rows": 2}, "rows"),
+    ],
+)
 def test_impossible_boards_are_refused(change, words):
     with pytest.raises(FormatError, match=words):
         Board.from_document({**BOARD.document, **change})

@@ -176,12 +176,15 @@ def test_no_jump_between_the_two_poses_of_a_lone_face():
     assert max(errors) < 6.0
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    (("thumb", "cube", cube(5)), "tag 5 is on"),
-    (("thumb", "cube", {**cube(0), "tag": 30.0}), "thumb: cube: tag 30"),
-    (("index", "tip", {"position": [0, 0, 0], "quaternion": [0, 0, 0, 0]}), "length 0"),
-    (("index", "tip", {"position": [0, 0], "quaternion": [0, 0, 0, 1]}), "position"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("thumb", "cube", cube(5)), "tag 5 is on"),
+        (("thumb", "cube", {**cube(0), "tag": 30.0}), "thumb: cube: tag 30"),
+        (("index", "tip", {"position": [0, 0, 0], "quaternion": [0, 0, 0, 0]}), "length 0"),
+        (("index", "tip", {"position": [0, 0], "quaternion": [0, 0, 0, 1]}), "position"),
+    ],
+)
 def test_bad_finger_files_are_refused(change, words):
     name, key, value = change
     broken = copy.deepcopy(DOCUMENT)

@@ -33,9 +33,13 @@ def scored(outcomes):
 def test_what_a_dataset_does_not_allow_is_named(outcomes):
     found, _, _ = outcomes
     assert [(o.settings.split, o.settings.seed, bool(o.evaluation)) for o in found] == [
-        ("episode", 0, True), ("episode", 1, True), ("indenter", 0, True), ("indenter", 1, True),
-        ("specimen", 0, False), ("specimen", 1, False),
-    ]  # fmt: skip
+        ("episode", 0, True),
+        ("episode", 1, True),
+        ("indenter", 0, True),
+        ("indenter", 1, True),
+        ("specimen", 0, False),
+        ("specimen", 1, False),
+    ]
     assert "leaves no train episode" in found[-1].reason
 
 

@@ -27,7 +27,8 @@ QUICK = {
 }
 """What makes a command short, by its verb."""
 SHAPES = (
-    BALL, {"shape": "flat_punch", "radius": 1.5, "edge_radius": 0.3},
+    BALL,
+    {"shape": "flat_punch", "radius": 1.5, "edge_radius": 0.3},
     {"shape": "ring", "ring_radius": 2.0, "tube_radius": 0.5},
 )
 
@@ -60,8 +61,12 @@ def test_the_page_is_typed_from_its_first_command_to_its_last(typed, tmp_path):
     assert own.document["simulated"]
     curve = documents.read(tmp_path / "curve" / "curve.json", "learning_curve")
     assert {(point["start"], point["presses"]) for point in curve["points"]} == {
-        ("pretrained", 0), ("pretrained", 3), ("pattern", 3), ("pretrained", 10), ("pattern", 10),
-    }  # fmt: skip
+        ("pretrained", 0),
+        ("pretrained", 3),
+        ("pattern", 3),
+        ("pretrained", 10),
+        ("pattern", 10),
+    }
     said, alone = typed["learning-curve"]
     assert said.count("pretrained") >= 3 and "IoU > 0.2 mm" in said
     rows = [line.split()[:2] for line in alone.splitlines()[-4:-2]]

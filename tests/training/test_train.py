@@ -191,8 +191,9 @@ def test_bfloat16_learns_alike(frames, tmp_path):
     assert not same(*last)
 
 
-@pytest.mark.parametrize("changed", [{"schedule": "linear"}, {"precision": "float8"}, {"gain_jitter": -0.1},
-                                     {"idle_share": 1.5}])  # fmt: skip
+@pytest.mark.parametrize(
+    "changed", [{"schedule": "linear"}, {"precision": "float8"}, {"gain_jitter": -0.1}, {"idle_share": 1.5}]
+)
 def test_variations_that_make_no_sense_are_refused(changed):
     with pytest.raises(UsageError, match=next(iter(changed))):
         TrainingSettings(**changed)

@@ -26,10 +26,18 @@ def write_dataset(root, frames, virtual=True, indenters=(BALL,)):
         indenter = from_document(indenters[e.number % len(indenters)])
         press = Press(e.number, indenter, f"ball {e.number % 2}", e.x, e.y, 0.0, e.depth, 1.0, 1.0)
         record = EpisodeRecord(
-            sensor=frames.sensor.content_hash, recording=f"{e.number:064x}", recording_file="episode.mcap",
-            label="b" * 64, label_provenance={}, press=press.document, rig="bench", virtual=virtual,
-            baseline=(0.0,) * 24, quality=1.0, complete=True,
-        )  # fmt: skip
+            sensor=frames.sensor.content_hash,
+            recording=f"{e.number:064x}",
+            recording_file="episode.mcap",
+            label="b" * 64,
+            label_provenance={},
+            press=press.document,
+            rig="bench",
+            virtual=virtual,
+            baseline=(0.0,) * 24,
+            quality=1.0,
+            complete=True,
+        )
         columns = {
             features.STATE: frames.taxels[here],
             features.RAW: frames.taxels[here] + 1000,
@@ -92,11 +100,7 @@ def test_train_then_evaluate(dataset, tmp_path):
     ("arguments", "kind", "words"),
     [
         (["train", "{dataset}", "--out", "{tmp}/run", "--epochs", 0], UsageError, "epochs = 0"),
-        (
-            ["train", "{dataset}", "--out", "{tmp}/run", "--network", "papr"],
-            UsageError,
-            "did you mean 'paper'",
-        ),
+        (["train", "{dataset}", "--out", "{tmp}/run", "--network", "papr"], UsageError, "did you mean 'paper'"),
         (["train", "{dataset}", "--out", "{tmp}/run", "--split", "indenter"], UsageError, "leaves no train"),
         (["train", "{tmp}/none", "--out", "{tmp}/run"], UsageError, "no folder"),
         (["train", "{dataset}", "--out", "{dataset}"], UsageError, "already exists"),

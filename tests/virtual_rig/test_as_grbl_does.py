@@ -21,42 +21,80 @@ from tacdata.virtual_rig.firmware.controller import Controller
 
 COMMAND = os.environ.get("TACDATA_GRBL_FIRMWARE", "")
 SETTINGS = {
-    "$1": "255", "$10": "1", "$20": "0", "$22": "0", "$100": "250.000", "$101": "250.000", "$102": "250.000",
-    "$110": "3000.000", "$111": "3000.000", "$112": "900.000", "$120": "200.000", "$121": "200.000", "$122": "150.000",
-}  # fmt: skip
+    "$1": "255",
+    "$10": "1",
+    "$20": "0",
+    "$22": "0",
+    "$100": "250.000",
+    "$101": "250.000",
+    "$102": "250.000",
+    "$110": "3000.000",
+    "$111": "3000.000",
+    "$112": "900.000",
+    "$120": "200.000",
+    "$121": "200.000",
+    "$122": "150.000",
+}
 WELCOME, LOCKED = "Grbl 1.1h ['$' for help]", "[MSG:'$H'|'$X' to unlock]"
 MODES = "[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]"
 PLAYS = {
     # Bytes that are sent, and pauses in s; what comes back, without settings, of reports the state alone.
-    "a reset in a pause, whose line is answered": (
-        ("G4P2\n", 0.3, "\x18", 0.4), ["ok", WELCOME]),
+    "a reset in a pause, whose line is answered": (("G4P2\n", 0.3, "\x18", 0.4), ["ok", WELCOME]),
     "a reset in motion, with a line that waits for its end": (
-        ("G1X-10F600\nG4P1\n", 0.4, "\x18", 1.3), ["ok", "ALARM:3", "ok", WELCOME, LOCKED]),
+        ("G1X-10F600\nG4P1\n", 0.4, "\x18", 1.3),
+        ["ok", "ALARM:3", "ok", WELCOME, LOCKED],
+    ),
     "a hold, then a reset": (
         ("G1X-10F600\nG4P1\n", 0.3, "!", 0.5, "?", 0.1, "\x18", 0.4, "?", 0.1),
-        ["ok", "<Hold:0>", "ok", WELCOME, "<Idle>"]),
+        ["ok", "<Hold:0>", "ok", WELCOME, "<Idle>"],
+    ),
     "check mode, left by a reset": (
         ("$C\n", 0.1, "?", 0.1, "$#\n", 0.1, "$N\n", 0.1, "$110=3000\n", 0.1, "$G\n", 0.1, "$C\n", 0.4, "?", 0.1),
-        ["[MSG:Enabled]", "ok", "<Check>", "error:8", "error:8", "error:8", MODES, "ok", "[MSG:Disabled]", "ok",
-         WELCOME, "<Idle>"]),
+        [
+            "[MSG:Enabled]",
+            "ok",
+            "<Check>",
+            "error:8",
+            "error:8",
+            "error:8",
+            MODES,
+            "ok",
+            "[MSG:Disabled]",
+            "ok",
+            WELCOME,
+            "<Idle>",
+        ],
+    ),
     "sleep, after which it is locked": (
         ("$SLP\n", 0.3, "?", 0.1, "\x18", 0.4, "?", 0.1),
-        ["ok", "[MSG:Sleeping]", "<Sleep>", WELCOME, LOCKED, "<Alarm>"]),
+        ["ok", "[MSG:Sleeping]", "<Sleep>", WELCOME, LOCKED, "<Alarm>"],
+    ),
     "lines in a jog": (
         ("$J=G91X-5F300\n", 0.2, "G1X1F10\n", 0.1, "$$\n", 0.4, "$#\n", 0.1, "\x85", 0.4, "?", 0.1),
-        ["ok", "error:9", "ok", "error:8", "<Idle>"]),
+        ["ok", "error:9", "ok", "error:8", "<Idle>"],
+    ),
     "a door in a jog, which is not taken up again": (
         ("$J=G91X-5F300\n", 0.2, "\x84", 0.5, "?", 0.1, "~", 0.3, "?", 0.1),
-        ["ok", "[MSG:Check Door]", "<Door:0>", "<Idle>"]),
+        ["ok", "[MSG:Check Door]", "<Door:0>", "<Idle>"],
+    ),
     "a target beyond the soft limits": (
         ("$22=1\n", 0.3, "$20=1\n", 0.3, "G1X300F600\n", 1.0, "?", 0.1, "\x18", 0.5, "?", 0.1, "$X\n", 0.2),
-        ["ok", "ok", "ALARM:2", "[MSG:Reset to continue]", "ok", WELCOME, LOCKED, "<Alarm>",
-         "[MSG:Caution: Unlocked]", "ok"]),
-    "bytes that are left out of a line": (
-        ("\x01G21\n", 0.1, "/G21\n", 0.1, "%\n", 0.1), ["ok", "ok", "error:1"]),
-    "a tool's length, which the modes do not name": (
-        ("G43.1Z1.5\n", 0.1, "$G\n", 0.1), ["ok", MODES, "ok"]),
-}  # fmt: skip
+        [
+            "ok",
+            "ok",
+            "ALARM:2",
+            "[MSG:Reset to continue]",
+            "ok",
+            WELCOME,
+            LOCKED,
+            "<Alarm>",
+            "[MSG:Caution: Unlocked]",
+            "ok",
+        ],
+    ),
+    "bytes that are left out of a line": (("\x01G21\n", 0.1, "/G21\n", 0.1, "%\n", 0.1), ["ok", "ok", "error:1"]),
+    "a tool's length, which the modes do not name": (("G43.1Z1.5\n", 0.1, "$G\n", 0.1), ["ok", MODES, "ok"]),
+}
 
 
 def play(line, steps):

@@ -69,13 +69,27 @@ def terminal():
     controller.stop()
 
 
-@pytest.mark.parametrize(("line", "answer"), [
-    ("G1X1", "error:22"), ("G2X1Y1I1", "error:20"), ("G0G1X1", "error:21"), ("G4", "error:28"),
-    ("X1X2", "error:25"),
-    ("GX", "error:2"), ("%", "error:1"), ("$Q", "error:3"), ("$20=-1", "error:4"), ("$110=abc", "error:2"),
-    ("$J=X10", "error:22"), ("$J=X500F100", "error:15"), ("G53 G80 X1", "error:30"), ("", "ok"),
-    ("(comment) g21 ; tail", "ok"), ("G0 X-50.0 Y-50 Z-20", "ok"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("G1X1", "error:22"),
+        ("G2X1Y1I1", "error:20"),
+        ("G0G1X1", "error:21"),
+        ("G4", "error:28"),
+        ("X1X2", "error:25"),
+        ("GX", "error:2"),
+        ("%", "error:1"),
+        ("$Q", "error:3"),
+        ("$20=-1", "error:4"),
+        ("$110=abc", "error:2"),
+        ("$J=X10", "error:22"),
+        ("$J=X500F100", "error:15"),
+        ("G53 G80 X1", "error:30"),
+        ("", "ok"),
+        ("(comment) g21 ; tail", "ok"),
+        ("G0 X-50.0 Y-50 Z-20", "ok"),
+    ],
+)
 def test_answers(terminal, line, answer):
     assert terminal.ask(line) == answer
 
@@ -165,9 +179,10 @@ def test_carriage_return_and_line_feed_are_two_lines(terminal):
     assert terminal.hear_all(b"ok", 2).split() == [b"ok", b"ok"]
 
 
-@pytest.mark.parametrize(("line", "answer"), [
-    ("G1X" + "0" * 80, "error:11"), ("N12 G0 X-50", "ok"), ("$N1=G54", "ok"), ("$N3=G54", "error:3"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [("G1X" + "0" * 80, "error:11"), ("N12 G0 X-50", "ok"), ("$N1=G54", "ok"), ("$N3=G54", "error:3")],
+)
 def test_lines_as_the_firmware_takes_them(terminal, line, answer):
     assert terminal.ask(line) == answer
 

@@ -22,9 +22,12 @@ DEPTH = np.concatenate([np.linspace(-0.2, 0.8, 30), np.full(20, 0.8), np.linspac
 def pressed(world):
     """Press a ball at the centre down to 0.8 mm and up again; return all frames."""
     origin = np.array(TRUTH.registration.origin)
-    return np.array([
-        world.readings(origin - np.array([0.0, 0.0, d]), Sphere(3.0), 0.0, (k + 1) * STEP) for k, d in enumerate(DEPTH)
-    ])  # fmt: skip
+    return np.array(
+        [
+            world.readings(origin - np.array([0.0, 0.0, d]), Sphere(3.0), 0.0, (k + 1) * STEP)
+            for k, d in enumerate(DEPTH)
+        ]
+    )
 
 
 def true_depth(folder):

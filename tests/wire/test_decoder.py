@@ -26,18 +26,33 @@ def frame(counter: int, value: int = 500) -> bytes:
 
 def inline(**changes):
     document = {
-        "version": "1.0", "name": "t", "encoding": "ascii", "sync": "$C,", "counter": "uint8",
-        "channels": {"count": 3, "type": "uint16"}, "checksum": {"kind": "xor8"}, "rate": 100,
-    }  # fmt: skip
+        "version": "1.0",
+        "name": "t",
+        "encoding": "ascii",
+        "sync": "$C,",
+        "counter": "uint8",
+        "channels": {"count": 3, "type": "uint16"},
+        "checksum": {"kind": "xor8"},
+        "rate": 100,
+    }
     document.update(changes)
     return from_document({k: v for k, v in document.items() if v is not None}, "test")
 
 
 @pytest.mark.parametrize(
     ("kind", "value"),
-    [("crc8", 0xF4), ("crc16_ccitt_false", 0x29B1), ("crc16_xmodem", 0x31C3), ("crc16_modbus", 0x4B37),
-     ("crc32", 0xCBF43926), ("xor8", 0x31), ("sum8", 0xDD), ("sum16", 0x01DD), ("none", 0)],
-)  # fmt: skip
+    [
+        ("crc8", 0xF4),
+        ("crc16_ccitt_false", 0x29B1),
+        ("crc16_xmodem", 0x31C3),
+        ("crc16_modbus", 0x4B37),
+        ("crc32", 0xCBF43926),
+        ("xor8", 0x31),
+        ("sum8", 0xDD),
+        ("sum16", 0x01DD),
+        ("none", 0),
+    ],
+)
 def test_checksums_give_the_published_check_values(kind, value):
     assert checksum(kind, b"123456789") == value
 
@@ -161,15 +176,22 @@ def test_ascii_lines_that_are_no_frames(line):
 
 
 @pytest.mark.parametrize("kind", ["uint8", "int8", "uint16", "int16", "uint24", "int24", "uint32", "int32", "float32"])
-@pytest.mark.parametrize("changes", [
-    {
-        "encoding": "binary", "sync": [1, 2, 3], "endianness": "big", "trailer": [13, 10],
-        "checksum": {"kind": "crc32", "covers": "frame"}, "timestamp": {"type": "uint32", "tick": 1e-6},
-        "order": ["timestamp", "channels", "counter"],
-    },
-    {"encoding": "binary", "sync": [255], "checksum": {"kind": "sum8"}},
-    {"sync": "T:", "separator": " ", "checksum": {"kind": "crc16_modbus", "covers": "frame"}},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {
+            "encoding": "binary",
+            "sync": [1, 2, 3],
+            "endianness": "big",
+            "trailer": [13, 10],
+            "checksum": {"kind": "crc32", "covers": "frame"},
+            "timestamp": {"type": "uint32", "tick": 1e-6},
+            "order": ["timestamp", "channels", "counter"],
+        },
+        {"encoding": "binary", "sync": [255], "checksum": {"kind": "sum8"}},
+        {"sync": "T:", "separator": " ", "checksum": {"kind": "crc16_modbus", "covers": "frame"}},
+    ],
+)
 def test_every_type_comes_back(kind, changes):
     layout = inline(**changes, channels={"count": 5, "type": kind})
     bits = int(kind.strip("uintfloa"))
@@ -194,13 +216,16 @@ def test_thousand_frames_a_second_survive_bursts():
     assert decoder.counts.lost == decoder.counts.corrupt == decoder.counts.garbage_bytes == 0
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"channels": {"count": 0, "type": "uint16"}}, "channels/count"),
-    ({"checksum": {"kind": "md5"}}, "crc16_modbus"),
-    ({"encoding": "binary"}, "list of bytes"),
-    ({"order": ["channels"]}, "order names channels"),
-    ({"rate": -1}, "Hz"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"channels": {"count": 0, "type": "uint16"}}, "channels/count"),
+        ({"checksum": {"kind": "md5"}}, "crc16_modbus"),
+        ({"encoding": "binary"}, "list of bytes"),
+        ({"order": ["channels"]}, "order names channels"),
+        ({"rate": -1}, "Hz"),
+    ],
+)
 def test_bad_formats_are_said(changes, words):
     with pytest.raises(FormatError, match=words):
         inline(**changes)

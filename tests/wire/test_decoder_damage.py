@@ -14,14 +14,17 @@ FORMATS = {
     "crc32": {"encoding": "binary", "sync": [0xA5, 0x5A], "checksum": {"kind": "crc32"}},
     "short sync": {"encoding": "binary", "sync": [0], "checksum": {"kind": "crc32c", "covers": "frame"}},
     "modbus order": {
-        "encoding": "binary", "endianness": "big", "sync": [1, 2, 3], "trailer": [13, 10],
+        "encoding": "binary",
+        "endianness": "big",
+        "sync": [1, 2, 3],
+        "trailer": [13, 10],
         "checksum": {"kind": "crc32_mpeg2", "endianness": "little"},
     },
     "slip": {"encoding": "binary", "framing": "slip", "checksum": {"kind": "crc32"}},
     "cobs": {"encoding": "binary", "framing": "cobs", "checksum": {"kind": "crc32"}},
     "ascii": {"encoding": "ascii", "sync": "$C,", "checksum": {"kind": "crc32"}},
     "ascii without sync": {"encoding": "ascii", "separator": " ", "radix": 16, "checksum": {"kind": "crc32"}},
-}  # fmt: skip
+}
 
 
 def chewed(rng, frames):
@@ -90,11 +93,18 @@ def test_noise_gives_nothing_and_takes_no_memory(name):
 
 @pytest.mark.parametrize(
     ("kind", "text", "value"),
-    [("crc8_maxim", b"123456789", 0xA1), ("crc8_sae_j1850", b"123456789", 0x4B),
-     ("crc16_kermit", b"123456789", 0x2189), ("crc16_x25", b"123456789", 0x906E),
-     ("crc16_arc", b"123456789", 0xBB3D), ("crc32_mpeg2", b"123456789", 0x0376E6E7),
-     ("crc32c", b"123456789", 0xE3069283), ("lrc8", b"123456789", 0x23), ("fletcher16", b"abcde", 0xC8F0)],
-)  # fmt: skip
+    [
+        ("crc8_maxim", b"123456789", 0xA1),
+        ("crc8_sae_j1850", b"123456789", 0x4B),
+        ("crc16_kermit", b"123456789", 0x2189),
+        ("crc16_x25", b"123456789", 0x906E),
+        ("crc16_arc", b"123456789", 0xBB3D),
+        ("crc32_mpeg2", b"123456789", 0x0376E6E7),
+        ("crc32c", b"123456789", 0xE3069283),
+        ("lrc8", b"123456789", 0x23),
+        ("fletcher16", b"abcde", 0xC8F0),
+    ],
+)
 def test_further_checksums_give_the_published_check_values(kind, text, value):
     assert checksum(kind, text) == value
 
@@ -125,9 +135,16 @@ def test_a_reading_that_the_board_calls_nan_is_kept_as_it_is():
 
 def test_wide_numbers_come_back():
     layout = from_document(
-        {**BASE, "encoding": "binary", "sync": [9], "timestamp": {"type": "uint64", "tick": 1e-6},
-         "channels": {"count": 2, "type": "float64"}, "checksum": {"kind": "sum16"}}, "t",
-    )  # fmt: skip
+        {
+            **BASE,
+            "encoding": "binary",
+            "sync": [9],
+            "timestamp": {"type": "uint64", "tick": 1e-6},
+            "channels": {"count": 2, "type": "float64"},
+            "checksum": {"kind": "sum16"},
+        },
+        "t",
+    )
     encoder = Encoder(layout)
     frames = Decoder(layout).feed(b"".join(encoder.encode(np.array([0.1, -1e9]), k, 2**40 + k) for k in range(2)), 0)
     assert [f.device_ns for f in frames] == [2**40 * 1000, (2**40 + 1) * 1000]

@@ -45,10 +45,12 @@ def test_work_offset_is_the_sum_of_what_is_active():
     [
         ("G0 G54 G17 G21 G90 G94 G49 G98 G50 M5 M9 T0 F0 S0.", ()),
         ("G0 G54 G17 G21 G90 G94 G49 G98 G51:XZ M5 M9 T0 F0 S0.", ("G51",)),
-        ("G0 G54 G92 G7 G17 G20 G91 G93 G43.2 G98 G50 M3 M8 M53 T0 F0 S500.",
-         ("G92", "G7", "G20", "G91", "G93", "G43.2", "M3", "M53")),
+        (
+            "G0 G54 G92 G7 G17 G20 G91 G93 G43.2 G98 G50 M3 M8 M53 T0 F0 S500.",
+            ("G92", "G7", "G20", "G91", "G93", "G43.2", "M3", "M53"),
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_bends_moves_or_lets_them_go_on_is_read_as_grblhal_writes_it(said, bent):
     assert GrblSettings({"GC": said}).bent_by == bent
 

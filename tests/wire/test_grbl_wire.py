@@ -26,9 +26,9 @@ def test_what_is_no_response(line):
     assert not RESPONSE.match(line)
 
 
-@pytest.mark.parametrize("line", [
-    "Grbl 1.1h ['$' for help]", "GrblHAL 1.1f ['$' or '$HELP' for help]", "\ufffdGrbl 0.9j ['$' for help]",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "line", ["Grbl 1.1h ['$' for help]", "GrblHAL 1.1f ['$' or '$HELP' for help]", "\ufffdGrbl 0.9j ['$' for help]"]
+)
 def test_welcomes(line):
     assert WELCOME.search(line)
 
@@ -54,12 +54,15 @@ def test_settings_and_messages():
     assert alarm[1] == "9"
 
 
-@pytest.mark.parametrize(("line", "state", "position", "work", "feed"), [
-    ("<Idle|MPos:0.000,-1.500,2.250|FS:0,0>", "Idle", (0, -1.5, 2.25), False, 0),
-    ("<Hold:0|WPos:1,2,3|Bf:15,128|FS:120,0|WCO:10,20,30>", "Hold:0", (1, 2, 3), True, 120),
-    ("<Run|MPos:1,2,3|F:500|Pn:XYZ|Ov:100,100,100|A:SFM>", "Run", (1, 2, 3), False, 500),
-    ("<Idle|MPos:1,2,3,4|Bf:100,1023|FS:0,0,0|Pn:>", "Idle", (1, 2, 3), False, 0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("line", "state", "position", "work", "feed"),
+    [
+        ("<Idle|MPos:0.000,-1.500,2.250|FS:0,0>", "Idle", (0, -1.5, 2.25), False, 0),
+        ("<Hold:0|WPos:1,2,3|Bf:15,128|FS:120,0|WCO:10,20,30>", "Hold:0", (1, 2, 3), True, 120),
+        ("<Run|MPos:1,2,3|F:500|Pn:XYZ|Ov:100,100,100|A:SFM>", "Run", (1, 2, 3), False, 500),
+        ("<Idle|MPos:1,2,3,4|Bf:100,1023|FS:0,0,0|Pn:>", "Idle", (1, 2, 3), False, 0),
+    ],
+)
 def test_status_reports(line, state, position, work, feed):
     report = parse_status(line)
     assert report is not None
@@ -78,10 +81,18 @@ def test_overrides_and_inputs_of_a_report():
     assert (bare.feed_override, bare.pins, np.isnan(bare.feed)) == (None, "", True)
 
 
-@pytest.mark.parametrize("line", [
-    "<Idle|MPos:0.000,-1.5", "<Idle|MPos:0.0.0,1,2|FS:0,0>", "<Idle|MPos:1,2|FS:0,0>", "<|MPos:1,2,3>",
-    "<Idle>",
-    "<Idle|FS:0,0>", "<Id\ufffdle|MPos:1,2,3>", "<Idle|MPos:1,2,3|WCO:1,2>",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "line",
+    [
+        "<Idle|MPos:0.000,-1.5",
+        "<Idle|MPos:0.0.0,1,2|FS:0,0>",
+        "<Idle|MPos:1,2|FS:0,0>",
+        "<|MPos:1,2,3>",
+        "<Idle>",
+        "<Idle|FS:0,0>",
+        "<Id\ufffdle|MPos:1,2,3>",
+        "<Idle|MPos:1,2,3|WCO:1,2>",
+    ],
+)
 def test_damaged_reports_are_none(line):
     assert parse_status(line) is None

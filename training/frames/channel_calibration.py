@@ -83,10 +83,14 @@ class ChannelCalibration:
     def document(self) -> dict[str, Any]:
         """The calibration as plain data (in `schemas/checkpoint.schema.json`)."""
         return {
-            "gain": self.gain.tolist(), "gain_error": self.gain_error.tolist(), "exponent": self.exponent,
-            "exponent_error": self.exponent_error, "presses": self.presses, "spread": self.spread,
+            "gain": self.gain.tolist(),
+            "gain_error": self.gain_error.tolist(),
+            "exponent": self.exponent,
+            "exponent_error": self.exponent_error,
+            "presses": self.presses,
+            "spread": self.spread,
             "spread_error": self.spread_error,
-        }  # fmt: skip
+        }
 
     @classmethod
     def from_document(cls, document: dict[str, Any], taxels: Taxels) -> ChannelCalibration:
@@ -94,9 +98,15 @@ class ChannelCalibration:
         gain, error = (np.asarray(document[name], float) for name in ("gain", "gain_error"))
         variance = document.get("spread", 0.0)
         return cls(
-            gain, document["exponent"], error, document["exponent_error"], document["presses"], variance,
-            document.get("spread_error", 0.0), spreading(taxels, variance) if variance else None,
-        )  # fmt: skip
+            gain,
+            document["exponent"],
+            error,
+            document["exponent_error"],
+            document["presses"],
+            variance,
+            document.get("spread_error", 0.0),
+            spreading(taxels, variance) if variance else None,
+        )
 
 
 def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
@@ -112,9 +122,10 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
     """
     if frames.taxel_force is None:
         raise FormatError(
-            f"{frames.origin} does not say the forces on the protrusions", "the column tacdata.taxel_force",
+            f"{frames.origin} does not say the forces on the protrusions",
+            "the column tacdata.taxel_force",
             "label the recordings again and pack them",
-        )  # fmt: skip
+        )
     presses = []
     for span in frames.spans(episodes):
         here = np.arange(span.start, span.stop)
@@ -127,12 +138,13 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
             f"{frames.origin} is of {frames.sensor.name}, a flat skin: the model knows no force on its taxels",
             "a skin with protrusions on a board, to turn readings into forces",
             "add --no-calibrate, or train another network (--network paper)",
-        )  # fmt: skip
+        )
     if not presses:
         raise UsageError(
-            f"{frames.origin}: none of {len(episodes)} presses touches the skin", "a press that loads taxels",
+            f"{frames.origin}: none of {len(episodes)} presses touches the skin",
+            "a press that loads taxels",
             "record presses deeper than 0.2 mm",
-        )  # fmt: skip
+        )
     _check_order(presses, frames.origin)
     sums = _sums(presses)
     gain, error, exponent = _fitted(sums)
@@ -148,9 +160,7 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
         group = np.arange(len(presses)) % groups
         left_out = np.array([_fitted([part[..., group != k, :] for part in sums])[2] for k in range(groups)])
         exponent_error = _jackknifed(left_out)
-    return ChannelCalibration(
-        gain, exponent, error, exponent_error, len(presses), variance, variance_error, mixing
-    )
+    return ChannelCalibration(gain, exponent, error, exponent_error, len(presses), variance, variance_error, mixing)
 
 
 def doubts(calibration: ChannelCalibration, frames: Frames, episodes: tuple[int, ...]) -> list[str]:
@@ -316,5 +326,6 @@ def _check_order(presses: list[tuple[np.ndarray, np.ndarray]], origin: str) -> N
             raise UsageError(
                 f"{origin}: channel {k} reads what channel {j} should, and channel {j} what channel {k} should "
                 f"(correlation with the model's forces {across[k, j]:.2f} and {across[j, k]:.2f})",
-                "channels in the order of the sensor file", "correct the wiring or the order, and record again",
-            )  # fmt: skip
+                "channels in the order of the sensor file",
+                "correct the wiring or the order, and record again",
+            )

@@ -69,6 +69,15 @@ def _span(episode: DatasetEpisode, tip: np.ndarray) -> EpisodeSpan:
         x, y, depth = (float(v) for v in path[np.argmax(path[:, 2])])
         return EpisodeSpan(episode.index, episode.start, episode.stop, UNKNOWN, UNKNOWN, x, y, depth, None, specimen)
     return EpisodeSpan(
-        episode.index, episode.start, episode.stop, press.indenter_name, press.indenter.shape,
-        press.x, press.y, press.depth, press.speed, specimen, press.purpose,
-    )  # fmt: skip
+        episode.index,
+        episode.start,
+        episode.stop,
+        press.indenter_name,
+        press.indenter.shape,
+        press.x,
+        press.y,
+        press.depth,
+        press.speed,
+        specimen,
+        press.purpose,
+    )

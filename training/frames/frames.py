@@ -82,10 +82,7 @@ class Frames:
         self._check_shape("phases", self.phase, (n,), "the phase column is damaged")
         self._check_shape("times", self.time_ns, (n,), "the time column is damaged")
         self._check_shape("validity flags", self.valid, (n,), "the column is damaged")
-        if not self.episodes or [e.start for e in self.episodes] != [
-            0,
-            *(e.stop for e in self.episodes[:-1]),
-        ]:
+        if not self.episodes or [e.start for e in self.episodes] != [0, *(e.stop for e in self.episodes[:-1])]:
             raise FormatError(f"{self.origin}: episodes do not follow each other", "gapless spans", "pack it again")
         if self.episodes[-1].stop != n or any(e.stop <= e.start for e in self.episodes):
             raise FormatError(
@@ -93,11 +90,7 @@ class Frames:
                 "at least one frame an episode, and none outside",
                 "pack it again",
             )
-        for name, values in (
-            ("taxel signals", self.taxels),
-            ("label maps", self.depth),
-            ("nominal tip", self.tip),
-        ):
+        for name, values in (("taxel signals", self.taxels), ("label maps", self.depth), ("nominal tip", self.tip)):
             self._check_finite(name, values)
 
     def _check_shape(self, name: str, values: np.ndarray, expected: tuple[int, ...], why: str) -> None:

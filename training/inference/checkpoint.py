@@ -140,9 +140,7 @@ def load(path: Path, device: torch.device | str = "cpu") -> Checkpoint:
     mean, sd = (np.asarray(document["normalization"][k], dtype=np.float32) for k in ("mean", "sd"))
     if mean.shape != (sensor.taxels.count,) or sd.shape != mean.shape:
         raise FormatError(
-            f"{path}: normalization of {mean.size} and {sd.size} channels",
-            f"{sensor.taxels.count} each",
-            "train again",
+            f"{path}: normalization of {mean.size} and {sd.size} channels", f"{sensor.taxels.count} each", "train again"
         )
     network.set_normalization(mean, sd)
     if calibration := document.get("calibration"):

@@ -111,17 +111,26 @@ def _write(onnx: Any, trained: Checkpoint, estimator: DepthNetwork, example: tor
         # torch recommends its newer exporter, which needs a package more and takes ten times as long.
         warnings.simplefilter("ignore")
         torch.onnx.export(
-            estimator, (example,), path, input_names=["windows"], output_names=["depth"], opset_version=OPSET,
-            dynamic_axes={"windows": {0: "frames"}, "depth": {0: "frames"}}, dynamo=False,
-        )  # fmt: skip
+            estimator,
+            (example,),
+            path,
+            input_names=["windows"],
+            output_names=["depth"],
+            opset_version=OPSET,
+            dynamic_axes={"windows": {0: "frames"}, "depth": {0: "frames"}},
+            dynamo=False,
+        )
     model = onnx.load(path)
     onnx.checker.check_model(model)
     told = {
-        "checkpoint": trained.content_hash, "network": trained.network.name, "offsets": list(trained.network.offsets),
+        "checkpoint": trained.content_hash,
+        "network": trained.network.name,
+        "offsets": list(trained.network.offsets),
         "sensor": {"name": trained.sensor.name, "hash": trained.sensor.content_hash},
-        "rate_hz": trained.sensor.taxels.rate, "windows": "tared readings [counts], (frames, window, taxels)",
+        "rate_hz": trained.sensor.taxels.rate,
+        "windows": "tared readings [counts], (frames, window, taxels)",
         "depth": "[mm], (frames, pixels_x, pixels_y)",
-    }  # fmt: skip
+    }
     entry = model.metadata_props.add()
     entry.key, entry.value = KEY, json.dumps(told)
     onnx.save(model, path)

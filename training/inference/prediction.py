@@ -59,9 +59,7 @@ def write_prediction(path: Path, prediction: PredictedMaps) -> None:
     depth = np.ascontiguousarray(prediction.depth, dtype=np.float32)
     if depth.ndim != 3 or len(depth) != len(prediction.time_ns) or not np.isfinite(depth).all():
         raise FormatError(
-            f"{path}: maps {depth.shape} for {len(prediction.time_ns)} times",
-            "one finite map a frame",
-            "predict again",
+            f"{path}: maps {depth.shape} for {len(prediction.time_ns)} times", "one finite map a frame", "predict again"
         )
     _, pixels_x, pixels_y = depth.shape
     named = {k: v for k, v in vars(prediction).items() if k not in ("time_ns", "depth")}

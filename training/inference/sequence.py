@@ -30,8 +30,9 @@ def sequence_maps(trained: Checkpoint, taxels: np.ndarray) -> np.ndarray:
     if taxels.ndim != 2 or taxels.shape[1] != count or not finite:
         raise FormatError(
             f"readings of shape {taxels.shape}" + ("" if finite else " with values that are no numbers"),
-            f"finite, {count} taxels a frame", "give the board's frames, tared",
-        )  # fmt: skip
+            f"finite, {count} taxels a frame",
+            "give the board's frames, tared",
+        )
     network, depth_max = trained.network.eval(), trained.sensor.map.depth_max
     signals = torch.as_tensor(np.ascontiguousarray(taxels, np.float32))
     offsets, last = torch.tensor(network.offsets), len(taxels) - 1
@@ -47,9 +48,12 @@ def sequence_maps(trained: Checkpoint, taxels: np.ndarray) -> np.ndarray:
 def identity(trained: Checkpoint) -> dict[str, str | int]:
     """Return which network this is: hash of its file, name, epoch, look-ahead [frames], sensor."""
     return {
-        "hash": trained.content_hash, "network": trained.network.name, "epoch": trained.document["epoch"],
-        "lookahead": max(trained.network.offsets), "sensor": trained.sensor.content_hash,
-    }  # fmt: skip
+        "hash": trained.content_hash,
+        "network": trained.network.name,
+        "epoch": trained.document["epoch"],
+        "lookahead": max(trained.network.offsets),
+        "sensor": trained.sensor.content_hash,
+    }
 
 
 def window_map(trained: Checkpoint) -> Callable[[np.ndarray], np.ndarray]:

@@ -149,9 +149,11 @@ def _centroids(depth: np.ndarray, owner: np.ndarray) -> np.ndarray:
 
 
 def hills(
-    depth: np.ndarray, threshold: float = CONTACT_THRESHOLD, prominence: float = PROMINENCE,
+    depth: np.ndarray,
+    threshold: float = CONTACT_THRESHOLD,
+    prominence: float = PROMINENCE,
     least: float = LEAST_PROMINENCE,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return which hill each pixel deeper than the threshold belongs to, the deepest hill is 0; -1 elsewhere.
 
     Args:

@@ -58,10 +58,13 @@ class TrainingReadings:
     def document(self) -> dict[str, Any]:
         """These readings as plain data (`schemas/seen.schema.json`)."""
         return {
-            "version": schemas.version("seen"), "checkpoint": self.checkpoint, "far": self.far, "share": SHARE,
+            "version": schemas.version("seen"),
+            "checkpoint": self.checkpoint,
+            "far": self.far,
+            "share": SHARE,
             "readings": np.round(self.readings, 1).tolist(),
             "provenance": provenance.stamp("training.metrics.novelty", {"checkpoint": self.checkpoint}, {"kept": KEPT}),
-        }  # fmt: skip
+        }
 
 
 def gathered(

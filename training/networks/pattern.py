@@ -28,10 +28,15 @@ class Pattern(Network):
 
     offsets = OFFSETS
     recipe: ClassVar[dict[str, Any]] = {
-        "calibrate": True, "mirror": True, "schedule": "cosine", "batch_size": 128,
-        "gain_jitter": 0.05, "scale_jitter": 0.05, "exponent_jitter": 0.03,
+        "calibrate": True,
+        "mirror": True,
+        "schedule": "cosine",
+        "batch_size": 128,
+        "gain_jitter": 0.05,
+        "scale_jitter": 0.05,
+        "exponent_jitter": 0.03,
         "loss": WeightedLoss(mixture=0.9, threshold=1 / 30, foreground=3.0),
-    }  # fmt: skip
+    }
 
     def __init__(
         self,

@@ -100,18 +100,20 @@ def learning_curve(
         pretrained.check_sensor(frames.sensor, frames.origin)
     if frames.simulated:
         raise UsageError(
-            f"{frames.origin} is simulated", "recorded presses: the curve says how many of them are needed",
+            f"{frames.origin} is simulated",
+            "recorded presses: the curve says how many of them are needed",
             "give the dataset of a unit",
-        )  # fmt: skip
+        )
     parents = {"dataset": frames.dataset_hash}
     if pretrained:
         pretrained.check_unseen(frames.dataset_hash, frames.origin)
         parents["pretrained"] = pretrained.content_hash
     elif simulated:
         raise UsageError(
-            "simulated frames beside random weights", "simulated frames where a pretrained network is fitted",
+            "simulated frames beside random weights",
+            "simulated frames where a pretrained network is fitted",
             "leave --simulated out, or name a pretrained network by --from",
-        )  # fmt: skip
+        )
     parents |= {"simulated": simulated.dataset_hash} if simulated else {}
     held = divide(frames, split, seeds[0])
     pool = tuple(sorted({*held.train, *held.validation}))
@@ -121,7 +123,7 @@ def learning_curve(
             f"{list(presses)} presses of {len(pool)} that are not held out",
             f"{'0, or ' if pretrained else ''}2 to {len(pool)} presses",
             "record more presses, or ask for fewer",
-        )  # fmt: skip
+        )
     document = _document(out, split, held, parents)
     done = {(point["start"], point["presses"], point["seed"]) for point in document["points"]}
     for count in possible:
@@ -138,9 +140,17 @@ def learning_curve(
                     division = _division(held, chosen, seed)
                     listener = begun(start, count, seed)
                     network = train(
-                        frames, settings, run, device, (run / "last.safetensors").is_file(), threads, listener,
-                        pretrained=from_start, simulated=mixed, split=division,
-                    ).network  # fmt: skip
+                        frames,
+                        settings,
+                        run,
+                        device,
+                        (run / "last.safetensors").is_file(),
+                        threads,
+                        listener,
+                        pretrained=from_start,
+                        simulated=mixed,
+                        split=division,
+                    ).network
                 with reproducible(threads):
                     point = _scored(network, frames, held.test, start, count, seed)
                 document["points"].append(asdict(point))
@@ -171,29 +181,38 @@ def _scored(network: Any, frames: Frames, test: tuple[int, ...], start: str, pre
     touching, deep = scores.labelled, label.max(axis=(1, 2)) > DEEP
     if not deep.any():
         raise FormatError(
-            f"{frames.origin}: no frame of the presses held out is deeper than {DEEP} mm", "presses into the skin",
+            f"{frames.origin}: no frame of the presses held out is deeper than {DEEP} mm",
+            "presses into the skin",
             "record deeper presses, or hold out others by --split",
-        )  # fmt: skip
+        )
     seen = touching & scores.predicted
     return CurvePoint(
-        start, presses, seed,
+        start,
+        presses,
+        seed,
         centroid_error=float(np.median(scores.centroid_error[seen]) if seen.any() else np.hypot(*network.map_shape)),
-        contact_rmse=float(np.median(scores.contact_rmse[touching])), iou=float(np.median(scores.iou[touching])),
-        iou_deep=float(scores.iou[deep].mean()), missed=float(1 - seen.sum() / touching.sum()),
-    )  # fmt: skip
+        contact_rmse=float(np.median(scores.contact_rmse[touching])),
+        iou=float(np.median(scores.iou[touching])),
+        iou_deep=float(scores.iou[deep].mean()),
+        missed=float(1 - seen.sum() / touching.sum()),
+    )
 
 
 def _document(out: Path, split: str, held: Split, parents: dict[str, str]) -> dict[str, Any]:
     fresh = {
-        "version": schemas.version("learning_curve"), "split": split, "held_out": list(held.test), "points": [],
+        "version": schemas.version("learning_curve"),
+        "split": split,
+        "held_out": list(held.test),
+        "points": [],
         "provenance": provenance.stamp("training.pretraining.learning_curve", parents, {"deep": DEEP}),
-    }  # fmt: skip
+    }
     if not (out / FILE).is_file():
         return fresh
     kept = documents.read(out / FILE, "learning_curve")
     if kept["provenance"]["parents"] != fresh["provenance"]["parents"] or kept["split"] != split:
         raise UsageError(
-            f"{out} holds the learning curve of another dataset, network or split", "the same ones, to go on with it",
+            f"{out} holds the learning curve of another dataset, network or split",
+            "the same ones, to go on with it",
             "choose another --out",
-        )  # fmt: skip
+        )
     return kept

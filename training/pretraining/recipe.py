@@ -45,7 +45,8 @@ def recipe(asked: Mapping[str, Any], pretrained: Checkpoint | None = None, simul
     if name != pretrained.network.name:
         raise UsageError(
             f"--network {name} from {pretrained.path}, which is a network {pretrained.network.name}",
-            "the same network", "leave --network out, or train without --from",
-        )  # fmt: skip
+            "the same network",
+            "leave --network out, or train without --from",
+        )
     fitting: dict[str, Any] = {**FITTING, "arguments": pretrained.network.arguments, "pull": 0.0 if simulated else PULL}
     return TrainingSettings(**{**kind.recipe, **fitting, **wishes})

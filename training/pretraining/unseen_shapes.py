@@ -60,9 +60,17 @@ def calibrate_on_unseen_shapes(
         run = trained.path.parent / f"without-{number}"
         resume = (run / checkpoint.LAST).is_file()
         other = train(
-            frames, trained.settings, run, device, resume, threads, begun(number), pretrained=pretrained,
-            simulated=simulated, split=division,
-        )  # fmt: skip
+            frames,
+            trained.settings,
+            run,
+            device,
+            resume,
+            threads,
+            begun(number),
+            pretrained=pretrained,
+            simulated=simulated,
+            split=division,
+        )
         windows, top = Windows(frames, other.network.offsets), frames.sensor.map.depth_max
         with reproducible(threads):
             for episode in division.test:
@@ -80,9 +88,10 @@ def _dealt(spans: tuple[EpisodeSpan, ...], groups: int, origin: str) -> list[tup
     shapes = sorted({span.shape for span in spans})
     if not 2 <= groups <= len(shapes):
         raise UsageError(
-            f"{groups} groups of the {len(shapes)} shapes to train on in {origin}", f"2 to {len(shapes)}",
+            f"{groups} groups of the {len(shapes)} shapes to train on in {origin}",
+            f"2 to {len(shapes)}",
             "ask for fewer, or record more shapes",
-        )  # fmt: skip
+        )
     turn = np.random.default_rng(_SEED).permutation(len(shapes)) % groups
     return [tuple(span for span in spans if turn[shapes.index(span.shape)] == group) for group in range(groups)]
 

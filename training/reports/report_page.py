@@ -104,10 +104,17 @@ def _baseline_rows(found: list[Group]) -> list[list[str]]:
     """Return a row for each predictor without a network and split; networks on one split share their frames."""
     splits = {group.split: group for group in found if group.baselines}
     return [
-        [f"without a network: {name}", split, str(len(group.seeds)), str(group.frames),
-         *(number(values[m]) for m in METRICS), ""]
-        for split, group in splits.items() for name, values in group.baselines.items()
-    ]  # fmt: skip
+        [
+            f"without a network: {name}",
+            split,
+            str(len(group.seeds)),
+            str(group.frames),
+            *(number(values[m]) for m in METRICS),
+            "",
+        ]
+        for split, group in splits.items()
+        for name, values in group.baselines.items()
+    ]
 
 
 def _cell(group: Group, metric: str) -> str:

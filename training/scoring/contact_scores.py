@@ -36,13 +36,17 @@ def scored(presses: Iterable[tuple[np.ndarray, np.ndarray]], pitch: float) -> di
     """
     found = [match(depth, label, pitch) for depth, label in presses]
     return {
-        "prominence": PROMINENCE, "least_prominence_mm": LEAST_PROMINENCE, "reach_mm": REACH,
+        "prominence": PROMINENCE,
+        "least_prominence_mm": LEAST_PROMINENCE,
+        "reach_mm": REACH,
         "predicted": {
-            "long": LONG, "prominence_long": PREDICTED_PROMINENCE, "prominence_round": ROUND_PROMINENCE,
+            "long": LONG,
+            "prominence_long": PREDICTED_PROMINENCE,
+            "prominence_round": ROUND_PROMINENCE,
             "least_prominence_mm": PREDICTED_LEAST,
         },
         "presses": contact_rows(found, pitch),
-    }  # fmt: skip
+    }
 
 
 def contact_rows(found: Sequence[ContactMatch], pitch: float) -> list[dict[str, Any]]:
@@ -59,8 +63,12 @@ def _row(chosen: list[ContactMatch], contacts: str, low: float | None, high: flo
     interval = binomtest(every, len(chosen)).proportion_ci(method="wilson") if chosen else (None, None)
     errors = np.concatenate([m.error for m in chosen]) if chosen else np.zeros(0)
     return {
-        "contacts": contacts, "above_mm": low, "up_to_mm": high, "presses": len(chosen),
+        "contacts": contacts,
+        "above_mm": low,
+        "up_to_mm": high,
+        "presses": len(chosen),
         "all_found": {"count": every, "of": len(chosen), "wilson_95": list(interval)},
-        "missed": sum(m.missed for m in chosen), "invented": sum(m.invented for m in chosen),
+        "missed": sum(m.missed for m in chosen),
+        "invented": sum(m.invented for m in chosen),
         "centroid_error": asdict(summarize(errors)),
-    }  # fmt: skip
+    }

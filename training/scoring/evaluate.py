@@ -188,9 +188,7 @@ def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
         "indenters": by_indenter,
         "depths": _by_depth(episodes),
         "missed_contact": _proportion(
-            "frames in contact whose predicted map has no pixel above the contact threshold",
-            missed,
-            len(touching.iou),
+            "frames in contact whose predicted map has no pixel above the contact threshold", missed, len(touching.iou)
         ),
         "false_contact": _proportion(
             "frames out of contact whose predicted map has a pixel above the contact threshold",

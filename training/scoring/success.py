@@ -54,9 +54,13 @@ def rate(condition: str, group: str, attempts: list[Attempt]) -> Rate:
     counted = np.array([a.adjustments for a in won if a.adjustments is not None], dtype=float)
     spread = float(counted.std(ddof=1)) if len(counted) > 1 else None
     return Rate(
-        condition, group, len(won), len(attempts), _wilson(len(won), len(attempts)),
+        condition,
+        group,
+        len(won),
+        len(attempts),
+        _wilson(len(won), len(attempts)),
         (float(counted.mean()), spread) if len(counted) else None,
-    )  # fmt: skip
+    )
 
 
 def rates(attempts: list[Attempt], groups: Mapping[str, set[str]] | None = None) -> list[Rate]:

@@ -98,9 +98,13 @@ def catalogue_server(
 
 
 def _draw(
-    listed: EpisodeList, labels: Path | None, predictions: Path | None, folder: Path, layout: Path,
+    listed: EpisodeList,
+    labels: Path | None,
+    predictions: Path | None,
+    folder: Path,
+    layout: Path,
     drawn: Callable[[int, int], None],
-) -> dict[int, int]:  # fmt: skip
+) -> dict[int, int]:
     """Write every episode, and the layout of the first for all; return each one's deepest moment [ns]."""
     from viewers.rerun.backend import APPLICATION, RerunBackend
     from viewers.rerun.blueprint import episode_blueprint
@@ -137,6 +141,7 @@ def _wait_for(port: int, lives: Callable[[], bool]) -> None:
             return
         time.sleep(0.1)
     raise UsageError(
-        f"Rerun's catalogue server does not answer on port {port}", f"an answer within {BEGIN_LIMIT:g} s",
+        f"Rerun's catalogue server does not answer on port {port}",
+        f"an answer within {BEGIN_LIMIT:g} s",
         "look at the episodes with --web instead",
-    )  # fmt: skip
+    )

@@ -124,10 +124,12 @@ def with_flags(entries: tuple[Entry, ...], flags: dict[str, Flag]) -> tuple[Entr
     """Return entries with the reasons why they are set aside, found by the recording's hash, else by its name."""
     by_file = {flag.file: flag.reason for flag in flags.values()}
     return tuple(
-        replace(e, flag=flags[e.recording].reason if e.recording in flags else "" if e.recording else
-                by_file.get(e.file, ""))
+        replace(
+            e,
+            flag=flags[e.recording].reason if e.recording in flags else "" if e.recording else by_file.get(e.file, ""),
+        )
         for e in entries
-    )  # fmt: skip
+    )
 
 
 def of_press(number: int, file: str, press: Press | None) -> Entry:
@@ -172,8 +174,9 @@ def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, pre
     scores = score_frames(predicted[theirs], depth[ours])
     return Errors(
         float(np.sqrt(np.mean(np.square(predicted[theirs] - depth[ours], dtype=np.float64)))),
-        _mean(scores.centroid_error), _mean(scores.iou),
-    )  # fmt: skip
+        _mean(scores.centroid_error),
+        _mean(scores.iou),
+    )
 
 
 def _mean(values: np.ndarray) -> float | None:

@@ -137,8 +137,11 @@ def _record_keys(root: Path, rows: list[folder.EpisodeRow]) -> dict[int, int]:
             table = pq.ParquetFile(root / folder.data_path(number)).read([features.RECORD], use_threads=False)
         except (pa.ArrowException, OSError, KeyError) as error:
             reason = str(error).splitlines()[0]
-            raise FormatError(f"{folder.data_path(number)} cannot be read: {reason}", "a data file",
-                              "take it from a copy, or pack the session again") from None  # fmt: skip
+            raise FormatError(
+                f"{folder.data_path(number)} cannot be read: {reason}",
+                "a data file",
+                "take it from a copy, or pack the session again",
+            ) from None
         values, first = table.column(0), min(row.start for row in own)
         keys |= {row.index: int(values[row.start - first].as_py()) for row in own}
     return keys

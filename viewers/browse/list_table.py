@@ -23,9 +23,10 @@ def list_table(listed: EpisodeList, most: int, scored: bool) -> str:
     left = len(listed.entries) - len(shown)
     lines.append("")
     lines.append(
-        f"{len(listed.entries)} episodes of {listed.root}" + (f", {flagged} flagged" if flagged else "")
+        f"{len(listed.entries)} episodes of {listed.root}"
+        + (f", {flagged} flagged" if flagged else "")
         + (f"; {left} more, see them with --most" if left else "")
-    )  # fmt: skip
+    )
     return "\n".join(lines)
 
 

@@ -102,9 +102,12 @@ class Pages:
             if row["flag"] and (flag := flags.get(row["recording"]) or by_file.get(row["file"])):
                 row |= {"flagged_at": flag.flagged_at, "flagged_by": flag.flagged_by}
         return {
-            "root": str(self.listed.root), "units": UNITS, "episodes": rows, "remarks": self.listed.remarks,
+            "root": str(self.listed.root),
+            "units": UNITS,
+            "episodes": rows,
+            "remarks": self.listed.remarks,
             "viewer": self.viewer + "/?hide_welcome_screen&url=" + quote(self.address + "/episode/", safe=""),
-        }  # fmt: skip
+        }
 
     def _marked(self, flags: dict[str, Flag]) -> tuple[Entry, ...]:
         return with_notes(with_flags(self.listed.entries, flags), read_notes(self.listed.root))

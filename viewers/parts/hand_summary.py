@@ -71,10 +71,11 @@ def of_targets(title: str, targets: FingertipTargets, others: int, joints: dict[
     seconds = (targets.time_ns[-1] - targets.time_ns[0]) / 1e9
     moved = 1000 * np.linalg.norm(targets.position - targets.seen, axis=-1)
     lines = [
-        f"# {title}", "",
+        f"# {title}",
+        "",
         f"- **Targets** {targets.kind}, {len(targets.time_ns)} in {seconds:.1f} s, frame {targets.frame}",
         f"- **Demonstration** {targets.recording}, task {targets.task}",
-    ]  # fmt: skip
+    ]
     for k, name in enumerate(targets.fingers):
         gain = f", gain {1000 * targets.gains[name]:g} mm/mm" if name in targets.gains else ""
         lines.append(

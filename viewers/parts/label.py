@@ -41,9 +41,7 @@ class ShownLabel:
     def of(cls, label: Label) -> ShownLabel:
         """Return all of a label's maps."""
         every = np.arange(len(label.time_ns))
-        return cls(
-            label.time_ns, label.force, label.error, every, label.signed, label.traction, label.taxel_pressure
-        )
+        return cls(label.time_ns, label.force, label.error, every, label.signed, label.traction, label.taxel_pressure)
 
     @property
     def map_ns(self) -> np.ndarray:
@@ -80,7 +78,5 @@ def shown_label(path: Path, most: int | None = None) -> ShownLabel:
         begin += len(maps)
     signed = np.stack([shown[k] for k in range(most)])
     # One after the other: each is as large as all maps of the label.
-    contact = {
-        name: values[row] for only in CONTACT for name, values in read_label_columns(path, (only,)).items()
-    }
+    contact = {name: values[row] for only in CONTACT for name, values in read_label_columns(path, (only,)).items()}
     return ShownLabel(**small, kept=row, signed=signed, **contact)

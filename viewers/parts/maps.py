@@ -25,9 +25,7 @@ CONTACT_FLOOR = 1.0
 
 
 def depth_maps(
-    sensor: Sensor,
-    label: tuple[np.ndarray, np.ndarray] | None,
-    prediction: tuple[np.ndarray, np.ndarray] | None,
+    sensor: Sensor, label: tuple[np.ndarray, np.ndarray] | None, prediction: tuple[np.ndarray, np.ndarray] | None
 ) -> tuple[DepthMaps, ...]:
     """Return the maps called "label", "prediction" and, for frames that both hold, "error".
 

@@ -39,13 +39,7 @@ def surfaces(
         scale = scale_of(np.zeros(1), "mm", floor=DEPTH_FLOOR)
         result.append(
             SkinSurface(
-                "undeformed",
-                sensor.map.x,
-                sensor.map.y,
-                np.array([start_ns]),
-                flat,
-                np.zeros_like(flat),
-                scale,
+                "undeformed", sensor.map.x, sensor.map.y, np.array([start_ns]), flat, np.zeros_like(flat), scale
             )
         )
     return tuple(result)
@@ -94,11 +88,4 @@ def indenter_body(sensor: Sensor, press: Press, time_ns: np.ndarray, tip: np.nda
     position = np.column_stack([tip[:, :2], sensor.skin.thickness - tip[:, 2] + rise])
     rows = thinning.strongest(tip[:, 2], thinning.ARRAYS)
     time_ns, position = time_ns[rows], position[rows]
-    return Body(
-        "indenter",
-        np.asarray(mesh.vertices),
-        np.asarray(mesh.faces),
-        turn.as_quat(),
-        time_ns,
-        position,
-    )
+    return Body("indenter", np.asarray(mesh.vertices), np.asarray(mesh.faces), turn.as_quat(), time_ns, position)

@@ -94,10 +94,7 @@ def of_dataset_episode(
             + ("" if record.complete else "; **interrupted or salvaged**")
         )
     lines += of_prediction(prediction, maps)
-    notes = (
-        *remarks,
-        *(record.notes if record else ("an edit of the dataset lost where this episode comes from",)),
-    )
+    notes = (*remarks, *(record.notes if record else ("an edit of the dataset lost where this episode comes from",)))
     return "\n".join([*lines, *(["", *(f"- {note}" for note in notes)] if notes else [])])
 
 

@@ -68,9 +68,13 @@ def _sites(axes, episodes: list[Episode]) -> None:
     axes.figure.colorbar(points, ax=axes, label="depth [mm]")
     half = sensor.skin.size_x / 2, sensor.skin.size_y / 2
     axes.set(
-        xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="x [mm]", ylabel="y [mm]",
+        xlim=(-half[0], half[0]),
+        ylim=(-half[1], half[1]),
+        aspect="equal",
+        xlabel="x [mm]",
+        ylabel="y [mm]",
         title="presses and taxels",
-    )  # fmt: skip
+    )
 
 
 def _noise(axes, report: Report, unit: str) -> None:

@@ -30,9 +30,13 @@ class FeltMaps:
         for own, name in zip(axes, felt, strict=True):
             grid = made.sensors[name].map
             image = own.imshow(
-                maps[name][0].T, origin="lower", cmap=scale.colormap, vmin=scale.low, vmax=scale.high,
+                maps[name][0].T,
+                origin="lower",
+                cmap=scale.colormap,
+                vmin=scale.low,
+                vmax=scale.high,
                 extent=(grid.x[0], grid.x[-1], grid.y[0], grid.y[-1]),
-            )  # fmt: skip
+            )
             own.tick_params(labelsize=7)
             own.set_ylabel("y [mm]", fontsize=8)
             self._maps.append(maps[name])

@@ -52,12 +52,16 @@ class HandPage:
         parts: Any = self.figure.subfigures(1, 2, width_ratios=[3.0, 1.0]) if scene.maps else [self.figure]
         heights = [1.5, 1.5, 0.8] if scene.cameras else [1.5, 0.8]
         rows: Any = parts[0].subfigures(len(heights), 1, height_ratios=heights)
-        self._cameras = [] if not scene.cameras else [
-            _CameraPicture(axes, view, scene.bodies)
-            for axes, view in zip(
-                rows[0].subplots(1, len(scene.cameras), squeeze=False)[0], scene.cameras, strict=True
-            )
-        ]  # fmt: skip
+        self._cameras = (
+            []
+            if not scene.cameras
+            else [
+                _CameraPicture(axes, view, scene.bodies)
+                for axes, view in zip(
+                    rows[0].subplots(1, len(scene.cameras), squeeze=False)[0], scene.cameras, strict=True
+                )
+            ]
+        )
         low, high = _ends(scene)
         self._space = [
             _Plane(axes, scene.bodies, (across, up), (low, high))
@@ -74,9 +78,13 @@ class HandPage:
         for own, maps in zip(axes, self._scene.maps, strict=True):
             name = maps.name.removeprefix("predicted ")
             image = own.imshow(
-                maps.values[0].T, origin="lower", cmap=maps.scale.colormap, vmin=maps.scale.low, vmax=maps.scale.high,
+                maps.values[0].T,
+                origin="lower",
+                cmap=maps.scale.colormap,
+                vmin=maps.scale.low,
+                vmax=maps.scale.high,
                 extent=(maps.x[0], maps.x[-1], maps.y[0], maps.y[-1]),
-            )  # fmt: skip
+            )
             own.tick_params(labelsize=7)
             own.set_ylabel("y [mm]", fontsize=8)
             self._maps.append((image, own.set_title(name, fontsize=9), name))
@@ -251,9 +259,15 @@ def _depth_curves(axes: Axes, scene: Scene, fingers: list[str]) -> Any:
         if curves.name.startswith("fingertip/") and len(curves.doubtful):
             seconds = (curves.time_ns - zero) / 1e9
             axes.fill_between(
-                seconds, 0, 1, where=curves.doubtful.tolist(), transform=axes.get_xaxis_transform(), color="0.85",
-                zorder=0, linewidth=0,
-            )  # fmt: skip
+                seconds,
+                0,
+                1,
+                where=curves.doubtful.tolist(),
+                transform=axes.get_xaxis_transform(),
+                color="0.85",
+                zorder=0,
+                linewidth=0,
+            )
     axes.set(xlim=(0.0, (end - zero) / 1e9))
     axes.set_xlabel("time [s]; grey: a path is bridged", fontsize=8)
     axes.set_ylabel("predicted\ndepth [mm]" if depth else "no predicted\ndepth", fontsize=8)

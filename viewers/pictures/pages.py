@@ -87,9 +87,14 @@ def space(figure: SubFigure, scene: Scene) -> None:
                 for k, strip in enumerate(trail.strips(doubtful)):
                     label = trail.name if k == 0 and not doubtful else None
                     axes.plot(
-                        strip[:, across], strip[:, up], style, color=color, linewidth=1.5, label=label,
+                        strip[:, across],
+                        strip[:, up],
+                        style,
+                        color=color,
+                        linewidth=1.5,
+                        label=label,
                         alpha=0.4 if trail.faint else 1.0,
-                    )  # fmt: skip
+                    )
         for cloud in scene.clouds:
             own = cloud.position[_most(cloud)]
             axes.plot(*own[:, [across, up]].T, ".", color="0.2", markersize=0.8)
@@ -139,9 +144,15 @@ def course(axes: Axes, curves: Curves, scene: Scene) -> None:
         axes.plot(seconds, values, color=color, linewidth=width, alpha=alpha, label=label)
     if len(curves.doubtful):
         axes.fill_between(
-            seconds, 0, 1, where=curves.doubtful.tolist(), transform=axes.get_xaxis_transform(), color="0.85",
-            zorder=0, label="bridged",
-        )  # fmt: skip
+            seconds,
+            0,
+            1,
+            where=curves.doubtful.tolist(),
+            transform=axes.get_xaxis_transform(),
+            color="0.85",
+            zorder=0,
+            label="bridged",
+        )
     if len(curves.labels) <= 6:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=7, ncols=6, borderaxespad=0.1)
     axes.set_title(curves.name.replace("_", " ").replace("/", ": "), fontsize=10)

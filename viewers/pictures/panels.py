@@ -17,8 +17,12 @@ from viewers.scene.scene import Scene
 
 Moments = tuple[tuple[str, int], ...]
 TITLES = {
-    "label": "Label", "prediction": "Prediction", "error": "Prediction − label",
-    "pressure": "Pressure", "shear": "Shear", "board": "Protrusions on the board",
+    "label": "Label",
+    "prediction": "Prediction",
+    "error": "Prediction − label",
+    "pressure": "Pressure",
+    "shear": "Shear",
+    "board": "Protrusions on the board",
 }
 INK, SHADES = "0.25", ("0.97", "0.91")
 
@@ -113,13 +117,7 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
             if shown.scale.signed:
                 rmse = np.sqrt(np.mean(picture_at(shown, moment).astype(float) ** 2))
                 axes.text(
-                    0.98,
-                    0.03,
-                    f"RMSE {rmse:.3f} mm",
-                    transform=axes.transAxes,
-                    ha="right",
-                    fontsize=8,
-                    color=INK,
+                    0.98, 0.03, f"RMSE {rmse:.3f} mm", transform=axes.transAxes, ha="right", fontsize=8, color=INK
                 )
     first = scene.maps[0]
     for axis, centers in (("x", first.x), ("y", first.y)):
@@ -150,12 +148,7 @@ def image(axes: Axes, values: np.ndarray, centers: tuple[np.ndarray, np.ndarray]
     """Draw values, shape (rows, columns), whose centres along x and y [mm] are given."""
     (left, right), (bottom, top) = map(_ends, centers)
     axes.imshow(
-        values,
-        origin="lower",
-        extent=(left, right, bottom, top),
-        cmap=scale.colormap,
-        vmin=scale.low,
-        vmax=scale.high,
+        values, origin="lower", extent=(left, right, bottom, top), cmap=scale.colormap, vmin=scale.low, vmax=scale.high
     )
     axes.spines[:].set_visible(False)
 

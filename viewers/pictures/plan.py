@@ -58,9 +58,17 @@ def _pad(axes, plan: Plan, sensor: Sensor, names: list[str]):
         presses.sort(key=lambda press: -press.depth)
         size = [20 + 110 * max(press.depth, 0.0) for press in presses]
         points = axes.scatter(
-            [p.x for p in presses], [p.y for p in presses], c=[max(p.depth, HOVER) for p in presses], s=size, zorder=3,
-            marker=MARKS[number % len(MARKS)], edgecolors="black", linewidths=0.4, label=name, **scale,
-        )  # fmt: skip
+            [p.x for p in presses],
+            [p.y for p in presses],
+            c=[max(p.depth, HOVER) for p in presses],
+            s=size,
+            zorder=3,
+            marker=MARKS[number % len(MARKS)],
+            edgecolors="black",
+            linewidths=0.4,
+            label=name,
+            **scale,
+        )
     for press in (p for p in plan.presses if p.approach_from):
         dx, dy = (plan.motion.run_up * c for c in SIDES[press.approach_from])
         axes.annotate(

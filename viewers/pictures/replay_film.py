@@ -161,9 +161,15 @@ class ReplayCurves:
         if gap.any():
             bridged = gap.any(axis=1).tolist()
             axes.fill_between(
-                replay.time, 0, 1, where=bridged, transform=axes.get_xaxis_transform(), color="0.85", zorder=0,
+                replay.time,
+                0,
+                1,
+                where=bridged,
+                transform=axes.get_xaxis_transform(),
+                color="0.85",
+                zorder=0,
                 label="path bridged",
-            )  # fmt: skip
+            )
         axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, most))
         axes.set_ylabel(name, fontsize=8)
         self._now = axes.axvline(0.0, color="black", linewidth=1)

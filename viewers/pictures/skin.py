@@ -36,10 +36,7 @@ def skin(figure: SubFigure, scene: Scene, chosen: Moments, bar: bool = True) -> 
     low, high = scene.corners
     for level in (low[2], high[2]):
         axes.plot(
-            *zip(*[(a, b, level) for a, b in _corners(low, high)], strict=True),
-            color="0.6",
-            linewidth=0.9,
-            zorder=0,
+            *zip(*[(a, b, level) for a, b in _corners(low, high)], strict=True), color="0.6", linewidth=0.9, zorder=0
         )
     for a, b in _corners(low, high)[:4]:
         axes.plot([a, a], [b, b], [low[2], high[2]], color="0.6", linewidth=0.9, zorder=0)

@@ -73,8 +73,5 @@ def taxel_colors(columns: int, rows: int) -> np.ndarray:
     """Return one colour a taxel, shape (columns * rows, 3), uint8: a hue a row, darker to lighter along x."""
     base = np.array([HUES[j % len(HUES)] for j in range(rows)], dtype=float)
     shade = np.linspace(-0.35, 0.45, columns)[None, :, None] if columns > 1 else np.zeros((1, 1, 1))
-    dark, light = (
-        base[:, None, :] * (1 + np.minimum(shade, 0)),
-        (255 - base[:, None, :]) * np.maximum(shade, 0),
-    )
+    dark, light = (base[:, None, :] * (1 + np.minimum(shade, 0)), (255 - base[:, None, :]) * np.maximum(shade, 0))
     return np.rint(dark + light).reshape(-1, 3).astype(np.uint8)

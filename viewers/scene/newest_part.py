@@ -57,19 +57,24 @@ class ScenePart:
         later = self._later(f"clouds/{cloud.name}", cloud.time_ns)
         points = np.repeat(later, cloud.count)
         return replace(
-            cloud, time_ns=cloud.time_ns[later], count=cloud.count[later], position=cloud.position[points],
+            cloud,
+            time_ns=cloud.time_ns[later],
+            count=cloud.count[later],
+            position=cloud.position[points],
             values=cloud.values[points],
-        )  # fmt: skip
+        )
 
     def _camera(self, camera: CameraView) -> CameraView:
         images = self._later(f"images/{camera.name}", camera.image_ns)
         cubes = self._later(f"cubes/{camera.name}", camera.cube_ns)
         return replace(
-            camera, image_ns=camera.image_ns[images],
+            camera,
+            image_ns=camera.image_ns[images],
             images=tuple(own for own, late in zip(camera.images, images.tolist(), strict=True) if late),
-            cube_ns=camera.cube_ns[cubes], cube_position=camera.cube_position[cubes],
+            cube_ns=camera.cube_ns[cubes],
+            cube_position=camera.cube_position[cubes],
             cube_quaternion=camera.cube_quaternion[cubes],
-        )  # fmt: skip
+        )
 
 
 def open_ended(spans: tuple[Span, ...]) -> tuple[Span, ...]:

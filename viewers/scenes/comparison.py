@@ -61,11 +61,18 @@ def maps_comparison(
     curves = [_course(all_sides), *(_of_difference(name, d, t) for name, d, t in differences)]
     drawn = depth_maps.thinned(tuple(shown))
     return Scene(
-        title, _words(title, all_sides, differences), first.time_ns, np.arange(len(first.time_ns)),
-        footprint=skin_surface.footprint(sensor), curves=tuple(map(signals.thinned, curves)), maps=drawn,
-        arrays=(_taxels(sensor),), surfaces=skin_surface.faces(sensor, drawn[: len(all_sides)]), phases=phases,
+        title,
+        _words(title, all_sides, differences),
+        first.time_ns,
+        np.arange(len(first.time_ns)),
+        footprint=skin_surface.footprint(sensor),
+        curves=tuple(map(signals.thinned, curves)),
+        maps=drawn,
+        arrays=(_taxels(sensor),),
+        surfaces=skin_surface.faces(sensor, drawn[: len(all_sides)]),
+        phases=phases,
         kind="comparison",
-    )  # fmt: skip
+    )
 
 
 def readings_comparison(
@@ -109,9 +116,14 @@ def readings_comparison(
             f"most in channel {worst}: {np.sqrt(np.mean(np.square(values[:, worst]))):.3g} {unit}"
         )
     return Scene(
-        title, "\n".join(lines), time_ns, np.arange(len(time_ns)), curves=tuple(map(signals.thinned, curves)),
-        arrays=tuple(arrays), kind="comparison",
-    )  # fmt: skip
+        title,
+        "\n".join(lines),
+        time_ns,
+        np.arange(len(time_ns)),
+        curves=tuple(map(signals.thinned, curves)),
+        arrays=tuple(arrays),
+        kind="comparison",
+    )
 
 
 def _heat(name: str, shape: tuple[int, int], time_ns: np.ndarray, values: np.ndarray, scale: ColorScale) -> TaxelArray:

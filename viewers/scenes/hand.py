@@ -76,9 +76,15 @@ def targets_scene(
     if joints:
         curves.append(Curves("joints", "rad or m", tuple(joints), time, np.column_stack(list(joints.values()))))
     return Scene(
-        title, hand_summary.of_targets(title, targets, others, joints), time, np.arange(len(time)),
-        curves=tuple(map(signals.thinned, curves)), trails=tuple(trails), bodies=tuple(bodies), kind="hand",
-    )  # fmt: skip
+        title,
+        hand_summary.of_targets(title, targets, others, joints),
+        time,
+        np.arange(len(time)),
+        curves=tuple(map(signals.thinned, curves)),
+        trails=tuple(trails),
+        bodies=tuple(bodies),
+        kind="hand",
+    )
 
 
 def _with_recording(scene: Scene, recorded: DemoRecording, images: Iterable[tuple[str, int, bytes]]) -> Scene:
@@ -96,9 +102,13 @@ def _with_recording(scene: Scene, recorded: DemoRecording, images: Iterable[tupl
     cameras = camera_view.hand_views(recorded, images)
     time = board.sample_ns if board else np.array(sorted({t for c in cameras for t in c.cube_ns}), np.int64)
     return replace(
-        scene, frame_ns=time, frame=np.arange(len(time)), arrays=tuple(arrays), cameras=cameras,
+        scene,
+        frame_ns=time,
+        frame=np.arange(len(time)),
+        arrays=tuple(arrays),
+        cameras=cameras,
         curves=tuple(map(signals.thinned, curves)),
-    )  # fmt: skip
+    )
 
 
 def _with_tracks(scene: Scene, made: Demonstration) -> Scene:
@@ -146,9 +156,14 @@ def depth_of(name: str, sensor: Sensor, time_ns: np.ndarray, track: FingerTrack,
     """Return a finger's predicted maps, at most `thinning.MAPS` of them; without reading 0."""
     depth = np.nan_to_num(np.asarray(track.depth, np.float32))
     whole = DepthMaps(
-        f"predicted {name}", sensor.map.x, sensor.map.y, time_ns, depth, scale,
+        f"predicted {name}",
+        sensor.map.x,
+        sensor.map.y,
+        time_ns,
+        depth,
+        scale,
         f"{name}: predicted depth, 0 to {scale.high:g} mm",
-    )  # fmt: skip
+    )
     return thinned((whole,))[0]
 
 

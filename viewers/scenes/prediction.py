@@ -31,18 +31,26 @@ def prediction_scene(title: str, prediction: PredictedMaps, sensor: Sensor | Non
     flat = depth.reshape(len(depth), -1)
     curves = Curves("predicted depth", "mm", ("largest", "mean"), time, np.column_stack([flat.max(1), flat.mean(1)]))
     lines = [
-        f"# {title}", "",
+        f"# {title}",
+        "",
         f"- **Prediction** of episode {prediction.episode} by {prediction.network}, checkpoint "
         f"{prediction.checkpoint[:12]}, part {prediction.part}",
         f"- **Depth** to {flat.max():.2f} mm in {len(time)} frames; an estimate, no measurement",
-        "", "Not shown: label, signals and cameras; `tacdata view DATASET --predictions RUN` shows them beside it.",
-    ]  # fmt: skip
+        "",
+        "Not shown: label, signals and cameras; `tacdata view DATASET --predictions RUN` shows them beside it.",
+    ]
     if files > 1:
         lines += ["", f"{files} predictions lie there: choose one with --episode."]
     if not fits:
         lines += ["", "- no checkpoint of this sensor lies beside it, so the maps are in pixels"]
     return Scene(
-        title, "\n".join(lines), time, np.arange(len(time)), curves=(signals.thinned(curves),), maps=drawn,
+        title,
+        "\n".join(lines),
+        time,
+        np.arange(len(time)),
+        curves=(signals.thinned(curves),),
+        maps=drawn,
         surfaces=skin_surface.faces(sensor, drawn) if sensor and fits else (),
-        footprint=skin_surface.footprint(sensor) if sensor and fits else None, kind="comparison",
-    )  # fmt: skip
+        footprint=skin_surface.footprint(sensor) if sensor and fits else None,
+        kind="comparison",
+    )

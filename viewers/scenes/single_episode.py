@@ -12,9 +12,7 @@ from tacdata.dataset.format import features, folder, metadata
 from tacdata.dataset.reader import Dataset, DatasetEpisode, read_dataset
 from tacdata.errors import FormatError
 
-SHOWN = (
-    features.TIME, features.STATE, features.RAW, features.DEPTH, features.TIP, features.FORCE, features.PHASE,
-)  # fmt: skip
+SHOWN = (features.TIME, features.STATE, features.RAW, features.DEPTH, features.TIP, features.FORCE, features.PHASE)
 """Columns that a scene is made of."""
 
 
@@ -69,9 +67,10 @@ def _columns(path: Path, info: dict, row: folder.EpisodeRow) -> dict[str, np.nda
     first, last = np.searchsorted(index, [row.start, row.stop])
     if not np.array_equal(index[first:last], np.arange(row.start, row.stop)):
         raise FormatError(
-            f"{path}: it lacks frames of episode {row.index}", f"frames {row.start} to {row.stop - 1}",
+            f"{path}: it lacks frames of episode {row.index}",
+            f"frames {row.start} to {row.stop - 1}",
             "put the original file back, or pack the session again",
-        )  # fmt: skip
+        )
     own = table.slice(int(first), int(last - first))
     try:
         return {key: cache.column_values(own[key], info["features"][key]) for key in wanted}

@@ -91,12 +91,12 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
     gate, left = verdict["gate"], verdict["left"]
     says = f"{GATE:g} or less says so"
     share = f" **Left** {left['share']:.1%} of what could be explained." if verdict["effects"] else ""
-    lines += [
-        "", f"**Gap** p = {gate['p']:.3g} ({'there is one' if gate['gap'] else 'none'}: {says}).{share}", "",
-    ]  # fmt: skip
+    lines += ["", f"**Gap** p = {gate['p']:.3g} ({'there is one' if gate['gap'] else 'none'}: {says}).{share}", ""]
     for heading, items in (
-        ("Where it lives", verdict["located"]), ("Next", verdict["next"]), ("Of these recordings", verdict["remarks"]),
-    ):  # fmt: skip
+        ("Where it lives", verdict["located"]),
+        ("Next", verdict["next"]),
+        ("Of these recordings", verdict["remarks"]),
+    ):
         if items:
             lines += [f"## {heading}", "", *(f"- {item}" for item in items), ""]
     if verdict["unjudgeable"]:
@@ -131,9 +131,14 @@ def _margins(verdict: dict[str, Any]) -> list[Bars]:
             rivals = sorted(effect["margins"].items(), key=lambda pair: pair[1])
             title = f"{effect['effect']}: by how many standard errors better than"
             found.append(
-                Bars(f"margins/{effect['effect']}", title, tuple(n for n, _ in rivals),
-                     np.array([v for _, v in rivals], float), SURELY)
-            )  # fmt: skip
+                Bars(
+                    f"margins/{effect['effect']}",
+                    title,
+                    tuple(n for n, _ in rivals),
+                    np.array([v for _, v in rivals], float),
+                    SURELY,
+                )
+            )
     return found
 
 

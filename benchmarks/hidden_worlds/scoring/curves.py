@@ -58,8 +58,13 @@ def reliability(rows, path):
     for said, right, n in table:
         low, high = interval(round(right * n), n)
         ax.errorbar(said, right, [[right - low], [high - right]], fmt="o", color="tab:blue", ms=3 + np.sqrt(n))
-    ax.set(xlabel="confidence given", ylabel="share right", xlim=(0, 1), ylim=(0, 1),
-           title=f"n = {len(pairs)}, ECE {error:.3f}, Brier {brier:.3f}")  # fmt: skip
+    ax.set(
+        xlabel="confidence given",
+        ylabel="share right",
+        xlim=(0, 1),
+        ylim=(0, 1),
+        title=f"n = {len(pairs)}, ECE {error:.3f}, Brier {brier:.3f}",
+    )
     figure.tight_layout()
     figure.savefig(path, dpi=130)
     plt.close(figure)

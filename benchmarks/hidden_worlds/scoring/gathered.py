@@ -15,12 +15,21 @@ def rows(out, label):
         answer, truth = json.loads(path.read_text()), json.loads((out / "truth" / path.name).read_text())
         verdict = answer["verdict"]
         row = {
-            "id": truth["id"], "block": truth["block"], "name": truth["name"], "response": truth["response"],
-            "effects": list(truth["effects"]), "times": truth["times"], "facts": truth["facts"],
-            "expected": truth["expected"], "settings": truth["settings"], "outcome": outcome(truth, verdict),
-            "engine": answer["engine"], "seconds": answer["seconds"], "status": verdict and verdict["status"],
+            "id": truth["id"],
+            "block": truth["block"],
+            "name": truth["name"],
+            "response": truth["response"],
+            "effects": list(truth["effects"]),
+            "times": truth["times"],
+            "facts": truth["facts"],
+            "expected": truth["expected"],
+            "settings": truth["settings"],
+            "outcome": outcome(truth, verdict),
+            "engine": answer["engine"],
+            "seconds": answer["seconds"],
+            "status": verdict and verdict["status"],
             "told": verdict and [[m["mechanism"], *m["alternatives"]] for m in verdict["effects"]],
-        }  # fmt: skip
+        }
         if verdict is not None:
             row["family"] = family_right(truth, verdict)
             row["parameters"] = measures.parameters(truth, verdict)

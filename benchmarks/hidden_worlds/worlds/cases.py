@@ -46,29 +46,61 @@ class Case:
 
 
 NEAR = (
-    ("latency", "low_pass_filter"), ("backlash", "hysteresis"), ("relaxation", "baseline_tracking"),
-    ("softening", "wear_in"), ("z_offset", "stiffening"),
-    ("gap_curvature", "saturation"), ("tilt", "gantry_sag"),
-    ("thermal_growth", "lost_steps"), ("crosstalk", "bulge"), ("relaxation", "creep"), ("servo_lag", "latency"),
+    ("latency", "low_pass_filter"),
+    ("backlash", "hysteresis"),
+    ("relaxation", "baseline_tracking"),
+    ("softening", "wear_in"),
+    ("z_offset", "stiffening"),
+    ("gap_curvature", "saturation"),
+    ("tilt", "gantry_sag"),
+    ("thermal_growth", "lost_steps"),
+    ("crosstalk", "bulge"),
+    ("relaxation", "creep"),
+    ("servo_lag", "latency"),
     ("xy_offset", "rotation"),
-)  # fmt: skip
+)
 """Pairs of one group, or that hide one another."""
 FAR = (
-    ("relaxation", "latency"), ("backlash", "relaxation"), ("drift", "softening"), ("z_offset", "low_pass_filter"),
-    ("crosstalk", "relaxation"), ("hysteresis", "latency"), ("tilt", "gain_drift"), ("channel_gain", "backlash"),
-    ("xy_offset", "relaxation"), ("lateral_backlash", "low_pass_filter"), ("frame_compliance", "latency"),
+    ("relaxation", "latency"),
+    ("backlash", "relaxation"),
+    ("drift", "softening"),
+    ("z_offset", "low_pass_filter"),
+    ("crosstalk", "relaxation"),
+    ("hysteresis", "latency"),
+    ("tilt", "gain_drift"),
+    ("channel_gain", "backlash"),
+    ("xy_offset", "relaxation"),
+    ("lateral_backlash", "low_pass_filter"),
+    ("frame_compliance", "latency"),
     ("lost_steps", "relaxation"),
-)  # fmt: skip
+)
 """Pairs that have little in common."""
 TRIPLES = (
-    ("relaxation", "latency", "xy_offset"), ("backlash", "drift", "crosstalk"),
+    ("relaxation", "latency", "xy_offset"),
+    ("backlash", "drift", "crosstalk"),
     ("softening", "low_pass_filter", "tilt"),
-    ("z_offset", "relaxation", "scan_skew"), ("hysteresis", "gain_drift", "latency"),
-    ("lost_steps", "relaxation", "channel_gain"), ("servo_lag", "thermal_growth", "crosstalk"),
-    ("adhesion", "latency", "drift"), ("rotation", "softening", "latency"), ("backlash", "relaxation", "xy_offset"),
-)  # fmt: skip
-FEW = ("latency", "relaxation", "backlash", "hysteresis", "drift", "softening", "z_offset", "crosstalk", "scan_skew",
-       "low_pass_filter", "xy_offset", "lost_steps")  # fmt: skip
+    ("z_offset", "relaxation", "scan_skew"),
+    ("hysteresis", "gain_drift", "latency"),
+    ("lost_steps", "relaxation", "channel_gain"),
+    ("servo_lag", "thermal_growth", "crosstalk"),
+    ("adhesion", "latency", "drift"),
+    ("rotation", "softening", "latency"),
+    ("backlash", "relaxation", "xy_offset"),
+)
+FEW = (
+    "latency",
+    "relaxation",
+    "backlash",
+    "hysteresis",
+    "drift",
+    "softening",
+    "z_offset",
+    "crosstalk",
+    "scan_skew",
+    "low_pass_filter",
+    "xy_offset",
+    "lost_steps",
+)
 """Effects of the blocks of noise and of amounts of data."""
 
 
@@ -105,8 +137,15 @@ def singles(times, names=SINGLES, block="singles", expected="name", responses=("
     for name, response in itertools.product(names, responses):
         size = sized([name], [times], response)
         if size and not inseparable(name, response, max(times, 3.0)) and (response == "table" or KNOWN[name].fitted):
-            yield entry(block=f"{block}{times:g}", name=name, effects=size, expected=expected, response=response,
-                       settings={**needs([name]), **settings}, times={name: times})  # fmt: skip
+            yield entry(
+                block=f"{block}{times:g}",
+                name=name,
+                effects=size,
+                expected=expected,
+                response=response,
+                settings={**needs([name]), **settings},
+                times={name: times},
+            )
 
 
 def inseparable(name, response, times):
@@ -136,9 +175,15 @@ def together(block, groups, ratios, **facts):
         for order in dict.fromkeys((times, times[::-1])):
             size = sized(names, [t * clear(n, "table") for n, t in zip(names, order, strict=True)], "table")
             if size:
-                yield entry(block=block, name="+".join(names) + f"-{order[0]:g}-{order[1]:g}", effects=size,
-                           expected="name", settings=needs(names), times=dict(zip(names, order, strict=True)),
-                           facts=facts)  # fmt: skip
+                yield entry(
+                    block=block,
+                    name="+".join(names) + f"-{order[0]:g}-{order[1]:g}",
+                    effects=size,
+                    expected="name",
+                    settings=needs(names),
+                    times=dict(zip(names, order, strict=True)),
+                    facts=facts,
+                )
 
 
 def nulls():
@@ -147,16 +192,31 @@ def nulls():
     for realism, level, response, k in every:
         name = tuple(protocol.KNOWN)[k % 5]
         streams = ((), (), ("tag",), ("force",), (), ("tag", "force", "temperature"))[(k + (response == "table")) % 6]
-        yield entry(block="nulls", name=f"{realism}-{level:g}-{k}", effects={}, expected="none", response=response,
-                   settings={"protocol": name, "noise": level, "realism": realism, "streams": streams,
-                             "sessions": 1 + 2 * (k % 3 == 2), "episodes": (48, 24, 100, 10, 30)[k % 5]})  # fmt: skip
+        yield entry(
+            block="nulls",
+            name=f"{realism}-{level:g}-{k}",
+            effects={},
+            expected="none",
+            response=response,
+            settings={
+                "protocol": name,
+                "noise": level,
+                "realism": realism,
+                "streams": streams,
+                "sessions": 1 + 2 * (k % 3 == 2),
+                "episodes": (48, 24, 100, 10, 30)[k % 5],
+            },
+        )
 
 
 def aliases():
     """Yield truths that an oracle cannot tell from a mixture of one rival's signatures under their protocol."""
     known = limits()
-    found = [(e["effect"], e["response"], e["size"], e["limits"], e["separation"], e["rival"], e["settings"])
-             for e in known["aliases"] if e["settings"]["protocol"] != "rich"]  # fmt: skip
+    found = [
+        (e["effect"], e["response"], e["size"], e["limits"], e["separation"], e["rival"], e["settings"])
+        for e in known["aliases"]
+        if e["settings"]["protocol"] != "rich"
+    ]
     for response, name in ((r, n) for r, every in known["separations"].items() for n in every):
         for times in (10.0, 3.0):
             size = sized([name], [times], response)
@@ -165,8 +225,16 @@ def aliases():
                 break
     for name, response, size, times, apart, rival, settings in found:
         label = settings.get("protocol", "rich")
-        yield entry(block="aliases", name=f"{name}-{label}", effects={name: size}, expected="set", response=response,
-                   settings=settings, times={name: times}, facts={"separation": apart, "rival": rival})  # fmt: skip
+        yield entry(
+            block="aliases",
+            name=f"{name}-{label}",
+            effects={name: size},
+            expected="set",
+            response=response,
+            settings=settings,
+            times={name: times},
+            facts={"separation": apart, "rival": rival},
+        )
 
 
 def remainders(share):
@@ -183,9 +251,16 @@ def remainders(share):
             many = times * math.sqrt(share / (1 - share))
             size = sized([name, other], [times, many], response)
             if size:
-                yield entry(block=f"remainder{100 * share:g}", name=f"{name}+{other}", effects=size, expected="part",
-                           response=response, settings=needs([name, other]), times={name: times, other: many},
-                           facts={"remainder": other})  # fmt: skip
+                yield entry(
+                    block=f"remainder{100 * share:g}",
+                    name=f"{name}+{other}",
+                    effects=size,
+                    expected="part",
+                    response=response,
+                    settings=needs([name, other]),
+                    times={name: times, other: many},
+                    facts={"remainder": other},
+                )
                 break
 
 
@@ -201,11 +276,18 @@ def tagged():
     """Yield what a tag or a force reading splits, with that stream."""
     for name in ("backlash", "lost_steps", "z_offset", "servo_lag", "travel_scale", "skew", "lateral_backlash"):
         yield from ({**c, "block": "tagged"} for c in singles(10.0, (name,), responses=("table",), streams=("tag",)))
-    yield entry(block="tagged", name="tag_flex", effects={"tag_flex": 1.0}, expected="unknown",
-               settings={"streams": ("tag",)})  # fmt: skip
+    yield entry(
+        block="tagged", name="tag_flex", effects={"tag_flex": 1.0}, expected="unknown", settings={"streams": ("tag",)}
+    )
     for name in ("frame_compliance", "modulus", "gain", "thickness"):
-        yield entry(block="tagged", name=name, effects={name: 1.5}, expected="name", settings={"streams": ("force",)},
-                   times={name: None})  # fmt: skip
+        yield entry(
+            block="tagged",
+            name=name,
+            effects={name: 1.5},
+            expected="name",
+            settings={"streams": ("force",)},
+            times={name: None},
+        )
 
 
 def amounts():
@@ -230,7 +312,12 @@ def plain(block, name, response, **settings):
 
 
 BLOCKS = {
-    "nulls": nulls, "aliases": aliases, "bugs": bugs, "tagged": tagged, "amounts": amounts, "levels": levels,
+    "nulls": nulls,
+    "aliases": aliases,
+    "bugs": bugs,
+    "tagged": tagged,
+    "amounts": amounts,
+    "levels": levels,
     **{f"singles{t:g}": (lambda t=t: singles(t)) for t in TIMES},
     **{f"outside{t:g}": (lambda t=t: singles(t, OUTSIDE, "outside", "unknown")) for t in (1.0, 3.0, 10.0, 30.0)},
     **{f"remainder{100 * s:g}": (lambda s=s: remainders(s)) for s in (0.05, 0.15, 0.3, 0.5)},
@@ -238,7 +325,7 @@ BLOCKS = {
     "pairs": lambda: together("pairs", FAR, ((3.0, 3.0), (9.0, 3.0)), adversarial=False),
     "near_pairs": lambda: together("near_pairs", NEAR, ((3.0, 3.0), (9.0, 3.0)), adversarial=True),
     "triples": lambda: together("triples", TRIPLES, ((3.0, 3.0, 3.0), (8.0, 4.0, 3.0))),
-}  # fmt: skip
+}
 """Name -> cases without seeds."""
 
 

@@ -14,19 +14,55 @@ SEEDS = (900, 901, 902)
 SETS = {
     "one_rate": (("latency", "low_pass_filter", "servo_lag", "two_pole_filter", "scan_skew"), ("table", "fitted")),
     "poor": (
-        ("latency", "low_pass_filter", "servo_lag", "backlash", "hysteresis", "softening", "relaxation", "creep",
-         "adhesion", "baseline_tracking", "elastic_backlash"), ("table", "fitted"),
+        (
+            "latency",
+            "low_pass_filter",
+            "servo_lag",
+            "backlash",
+            "hysteresis",
+            "softening",
+            "relaxation",
+            "creep",
+            "adhesion",
+            "baseline_tracking",
+            "elastic_backlash",
+        ),
+        ("table", "fitted"),
     ),
     "no_holds": (
-        ("relaxation", "creep", "baseline_tracking", "poroelasticity", "nonlinear_relaxation",
-         "fractional_relaxation", "hysteresis"), ("table", "fitted"),
+        (
+            "relaxation",
+            "creep",
+            "baseline_tracking",
+            "poroelasticity",
+            "nonlinear_relaxation",
+            "fractional_relaxation",
+            "hysteresis",
+        ),
+        ("table", "fitted"),
     ),
     "one_site": (
-        ("z_offset", "tilt", "gantry_sag", "xy_offset", "rotation", "skew", "stiffening", "frame_compliance",
-         "saturation", "gap_curvature", "thickness", "modulus", "gain", "channel_gain", "travel_scale"), ("table",),
+        (
+            "z_offset",
+            "tilt",
+            "gantry_sag",
+            "xy_offset",
+            "rotation",
+            "skew",
+            "stiffening",
+            "frame_compliance",
+            "saturation",
+            "gap_curvature",
+            "thickness",
+            "modulus",
+            "gain",
+            "channel_gain",
+            "travel_scale",
+        ),
+        ("table",),
     ),
     "rich": (("gain", "modulus", "thickness", "z_offset", "travel_scale", "gap_curvature", "stiffening"), ("table",)),
-}  # fmt: skip
+}
 """Protocol -> effects that it may not tell apart, each a rival of the others; responses."""
 EPISODES = {"poor": 24}
 STEPS = (3.0, 10.0, 40.0)
@@ -62,10 +98,17 @@ def aliases():
                 alike = [(times, far, by) for times, (far, by) in steps.items() if far < LEVEL]
                 if alike:
                     times, far, by = max(alike)
-                    made.append({
-                        "effect": name, "settings": settings, "response": response,
-                        "size": round(times * known[name], 5), "limits": times, "separation": far, "rival": by,
-                    })  # fmt: skip
+                    made.append(
+                        {
+                            "effect": name,
+                            "settings": settings,
+                            "response": response,
+                            "size": round(times * known[name], 5),
+                            "limits": times,
+                            "separation": far,
+                            "rival": by,
+                        }
+                    )
                     print(made[-1], flush=True)
     return made
 
@@ -124,10 +167,16 @@ def main(only, again):
     if not only:
         before["aliases"] = aliases()
     document = {
-        "version": "1.0", "made_by": "python -m worlds.limits, in benchmarks/hidden_worlds", "level": LEVEL,
-        "seeds": list(SEEDS), "noise": 4.0, "episodes": 48, "limits": before["limits"], "aliases": before["aliases"],
+        "version": "1.0",
+        "made_by": "python -m worlds.limits, in benchmarks/hidden_worlds",
+        "level": LEVEL,
+        "seeds": list(SEEDS),
+        "noise": 4.0,
+        "episodes": 48,
+        "limits": before["limits"],
+        "aliases": before["aliases"],
         "separations": separations(before["limits"]) if not only else before.get("separations", {}),
-    }  # fmt: skip
+    }
     FILE.write_text(json.dumps(document, indent=1) + "\n")
 
 

@@ -45,23 +45,38 @@ def rich(rng, episodes):
     made = []
     for _ in range(episodes):
         site = SITES[rng.integers(len(SITES))]
-        made.append({
-            "x": site[0], "y": site[1], "depth": float(rng.choice([0.4, 0.7, 1.0])),
-            "speed": float(rng.choice([0.3, 1.0, 3.0])),
-            "hold": float(rng.choice([0.4, 1.5, 8.0], p=[0.5, 0.35, 0.15])),
-            "recovery": float(rng.choice([0.8, 6.0], p=[0.8, 0.2])), "tool": int(rng.random() < 0.3),
-            "overshoot": 0.25 if rng.random() < 0.15 else 0.0, "from": SIDE * _side(rng),
-        })  # fmt: skip
+        made.append(
+            {
+                "x": site[0],
+                "y": site[1],
+                "depth": float(rng.choice([0.4, 0.7, 1.0])),
+                "speed": float(rng.choice([0.3, 1.0, 3.0])),
+                "hold": float(rng.choice([0.4, 1.5, 8.0], p=[0.5, 0.35, 0.15])),
+                "recovery": float(rng.choice([0.8, 6.0], p=[0.8, 0.2])),
+                "tool": int(rng.random() < 0.3),
+                "overshoot": 0.25 if rng.random() < 0.15 else 0.0,
+                "from": SIDE * _side(rng),
+            }
+        )
     return made
 
 
 def poor(rng, episodes):
     """One rate, one depth, one tool, short holds, three places, one side of approach."""
     return [
-        {"x": SITES[k % 3][0], "y": SITES[k % 3][1], "depth": 0.7, "speed": 1.0, "hold": 0.4, "recovery": 0.8,
-         "tool": 0, "overshoot": 0.0, "from": np.array([SIDE, 0.0])}
+        {
+            "x": SITES[k % 3][0],
+            "y": SITES[k % 3][1],
+            "depth": 0.7,
+            "speed": 1.0,
+            "hold": 0.4,
+            "recovery": 0.8,
+            "tool": 0,
+            "overshoot": 0.0,
+            "from": np.array([SIDE, 0.0]),
+        }
         for k in range(episodes)
-    ]  # fmt: skip
+    ]
 
 
 def one_rate(rng, episodes):

@@ -60,8 +60,9 @@ def depth_map(pose, radius, layer=LAYER):
     return np.where(r < a, d - r * r / (2 * R), skirt)
 
 
-def write_table(path, radii, deepest=1.6, nodes=(41, 33, 25), shift=(0.0, 0.0), radius_factor=1.0, layer=LAYER,
-                order=None):  # fmt: skip
+def write_table(
+    path, radii, deepest=1.6, nodes=(41, 33, 25), shift=(0.0, 0.0), radius_factor=1.0, layer=LAYER, order=None
+):
     """Write the nominal response that the lab believes in, as a table of presses on a grid.
 
     Args:
@@ -84,7 +85,15 @@ def write_table(path, radii, deepest=1.6, nodes=(41, 33, 25), shift=(0.0, 0.0), 
     total = np.stack([force(gd, r * radius_factor, layer).reshape(shape) for r in radii])
     curve = np.linspace(0, 1.5 * load.max(), 600)
     np.savez_compressed(
-        path, x=x, y=y, depth=depth, load=load.astype(np.float32), force=total, curve_load=curve,
-        curve_signal=counts(curve) / GAIN, gain=np.full(CHANNELS, GAIN), offset=np.full(CHANNELS, OFFSET),
+        path,
+        x=x,
+        y=y,
+        depth=depth,
+        load=load.astype(np.float32),
+        force=total,
+        curve_load=curve,
+        curve_signal=counts(curve) / GAIN,
+        gain=np.full(CHANNELS, GAIN),
+        offset=np.full(CHANNELS, OFFSET),
         tools=np.array([f"sphere_{r:g}" for r in radii]),
-    )  # fmt: skip
+    )

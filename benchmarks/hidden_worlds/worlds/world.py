@@ -11,8 +11,15 @@ from worlds.physics import KNOWN, STAGES
 
 RATE = 30.0
 RADII = (4.0, 2.0)
-SETTINGS = {"protocol": "rich", "episodes": 48, "noise": 4.0, "realism": "plain", "sessions": 1, "streams": (),
-            "more": ()}  # fmt: skip
+SETTINGS = {
+    "protocol": "rich",
+    "episodes": 48,
+    "noise": 4.0,
+    "realism": "plain",
+    "sessions": 1,
+    "streams": (),
+    "more": (),
+}
 """What a world is made with unless told otherwise; streams: tag, force, temperature; more: presses after its own."""
 TAG_NOISE, FORCE_NOISE, WARM_NOISE = 0.02, 0.01, 0.05  # mm, N, degC
 
@@ -27,13 +34,27 @@ def begin(seed, settings):
     clock = fine[:, 0]
     warm = 24 + 4 * np.sin(2 * np.pi * clock / clock[-1] * 0.8 - 1.0) + 2 * clock / clock[-1]
     w = SimpleNamespace(
-        clock=clock, episode=episode, site=site.ravel()[episode], session=session, step=1 / protocol.FINE,
+        clock=clock,
+        episode=episode,
+        site=site.ravel()[episode],
+        session=session,
+        step=1 / protocol.FINE,
         presses=np.split(np.arange(len(clock)), np.flatnonzero(np.diff(episode)) + 1),
-        fresh=np.diff(episode, prepend=-1) != 0, gap=np.diff(clock, prepend=clock[0]),
-        tool=fine[:, 5].astype(int), radius=np.array(RADII)[fine[:, 5].astype(int)], layer=skin.LAYER,
-        command=fine[:, 2:5], carriage=fine[:, 2:5].copy(), tag_error=np.zeros((len(clock), 3)), warm=warm,
-        delay=np.zeros(len(clock)), scan=np.zeros(len(clock)), table={}, parameters={}, rng=None,
-    )  # fmt: skip
+        fresh=np.diff(episode, prepend=-1) != 0,
+        gap=np.diff(clock, prepend=clock[0]),
+        tool=fine[:, 5].astype(int),
+        radius=np.array(RADII)[fine[:, 5].astype(int)],
+        layer=skin.LAYER,
+        command=fine[:, 2:5],
+        carriage=fine[:, 2:5].copy(),
+        tag_error=np.zeros((len(clock), 3)),
+        warm=warm,
+        delay=np.zeros(len(clock)),
+        scan=np.zeros(len(clock)),
+        table={},
+        parameters={},
+        rng=None,
+    )
     # Closing over the world itself would be a cycle, which keeps its arrays until the collector comes by.
     told = w.parameters
     w.tell = lambda name, **values: told.__setitem__(name, {k: float(v) for k, v in values.items()})
@@ -113,11 +134,18 @@ def make(seed, effects, **given):
     readings[again] = readings[again - 1]  # a frame said twice has the noise of the first time
     way = path_rows(w, settings["episodes"])
     data = {
-        "time": w.clock[rows], "episode": w.episode[rows], "readings": readings,
-        "tool": w.tool[[r[0] for r in w.presses]], "session": w.session,
-        "site": w.site[[r[0] for r in w.presses]], "centers": skin.centers(), "radii": np.array(RADII),
-        "path_time": w.clock[way], "path_episode": w.episode[way], "path": w.command[way],
-    }  # fmt: skip
+        "time": w.clock[rows],
+        "episode": w.episode[rows],
+        "readings": readings,
+        "tool": w.tool[[r[0] for r in w.presses]],
+        "session": w.session,
+        "site": w.site[[r[0] for r in w.presses]],
+        "centers": skin.centers(),
+        "radii": np.array(RADII),
+        "path_time": w.clock[way],
+        "path_episode": w.episode[way],
+        "path": w.command[way],
+    }
     if "tag" in settings["streams"]:
         data["tag"] = (w.carriage + w.tag_error)[rows] + TAG_NOISE * rng.normal(size=(len(rows), 3))
     if "force" in settings["streams"]:
@@ -134,7 +162,13 @@ def truth(seed, effects, settings, w, rows):
     run(again, seed, effects, noise.contact(fresh, again, settings["realism"]))
     run(known, seed, effects, np.zeros((len(known.presses), 3)))
     return {
-        "time": w.clock[rows], "episode": w.episode[rows], "pose": w.pose[rows], "command": w.command[rows],
-        "radius": w.radius[rows], "layer": np.full(len(rows), w.layer), "again": read(again, again.rise, rows),
-        "oracle": read(known, known.rise, rows), "parameters": w.parameters,
-    }  # fmt: skip
+        "time": w.clock[rows],
+        "episode": w.episode[rows],
+        "pose": w.pose[rows],
+        "command": w.command[rows],
+        "radius": w.radius[rows],
+        "layer": np.full(len(rows), w.layer),
+        "again": read(again, again.rise, rows),
+        "oracle": read(known, known.rise, rows),
+        "parameters": w.parameters,
+    }

@@ -33,10 +33,19 @@ def write(out, case):
     np.savez_compressed(truth.with_suffix(".npz"), **{k: np.asarray(v, np.float32) for k, v in known.items()})
     settings = {**world.SETTINGS, **case.settings}
     document = {
-        "version": "1.0", "id": case.identity, "block": case.block, "name": case.name, "seed": case.seed,
-        "response": case.response, "settings": settings, "effects": case.effects, "times": case.times,
-        "expected": case.expected, "parameters": parameters, "facts": case.facts,
-    }  # fmt: skip
+        "version": "1.0",
+        "id": case.identity,
+        "block": case.block,
+        "name": case.name,
+        "seed": case.seed,
+        "response": case.response,
+        "settings": settings,
+        "effects": case.effects,
+        "times": case.times,
+        "expected": case.expected,
+        "parameters": parameters,
+        "facts": case.facts,
+    }
     written = truth.with_suffix(".new")
     written.write_text(json.dumps(document))
     written.replace(truth)

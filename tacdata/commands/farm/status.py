@@ -45,8 +45,9 @@ def run(
         refused = entry["state"] == "refused"
         error = SolveError(
             f"submission {number} " + ("is refused" if refused else f"left {entry['failed']} episodes without a label"),
-            "a label for every episode", "mend what is said above and submit again",
-        )  # fmt: skip
+            "a label for every episode",
+            "mend what is said above and submit again",
+        )
         return Result(entry, error)
     if entry["state"] == "done":
         print(f"labels lie in {entry['session']}/labels under the service's root; on another computer:")
@@ -68,11 +69,15 @@ def _all(state: dict[str, Any]) -> None:
     if not state["submissions"]:
         print("nothing was submitted yet: tacdata farm submit SESSION")
     presses = state["presses"]
-    print(f"presses: {presses['waiting']} waiting, {presses['in_work']} in work, {presses['solved']} solved, "
-          f"{presses['failed']} failed")  # fmt: skip
+    print(
+        f"presses: {presses['waiting']} waiting, {presses['in_work']} in work, {presses['solved']} solved, "
+        f"{presses['failed']} failed"
+    )
     for row in state["workers"]:
-        print(f"worker {row['owner']} on {row['device']}: {row['done']} solved, {60 * row['rate']:.1f} a minute"
-              + (f"; {row['note']}" if row["note"] else ""))  # fmt: skip
+        print(
+            f"worker {row['owner']} on {row['device']}: {row['done']} solved, {60 * row['rate']:.1f} a minute"
+            + (f"; {row['note']}" if row["note"] else "")
+        )
     if state["seconds_left"]:
         print(f"about {state['seconds_left'] / 60:.1f} min left")
     if state["paused"]:

@@ -38,10 +38,17 @@ def run(
     from label_farm.remote.client import Client, refusal
 
     wish = {
-        "session": session, "by": by or f"{getpass.getuser()}@{socket.gethostname()}", "priority": priority,
-        "sensor": sensor or None, "dataset": into or None, "redo": redo, "uncertainty": uncertainty,
-        "tolerance": tolerance, "load_step": load_step, "unload_step": unload_step,
-    }  # fmt: skip
+        "session": session,
+        "by": by or f"{getpass.getuser()}@{socket.gethostname()}",
+        "priority": priority,
+        "sensor": sensor or None,
+        "dataset": into or None,
+        "redo": redo,
+        "uncertainty": uncertainty,
+        "tolerance": tolerance,
+        "load_step": load_step,
+        "unload_step": unload_step,
+    }
     client = Client(url, token)
     filed = client.post("/api/submissions", wish)
     print(f"submission {filed['id']} of {session} is filed", flush=True)

@@ -34,7 +34,14 @@ def run(
 
     up(
         UpSettings(
-            root=root, store=store, host=host, port=port, token=token, workers=workers, devices=tuple(device or ()),
-            dask=dask, factory=factory,
+            root=root,
+            store=store,
+            host=host,
+            port=port,
+            token=token,
+            workers=workers,
+            devices=tuple(device or ()),
+            dask=dask,
+            factory=factory,
         )
-    )  # fmt: skip
+    )

@@ -119,14 +119,7 @@ def extra_of(described: Iterable[str]) -> tuple[str, ...]:
 def shapes(sensor: Sensor, extra: Iterable[str] = ()) -> dict[str, tuple[int, ...]]:
     """Return the shape of one frame of every own column and of some of `EXTRA`; scalars are ``()``."""
     taxels = (sensor.taxels.count,)
-    vectors = {
-        STATE: taxels,
-        RAW: taxels,
-        DEPTH: sensor.map.shape,
-        TIP: (3,),
-        FORCE: (3,),
-        TAXEL_FORCE: taxels,
-    }
+    vectors = {STATE: taxels, RAW: taxels, DEPTH: sensor.map.shape, TIP: (3,), FORCE: (3,), TAXEL_FORCE: taxels}
     given = {key: columns.shape(EXTRA[key], 1, sensor.map.shape, sensor.taxels.count)[1:] for key in extra}
     flat = {key: (int(np.prod(shape)),) if shape else () for key, shape in given.items()}
     return {key: vectors.get(key, ()) for key in DTYPES} | flat

@@ -100,9 +100,10 @@ def read_info(root: Path) -> dict[str, Any]:
         ) from None
     if isinstance(info["fps"], float):
         raise FormatError(
-            f"{root / INFO}: {info['fps']:g} frames a second", "a whole number of frames a second, as LeRobot has it",
+            f"{root / INFO}: {info['fps']:g} frames a second",
+            "a whole number of frames a second, as LeRobot has it",
             "write the rate that the timestamps have as a whole number, or pack the session again",
-        )  # fmt: skip
+        )
     if not complete or str(version).split(".")[0] != CODEBASE_VERSION.split(".")[0]:
         raise FormatError(
             f"{root / INFO}: LeRobot format {version}" if complete else f"{root / INFO} lacks counts or features",

@@ -63,7 +63,7 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
             f"hand-eye pairs with residuals of {1000 * place:.1f} mm and {np.degrees(turn):.1f} deg",
             "pairs of the same moments",
             "check the order of the pairs, the units (metres), xyzw, and that the cube sits firmly on the gripper",
-        )  # fmt: skip
+        )
     spread = _spread(base, held, grippers[kept], cubes[kept])
     method = "hand-eye (calibrateRobotWorldHandEye, then least squares)"
     return CameraWorld(camera, frame, base, method, int(kept.sum()), (place, turn), spread, held, tuple(remarks))
@@ -117,8 +117,9 @@ def _check_turns(grippers: np.ndarray) -> None:
         raise UsageError(
             f"a gripper that rotated by {np.degrees(np.linalg.norm(turns, axis=1).max()):.0f} deg, and by "
             f"{np.degrees(about[1] if len(about) > 1 else 0):.0f} deg about a second axis",
-            f"{np.degrees(LEAST_TURN):.0f} deg or more about two axes", "add poses that are rotated about all axes",
-        )  # fmt: skip
+            f"{np.degrees(LEAST_TURN):.0f} deg or more about two axes",
+            "add poses that are rotated about all axes",
+        )
 
 
 def _begun(grippers: np.ndarray, cubes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

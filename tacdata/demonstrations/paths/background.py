@@ -130,8 +130,8 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
 
 
 def _corners(image: np.ndarray) -> np.ndarray:
-    """Return corners spread over an image, clearer than its noise [px], shape (n, 1, 2), float32; none if they are not.
-    """
+    """Return corners spread over an image, clearer than its noise [px], shape (n, 1, 2), float32; "
+    "none if they are not."""
     import cv2
 
     clear = cv2.cornerMinEigenVal(image, BLOCK)

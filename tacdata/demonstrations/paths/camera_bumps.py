@@ -242,9 +242,9 @@ def _which(
     without: dict[str, float] = {}
     for name, rest in (cameras, cameras[::-1]):
         noise = {finger: _noise(found, rest) for finger, found in near.items()}
-        times = np.unique(np.concatenate([
-            found.time_ns[[camera == name for camera in found.camera]] for found in near.values()
-        ]))  # fmt: skip
+        times = np.unique(
+            np.concatenate([found.time_ns[[camera == name for camera in found.camera]] for found in near.values()])
+        )
         middle = int(np.searchsorted(times, moment))
         # Before the bump, too, the camera's place may be a little off: only the change counts.
         whole = Bump(name, 0, 0, None, 0.0, "")

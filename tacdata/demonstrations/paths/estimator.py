@@ -61,9 +61,10 @@ def by_finger(given: Estimator | Mapping[str, Estimator] | None, fingers: tuple[
     unknown = sorted(set(named) - {ALL, *fingers})
     if unknown:
         raise UsageError(
-            f"a network for {', '.join(unknown)}, of which there is no board", ", ".join(fingers) or "no finger",
+            f"a network for {', '.join(unknown)}, of which there is no board",
+            ", ".join(fingers) or "no finger",
             "correct the names in --network",
-        )  # fmt: skip
+        )
     found = {finger: named.get(finger, named.get(ALL)) for finger in fingers}
     return {finger: estimator for finger, estimator in found.items() if estimator is not None}
 

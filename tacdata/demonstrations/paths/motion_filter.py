@@ -94,9 +94,12 @@ class _State:
 
     def plus(self, error: np.ndarray) -> _State:
         return _State(
-            exponential(error[:3]) @ self.rotation, self.position + error[3:6], self.turning + error[6:9],
-            self.velocity + error[9:MOTION], self.cameras + error[MOTION:],
-        )  # fmt: skip
+            exponential(error[:3]) @ self.rotation,
+            self.position + error[3:6],
+            self.turning + error[6:9],
+            self.velocity + error[9:MOTION],
+            self.cameras + error[MOTION:],
+        )
 
     def minus(self, other: _State) -> np.ndarray:
         turn = logarithm(self.rotation @ other.rotation.T)
@@ -105,9 +108,13 @@ class _State:
 
 
 def smooth(
-    seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise, back: bool = True, reacquired: Sequence[int] = (),
+    seen: Sightings,
+    times_ns: np.ndarray,
+    wander: ProcessNoise,
+    back: bool = True,
+    reacquired: Sequence[int] = (),
     left_out: Sequence[int] = (),
-) -> Smoothed:  # fmt: skip
+) -> Smoothed:
     """Return the pose at given times.
 
     Args:
@@ -157,9 +164,11 @@ def _collected(
 ) -> Smoothed:
     count = len(inside)
     result = {
-        "position": np.full((count, 3), np.nan), "rotation": np.full((count, 3, 3), np.nan),
-        "covariance": np.full((count, 6, 6), np.nan), "velocity": np.full((count, 3), np.nan),
-    }  # fmt: skip
+        "position": np.full((count, 3), np.nan),
+        "rotation": np.full((count, 3, 3), np.nan),
+        "covariance": np.full((count, 6, 6), np.nan),
+        "velocity": np.full((count, 3), np.nan),
+    }
     for row, node in zip(np.flatnonzero(inside), poses, strict=True):
         result["position"][row], result["rotation"][row] = node.state.position, node.state.rotation
         result["covariance"][row], result["velocity"][row] = node.known[:6, :6], node.state.velocity
@@ -223,9 +232,7 @@ def _updated(
     expected: _State, spread: np.ndarray, seen: Sightings, n: int, wrong: bool
 ) -> tuple[_State, np.ndarray, float, float]:
     """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes neither."""
-    surprise = np.concatenate([
-        logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position
-    ])  # fmt: skip
+    surprise = np.concatenate([logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position])
     if seen.cameras:
         seen_as = _observed(expected, seen, n)
         surprise = surprise - seen_as[:, MOTION:] @ expected.cameras

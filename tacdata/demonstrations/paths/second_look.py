@@ -37,8 +37,9 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
     """
     trackers = {
         name: FingerTracker(entry["intrinsics"], recording.rig.fingers)
-        for name, entry in recording.rig.cameras.items() if "intrinsics" in entry
-    }  # fmt: skip
+        for name, entry in recording.rig.cameras.items()
+        if "intrinsics" in entry
+    }
     image_topics = {topics.image(name): name for name in trackers}
     seen: dict[str, list[dict[str, TipPose]]] = {name: [] for name in trackers}
     remarks: list[str] = []
@@ -60,9 +61,7 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
         views += [_stream(name, finger, times, found) for finger in recording.rig.fingers]
     notes = tuple(note for note in recording.notes if not note.startswith("camera ") or "failed" in note)
     searched = f"all {sum(map(len, seen.values()))} images"
-    return replace(
-        recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched
-    )  # fmt: skip
+    return replace(recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched)
 
 
 def why_nothing_is_seen(recording: DemoRecording) -> Unread | None:

@@ -60,10 +60,16 @@ class Sightings:
         """Return some of the sightings; ``kept`` has shape (p,), bool."""
         chosen = np.flatnonzero(kept)
         return Sightings(
-            self.finger, self.time_ns[kept], self.position[kept], self.rotation[kept], self.covariance[kept],
-            self.ambiguous[kept], tuple(self.camera[k] for k in chosen), tuple(self.ids[k] for k in chosen),
+            self.finger,
+            self.time_ns[kept],
+            self.position[kept],
+            self.rotation[kept],
+            self.covariance[kept],
+            self.ambiguous[kept],
+            tuple(self.camera[k] for k in chosen),
+            tuple(self.ids[k] for k in chosen),
             self.cameras,
-        )  # fmt: skip
+        )
 
 
 def sightings_of(
@@ -96,10 +102,16 @@ def sightings_of(
         return np.concatenate([getattr(part, name) for part in parts])[order]
 
     return Sightings(
-        finger, time_ns[order], joined("position"), joined("rotation"), joined("covariance"), joined("ambiguous"),
-        tuple(cameras[k] for k in order), tuple(ids[k] for k in order),
+        finger,
+        time_ns[order],
+        joined("position"),
+        joined("rotation"),
+        joined("covariance"),
+        joined("ambiguous"),
+        tuple(cameras[k] for k in order),
+        tuple(ids[k] for k in order),
         {name: error for name in rig.worlds if (error := _error_of(name, rig)) is not None},
-    )  # fmt: skip
+    )
 
 
 def _error_of(camera: str, rig: DemoRig) -> CameraError | None:
@@ -131,9 +143,15 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     ids: list[tuple[int, ...]] = list(view.ids) if view.ids else [()] * len(seen)
     matrices = Rotation.from_quat(view.quaternion[seen]).as_matrix() if count else np.zeros((0, 3, 3))
     return Sightings(
-        view.finger, view.sample_ns[seen], view.position[seen] @ turn.T + pose[:3, 3], turn @ matrices,
-        covariance + _diagonal(*FLOOR), ambiguous[seen], (view.camera,) * count, tuple(ids[k] for k in chosen),
-    )  # fmt: skip
+        view.finger,
+        view.sample_ns[seen],
+        view.position[seen] @ turn.T + pose[:3, 3],
+        turn @ matrices,
+        covariance + _diagonal(*FLOOR),
+        ambiguous[seen],
+        (view.camera,) * count,
+        tuple(ids[k] for k in chosen),
+    )
 
 
 def _motion(time_ns: np.ndarray, position: np.ndarray) -> np.ndarray:

@@ -108,12 +108,19 @@ def track(
                 "this checkpoint lies beside it; tacdata train writes one, unless validation presses hardly touch"
             )
     return Demonstration(
-        recording.path.name, parents["recording"], recording.task, recording.rig.frame, rate, times, tracks,
+        recording.path.name,
+        parents["recording"],
+        recording.task,
+        recording.rig.frame,
+        rate,
+        times,
+        tracks,
         recording.rig.sensors,
         {"gate": GATE, "floor": list(FLOOR), "fingers": settings, "searched": recording.searched},
-        network, tuple(dict.fromkeys(remarks)),
+        network,
+        tuple(dict.fromkeys(remarks)),
         provenance.stamp("tacdata track", parents, {"rate": rate}),
-    )  # fmt: skip
+    )
 
 
 def _nothing_seen(recording: DemoRecording) -> FormatError:
@@ -121,8 +128,10 @@ def _nothing_seen(recording: DemoRecording) -> FormatError:
     if looked < ENOUGH and not recording.searched.startswith("all"):
         return FormatError(
             f"{recording.path}: no finger was seen in {FEWEST} images, as only {looked} were searched for tags while "
-            "recording", f"{ENOUGH} images or more", "all images are stored: add --every-image to tacdata track",
-        )  # fmt: skip
+            "recording",
+            f"{ENOUGH} images or more",
+            "all images are stored: add --every-image to tacdata track",
+        )
     why = why_nothing_is_seen(recording)
     return FormatError(
         f"{recording.path}: no finger was seen in {FEWEST} images" + (f"; {why.found}" if why else ""),
@@ -223,9 +232,8 @@ def _misplaced(seen: Sightings, path: Smoothed, times: np.ndarray) -> np.ndarray
 
 
 def _track(
-    name: str, path: Smoothed, seen: Sightings, recording: DemoRecording, times: np.ndarray,
-    estimator: Estimator | None,
-) -> tuple[FingerTrack, list[str]]:  # fmt: skip
+    name: str, path: Smoothed, seen: Sightings, recording: DemoRecording, times: np.ndarray, estimator: Estimator | None
+) -> tuple[FingerTrack, list[str]]:
     from scipy.spatial.transform import Rotation
 
     finger, inside = recording.rig.fingers[name], np.isfinite(path.position).all(axis=1)
@@ -251,7 +259,17 @@ def _track(
             if unfelt:
                 words.append(f"{name}: no reading, so no predicted depth, at {unfelt} of {len(times)} times")
     made = FingerTrack(
-        name, finger.hand, finger.kind, path.position, quaternion, path.covariance, gap, len(path.accepted),
-        int((~path.accepted).sum()), signals, depth, novelty,
-    )  # fmt: skip
+        name,
+        finger.hand,
+        finger.kind,
+        path.position,
+        quaternion,
+        path.covariance,
+        gap,
+        len(path.accepted),
+        int((~path.accepted).sum()),
+        signals,
+        depth,
+        novelty,
+    )
     return made, words

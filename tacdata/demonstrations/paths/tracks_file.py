@@ -21,9 +21,14 @@ from tacdata.sensor import Sensor
 HEADER = b"tacdata.finger_tracks"
 ENDING = ".tracks.parquet"
 UNITS = {
-    "position": "m", "quaternion": "1", "covariance": "rad^2, rad m, m^2", "gap": "1",
-    "signals": "counts", "predicted_depth": "mm", "novelty": "1",
-}  # fmt: skip
+    "position": "m",
+    "quaternion": "1",
+    "covariance": "rad^2, rad m, m^2",
+    "gap": "1",
+    "signals": "counts",
+    "predicted_depth": "mm",
+    "novelty": "1",
+}
 """Column of a finger -> unit; the columns are called FINGER.COLUMN, and time_ns [ns]."""
 REMEDY = "run `tacdata track` again: the recording holds everything"
 
@@ -45,17 +50,21 @@ def write_tracks(path: Path, made: Demonstration) -> None:
         for column, values in _columns(track).items():
             flat = values.reshape(len(values), -1)
             columns[f"{name}.{column}"] = (
-                pa.array(values) if values.ndim == 1
+                pa.array(values)
+                if values.ndim == 1
                 else pa.FixedSizeListArray.from_arrays(pa.array(flat.reshape(-1)), flat.shape[1])
-            )  # fmt: skip
+            )
     header = {
         "version": schemas.version("finger_tracks"),
         **{k: getattr(made, k) for k in ("recording", "recording_hash", "task", "frame", "rate", "smoothing")},
         "frames": len(made.time_ns),
         "fingers": {name: _described(track, made.sensors.get(name)) for name, track in made.tracks.items()},
-        "units": {"time_ns": "ns", **UNITS}, "columns": list(columns), "network": made.network,
-        "remarks": list(made.remarks), "provenance": made.provenance,
-    }  # fmt: skip
+        "units": {"time_ns": "ns", **UNITS},
+        "columns": list(columns),
+        "network": made.network,
+        "remarks": list(made.remarks),
+        "provenance": made.provenance,
+    }
     documents.check(header, "finger_tracks", str(path))
     table = pa.table(columns).replace_schema_metadata({HEADER: json.dumps(header)})
     try:
@@ -89,8 +98,9 @@ def read_tracks(path: Path) -> Demonstration:
     try:
         sensors = {
             name: Sensor.from_document(entry["sensor"], f"{path}: {name}")
-            for name, entry in header["fingers"].items() if entry.get("sensor")
-        }  # fmt: skip
+            for name, entry in header["fingers"].items()
+            if entry.get("sensor")
+        }
         tracks = {n: _track(n, e, table, sensors.get(n)) for n, e in header["fingers"].items()}
         time_ns = table.column("time_ns").to_numpy()
     except (KeyError, ValueError, AttributeError, pa.ArrowException) as error:
@@ -128,7 +138,16 @@ def _track(name: str, entry: dict[str, Any], table: pa.Table, sensor: Sensor | N
     found = column("position", 3), column("quaternion", 4), column("covariance", 6, 6)
     position, quaternion, covariance = (values for values in found if values is not None)
     return FingerTrack(
-        name, entry["hand"], entry["kind"], position, quaternion, covariance,
-        table.column(f"{name}.gap").to_numpy(), entry["sightings"], entry["outliers"], column("signals", -1),
-        column("predicted_depth", *maps) if sensor else None, column("novelty"),
-    )  # fmt: skip
+        name,
+        entry["hand"],
+        entry["kind"],
+        position,
+        quaternion,
+        covariance,
+        table.column(f"{name}.gap").to_numpy(),
+        entry["sightings"],
+        entry["outliers"],
+        column("signals", -1),
+        column("predicted_depth", *maps) if sensor else None,
+        column("novelty"),
+    )

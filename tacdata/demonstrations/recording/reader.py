@@ -65,8 +65,9 @@ def read_demo(path: Path) -> DemoRecording:
     except (KeyError, ValueError, TypeError) as error:
         raise FormatError(
             f"{path}: a recording with unexpected content ({type(error).__name__}: {error})",
-            "a demonstration recorded by this release of tacdata", "use the release that wrote it",
-        ) from error  # fmt: skip
+            "a demonstration recorded by this release of tacdata",
+            "use the release that wrote it",
+        ) from error
 
 
 def _recording(records: Records) -> DemoRecording:
@@ -84,11 +85,15 @@ def _recording(records: Records) -> DemoRecording:
         views += finger_streams(records, camera, clock)
         timing[camera] = _timing(clock)
     return DemoRecording(
-        records.path, rig, _attachment(records, "task.json")["task"],
+        records.path,
+        rig,
+        _attachment(records, "task.json")["task"],
         {name: _taxels(records, name, boards[name], rate, rig.sensors[name].taxels.count) for name in rig.boards},
-        tuple(views), bool(json.loads(end.get("complete", "false"))) and not records.damage, tuple(notes),
+        tuple(views),
+        bool(json.loads(end.get("complete", "false"))) and not records.damage,
+        tuple(notes),
         timing,
-    )  # fmt: skip
+    )
 
 
 def _timing(clock: ClockModel | None) -> float:
@@ -115,9 +120,10 @@ def _taxels(records: Records, name: str, board: dict[str, Any], rate: float, cou
     widths = {len(frame.counts) for frame in frames} - {count}
     if widths:
         raise FormatError(
-            f"{records.path}: {name}: frames of {sorted(widths)[0]} channels", f"{count}, as {name}'s sensor says",
+            f"{records.path}: {name}: frames of {sorted(widths)[0]} channels",
+            f"{count}, as {name}'s sensor says",
             "name the sensor file of that board in the demo rig",
-        )  # fmt: skip
+        )
     arrival, counter, device = (
         np.array([getattr(frame, field) for frame in frames], np.int64)
         for field in ("arrival_ns", "counter", "device_ns")

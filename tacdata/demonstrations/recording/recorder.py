@@ -50,9 +50,8 @@ class DemoRecorder:
     """
 
     def __init__(
-        self, session: DemoSession, rig: DemoRig, detect: Detect | None = None,
-        say: Callable[[str], None] | None = None,
-    ) -> None:  # fmt: skip
+        self, session: DemoSession, rig: DemoRig, detect: Detect | None = None, say: Callable[[str], None] | None = None
+    ) -> None:
         """Build the drivers; nothing is opened yet.
 
         Args:
@@ -82,9 +81,14 @@ class DemoRecorder:
                     self._open(f"{kind} {name}", device)
             rig = self.rig
             streams = DemoStreams(
-                self._boards, self._cameras, rig.cameras, rig.document["fingers"], self._detect, self._say,
+                self._boards,
+                self._cameras,
+                rig.cameras,
+                rig.document["fingers"],
+                self._detect,
+                self._say,
                 rig.latencies,
-            )  # fmt: skip
+            )
             self._streams = self._stack.enter_context(streams)
             self._wait(self._streams)
         except BaseException:

@@ -105,8 +105,9 @@ def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[st
         if strangers:
             raise FormatError(
                 f"{origin}: {what} of {', '.join(strangers)}, which carry no cube",
-                ", ".join(fingers), "name boards and cubes by the same fingers",
-            )  # fmt: skip
+                ", ".join(fingers),
+                "name boards and cubes by the same fingers",
+            )
     streams = {f"taxels {name}" for name in document["boards"]} | {f"camera {name}" for name in document["cameras"]}
     unknown = sorted(set(document.get("latencies", {})) - streams)
     if unknown:
@@ -120,9 +121,10 @@ def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[st
     frames = sorted({world.frame for world in worlds.values()})
     if len(frames) > 1:
         raise FormatError(
-            f"{origin}: cameras in several worlds ({', '.join(frames)})", "one frame for all cameras",
+            f"{origin}: cameras in several worlds ({', '.join(frames)})",
+            "one frame for all cameras",
             "calibrate all cameras against the same robot or board",
-        )  # fmt: skip
+        )
     lost = sorted(set(document["cameras"]) - set(worlds))
     if lost and (worlds or len(lost) > 1):
         raise FormatError(

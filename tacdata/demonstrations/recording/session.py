@@ -50,14 +50,18 @@ def read_demo_session(folder: Path) -> DemoSession:
     folder = Path(folder)
     if not (folder / FILE).is_file():
         raise UsageError(
-            f"{folder} holds no demonstrations: no {FILE} in it", "a folder written by tacdata record --demo",
+            f"{folder} holds no demonstrations: no {FILE} in it",
+            "a folder written by tacdata record --demo",
             "check the path",
-        )  # fmt: skip
+        )
     document = documents.read(folder / FILE, "demo_session")
     return DemoSession(
-        folder, tuple(file_names.finished(folder).values()), tuple(file_names.unfinished(folder)),
-        demo_rig_of(document["rig"], str(folder / FILE)), document,
-    )  # fmt: skip
+        folder,
+        tuple(file_names.finished(folder).values()),
+        tuple(file_names.unfinished(folder)),
+        demo_rig_of(document["rig"], str(folder / FILE)),
+        document,
+    )
 
 
 def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> DemoSession:
@@ -82,10 +86,14 @@ def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> De
     if Path(folder).exists():
         raise UsageError(f"{folder} exists", "a new folder", "choose another --out, or add to it with --resume")
     document = {
-        "version": schemas.version("demo_session"), "code_version": provenance.code_version(),
-        "started": datetime.now(UTC).isoformat(timespec="seconds"), "task": task, "rig": rig.document,
-        "sensors": {name: sensor.document for name, sensor in rig.sensors.items()}, "episodes": [],
-    }  # fmt: skip
+        "version": schemas.version("demo_session"),
+        "code_version": provenance.code_version(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "task": task,
+        "rig": rig.document,
+        "sensors": {name: sensor.document for name, sensor in rig.sensors.items()},
+        "episodes": [],
+    }
     documents.write(folder / FILE, document, "demo_session")
     return read_demo_session(folder)
 

@@ -24,10 +24,15 @@ class DemoStreams(DeviceStreams):
     silence = 1.5
 
     def __init__(
-        self, boards: dict[str, TaxelBoard], cameras: dict[str, Camera], entries: dict[str, dict[str, Any]],
-        fingers: dict[str, Any], detect: Detect | None, say: Callable[[str], None],
+        self,
+        boards: dict[str, TaxelBoard],
+        cameras: dict[str, Camera],
+        entries: dict[str, dict[str, Any]],
+        fingers: dict[str, Any],
+        detect: Detect | None,
+        say: Callable[[str], None],
         latencies: dict[str, StreamLatency] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Prepare the threads.
 
         Args:

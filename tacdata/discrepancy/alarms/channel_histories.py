@@ -155,8 +155,9 @@ def _histories(course: Course) -> dict[str, np.ndarray]:
         "how deep its place was pressed before": running_max(share, course.row_site) - share,
         "how deep this press has been": running_max(share, course.episode) - share,
         "unloading": share * (speed < 0),
-        **late, **turned,
-    }  # fmt: skip
+        **late,
+        **turned,
+    }
 
 
 def _told(cleaned: Cleaned, best: Best) -> Alarm:

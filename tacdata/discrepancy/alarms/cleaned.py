@@ -55,8 +55,16 @@ class Cleaned:
         relative = None if noise.relative_scale is None else noise.relative_scale[:, :channels]
         missing = None if noise.missing is None else noise.missing[:, :channels]
         own = Noise(noise.scale[:channels], noise.memory, noise.step, relative_scale=relative, missing=missing)
-        return cls(problem, left[:, :channels].astype(float), rise, course.speed[course.read], begins,
-                   episode[begins], own, form_error)  # fmt: skip
+        return cls(
+            problem,
+            left[:, :channels].astype(float),
+            rise,
+            course.speed[course.read],
+            begins,
+            episode[begins],
+            own,
+            form_error,
+        )
 
     @property
     def course(self) -> Course:

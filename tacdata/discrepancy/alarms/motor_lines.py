@@ -62,11 +62,15 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
     most = float(size[order[0]])
     share = plain_number(100 * most / cleaned.largest, 2)
     large = f"by up to about {plain_number(most, 2)}, {share} % of the largest rise"
-    return [Alarm(
-        f"while the path moves, and not while it stands, readings swing at {frequency[best]:.3g} Hz, or an alias of "
-        f"it, {large}; most on {names}: a motor's drive is heard",
-        "move the rig beside the skin, in the air, with motors on and off; look at the ground and at cables near them",
-    )]  # fmt: skip
+    return [
+        Alarm(
+            f"while the path moves, and not while it stands, readings swing at {frequency[best]:.3g} "
+            "Hz, or an alias of "
+            f"it, {large}; most on {names}: a motor's drive is heard",
+            "move the rig beside the skin, in the air, with motors on and off; look at the ground "
+            "and at cables near them",
+        )
+    ]
 
 
 def hums(cleaned: Cleaned) -> bool:
@@ -92,9 +96,7 @@ def _even(cleaned: Cleaned) -> bool:
     return len(apart) < 2 or float(np.std(apart)) < EVEN * float(np.mean(apart))
 
 
-def _periodogram(
-    cleaned: Cleaned, rows: np.ndarray, every: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:  # fmt: skip
+def _periodogram(cleaned: Cleaned, rows: np.ndarray, every: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Return frequencies [Hz], periodograms (channels, frequencies) about 1, and values of a channel; None if few."""
     course = cleaned.course
     bins = int(2 ** np.ceil(np.log2(WINDOW * FINER / every)))

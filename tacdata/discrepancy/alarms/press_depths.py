@@ -57,22 +57,28 @@ def press_depths(cleaned: Cleaned) -> list[Alarm]:
         way = "deeper" if by > 0 else "less deep"
         least = "at least " if problem.setting.response.fitted else ""  # which takes up a part of it
         back = ", and the depth comes back" if end < len(depth) and begin > 0 else ""
-        return [Alarm(
-            f"from {first} to {last} presses go {least}{abs(by) * unit:.2g} mm {way} than others of a place{back}: "
-            "as if steps were lost and found, or something lay under the sensor",
-            "measure the height of a fixed point at every tenth press; look at the guide and at what holds the sensor",
-        )]  # fmt: skip
+        return [
+            Alarm(
+                f"from {first} to {last} presses go {least}{abs(by) * unit:.2g} mm {way} than others of a place{back}: "
+                "as if steps were lost and found, or something lay under the sensor",
+                "measure the height of a fixed point at every tenth press; look at the guide and at "
+                "what holds the sensor",
+            )
+        ]
     if problem.setting.response.fitted:
         return []  # each place's depth is its own: what two groups differ by is hidden by it
     apart = two_groups(depth, error)
     if apart is None or abs(apart[1]) * unit < LEAST_MM or reasoned(course, episodes, apart[0]):
         return []
     lower, by = apart
-    return [Alarm(
-        f"presses fall in two groups {by * unit:.2g} mm apart in depth, of {int(lower.sum())} and "
-        f"{int((~lower).sum())}, and neither place, tool, depth nor rate says which: as if the tool slid in its holder",
-        "tighten the tool and what holds the sensor; make one press thirty times and look at its depths",
-    )]  # fmt: skip
+    return [
+        Alarm(
+            f"presses fall in two groups {by * unit:.2g} mm apart in depth, of {int(lower.sum())} and "
+            f"{int((~lower).sum())}, and neither place, tool, depth nor rate says which: as if the "
+            "tool slid in its holder",
+            "tighten the tool and what holds the sensor; make one press thirty times and look at its depths",
+        )
+    ]
 
 
 def estimates(problem: Problem) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:

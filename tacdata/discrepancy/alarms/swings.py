@@ -66,17 +66,25 @@ def swings(cleaned: Cleaned) -> list[Alarm]:
     size = f"by about {share} % of the rise, up to {most} in readings"
     if found.wave < len(WAVES):
         every = cleaned.problem.setting.course.stroke / WAVES[found.wave]
-        return [Alarm(
-            f"in each press all channels swing together along the path, every {every:.2g} mm or a part of it, {size}, "
-            "each time with another beginning: as friction does that lets go in jumps (stick-slip)",
-            "press slower and faster, and with a drop of oil or some powder between tool and skin; look at the guide",
-        )]  # fmt: skip
+        return [
+            Alarm(
+                f"in each press all channels swing together along the path, every {every:.2g} mm or a "
+                f"part of it, {size}, "
+                "each time with another beginning: as friction does that lets go in jumps (stick-slip)",
+                "press slower and faster, and with a drop of oil or some powder between tool and "
+                "skin; look at the guide",
+            )
+        ]
     hertz = HERTZ[found.wave - len(WAVES)]
-    return [Alarm(
-        f"in each press all channels swing together at about {hertz:.2g} Hz, {size}, each time with another beginning: "
-        "as a press does that shakes",
-        "measure force or height while the tool stands still in contact; look at the drive's regulator and its footing",
-    )]  # fmt: skip
+    return [
+        Alarm(
+            f"in each press all channels swing together at about {hertz:.2g} Hz, {size}, each time "
+            "with another beginning: "
+            "as a press does that shakes",
+            "measure force or height while the tool stands still in contact; look at the drive's "
+            "regulator and its footing",
+        )
+    ]
 
 
 def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:

@@ -70,9 +70,10 @@ def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, np.ndarray, list[s
             kept.append(channel)
     if not kept:
         raise FormatError(
-            f"no channel with usable readings ({'; '.join(notes[:3])})", "at least one that changes",
+            f"no channel with usable readings ({'; '.join(notes[:3])})",
+            "at least one that changes",
             "mend the board, or name other columns in the import's mapping, and record or import again",
-        )  # fmt: skip
+        )
     limits, words = _clipped(recorded, kept)
     return np.array(kept), limits, notes + words
 

@@ -58,10 +58,15 @@ def check(setting: Setting) -> DataChecks:
     wiring = () if setting.given else tuple(miswired(course, response))
     late, words = shifted(course)
     return DataChecks(
-        course.episodes, wiring, tuple(shortcomings(course)),
-        _base(setting), (*idle_lines(course), *odd_channels(course, response)),
-        words if late else (), _touched(course), () if late else words,
-    )  # fmt: skip
+        course.episodes,
+        wiring,
+        tuple(shortcomings(course)),
+        _base(setting),
+        (*idle_lines(course), *odd_channels(course, response)),
+        words if late else (),
+        _touched(course),
+        () if late else words,
+    )
 
 
 def _touched(course: Course) -> tuple[str, ...]:

@@ -51,9 +51,11 @@ def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray
     known = {p.name: np.asarray(values.get(p.name, 0.0)) for p in effect.parameters}
     hold, lag = longest_hold(course), max(effect.time_constant(known), effect.delay(known))
     held = hold >= max(HOLD, effect.time_constant(known))
-    if effect.at_rest is AtRest.CATCHES_UP and effect.delay(known) >= 0 and (
-        stairs(course) or hold >= max(HOLD, OVER * lag)
-    ):  # fmt: skip
+    if (
+        effect.at_rest is AtRest.CATCHES_UP
+        and effect.delay(known) >= 0
+        and (stairs(course) or hold >= max(HOLD, OVER * lag))
+    ):
         # At a stop it catches up, and is done: play stays behind there, what relaxes falls, what creeps goes on.
         return _that(AtRest.CATCHES_UP)
     if not stairs(course):

@@ -67,9 +67,10 @@ def course_of(paths: list[Path]) -> Course:
     counts = {e.taxels.counts.shape[1] for _, e in found}
     if len(counts) > 1:
         raise FormatError(
-            f"recordings of {', '.join(map(str, sorted(counts)))} channels", "the same channels throughout",
+            f"recordings of {', '.join(map(str, sorted(counts)))} channels",
+            "the same channels throughout",
             "judge sensors one at a time",
-        )  # fmt: skip
+        )
     recordings = [r for _, r in every]
     kept, limits, left_out = usable([readings(r) for r in recordings])
     notes += in_source(recordings, min(counts)) + left_out + _dropouts([e for _, e in found])
@@ -104,9 +105,10 @@ def _of_one_sensor(episodes: list[Episode]) -> list[str]:
     kinds = {(t.columns, t.rows, t.pitch_x, t.pitch_y) for t in (e.sensor.taxels for e in episodes)}
     if len(kinds) > 1:
         raise FormatError(
-            f"recordings of sensors of several kinds: {', '.join(names)}", "one sensor in one verdict",
+            f"recordings of sensors of several kinds: {', '.join(names)}",
+            "one sensor in one verdict",
             "judge them one at a time",
-        )  # fmt: skip
+        )
     return [f"recordings name {len(names)} sensors ({', '.join(names[:4])}): judge them apart, unless they are one"]
 
 
@@ -155,9 +157,14 @@ def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
 
 
 def _strokes_of(
-    episode: Episode, of: tuple[int, int], kept: np.ndarray, force: str, temperature: str, views: Views | None,
+    episode: Episode,
+    of: tuple[int, int],
+    kept: np.ndarray,
+    force: str,
+    temperature: str,
+    views: Views | None,
     tag: bool,
-) -> list[_Stroke]:  # fmt: skip
+) -> list[_Stroke]:
     time_ns = episode.taxels.sample_ns
     order = np.argsort(time_ns, kind="stable")
     time_ns = time_ns[order]
@@ -207,9 +214,12 @@ def _tool(episode: Episode) -> Tool:
 
 
 def _joined(
-    parts: list[_Stroke], usable: tuple[np.ndarray, np.ndarray], example: Episode, extra: tuple[bool, bool, bool],
+    parts: list[_Stroke],
+    usable: tuple[np.ndarray, np.ndarray],
+    example: Episode,
+    extra: tuple[bool, bool, bool],
     notes: list[str],
-) -> Course:  # fmt: skip
+) -> Course:
     (kept, (least, most)), (force, temperature, tag) = usable, extra
     tools = tuple(dict.fromkeys(p.tool for p in parts))
     clock, last = [], None
@@ -231,18 +241,25 @@ def _joined(
     site, told = _sites(parts, channels)
     recording = np.unique([p.recording for p in parts], return_inverse=True)[1]
     return Course(
-        time=time - time[0], episode=episode, tip=np.concatenate([p.rows.tip for p in parts]),
-        tool=np.array([tools.index(p.tool) for p in parts])[episode], readings=read,
+        time=time - time[0],
+        episode=episode,
+        tip=np.concatenate([p.rows.tip for p in parts]),
+        tool=np.array([tools.index(p.tool) for p in parts])[episode],
+        readings=read,
         averaged=np.concatenate([p.rows.averaged for p in parts]),
-        session=np.array([numbers[p.session] for p in parts]), site=site,
-        tools=tools, names=tuple(p.name for p in parts),
+        session=np.array([numbers[p.session] for p in parts]),
+        site=site,
+        tools=tools,
+        names=tuple(p.name for p in parts),
         centers=centers[kept] if len(centers) > int(kept.max()) else None,
         force=values[:, channels] if force else None,
-        temperature=_filled(values[:, channels + force]) if temperature else None, notes=(*notes, *told),
+        temperature=_filled(values[:, channels + force]) if temperature else None,
+        notes=(*notes, *told),
         tag=values[:, channels + force + temperature :] if tag else None,
-        recording=recording if recording.max() + 1 < len(parts) else None, numbers=tuple(int(k) for k in kept),
+        recording=recording if recording.max() + 1 < len(parts) else None,
+        numbers=tuple(int(k) for k in kept),
         clipped=clipped if clipped.any() else None,
-    )  # fmt: skip
+    )
 
 
 def _sites(parts: list[_Stroke], channels: int) -> tuple[np.ndarray, list[str]]:

@@ -101,17 +101,28 @@ def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, 
         if RUN <= end - begin <= len(own) // 2 and abs(np.median(others[begin:end]) - 1) < SHARED * abs(change):
             first, last = (course.names[int(episodes[known[k]])] for k in (begin, end - 1))
             healed = "and comes back" if end < len(own) else "to the end"
-            words.append((abs(change), (
-                f"{called}: reads {100 * abs(change):.0f} % {'more' if change > 0 else 'less'} from {first} to {last} "
-                f"{healed}: look at its contact, or leave these presses out"
-            )))  # fmt: skip
+            words.append(
+                (
+                    abs(change),
+                    (
+                        f"{called}: reads {100 * abs(change):.0f} % {'more' if change > 0 else 'less'} "
+                        f"from {first} to {last} "
+                        f"{healed}: look at its contact, or leave these presses out"
+                    ),
+                )
+            )
             continue
         spread = float(np.ptp(_smooth(own)))
         if spread > max(LEAST_WANDER, WANDER_Z * scatter / np.sqrt(5)) and np.ptp(_smooth(others)) < SHARED * spread:
-            words.append((spread, (
-                f"{called}: its gain wanders by {100 * spread:.0f} % over the session, unlike the others': "
-                "look at its contact and its cable"
-            )))  # fmt: skip
+            words.append(
+                (
+                    spread,
+                    (
+                        f"{called}: its gain wanders by {100 * spread:.0f} % over the session, unlike the others': "
+                        "look at its contact and its cable"
+                    ),
+                )
+            )
     return [said for _, said in sorted(words, reverse=True)]
 
 
@@ -139,13 +150,19 @@ def _longest(flags: np.ndarray) -> tuple[int, int]:
 
 def _swaps(
     course: Course, episodes: np.ndarray, measured: list[np.ndarray], expected: list[np.ndarray]
-) -> dict[tuple[int, int], str]:  # fmt: skip
+) -> dict[tuple[int, int], str]:
     """Return which two channels changed places in a part of the session, each pair with words."""
     words, channels = {}, course.channels
-    cross = np.array([
-        [[np.nansum(np.square(m[:, i] - p[:, j])) for j in range(channels)] for i in range(channels)]
-        for m, p in zip(measured, expected, strict=True)
-    ]) if channels <= 32 else np.zeros((0, 0, 0))  # fmt: skip
+    cross = (
+        np.array(
+            [
+                [[np.nansum(np.square(m[:, i] - p[:, j])) for j in range(channels)] for i in range(channels)]
+                for m, p in zip(measured, expected, strict=True)
+            ]
+        )
+        if channels <= 32
+        else np.zeros((0, 0, 0))
+    )
     for i in range(len(cross) and channels):
         for j in range(i + 1, channels):
             own, other = cross[:, i, i] + cross[:, j, j], cross[:, i, j] + cross[:, j, i]

@@ -83,7 +83,7 @@ def _groups(parts: Sequence[Rows], channels: int) -> np.ndarray:
         near = [
             abs(mine - np.mean([np.log(max(_level(parts[i], own, channels), 1e-12)) for i in deep[number == n]]))
             for n in range(int(number.max()) + 1)
-        ]  # fmt: skip
+        ]
         group[k] = int(np.argmin(near))
     first = [int(np.flatnonzero(group == n)[0]) for n in range(int(group.max()) + 1)]
     return np.argsort(np.argsort(first))[group]

@@ -121,7 +121,8 @@ def _recovers(course: Course) -> bool:
 
 def _tared(course: Course) -> bool:
     reduced = course.reduced
-    starts = np.array([reduced.readings[np.flatnonzero(reduced.episode == e)[:3]].mean(axis=0)
-                       for e in np.unique(reduced.episode)])  # fmt: skip
+    starts = np.array(
+        [reduced.readings[np.flatnonzero(reduced.episode == e)[:3]].mean(axis=0) for e in np.unique(reduced.episode)]
+    )
     level = np.abs(starts).max()
     return bool(course.episodes > 3 and level < 1e-3 * np.ptp(reduced.readings))

@@ -46,8 +46,11 @@ def miswired(course: Course, response: Response) -> list[str]:
     likeness[turned] = np.abs(likeness[turned])
     _, best = linear_sum_assignment(-likeness)
     own = np.diag(likeness)
-    mismatched = [k for k in range(course.channels) if moved[k] and moved[best[k]] and own[k] < POOR
-           and likeness[k, best[k]] > own[k] + BETTER]  # fmt: skip
+    mismatched = [
+        k
+        for k in range(course.channels)
+        if moved[k] and moved[best[k]] and own[k] < POOR and likeness[k, best[k]] > own[k] + BETTER
+    ]
     return words + (_in_words(mismatched, best, course) if mismatched else [])
 
 

@@ -173,7 +173,7 @@ class FittedResponse(Response):
 
     def _corrections(
         self, residual: np.ndarray, features: np.ndarray
-    ) -> Iterator[tuple[int, slice, np.ndarray, np.ndarray]]:  # fmt: skip
+    ) -> Iterator[tuple[int, slice, np.ndarray, np.ndarray]]:
         """Give places and streams with their features, shape (k, splines), and what to add to weights there."""
         last = residual.shape[1] - 1
         parts = [slice(None)] if features.ndim == 2 else [slice(0, last), slice(last, None)]
@@ -183,7 +183,7 @@ class FittedResponse(Response):
                 own = (features[rows] if features.ndim == 2 else features[rows, of.start])[:, :count]
                 more, _ = self._solve(
                     rows, np.nan_to_num(residual[rows, of]), own, basis, self._smooth[k][of], self._weights[k][:, of]
-                )  # fmt: skip
+                )
                 yield k, of, own, more
 
     def _fit(self, streams: np.ndarray) -> None:
@@ -233,9 +233,14 @@ class FittedResponse(Response):
         return self.context[self._read] == k
 
     def _solve(
-        self, rows: np.ndarray, values: np.ndarray, design: np.ndarray, basis: BSpline,
-        smooth: np.ndarray | None = None, before: np.ndarray | float = 0.0,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        self,
+        rows: np.ndarray,
+        values: np.ndarray,
+        design: np.ndarray,
+        basis: BSpline,
+        smooth: np.ndarray | None = None,
+        before: np.ndarray | float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return spline weights, with an offset for every episode fitted beside and left out, and how smooth they are.
 
         Args:
@@ -279,7 +284,7 @@ class FittedResponse(Response):
         result = np.empty((len(pose), self._weights[0].shape[1]))
         for rows, design, air, weights in zip(
             self._rows, self._designs_at(pose), self._air, self._weights, strict=True
-        ):  # fmt: skip
+        ):
             result[rows] = design @ weights - air @ weights
         result.flags.writeable = False  # others are given the same
         self._answers = [*self._answers[1 - CACHED :], (depth, result)]
@@ -332,7 +337,7 @@ def _roughness(basis: BSpline) -> np.ndarray:
     bend = np.zeros((len(apart) - 1, len(apart) + 1))
     usual = float(np.median(apart))
     for k, (before, after) in enumerate(pairwise(apart)):
-        scale = usual ** 1.5 / np.sqrt(0.5 * (before + after))
+        scale = usual**1.5 / np.sqrt(0.5 * (before + after))
         bend[k, k : k + 3] = scale / before, -scale / before - scale / after, scale / after
     return bend.T @ bend
 

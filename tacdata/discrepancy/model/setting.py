@@ -42,5 +42,5 @@ class Setting:
         force = self.course.force is not None
         common = {
             e.name for e in library() if e.gain is GainKind.COMMON or (e.like_gain is LikeGain.EQUAL and not force)
-        }  # fmt: skip
+        }
         return frozenset(self.nuisance) | common

@@ -51,8 +51,9 @@ class Spec:
             if set(entry["values"]) != wanted:
                 raise FormatError(
                     f"model spec: {effect.name} with {', '.join(entry['values']) or 'no values'}",
-                    ", ".join(sorted(wanted)), "correct values",
-                )  # fmt: skip
+                    ", ".join(sorted(wanted)),
+                    "correct values",
+                )
             placed.append(Placed(effect, {name: np.array(value, float) for name, value in entry["values"].items()}))
         return tuple(placed)
 
@@ -69,15 +70,17 @@ class Spec:
         if len(table.gain) != course.channels:
             raise FormatError(
                 f"a response table of {len(table.gain)} channels, recordings of {course.channels}",
-                "as many", "take the table of this sensor, or response: {kind: fitted}",
-            )  # fmt: skip
+                "as many",
+                "take the table of this sensor, or response: {kind: fitted}",
+            )
         names = {name: k for k, name in enumerate(table.tools)}
         missing = [tool.name for tool in course.tools if tool.name not in names]
         if missing:
             raise FormatError(
-                f"indenter {missing[0]!r} is not in the response table", ", ".join(table.tools),
+                f"indenter {missing[0]!r} is not in the response table",
+                ", ".join(table.tools),
                 "solve it too, or leave its recordings out",
-            )  # fmt: skip
+            )
         table = table.with_tools([names[tool.name] for tool in course.tools])
         reduced = course.reduced
         quiet = reduced.tip[:, 2] <= 0
@@ -87,12 +90,14 @@ class Spec:
         """Return the document of the next version."""
         entries = [
             {
-                "effect": one.effect.name, "stage": one.stage,
+                "effect": one.effect.name,
+                "stage": one.stage,
                 "values": {name: np.asarray(value).tolist() for name, value in one.values.items()},
-                "error": {name: float(value) for name, value in error.items()}, "evidence": evidence,
+                "error": {name: float(value) for name, value in error.items()},
+                "evidence": evidence,
             }
             for one, error in zip(placed, errors, strict=True)
-        ]  # fmt: skip
+        ]
         return {**self.document, "parent": self.content_hash, "effects": [*self.document["effects"], *entries]}
 
 
@@ -113,8 +118,11 @@ def read_spec(path: Path | None) -> Spec:
     """
     if path is None:
         document = {
-            "version": schemas.version("model_spec"), "name": "without memory", "parent": None,
-            "response": {"kind": "fitted"}, "effects": [],
-        }  # fmt: skip
+            "version": schemas.version("model_spec"),
+            "name": "without memory",
+            "parent": None,
+            "response": {"kind": "fitted"},
+            "effects": [],
+        }
         return Spec(document, Path())
     return Spec(documents.read(path, "model_spec"), path.parent)

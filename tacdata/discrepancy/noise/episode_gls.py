@@ -56,9 +56,7 @@ class JointScores:
 class FactoredErrors:
     """What the episodes of one place err by, factored: takes it out of any columns."""
 
-    def __init__(
-        self, spans: Sequence[slice], own: EpisodeErrorModel, like: FactoredErrors | None = None
-    ) -> None:  # fmt: skip
+    def __init__(self, spans: Sequence[slice], own: EpisodeErrorModel, like: FactoredErrors | None = None) -> None:
         """Factor what episodes, each given by its rows, err by.
 
         Args:

@@ -49,7 +49,7 @@ class EpisodeGrams:
 
 def episode_grams(
     columns: np.ndarray, course: Course, beside: np.ndarray | None = None, inner: np.ndarray | None = None
-) -> EpisodeGrams:  # fmt: skip
+) -> EpisodeGrams:
     """Return the `Evidence` of columns that are cleaned.
 
     Args:

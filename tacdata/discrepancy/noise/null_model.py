@@ -70,24 +70,41 @@ class NullModel:
 
     @classmethod
     def of(
-        cls, reduced: Course, context: np.ndarray, features: np.ndarray | None, errors: np.ndarray, ridge: np.ndarray,
-        beside: np.ndarray, noise: Noise, folds: np.ndarray, known: Whitener | None = None,
-        odd: np.ndarray | None = None, sizes: np.ndarray | None = None, spread: float = 0.0,
-    ) -> NullModel:  # fmt: skip
+        cls,
+        reduced: Course,
+        context: np.ndarray,
+        features: np.ndarray | None,
+        errors: np.ndarray,
+        ridge: np.ndarray,
+        beside: np.ndarray,
+        noise: Noise,
+        folds: np.ndarray,
+        known: Whitener | None = None,
+        odd: np.ndarray | None = None,
+        sizes: np.ndarray | None = None,
+        spread: float = 0.0,
+    ) -> NullModel:
         """Return the null model of the rows read, with what follows from its parts."""
         white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), NOISE_DRAWS))
         nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
         return cls(
-            context, features, errors, ridge, beside, nuisances, episode_grams(nuisances, reduced).gram, noise,
+            context,
+            features,
+            errors,
+            ridge,
+            beside,
+            nuisances,
+            episode_grams(nuisances, reduced).gram,
+            noise,
             folds,
             known or Whitener(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
-            white, sizes, spread,
-        )  # fmt: skip
+            white,
+            sizes,
+            spread,
+        )
 
-    def whitener_for(
-        self, setting: Setting, placed: Sequence[Placed], predicted: Prediction | None = None
-    ) -> Whitener:  # fmt: skip
+    def whitener_for(self, setting: Setting, placed: Sequence[Placed], predicted: Prediction | None = None) -> Whitener:
         """Return what takes nuisances out of columns beside a model's response.
 
         What the response takes up, and an episode's own errors of pose and gain, go through the model's effects: those
@@ -125,14 +142,16 @@ class NullModel:
         rise = streams.rise(said, response).astype(np.float32)
         missing, noise, process = ~np.isfinite(residual), self.noise, self.noise.offsets
         noise = replace(
-            noise, gain_error=(rise * self.spread).astype(np.float32), missing=missing if missing.any() else None,
+            noise,
+            gain_error=(rise * self.spread).astype(np.float32),
+            missing=missing if missing.any() else None,
             random_walk=_together(
                 offset_random_walk.modes(noise.walk_rate, reduced, noise.memory),
                 table_error.modes(response.error, rise, noise.scale, reduced),
             ),
             relative_scale=None if noise.relative_scale is None else readings.relative_scale(residual, rise, reduced),
             offsets=process and process.beside(reduced),
-        )  # fmt: skip
+        )
         errors = pose_errors(setting, placed, said) * (1.0 if self.sizes is None else self.sizes)
         context, features = contexts(reduced), taken_up(course, response, placed)
         kept = np.isin(course.read, fewer.read)
@@ -212,6 +231,16 @@ def null_model(setting: Setting) -> NullModel:
     beside = whitener.whitened(every[:, :, : extra.shape[2] + rich.shape[2]])
     folds = fold_of(course.episodes)
     return NullModel.of(
-        reduced, context, features, errors, ridge, beside, known, folds, whitener, own.odd, own.sizes,
+        reduced,
+        context,
+        features,
+        errors,
+        ridge,
+        beside,
+        known,
+        folds,
+        whitener,
+        own.odd,
+        own.sizes,
         max(spread, LEAST_GAIN_ERROR),
-    )  # fmt: skip
+    )

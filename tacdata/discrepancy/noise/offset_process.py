@@ -108,9 +108,13 @@ class OffsetProcess:
             return replace(self, error=np.where(there, self.error, np.inf), quiet=self.quiet[rows], episode=number)
         among = np.ix_(episodes, episodes)
         return OffsetProcess(
-            self.covariance[among], self.cross[among], self.variance[episodes], self.error[episodes],
-            self.quiet[rows], np.searchsorted(episodes, number),
-        )  # fmt: skip
+            self.covariance[among],
+            self.cross[among],
+            self.variance[episodes],
+            self.error[episodes],
+            self.quiet[rows],
+            np.searchsorted(episodes, number),
+        )
 
     def beside(self, course: Course) -> OffsetProcess:
         """Return it for a course with readings of more episodes: their offsets let no others be expected."""
@@ -129,7 +133,7 @@ class OffsetProcess:
 
 def offset_process(
     residual: np.ndarray, course: Course, scale: np.ndarray, memory: float, levels: Sequence[np.ndarray]
-) -> OffsetProcess | None:  # fmt: skip
+) -> OffsetProcess | None:
     """Return how offsets drift; None if there are too few episodes to estimate it.
 
     Args:
@@ -162,9 +166,13 @@ def offset_process(
     covariance, cross, variance = spans.covariances(length)
     more = same + nugget
     return OffsetProcess(
-        walk * covariance + more, walk * cross + more, walk * variance + np.diag(more), error, _quiet(course),
+        walk * covariance + more,
+        walk * cross + more,
+        walk * variance + np.diag(more),
+        error,
+        _quiet(course),
         course.episode,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -250,9 +258,13 @@ def _shared(offsets: np.ndarray, course: Course, scale: np.ndarray) -> tuple[np.
 
 
 def _variance_ratio(
-    shared: np.ndarray, process: tuple[float, float, float], error: np.ndarray, spans: _Spans,
-    levels: Sequence[np.ndarray], warmth: np.ndarray,
-) -> float:  # fmt: skip
+    shared: np.ndarray,
+    process: tuple[float, float, float],
+    error: np.ndarray,
+    spans: _Spans,
+    levels: Sequence[np.ndarray],
+    warmth: np.ndarray,
+) -> float:
     """Return how much larger variances are where channels wander together [1]: 1 where they surely do not.
 
     Common noise of all channels is quick, too; what settles or warms up is slow, and has no part in this.
@@ -319,7 +331,7 @@ def _means(
 
 def _reml(
     offsets: np.ndarray, error: np.ndarray, spans: _Spans, levels: Sequence[np.ndarray], warmth: np.ndarray
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float]:
     """Return the REML variance and time constant [s] of the process, and the variance of episodes' own offsets.
 
     Args:
@@ -350,8 +362,9 @@ def _reml(
             power = float(np.sum(seen * cho_solve(factor, seen, check_finite=False)))
             return seen.shape[1] * float(np.log(np.diag(factor[0])).sum()) + 0.5 * power
 
-        found = minimize(cost, np.log([size, 0.1 * size]), method="Nelder-Mead",
-                         options={"maxfev": 80, "xatol": 0.05, "fatol": 0.05})  # fmt: skip
+        found = minimize(
+            cost, np.log([size, 0.1 * size]), method="Nelder-Mead", options={"maxfev": 80, "xatol": 0.05, "fatol": 0.05}
+        )
         walk, own = (float(v) for v in np.exp(np.clip(found.x, -14, 14)))
         matrix = walk * alike + np.diag(error) + max(own, LEAST_OWN**2) * np.eye(len(time))
         best.append((float(found.fun), _doubt(matrix, basis), (walk, steps * between, own)))

@@ -91,11 +91,12 @@ def together(told: Sequence[JointScores]) -> list[JointScores]:
         packs[-1].append(run)
     return [
         JointScores(
-            np.concatenate([run.episodes for run in pack]), np.concatenate([run.score for run in pack]),
+            np.concatenate([run.episodes for run in pack]),
+            np.concatenate([run.score for run in pack]),
             block_diag(*(run.information for run in pack)),
         )
         for pack in packs
-    ]  # fmt: skip
+    ]
 
 
 def one_by_one(told: Sequence[JointScores]) -> list[JointScores]:
@@ -131,7 +132,7 @@ def _covariance(shared: np.ndarray, weights: np.ndarray, log: np.ndarray) -> tup
 
 def _unlikely(
     log: np.ndarray, told: Sequence[JointScores], shared: list[np.ndarray], weights: list[np.ndarray]
-) -> float:  # fmt: skip
+) -> float:
     """Return the negative logarithm of how likely sizes are, given as logarithms."""
     cost = 0.5 * float(np.sum(np.square(log / SURE)))
     for run, mean, counts in zip(told, shared, weights, strict=True):
@@ -144,7 +145,7 @@ def _unlikely(
 
 def _posterior(
     run: JointScores, mean: np.ndarray, counts: np.ndarray, log: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Return episodes' own errors, shape (n, kinds), and the covariance of each one's, shape (n, kinds, kinds)."""
     count, kinds = run.score.shape
     own, every = _covariance(mean, counts, log)
@@ -164,7 +165,7 @@ def _weights(errors: np.ndarray, spread: np.ndarray, log: np.ndarray) -> np.ndar
 
 def _alone(
     errors: np.ndarray, spread: np.ndarray, counts: np.ndarray, log: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Return errors and their covariance without the expectation of an episode's own."""
     kinds = errors.shape[1]
     inverse = np.linalg.inv(0.5 * (spread + np.swapaxes(spread, 1, 2)))

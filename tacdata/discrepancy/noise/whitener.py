@@ -83,9 +83,14 @@ class Whitener:
     """Whitens columns, and projects out what the response may take up, place by place."""
 
     def __init__(
-        self, course: Course, noise: Noise, context: np.ndarray, features: np.ndarray | None, pose_errors: np.ndarray,
+        self,
+        course: Course,
+        noise: Noise,
+        context: np.ndarray,
+        features: np.ndarray | None,
+        pose_errors: np.ndarray,
         like: Whitener | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Factor what is the same for all columns.
 
         Args:
@@ -141,7 +146,7 @@ class Whitener:
                 _turned(moved[group, :seen]),
                 None if shared is None else _features(shared, offset[group, :seen]),
                 None if random_walk is None else _turned(random_walk[group, :seen]),
-            )  # fmt: skip
+            )
             tag = None
             if seen < streams:
                 # A tag knows nothing of the response: it has a free offset for the place, and each episode's own.

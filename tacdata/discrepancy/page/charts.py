@@ -18,9 +18,12 @@ MOST_POINTS = 400
 
 
 def curves(
-    title: str, across: np.ndarray, lines: Sequence[tuple[str, np.ndarray]], labels: tuple[str, str],
+    title: str,
+    across: np.ndarray,
+    lines: Sequence[tuple[str, np.ndarray]],
+    labels: tuple[str, str],
     band: float | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Return a chart of curves over one axis.
 
     Args:
@@ -41,8 +44,9 @@ def curves(
     parts = []
     if band is not None:
         top, bottom = y.at(band), y.at(-band)
-        parts.append(f'<rect class="band" x="{LEFT}" y="{top:.1f}" width="{WIDTH - LEFT - RIGHT}" '
-                     f'height="{bottom - top:.1f}"/>')  # fmt: skip
+        parts.append(
+            f'<rect class="band" x="{LEFT}" y="{top:.1f}" width="{WIDTH - LEFT - RIGHT}" height="{bottom - top:.1f}"/>'
+        )
     for kind, values in lines:
         parts.append(f'<polyline class="{kind}" points="{_points(x, y, across[pick], values[pick])}"/>')
     return _framed(title, parts, x, y, labels)

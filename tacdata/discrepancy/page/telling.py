@@ -56,6 +56,12 @@ def _press(found: Residuals, number: int, stream: int) -> ToldPress:
     rows = found.episode == number
     time = found.time[rows]
     return ToldPress(
-        found.names[number], found.streams[stream], time - time[0], found.depth[rows], found.measured[rows, stream],
-        found.before[rows, stream], found.after[rows, stream], float(found.noise[stream]),
-    )  # fmt: skip
+        found.names[number],
+        found.streams[stream],
+        time - time[0],
+        found.depth[rows],
+        found.measured[rows, stream],
+        found.before[rows, stream],
+        found.after[rows, stream],
+        float(found.noise[stream]),
+    )

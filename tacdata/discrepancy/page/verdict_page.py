@@ -52,10 +52,15 @@ def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
     presses = telling(found)
     parts = [
         Part("What to do next", lines=tuple(verdict["next"])),
-        _presses(verdict, found, presses), _loops(verdict, presses), _shares(verdict), _where(verdict, found),
-        _path(verdict), _rivals(verdict), Part("Of these recordings", lines=tuple(unsaid(verdict))),
+        _presses(verdict, found, presses),
+        _loops(verdict, presses),
+        _shares(verdict),
+        _where(verdict, found),
+        _path(verdict),
+        _rivals(verdict),
+        Part("Of these recordings", lines=tuple(unsaid(verdict))),
         *_folded(verdict),
-    ]  # fmt: skip
+    ]
     shown = [part for part in parts if part.pictures or part.lines]
     return _template().render(verdict=verdict, parts=shown, tiles=_tiles(verdict))
 

@@ -168,13 +168,20 @@ def _shapes(effect: Effect) -> list[dict[str, float]]:
 
 
 def _columns(
-    effect: Effect, shapes: dict[str, float], course: Course, chain: Chain, placed: Sequence[Placed],
-    streams: Streams, now: np.ndarray, share: float = 1.0,
-) -> tuple[list[np.ndarray], list[float], list[float]]:  # fmt: skip
+    effect: Effect,
+    shapes: dict[str, float],
+    course: Course,
+    chain: Chain,
+    placed: Sequence[Placed],
+    streams: Streams,
+    now: np.ndarray,
+    share: float = 1.0,
+) -> tuple[list[np.ndarray], list[float], list[float]]:
     """Return what an effect changes at a share of its typical sizes, over that share, and the bounds."""
     made, low, high = [], [], []
-    rest = {p.name: np.full(course.channels, p.default) if p.per_channel else np.array(p.default)
-            for p in effect.amplitudes}  # fmt: skip
+    rest = {
+        p.name: np.full(course.channels, p.default) if p.per_channel else np.array(p.default) for p in effect.amplitudes
+    }
     rest |= {name: np.array(value) for name, value in shapes.items()}
     for p in effect.amplitudes:
         values = {**rest, p.name: rest[p.name] + share * p.typical}

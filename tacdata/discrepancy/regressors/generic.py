@@ -54,13 +54,21 @@ def histories(course: Course) -> np.ndarray:
     recent = np.maximum.accumulate(np.where(course.first, 0.0, share))
     stroke = _since_start(course, share)
     columns = [
-        np.sign(speed), np.sign(speed) * fast, fast, clock, clock**2 - 1 / 12, most - share, stroke - share,
-        most - recent * 0.0 - stroke, *(low_pass(share, course.step, tau) for tau in TIME_CONSTANTS),
+        np.sign(speed),
+        np.sign(speed) * fast,
+        fast,
+        clock,
+        clock**2 - 1 / 12,
+        most - share,
+        stroke - share,
+        most - recent * 0.0 - stroke,
+        *(low_pass(share, course.step, tau) for tau in TIME_CONSTANTS),
         *(np.square(low_pass(share, course.step, tau)) for tau in TIME_CONSTANTS[1::2]),
         *(play(share, r) - share for r in (0.03, 0.1, 0.3)),
-        share * (speed < 0), np.exp(-np.square(share / 0.1)) * (speed < 0),
+        share * (speed < 0),
+        np.exp(-np.square(share / 0.1)) * (speed < 0),
         course.session[course.episode] - float(np.mean(course.session)),
-    ]  # fmt: skip
+    ]
     return np.stack(columns, axis=-1)
 
 

@@ -36,7 +36,7 @@ class ModelErrors:
 
 def model_errors(
     course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()
-) -> ModelErrors:  # fmt: skip
+) -> ModelErrors:
     """Return what may be off; no columns without placed effects.
 
     A large effect whose equation is a little wrong leaves what small effects explain: what lies along these columns is
@@ -103,9 +103,13 @@ def variants(one: Placed, channels: int) -> list[Placed]:
 
 def _sized(one: Placed, by: float) -> Placed:
     """Return an effect of another size, within its bounds."""
-    return Placed(one.effect, {
-        p.name: np.clip(p.default + by * (one.values[p.name] - p.default), p.low, p.high) for p in one.effect.parameters
-    })  # fmt: skip
+    return Placed(
+        one.effect,
+        {
+            p.name: np.clip(p.default + by * (one.values[p.name] - p.default), p.low, p.high)
+            for p in one.effect.parameters
+        },
+    )
 
 
 def modulations(course: Course, streams: Streams, own: np.ndarray) -> list[np.ndarray]:

@@ -80,9 +80,12 @@ def saturated(course: Course, response: Response, placed: list[Placed]) -> dict[
     streams, said = Streams.of(course), predict(course, response, placed)
     ways = _ways(course, streams, response, said, placed)
     made = {
-        Family.DRIFT: _drift(ways), Family.KINEMATICS: _pose(ways, response, placed), Family.SKIN_MEMORY: _memory(ways),
-        Family.FRICTION_AND_PLAY: _friction(ways), Family.DELAY_AND_FILTER: _late(ways),
-    }  # fmt: skip
+        Family.DRIFT: _drift(ways),
+        Family.KINEMATICS: _pose(ways, response, placed),
+        Family.SKIN_MEMORY: _memory(ways),
+        Family.FRICTION_AND_PLAY: _friction(ways),
+        Family.DELAY_AND_FILTER: _late(ways),
+    }
     if not response.fitted:  # a fitted one takes these up
         made |= {Family.RESPONSE_CURVE: _curve(ways), Family.CROSSTALK: _spread(ways)}
     return {family: side_by_side(columns) for family, columns in made.items() if columns}
@@ -93,10 +96,15 @@ def _ways(course: Course, streams: Streams, response: Response, said: Prediction
     if depth.max() <= 0:
         depth = course.tip[:, 2] - course.tip[:, 2].min()
     return _Ways(
-        course, streams, streams.rise(said, response), depth_slope(course, response, placed) * (0.1 * course.stroke),
-        said.signal - response.signal(np.zeros((1, course.channels))), depth / max(float(depth.max()), 1e-9),
-        np.sign(course.speed) * (depth > 0), course.time / max(float(course.time[-1]), 1e-9),
-    )  # fmt: skip
+        course,
+        streams,
+        streams.rise(said, response),
+        depth_slope(course, response, placed) * (0.1 * course.stroke),
+        said.signal - response.signal(np.zeros((1, course.channels))),
+        depth / max(float(depth.max()), 1e-9),
+        np.sign(course.speed) * (depth > 0),
+        course.time / max(float(course.time[-1]), 1e-9),
+    )
 
 
 def _waves(ways: _Ways, count: int) -> list[np.ndarray]:

@@ -82,7 +82,7 @@ def knobs_of(placed: Sequence[Placed], channels: int) -> list[Knob]:
 
 def tangents(
     course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = (), run: Chain | None = None
-) -> Tangent:  # fmt: skip
+) -> Tangent:
     """Differentiate the chain by all numbers of the placed effects, those given beside them kept.
 
     Args:

@@ -110,7 +110,7 @@ def parsimonious(setting: Setting, model: Refined, null: NullModel, pooled: Pool
 
 def two_lags(
     setting: Setting, model: Refined, nothing: Refined, null: NullModel, pooled: Pooled
-) -> tuple[Refined, bool]:  # fmt: skip
+) -> tuple[Refined, bool]:
     """Return a model with two lags where no single one explains the episodes, and whether there may be two.
 
     To first order all lags are one. The chain itself must tell them, each alone and two at a time. What lies within

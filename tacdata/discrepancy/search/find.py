@@ -58,11 +58,20 @@ def _findings(given: Gate, selection: Selection, problem: Problem, answer: Answe
     """
     nothing, model, final = selection.nothing, answer.model, answer.problem
     return Findings(
-        gap=given.gap, tests=given.tests, effects=answer.findings,
-        left=leftovers(final) if until == "decide" else Leftovers(0.0, 0.0), explained=nothing.loss - model.loss,
-        energy=(nothing.energy, model.energy), values=problem.grams.rows, given=given.problem, problem=problem,
+        gap=given.gap,
+        tests=given.tests,
+        effects=answer.findings,
+        left=leftovers(final) if until == "decide" else Leftovers(0.0, 0.0),
+        explained=nothing.loss - model.loss,
+        energy=(nothing.energy, model.energy),
+        values=problem.grams.rows,
+        given=given.problem,
+        problem=problem,
         final=final,
-        limits=detection_limits(final), gains=channel_gains(final),
-        halves=gains_of_halves(final), until=until,
-        comparisons=answer.comparisons, path=tuple(effect.name for effect, _ in selection.explained),
-    )  # fmt: skip
+        limits=detection_limits(final),
+        gains=channel_gains(final),
+        halves=gains_of_halves(final),
+        until=until,
+        comparisons=answer.comparisons,
+        path=tuple(effect.name for effect, _ in selection.explained),
+    )

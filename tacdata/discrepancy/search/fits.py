@@ -27,7 +27,7 @@ def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) 
 
 def gained(
     problem: Problem, chosen: Sequence[Candidate], train: np.ndarray, episodes: np.ndarray | None = None
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return by how much such a fit lowers half the sum of squares of episodes, shape (episodes,).
 
     Args:

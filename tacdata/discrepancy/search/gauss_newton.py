@@ -105,9 +105,10 @@ class Refined:
         own = [(k, knob) for k, knob in enumerate(self.knobs) if knob.at == at and knob.shape]
         error = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) if own else np.zeros(0)
         return tuple(
-            knob.parameter.name for k, knob in own
+            knob.parameter.name
+            for k, knob in own
             if error[k] < KNOWN and knob.value(self.placed) <= knob.parameter.low * (1.001 + error[k])
-        )  # fmt: skip
+        )
 
 
 def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = MOST_STEPS) -> Refined:
@@ -151,10 +152,18 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
     # A run of the chain is large, and most models are never asked.
     later = partial(_state, *begin[:3], replace(view, chain=None), null)
     return Refined(
-        tuple(now), response, knobs_of(now, setting.course.channels), view.energy, view.left,
-        setting.course.reduced.episode, null.context, null.projected_draws(view.whitener), view.whitener,
-        view.whitener.freedom, later if ended is None else lambda: ended,
-    )  # fmt: skip
+        tuple(now),
+        response,
+        knobs_of(now, setting.course.channels),
+        view.energy,
+        view.left,
+        setting.course.reduced.episode,
+        null.context,
+        null.projected_draws(view.whitener),
+        view.whitener,
+        view.whitener.freedom,
+        later if ended is None else lambda: ended,
+    )
 
 
 def _own(response: Response) -> Response:
@@ -223,7 +232,7 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
 
 def _unconverged(
     rest: np.ndarray, course: Course, response: Response, whitener: Whitener, scale: np.ndarray
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return what a response should have taken up and did not: half the sum of squares, shape (episodes,).
 
     What splines may take up is projected out of the residual, as if they had. Where effects are far from linear in

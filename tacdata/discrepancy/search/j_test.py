@@ -160,9 +160,10 @@ def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelErr
     # Before few clusters are paid for: a large score shrinks by more than its sound part.
     noise = NoiseDifference.of(first, second).with_amplitudes(more, less)
     sound = replace(
-        score, total=score.total * noise.share(gram),
+        score,
+        total=score.total * noise.share(gram),
         expected_variance=score.expected_variance * noise.spread(float(gram[:, 1, 1].sum())),
-    )  # fmt: skip
+    )
     return min(max(sound.z_score(pooled.get(_differ_by_clock(first, second))), 0.0), most)
 
 

@@ -78,21 +78,27 @@ class Problem:
         knobs = [self.tangent.knobs[k] for k in kept]
         others = self.of_errors != at
         return replace(
-            self, placed=tuple(p for k, p in enumerate(self.placed) if k != at),
+            self,
+            placed=tuple(p for k, p in enumerate(self.placed) if k != at),
             grams=EpisodeGrams(gram, self.grams.rows),
             tangent=Tangent(
-                [replace(knob, at=knob.at - (knob.at > at)) for knob in knobs], self.tangent.values[:, :, kept],
+                [replace(knob, at=knob.at - (knob.at > at)) for knob in knobs],
+                self.tangent.values[:, :, kept],
                 self.tangent.columns[kept],
             ),
-            model_errors=self.model_errors[others], of_errors=self.of_errors[others] - (self.of_errors[others] > at),
+            model_errors=self.model_errors[others],
+            of_errors=self.of_errors[others] - (self.of_errors[others] > at),
             parts=np.delete(self.parts, at),
-        )  # fmt: skip
+        )
 
 
 def prepare(
-    setting: Setting, null: NullModel, placed: Sequence[Placed] = (), tested: bool = True,
+    setting: Setting,
+    null: NullModel,
+    placed: Sequence[Placed] = (),
+    tested: bool = True,
     among: Collection[Form] | None = None,
-) -> Problem:  # fmt: skip
+) -> Problem:
     """Build columns beside what is placed and reduce them.
 
     Args:
@@ -120,9 +126,20 @@ def prepare(
     nuisances, rich = np.arange(first, second), np.arange(second, first + beside.shape[2])
     board = replace(board, columns=board.columns[:1])
     return Problem(
-        setting, null, tuple(placed), board, found, moving.at(count), np.arange(slack, said), nuisances, rich,
-        _rise(setting, null), np.arange(said, last), errors.at, None if numerics is None else last,
-    )  # fmt: skip
+        setting,
+        null,
+        tuple(placed),
+        board,
+        found,
+        moving.at(count),
+        np.arange(slack, said),
+        nuisances,
+        rich,
+        _rise(setting, null),
+        np.arange(said, last),
+        errors.at,
+        None if numerics is None else last,
+    )
 
 
 def _numerics(setting: Setting, placed: Sequence[Placed]) -> np.ndarray | None:

@@ -165,7 +165,7 @@ def _added(setting: Setting, selection: Selection, best: Refined) -> Selection:
 
 def least_p_values(
     problem: Problem, tests: ScoreTests, before: tuple[tuple[str, float], ...]
-) -> tuple[tuple[str, float], ...]:  # fmt: skip
+) -> tuple[tuple[str, float], ...]:
     """Return the least corrected p-value of each mechanism, those of earlier tests included."""
     least = dict(before)
     for candidate, p in zip(problem.candidates, tests.p, strict=True):
@@ -181,7 +181,7 @@ def shares(model: Refined, before: int, more: float) -> list[tuple[Effect, float
 
 def model_error_energy(
     explained: list[tuple[Effect, float]], further: list[Effect], response: Response, problem: Problem | None = None
-) -> float:  # fmt: skip
+) -> float:
     """Return how much of what further effects explain may be the model error of those before them.
 
     In the unit of ``explained``, as the fall of half the sum of squares. An effect of the same ambiguity group looks

@@ -55,9 +55,14 @@ class Tried:
 
 
 def try_rivals(
-    current: Refined, without: Refined, at: int, beside: Problem, need: float, pooled: Pooled,
+    current: Refined,
+    without: Refined,
+    at: int,
+    beside: Problem,
+    need: float,
+    pooled: Pooled,
     late: Sequence[Placed] = (),
-) -> Tried:  # fmt: skip
+) -> Tried:
     """Try other effects in the place of one.
 
     Args:
@@ -131,11 +136,19 @@ def try_rivals(
     apart = _still(bare) - _still(told)
     chosen = _chosen(bare, best | rest, each | {n: g + apart for n, g in _first_order_gains(told, rest).items()})
     found = FoundEffect(
-        mine, error, (*bounds, *current.narrowest(at)), tuple(dict.fromkeys(rivals)), margins, need, losses,
+        mine,
+        error,
+        (*bounds, *current.narrowest(at)),
+        tuple(dict.fromkeys(rivals)),
+        margins,
+        need,
+        losses,
         _share(chosen, lambda e: e.called == mine.effect.called),
-        selected_family=_share(chosen, lambda e: e.family is mine.effect.family), forms=forms,
-        bought=without.loss - current.loss, unphysical=_only_unphysical(current, best, models),
-    )  # fmt: skip
+        selected_family=_share(chosen, lambda e: e.family is mine.effect.family),
+        forms=forms,
+        bought=without.loss - current.loss,
+        unphysical=_only_unphysical(current, best, models),
+    )
     return Tried(found, better, RivalModels(begin, current, without, models, pooled))
 
 
@@ -218,7 +231,7 @@ def _bound(model: Refined) -> bool:
 
 def _worth_preparing(
     told: Problem, gain: list[float], best: dict[str, Candidate], taken: set[str], always: Callable[[Effect], bool]
-) -> set[Form]:  # fmt: skip
+) -> set[Form]:
     """Return the effects and shapes that may be close in the place of one.
 
     Args:
@@ -236,10 +249,11 @@ def _worth_preparing(
     near = _close(taken, best, each, SLACK, PREPARED)
     most = {name: float((own + moved - still).sum()) for name, own in each.items()}
     return {
-        c.form for c, own in zip(told.candidates, gain, strict=True)
+        c.form
+        for c, own in zip(told.candidates, gain, strict=True)
         if (c.effect.name in near or always(c.effect))
         and own - still.sum() >= most[c.effect.name] - (1 - ALIKE) * abs(most[c.effect.name])
-    }  # fmt: skip
+    }
 
 
 def _first_order_gains(problem: Problem, best: dict[str, Candidate]) -> dict[str, np.ndarray]:
@@ -255,7 +269,7 @@ def _still(problem: Problem) -> np.ndarray:
 
 def _close(
     taken: set[str], best: dict[str, Candidate], each: dict[str, np.ndarray], slack: float = 1.0, most: int = TOP
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """Return the effects worth trying, the best first.
 
     Args:

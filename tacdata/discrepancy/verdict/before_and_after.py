@@ -33,14 +33,21 @@ def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int 
     every = max(int(np.ceil(measured.size / most)), 1)
     kept = slice(None, None, every)
     return Residuals(
-        episode=reduced.episode[kept].astype(np.int32), time=reduced.time[kept],
-        phase=phases(reduced)[kept].astype(np.int8), depth=reduced.tip[kept, 2].astype(np.float32),
-        rate=reduced.speed[kept].astype(np.float32), measured=measured[kept].astype(np.float32),
+        episode=reduced.episode[kept].astype(np.int32),
+        time=reduced.time[kept],
+        phase=phases(reduced)[kept].astype(np.int8),
+        depth=reduced.tip[kept, 2].astype(np.float32),
+        rate=reduced.speed[kept].astype(np.float32),
+        measured=measured[kept].astype(np.float32),
         before=_level(measured, before, reduced.episode)[kept].astype(np.float32),
         after=_level(measured, after, reduced.episode)[kept].astype(np.float32),
-        noise=scale.scale / np.sqrt(max(1 - scale.memory**2, 0.02)), streams=streams.names(course), phases=PHASES,
-        names=course.names, sealed=tuple(int(k) for k in sealed), every=every,
-    )  # fmt: skip
+        noise=scale.scale / np.sqrt(max(1 - scale.memory**2, 0.02)),
+        streams=streams.names(course),
+        phases=PHASES,
+        names=course.names,
+        sealed=tuple(int(k) for k in sealed),
+        every=every,
+    )
 
 
 def _level(measured: np.ndarray, predicted: np.ndarray, episode: np.ndarray) -> np.ndarray:

@@ -80,6 +80,10 @@ def fit(rows: list[dict[str, float]], right: list[bool], weight: float = 1.0) ->
     best = minimize(loss, np.zeros(len(names) + 1), method="BFGS").x
     n = len(rows)
     return {
-        "version": "1.0", "intercept": float(best[0]), "weights": dict(zip(names, map(float, best[1:]), strict=True)),
-        "range": [1 / (n + 2), 1 - 1 / (n + 2)], "names": n, "right": int(truth.sum()),
-    }  # fmt: skip
+        "version": "1.0",
+        "intercept": float(best[0]),
+        "weights": dict(zip(names, map(float, best[1:]), strict=True)),
+        "range": [1 / (n + 2), 1 - 1 / (n + 2)],
+        "names": n,
+        "right": int(truth.sum()),
+    }

@@ -114,9 +114,13 @@ class Decision:
 
 
 def decide(
-    found: Findings, checks: DataChecks, beside: tuple[BesideRemainder, ...] = (), shown: Gap | None = None,
-    lacking: Mapping[Family, Lack] | None = None, seen: tuple[Alarm, ...] = (),
-) -> Decision:  # fmt: skip
+    found: Findings,
+    checks: DataChecks,
+    beside: tuple[BesideRemainder, ...] = (),
+    shown: Gap | None = None,
+    lacking: Mapping[Family, Lack] | None = None,
+    seen: tuple[Alarm, ...] = (),
+) -> Decision:
     """Decide what may be said of findings.
 
     Args:
@@ -185,9 +189,15 @@ def decide(
     made = zip(answer, levels, strict=True)
     lone = lone_press(found.given) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
     return Decision(
-        status, reason, tuple(_decided(f, status, found, len(answer), level, own.get(f.placed.effect.name), shown)
-                              for f, level in made), lone, lacking, seen,
-    )  # fmt: skip
+        status,
+        reason,
+        tuple(
+            _decided(f, status, found, len(answer), level, own.get(f.placed.effect.name), shown) for f, level in made
+        ),
+        lone,
+        lacking,
+        seen,
+    )
 
 
 def _of_one_family(finding: FoundEffect) -> bool:
@@ -251,7 +261,7 @@ def stands(found: Findings, finding: FoundEffect, beside: BesideRemainder | None
 
 def beside_much(
     found: Findings, finding: FoundEffect, beside: BesideRemainder | None, shown: Gap | None = None
-) -> Level | None:  # fmt: skip
+) -> Level | None:
     """Return the finest level of an effect beside much that has no name; None if none holds.
 
     How exactly its size is the same in all conditions says how fine the name may be.
@@ -281,9 +291,10 @@ def _untried_kin(found: Findings, finding: FoundEffect) -> set[str]:
     mine, tried = finding.placed.effect, {load(name).called for name in finding.margins}
     every = {c.effect.called: c.effect for c in found.given.candidates}
     kin = {
-        called for called, e in every.items()
+        called
+        for called, e in every.items()
         if mine.at_rest is not None and (e.family, e.group, e.at_rest) == (mine.family, mine.group, mine.at_rest)
-    }  # fmt: skip
+    }
     return kin - tried - {mine.called}
 
 
@@ -358,9 +369,14 @@ def _hidden(found: Findings, finding: FoundEffect) -> list[str]:
 
 
 def _decided(
-    finding: FoundEffect, verdict: str, found: Findings, count: int, level: Level | None,
-    beside: BesideRemainder | None, shown: Gap | None,
-) -> Decided:  # fmt: skip
+    finding: FoundEffect,
+    verdict: str,
+    found: Findings,
+    count: int,
+    level: Level | None,
+    beside: BesideRemainder | None,
+    shown: Gap | None,
+) -> Decided:
     """Return an effect with its status; whoever reads it alone must not take it for a name that the verdict refuses."""
     values = features(found, finding, count)
     if level is not None and not _of_one_family(finding):

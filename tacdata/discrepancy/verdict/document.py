@@ -31,9 +31,13 @@ LARGEST_LIMIT = 1e3
 
 
 def document(
-    decision: Decision, found: Findings, checks: DataChecks, sliced: tuple[list[Slice], list[Slice]],
-    parents: dict[str, str], shown: Gap | None = None,
-) -> dict[str, Any]:  # fmt: skip
+    decision: Decision,
+    found: Findings,
+    checks: DataChecks,
+    sliced: tuple[list[Slice], list[Slice]],
+    parents: dict[str, str],
+    shown: Gap | None = None,
+) -> dict[str, Any]:
     """Return the verdict (`schemas/verdict.schema.json`).
 
     Args:
@@ -58,16 +62,27 @@ def document(
     remarks = [*checks.wiring, *checks.watched, *seen, *checks.shortcomings, *clocks, *told, *checks.base]
     tests, noise, values = found.tests, found.problem.null.noise, max(float(found.values.sum()), 1.0)
     return {
-        "version": schemas.version("verdict"), "status": decision.status,
+        "version": schemas.version("verdict"),
+        "status": decision.status,
         "why": reason_in_words(decision, found, checks, shown),
         "effects": [_effect(e) for e in decision.surest_first],
-        "gate": {"gap": found.gap, "p": float(tests.p.min(initial=1.0)), "p_generic": tests.p_generic,
-                 "noise": [float(v) for v in noise.scale], "memory": noise.memory},
-        "left": {"share": float(found.share_left), "t": float(np.clip(found.left.t, -99, 99)),
-                 "before": float(2 * found.energy[0].sum() / values),
-                 "after": float(2 * found.energy[1].sum() / values), "floor": 1.0,
-                 "families": _families(decision)},
-        "located": located(sliced[0], found) if sliced[0] else [], "slices": beside(*sliced),
+        "gate": {
+            "gap": found.gap,
+            "p": float(tests.p.min(initial=1.0)),
+            "p_generic": tests.p_generic,
+            "noise": [float(v) for v in noise.scale],
+            "memory": noise.memory,
+        },
+        "left": {
+            "share": float(found.share_left),
+            "t": float(np.clip(found.left.t, -99, 99)),
+            "before": float(2 * found.energy[0].sum() / values),
+            "after": float(2 * found.energy[1].sum() / values),
+            "floor": 1.0,
+            "families": _families(decision),
+        },
+        "located": located(sliced[0], found) if sliced[0] else [],
+        "slices": beside(*sliced),
         "located_after": in_words(sliced[1]) if decision.status == INCOMPLETE else [],
         "path": _path(found),
         "unjudgeable": found.given.board.unjudgeable,
@@ -78,17 +93,19 @@ def document(
         "remarks": [words for words in remarks if words],
         "next": following(decision, course, bool(checks.watched), bool(checks.base)),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": DRAWS}),
-    }  # fmt: skip
+    }
 
 
 def _families(decision: Decision) -> dict[str, dict[str, float]]:
     """Return what each family's saturated model still explains."""
     return {
         family.value: {
-            "size": round(own.size, 2), "held_out": round(own.gain, 2), "t": round(float(np.clip(own.t, -99, 99)), 2),
+            "size": round(own.size, 2),
+            "held_out": round(own.gain, 2),
+            "t": round(float(np.clip(own.t, -99, 99)), 2),
         }
         for family, own in decision.lacking.items()
-    }  # fmt: skip
+    }
 
 
 def _path(found: Findings) -> list[dict[str, Any]]:
@@ -98,7 +115,7 @@ def _path(found: Findings) -> list[dict[str, Any]]:
     return [
         {"effect": name, "share": bought[name] / whole if name in bought else None}
         for name in dict.fromkeys([*found.path, *bought])
-    ]  # fmt: skip
+    ]
 
 
 def located(before: list[Slice], found: Findings) -> list[str]:
@@ -120,22 +137,35 @@ def _effect(decided: Decided) -> dict[str, Any]:
             entry["interval"] = [float(value) - Z90 * error, float(value) + Z90 * error]
         parameters[p.name] = entry
     written = {
-        "mechanism": effect.called, "effect": effect.name, "title": effect.title, "stage": effect.stage,
-        "family": effect.family.value, "level": decided.level and decided.level.value,
-        "moves": list(effect.moves), "status": decided.status, "alternatives": list(finding.rivals),
-        "parameters": parameters, "margins": _bounded(finding.margins),
-        "necessity": float(np.clip(finding.necessity, -99, 99)), "at_bound": list(finding.at_bound),
-        "experiment": effect.experiment, "features": decided.features, "confidence": decided.confidence,
-        "forms": _bounded(finding.forms), "losses": finding.losses,
-        "bought": float(min(finding.bought, 1e12)), "selected_family": finding.selected_family,
-    }  # fmt: skip
+        "mechanism": effect.called,
+        "effect": effect.name,
+        "title": effect.title,
+        "stage": effect.stage,
+        "family": effect.family.value,
+        "level": decided.level and decided.level.value,
+        "moves": list(effect.moves),
+        "status": decided.status,
+        "alternatives": list(finding.rivals),
+        "parameters": parameters,
+        "margins": _bounded(finding.margins),
+        "necessity": float(np.clip(finding.necessity, -99, 99)),
+        "at_bound": list(finding.at_bound),
+        "experiment": effect.experiment,
+        "features": decided.features,
+        "confidence": decided.confidence,
+        "forms": _bounded(finding.forms),
+        "losses": finding.losses,
+        "bought": float(min(finding.bought, 1e12)),
+        "selected_family": finding.selected_family,
+    }
     if unphysical := [name for name in finding.unphysical if name not in finding.rivals]:
         written["unphysical"] = unphysical
     if decided.beside is not None:
         written["beside_remainder"] = {
-            "necessity": decided.beside.necessity, "margins": _bounded(decided.beside.margins),
+            "necessity": decided.beside.necessity,
+            "margins": _bounded(decided.beside.margins),
             "spreads": {name: round(by, 4) for name, by in decided.beside.spreads.items()},
-        }  # fmt: skip
+        }
     return written
 
 
@@ -194,9 +224,15 @@ def following(decision: Decision, course: Course, watched: bool = False, fitted:
 def data(course: Course) -> dict[str, Any]:
     """Return what was judged, in numbers."""
     return {
-        "episodes": course.episodes, "rows": len(course.read), "channels": course.channels,
+        "episodes": course.episodes,
+        "rows": len(course.read),
+        "channels": course.channels,
         "channel_numbers": list(course.numbers or range(course.channels)),
-        "places": len(np.unique(course.site)), "tools": [t.name for t in course.tools],
-        "sessions": len(np.unique(course.session)), "force": course.force is not None, "tag": course.tag is not None,
-        "temperature": course.temperature is not None, "seconds": float(course.time[-1]),
-    }  # fmt: skip
+        "places": len(np.unique(course.site)),
+        "tools": [t.name for t in course.tools],
+        "sessions": len(np.unique(course.session)),
+        "force": course.force is not None,
+        "tag": course.tag is not None,
+        "temperature": course.temperature is not None,
+        "seconds": float(course.time[-1]),
+    }

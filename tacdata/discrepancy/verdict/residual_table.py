@@ -68,11 +68,16 @@ def write(path: Path, residuals: Residuals, verdict: str) -> None:
         verdict: Content hash of the verdict that they belong to.
     """
     header: dict[str, Any] = {
-        "version": schemas.version("residuals"), "rows": len(residuals.time), "every": residuals.every,
-        "verdict": verdict, "phases": list(residuals.phases), "streams": list(residuals.streams),
-        "noise": [float(v) for v in residuals.noise], "episodes": list(residuals.names),
+        "version": schemas.version("residuals"),
+        "rows": len(residuals.time),
+        "every": residuals.every,
+        "verdict": verdict,
+        "phases": list(residuals.phases),
+        "streams": list(residuals.streams),
+        "noise": [float(v) for v in residuals.noise],
+        "episodes": list(residuals.names),
         "sealed": list(residuals.sealed),
-    }  # fmt: skip
+    }
     documents.check(header, "residuals", str(path))
     flat = {name: pa.array(getattr(residuals, name)) for name in ("episode", "time", "phase", "depth", "rate")}
     wide = {name: _wide(getattr(residuals, name)) for name in ("measured", "before", "after")}
@@ -101,12 +106,19 @@ def read(path: Path) -> Residuals:
     try:
         flat = {n: table.column(n).to_numpy() for n in ("episode", "time", "phase", "depth", "rate")}
         shape = header["rows"], len(header["streams"])
-        wide = {n: table.column(n).combine_chunks().flatten().to_numpy(zero_copy_only=False).reshape(shape)
-                for n in ("measured", "before", "after")}  # fmt: skip
+        wide = {
+            n: table.column(n).combine_chunks().flatten().to_numpy(zero_copy_only=False).reshape(shape)
+            for n in ("measured", "before", "after")
+        }
     except (KeyError, ValueError, AttributeError, pa.ArrowException) as error:
         raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
     return Residuals(
-        **flat, **wide, noise=np.array(header["noise"]), streams=tuple(header["streams"]),
-        phases=tuple(header["phases"]), names=tuple(header["episodes"]), sealed=tuple(header["sealed"]),
+        **flat,
+        **wide,
+        noise=np.array(header["noise"]),
+        streams=tuple(header["streams"]),
+        phases=tuple(header["phases"]),
+        names=tuple(header["episodes"]),
+        sealed=tuple(header["sealed"]),
         every=header["every"],
-    )  # fmt: skip
+    )

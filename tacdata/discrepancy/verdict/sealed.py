@@ -105,15 +105,22 @@ class Gap:
         before, after = self._drawn()
         closed, (low, high) = _closed(self.before.mean(), self.after.mean()), self.interval
         return {
-            "episodes": len(self.before), "share": SEALED_SHARE,
+            "episodes": len(self.before),
+            "share": SEALED_SHARE,
             "rule": f"least SHA-256 of session/name, {LEAST_SEALED} at least",
-            "before": float(self.before.mean()), "after": float(self.after.mean()), "floor": FLOOR, "ceiling": best,
-            "before_interval": _between(before), "after_interval": _between(after),
-            "closed": float(closed), "interval": [low, high], "certain": high - low < WIDEST,
+            "before": float(self.before.mean()),
+            "after": float(self.after.mean()),
+            "floor": FLOOR,
+            "ceiling": best,
+            "before_interval": _between(before),
+            "after_interval": _between(after),
+            "closed": float(closed),
+            "interval": [low, high],
+            "certain": high - low < WIDEST,
             "shares": self._shares(float(closed)),
             "worst": {"episode": self.names[worst], "after": float(self.after[worst])},
             **({} if self.ratio is None else {"ratio": self.ratio.document()}),
-        }  # fmt: skip
+        }
 
     def _shares(self, closed: float) -> dict[str, float]:
         """Return each effect's part of the share that is closed: in proportion to what its absence costs."""

@@ -12,15 +12,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable, kind_of_bytes
-from tacdata.importing.text_layout import (
-    COMMENTS,
-    MISSING,
-    THOUSANDS,
-    TextLayout,
-    is_comment,
-    is_number,
-    text_layout,
-)
+from tacdata.importing.text_layout import COMMENTS, MISSING, THOUSANDS, TextLayout, is_comment, is_number, text_layout
 
 SHOWN = 40
 """Letters of a text that an error quotes."""
@@ -145,14 +137,16 @@ def _without_zeros(path: Path, raw: bytes, notes: list[str]) -> bytes:
     for start, name in ((1, "utf-16-le"), (0, "utf-16-be")):
         if raw[start:4096:2].count(0) > 0.9 * len(raw[start:4096:2]):
             raise FormatError(
-                f"{path} is UTF-16 by all appearance, without its mark", "UTF-8, or an encoding that is given",
+                f"{path} is UTF-16 by all appearance, without its mark",
+                "UTF-8, or an encoding that is given",
                 f"give encoding: {name} under files in the mapping",
-            )  # fmt: skip
+            )
     line = raw.count(b"\n", 0, raw.index(b"\0")) + 1
     raise FormatError(
-        f"{path} is not text: {raw.count(bytes(1))} zero bytes, the first in line {line}", "a text file of columns",
+        f"{path} is not text: {raw.count(bytes(1))} zero bytes, the first in line {line}",
+        "a text file of columns",
         "cut them out, as a logger without power leaves them, or name another format in the mapping",
-    )  # fmt: skip
+    )
 
 
 def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[bytes, int, int]:
@@ -235,9 +229,10 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path)
             raise FormatError(
                 f"{path}: column {name}, row {row + 1} of the data: {shown}",
                 f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",
-                "save it again without a sign between thousands" if thousands
+                "save it again without a sign between thousands"
+                if thousands
                 else f"add {shown} to missing in the mapping if it stands for no value, else correct the file",
-            )  # fmt: skip
+            )
         field = text.strip()
         values[row] = np.nan if field in MISSING else float(field.replace(",", ".") if layout.decimal == "," else field)
     return values

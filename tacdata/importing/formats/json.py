@@ -31,9 +31,10 @@ class Json(SourceFormat):
         table = rows_of(path, arrays, options)
         if table.rows < FEWEST:
             raise FormatError(
-                f"{path} holds no {FEWEST} rows: settings, as it seems", "lists of as many values, or rows",
+                f"{path} holds no {FEWEST} rows: settings, as it seems",
+                "lists of as many values, or rows",
                 "leave it out, or save what was recorded as a table",
-            )  # fmt: skip
+            )
         return table
 
 
@@ -45,9 +46,10 @@ def _by_line(path: Path, text: str) -> list[Any]:
             rows += [json.loads(line)] if line.strip() else []
         except json.JSONDecodeError as error:
             raise FormatError(
-                f"{path}, line {number}: no JSON ({line[:40]})", "a value a line",
+                f"{path}, line {number}: no JSON ({line[:40]})",
+                "a value a line",
                 "take that line out of a copy, as a recording that broke off leaves one, and import the copy",
-            ) from error  # fmt: skip
+            ) from error
     return rows
 
 

@@ -104,8 +104,11 @@ def _stacked(name: str, elements: list[dict[str, Any]], lost: list[str]) -> dict
     rows = [max((len(np.atleast_1d(a)) for a in table.values()), default=0) for table in tables]
     shared = [key for key in tables[0] if all(key in table for table in tables)]
     prefix = f"{name}." if name else ""
-    lost += [f"{prefix}{key} (not in all {len(tables)} elements)"
-             for key in dict.fromkeys(k for table in tables for k in table) if key not in shared]  # fmt: skip
+    lost += [
+        f"{prefix}{key} (not in all {len(tables)} elements)"
+        for key in dict.fromkeys(k for table in tables for k in table)
+        if key not in shared
+    ]
     stacked = {}
     for key in shared:
         parts = []

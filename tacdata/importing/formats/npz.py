@@ -110,8 +110,9 @@ def _below_each_other(path: Path, arrays: dict[str, np.ndarray], axis: int) -> d
         shapes = ", ".join(f"{name} {'x'.join(map(str, array.shape))}" for name, array in arrays.items())
         raise FormatError(
             f"{path}: trial_axis {axis}, but no array has three axes ({shapes})",
-            "an array with one axis for trials, one for rows and one for channels", "leave trial_axis out",
-        )  # fmt: skip
+            "an array with one axis for trials, one for rows and one for channels",
+            "leave trial_axis out",
+        )
     trials, rows = max(blocks.values(), key=np.size).shape[:2]
     whole = {name: block for name, block in blocks.items() if block.shape[:2] == (trials, rows)}
     made: dict[str, np.ndarray] = {name: block.reshape(trials * rows, -1) for name, block in whole.items()}

@@ -26,8 +26,9 @@ class Parquet(SourceFormat):
             table = table.flatten()
         names = [str(name) for name in table.column_names]
         if twice := sorted({name for name in names if names.count(name) > 1}):
-            places = ", ".join(f"{name} in columns {' and '.join(str(k) for k, n in enumerate(names) if n == name)}"
-                               for name in twice)  # fmt: skip
+            places = ", ".join(
+                f"{name} in columns {' and '.join(str(k) for k, n in enumerate(names) if n == name)}" for name in twice
+            )
             raise FormatError(
                 f"{path}: columns of the same name: {places}", "each name once", "rename one, and save it again"
             )

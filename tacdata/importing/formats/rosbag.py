@@ -35,9 +35,10 @@ class Rosbag(SourceFormat):
         """Return the topics that hold numbers."""
         with _opened(path) as reader:
             return tuple(
-                topic for topic in _topics(reader)
+                topic
+                for topic in _topics(reader)
                 if any(np.ndim(v) or not isinstance(v, str) for _, v in _first(reader, topic))
-            )  # fmt: skip
+            )
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read one topic; without ``table`` in the options the only one with numbers. See the base class."""
@@ -47,11 +48,16 @@ class Rosbag(SourceFormat):
             if topic not in known:
                 raise FormatError(f"{path}: no topic {topic!r}", ", ".join(known) or "none", "correct table")
             longer: Counter[str] = Counter()
-            rows = [(time, dict(_flat(reader.deserialize(raw, connection.msgtype), longer)))
-                    for connection, time, raw in reader.messages(_connections(reader, topic))]  # fmt: skip
+            rows = [
+                (time, dict(_flat(reader.deserialize(raw, connection.msgtype), longer)))
+                for connection, time, raw in reader.messages(_connections(reader, topic))
+            ]
         columns, notes = _columns(rows, topic, path)
-        notes += [f"{path.name}: {count} messages of {topic} have more than {MOST_PARTS} parts in {name}: the first "
-                  f"{MOST_PARTS} are taken" for name, count in longer.items()]  # fmt: skip
+        notes += [
+            f"{path.name}: {count} messages of {topic} have more than {MOST_PARTS} parts in {name}: the first "
+            f"{MOST_PARTS} are taken"
+            for name, count in longer.items()
+        ]
         units = {name: "ns" for name in columns if name == RECEIVED or name.endswith("stamp")}
         return SourceTable(path, columns, units, tuple(notes))
 
@@ -70,8 +76,9 @@ def _opened(path: Path) -> Iterator[Any]:
     if path.name in parts[1:]:
         raise FormatError(
             f"{path} is part {parts.index(path.name) + 1} of a bag of {len(parts)} files",
-            f"its first file, {parts[0]}: it stands for the whole bag", f"name {parts[0]} in the mapping",
-        )  # fmt: skip
+            f"its first file, {parts[0]}: it stands for the whole bag",
+            f"name {parts[0]} in the mapping",
+        )
     bag = path.parent if len(parts) > 1 else path
     try:
         with AnyReader([bag], default_typestore=get_typestore(Stores.LATEST)) as reader:
@@ -120,9 +127,10 @@ def _only(path: Path, numeric: tuple[str, ...], known: dict[str, int]) -> str:
         return numeric[0]
     listed = ", ".join(f"{topic} ({known[topic]} messages)" for topic in numeric)
     raise UsageError(
-        f"{path} holds {len(numeric)} topics with numbers", listed or "topics with numbers",
+        f"{path} holds {len(numeric)} topics with numbers",
+        listed or "topics with numbers",
         "name one under files in the mapping, such as table: " + (numeric[0] if numeric else "/taxels"),
-    )  # fmt: skip
+    )
 
 
 def _flat(message: Any, longer: Counter[str], prefix: str = "") -> Iterator[tuple[str, Any]]:

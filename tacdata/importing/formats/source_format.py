@@ -27,12 +27,23 @@ ROOM, BASE = "tacdata.importing.formats", "source_format"
 LONGEST = 300
 """Letters of a library's words that an error repeats."""
 MAGIC = {
-    b"\x1f\x8b": "gzip (.gz)", b"PK\x03\x04": "a zip archive (such as .zip, .npz or .xlsx)", b"PAR1": "Parquet",
-    b"ARROW1": "Feather", b"\x89HDF": "HDF5", b"MATLAB 5.0": "a MATLAB file (.mat)", b"\x93NUMPY": "NumPy (.npy)",
-    b"SQLite format 3": "SQLite (.db3)", b"\x89MCAP": "MCAP", b"\x89PNG": "a PNG image", b"\xff\xd8": "a JPEG image",
-    b"%PDF": "PDF", b"\xd0\xcf\x11\xe0": "an old Office file (.xls)", b"BZh": "bzip2", b"\xfd7zXZ": "xz",
+    b"\x1f\x8b": "gzip (.gz)",
+    b"PK\x03\x04": "a zip archive (such as .zip, .npz or .xlsx)",
+    b"PAR1": "Parquet",
+    b"ARROW1": "Feather",
+    b"\x89HDF": "HDF5",
+    b"MATLAB 5.0": "a MATLAB file (.mat)",
+    b"\x93NUMPY": "NumPy (.npy)",
+    b"SQLite format 3": "SQLite (.db3)",
+    b"\x89MCAP": "MCAP",
+    b"\x89PNG": "a PNG image",
+    b"\xff\xd8": "a JPEG image",
+    b"%PDF": "PDF",
+    b"\xd0\xcf\x11\xe0": "an old Office file (.xls)",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
     b"\x28\xb5\x2f\xfd": "zstd",
-}  # fmt: skip
+}
 """First bytes of files and what they are."""
 
 

@@ -74,8 +74,9 @@ def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[Source
         return table, name, [other for other in sheets if other != name]
     raise FormatError(
         f"{path}: no sheet with rows of numbers ({', '.join(sheets)})" if refused else f"{path} holds no rows",
-        "a sheet with a header and rows", "leave it out, or name the sheet by table and its first lines by skip",
-    )  # fmt: skip
+        "a sheet with a header and rows",
+        "leave it out, or name the sheet by table and its first lines by skip",
+    )
 
 
 def _as_text(sheet: Any, most: int | None = None) -> bytes:

@@ -51,8 +51,9 @@ class Zarr(SourceFormat):
             values = np.asarray(found[:])
             arrays[name] = np.char.strip(values) if values.dtype.kind == "U" else values
         ends = arrays.pop(ENDS, None)
-        columns = {name.removeprefix("data/"): values for name, values in arrays.items()
-                   if not name.startswith("meta/")}  # fmt: skip
+        columns = {
+            name.removeprefix("data/"): values for name, values in arrays.items() if not name.startswith("meta/")
+        }
         if ends is not None and len(ends):
             columns["episode"] = np.searchsorted(ends, np.arange(int(ends[-1])), side="right")
         table = rows_of(path, columns, options)
@@ -71,8 +72,11 @@ def _refuse_cut_chunks(folder: Path) -> None:
     for chunk in sorted(file for file in folder.rglob("*") if file.is_file() and file.name not in DESCRIBED):
         data = chunk.read_bytes()
         if len(data) < BLOSC_HEADER or int.from_bytes(data[12:16], "little") != len(data):
-            said = f"{len(data)} bytes" if len(data) < BLOSC_HEADER else (
-                f"{len(data)} bytes in place of {int.from_bytes(data[12:16], 'little')}")  # fmt: skip
+            said = (
+                f"{len(data)} bytes"
+                if len(data) < BLOSC_HEADER
+                else (f"{len(data)} bytes in place of {int.from_bytes(data[12:16], 'little')}")
+            )
             raise FormatError(f"{chunk}: a damaged chunk, {said}", "whole chunks", "copy the store again")
 
 

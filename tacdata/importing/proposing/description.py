@@ -71,8 +71,9 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     if not found:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
-            "CSV, Excel, JSON, NPZ, Parquet or MATLAB files, or bags of ROS 2", "check the path, or convert the files",
-        )  # fmt: skip
+            "CSV, Excel, JSON, NPZ, Parquet or MATLAB files, or bags of ROS 2",
+            "check the path, or convert the files",
+        )
     found = _of_same_columns(found)
     lines = []
     for key, entry in found.items():

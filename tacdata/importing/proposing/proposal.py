@@ -66,11 +66,13 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
     for alias, found in roles.items():
         _whole_strokes(tables[alias], found, asked)
     document: dict[str, Any] = {
-        "version": schemas.version("import_mapping"), "name": source.stem, "source": "say where the data come from",
+        "version": schemas.version("import_mapping"),
+        "name": source.stem,
+        "source": "say where the data come from",
         "files": {alias: _file(kind, kinds[kind], roles[alias], asked) for alias, kind in aliases.items()},
         "sensor": {"name": source.stem},
         "taxels": {"file": wide, "columns": _short(roles[wide]["channels"]) or [0]},
-    }  # fmt: skip
+    }
     if "value" in roles[wide]:
         document["taxels"] = {
             "file": wide,

@@ -43,9 +43,15 @@ ONSET_SPEED = 0.1
 CLEARANCE = 0.5
 """Minimum distance of an indenter at full depth from the skin's rim [mm]."""
 MOTION = {
-    "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.5,
-    "hold": 1.0, "rest": 1.0, "run_up": 1.0,
-}  # fmt: skip
+    "clearance": 4.0,
+    "standoff": 0.3,
+    "travel_speed": 20.0,
+    "approach_speed": 5.0,
+    "press_speed": 0.5,
+    "hold": 1.0,
+    "rest": 1.0,
+    "run_up": 1.0,
+}
 
 
 class Diagnostic(ShippedPlan):
@@ -58,9 +64,10 @@ class Diagnostic(ShippedPlan):
         names = self.specimen_names(wishes)
         if len(names) != 2:
             raise UsageError(
-                f"{len(names)} indenters for the diagnostic plan", "two of one shape and different radius",
+                f"{len(names)} indenters for the diagnostic plan",
+                "two of one shape and different radius",
                 "name --indenter twice, for example sphere_4 and sphere_2",
-            )  # fmt: skip
+            )
         first, second = names
         half, pitch = half_box(sensor), np.array([sensor.taxels.pitch_x, sensor.taxels.pitch_y])
         on = _nearest(sensor, -0.3 * half)
@@ -69,38 +76,79 @@ class Diagnostic(ShippedPlan):
         corners = half * [[0, 0], [-1, -1], [1, -1], [1, 1]]  # the fourth is the virgin site's
         reference = {"indenter": first, "at": _points(on), "depths": [0.7], "purpose": "reference"}
         recipe = {
-            "version": "1.0", "name": f"diagnostic-{first}-{second}",
-            "purpose": "presses that tell physical effects apart", "indenters": specimens(names),
-            "motion": dict(MOTION), "grouped": False,
+            "version": "1.0",
+            "name": f"diagnostic-{first}-{second}",
+            "purpose": "presses that tell physical effects apart",
+            "indenters": specimens(names),
+            "motion": dict(MOTION),
+            "grouped": False,
             "blocks": [
-                {"indenter": first, "at": _points(on), "depths": [-MOTION["clearance"] / 2], "holds": [IDLE],
-                 "purpose": "idle stretch"},
+                {
+                    "indenter": first,
+                    "at": _points(on),
+                    "depths": [-MOTION["clearance"] / 2],
+                    "holds": [IDLE],
+                    "purpose": "idle stretch",
+                },
                 *_light(first, corners),
                 {"indenter": first, "at": _points(virgin), "depths": [0.6], "repeats": 6, "purpose": "virgin site"},
                 {"indenter": first, "at": _points(virgin), "depths": [0.9, 0.6], "purpose": "virgin site, then deeper"},
                 reference,
                 *_rates(first, np.array([on, between])),
                 reference,
-                {"indenter": first, "at": _points(between), "depths": [DEPTHS[0], DEPTHS[-1]], "holds": [HOLD],
-                 "recovery": RECOVERY, "purpose": "long hold and recovery"},
+                {
+                    "indenter": first,
+                    "at": _points(between),
+                    "depths": [DEPTHS[0], DEPTHS[-1]],
+                    "holds": [HOLD],
+                    "recovery": RECOVERY,
+                    "purpose": "long hold and recovery",
+                },
                 reference,
-                {"indenter": first, "at": _points(between), "depths": [0.7],
-                 "approach_from": ["+x", "-x", "+y", "-y"], "repeats": 2, "purpose": "approach direction"},
-                {"indenter": first, "at": _points(on), "depths": [0.7], "overshoot": 0.3, "repeats": 2,
-                 "purpose": "approach from below"},
-                {"indenter": first, "at": {"kind": "taxels", "only": _every(sensor, 12)}, "depths": [0.4],
-                 "order": "random", "purpose": "on taxels"},
-                {"indenter": first, "at": {"kind": "between", "count": 8} if sensor.taxels.count > 1
-                 else {"kind": "center"}, "depths": [0.4], "purpose": "between taxels"},
+                {
+                    "indenter": first,
+                    "at": _points(between),
+                    "depths": [0.7],
+                    "approach_from": ["+x", "-x", "+y", "-y"],
+                    "repeats": 2,
+                    "purpose": "approach direction",
+                },
+                {
+                    "indenter": first,
+                    "at": _points(on),
+                    "depths": [0.7],
+                    "overshoot": 0.3,
+                    "repeats": 2,
+                    "purpose": "approach from below",
+                },
+                {
+                    "indenter": first,
+                    "at": {"kind": "taxels", "only": _every(sensor, 12)},
+                    "depths": [0.4],
+                    "order": "random",
+                    "purpose": "on taxels",
+                },
+                {
+                    "indenter": first,
+                    "at": {"kind": "between", "count": 8} if sensor.taxels.count > 1 else {"kind": "center"},
+                    "depths": [0.4],
+                    "purpose": "between taxels",
+                },
                 {"indenter": first, "at": _points(virgin), "depths": [0.6], "purpose": "virgin site, after a rest"},
                 reference,
                 *_light(second, corners[:1]),
                 *_rates(second, np.array([on])),
-                {"indenter": second, "at": _points(between), "depths": [DEPTHS[-1]], "holds": [HOLD],
-                 "recovery": RECOVERY, "purpose": "long hold and recovery"},
+                {
+                    "indenter": second,
+                    "at": _points(between),
+                    "depths": [DEPTHS[-1]],
+                    "holds": [HOLD],
+                    "recovery": RECOVERY,
+                    "purpose": "long hold and recovery",
+                },
                 {**reference, "yaws": [180.0], "repeats": 2, "purpose": "turned indenter"},
             ],
-        }  # fmt: skip
+        }
         document = write_out(recipe, sensor, "diagnostic plan", wishes.seed)
         clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
         return document
@@ -115,9 +163,16 @@ def _light(name: str, places: np.ndarray) -> list[dict[str, Any]]:
 
 def _rates(name: str, places: np.ndarray) -> list[dict[str, Any]]:
     return [
-        {"indenter": name, "at": _points(places), "depths": DEPTHS, "speeds": SPEEDS, "order": "random", "rest": 3.0,
-         "purpose": "rates"}
-    ]  # fmt: skip
+        {
+            "indenter": name,
+            "at": _points(places),
+            "depths": DEPTHS,
+            "speeds": SPEEDS,
+            "order": "random",
+            "rest": 3.0,
+            "purpose": "rates",
+        }
+    ]
 
 
 def _nearest(sensor: Sensor, place: np.ndarray) -> np.ndarray:

@@ -32,9 +32,14 @@ POSITION_DEPTH = 0.8
 CLEARANCE = 0.1
 """Minimum distance of the indenter at full depth from the skin's rim [mm]; more would keep every contact whole."""
 MOTION = {
-    "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.7,
-    "hold": 1.0, "rest": 1.0,
-}  # fmt: skip
+    "clearance": 4.0,
+    "standoff": 0.3,
+    "travel_speed": 20.0,
+    "approach_speed": 5.0,
+    "press_speed": 0.7,
+    "hold": 1.0,
+    "rest": 1.0,
+}
 
 
 class Evaluation(ShippedPlan):
@@ -57,16 +62,28 @@ class Evaluation(ShippedPlan):
         cut = np.array([[edge[0], 0.3 * half[1]], [-edge[0], -0.3 * half[1]], [0.3 * half[0], edge[1]]])[:EDGE]
         places = np.vstack([[0.0, 0.0], _spread(PLACES - 1) * (half - _margin(half))])
         recipe = {
-            "version": "1.0", "name": f"evaluation-{names[0]}",
+            "version": "1.0",
+            "name": f"evaluation-{names[0]}",
             "purpose": "the paper's evaluation: 78 depth trials, 40 contact-position trials",
-            "indenters": specimens(names), "motion": dict(MOTION),
+            "indenters": specimens(names),
+            "motion": dict(MOTION),
             "blocks": [
-                {"indenter": names[0], "at": _points(places), "depths": DEPTHS, "order": "random",
-                 "purpose": "depth trial"},
-                {"indenter": names[0], "at": _points(np.vstack([interior, cut])), "depths": [POSITION_DEPTH],
-                 "order": "random", "purpose": "position trial"},
+                {
+                    "indenter": names[0],
+                    "at": _points(places),
+                    "depths": DEPTHS,
+                    "order": "random",
+                    "purpose": "depth trial",
+                },
+                {
+                    "indenter": names[0],
+                    "at": _points(np.vstack([interior, cut])),
+                    "depths": [POSITION_DEPTH],
+                    "order": "random",
+                    "purpose": "position trial",
+                },
             ],
-        }  # fmt: skip
+        }
         document = write_out(recipe, sensor, "evaluation plan", wishes.seed)
         clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
         return document

@@ -33,9 +33,14 @@ each of the four answers otherwise, and neighbours do not keep their ratio from 
 CLEARANCE = 0.5
 """Minimum distance of the indenter at full depth from the skin's rim [mm]."""
 MOTION = {
-    "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 1.0,
-    "hold": HOLD, "rest": 1.0,
-}  # fmt: skip
+    "clearance": 4.0,
+    "standoff": 0.3,
+    "travel_speed": 20.0,
+    "approach_speed": 5.0,
+    "press_speed": 1.0,
+    "hold": HOLD,
+    "rest": 1.0,
+}
 
 
 class Health(ShippedPlan):
@@ -52,18 +57,24 @@ class Health(ShippedPlan):
             )
         places = _sites(sensor)
         reference = {
-            "indenter": names[0], "at": _points(places[np.argmin(np.linalg.norm(places, axis=1))]), "depths": [DEPTH],
-        }  # fmt: skip
+            "indenter": names[0],
+            "at": _points(places[np.argmin(np.linalg.norm(places, axis=1))]),
+            "depths": [DEPTH],
+        }
         recipe = {
-            "version": "1.0", "name": f"health-{names[0]}", "purpose": "how a unit is, compared with its other visits",
-            "indenters": specimens(names), "motion": dict(MOTION), "grouped": False,
+            "version": "1.0",
+            "name": f"health-{names[0]}",
+            "purpose": "how a unit is, compared with its other visits",
+            "indenters": specimens(names),
+            "motion": dict(MOTION),
+            "grouped": False,
             "blocks": [
                 {**reference, "rest": REST, "purpose": "rest stretch, then reference"},
                 {**reference, "at": _points(places), "purpose": "sites"},
                 {**reference, "repeats": REPEATS, "purpose": "reference"},
                 {**reference, "speeds": [SPEEDS[1]], "purpose": "slow reference"},
             ],
-        }  # fmt: skip
+        }
         document = write_out(recipe, sensor, "health plan", wishes.seed)
         clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
         return document

@@ -71,7 +71,8 @@ def shipped_plan(name: str, sensor: Sensor, wishes: PlanOptions | None = None) -
     wishes = wishes or PlanOptions()
     if wishes.presses is not None and not plan.adjustable:
         raise UsageError(
-            f"{wishes.presses} presses of the plan {name}", "the number that the plan has",
+            f"{wishes.presses} presses of the plan {name}",
+            "the number that the plan has",
             "leave --presses out, or take the plan training",
-        )  # fmt: skip
+        )
     return plan.document(sensor, wishes)

@@ -17,8 +17,11 @@ from tacdata.sensor import Sensor
 USUAL = ("sphere_2", "sphere_4", "punch", "pin", "ellipsoid")
 """Default indenters of a plan."""
 YAWS: dict[str, tuple[float, ...]] = {
-    "cylinder": (0.0, 60.0), "ellipsoid": (0.0, 60.0), "prism": (0.0, 60.0), "square_punch": (0.0, 45.0),
-}  # fmt: skip
+    "cylinder": (0.0, 60.0),
+    "ellipsoid": (0.0, 60.0),
+    "prism": (0.0, 60.0),
+    "square_punch": (0.0, 45.0),
+}
 """Mounting angles of shapes that are not round [deg]; each needs a change of indenter."""
 DEPTHS = (0.3, 1.2)
 """Shallowest and deepest press [mm]."""
@@ -30,9 +33,14 @@ CLEARANCE = 0.5
 """Minimum distance of an indenter at full depth from the skin's rim, which the frame holds [mm]."""
 KINDS = ("taxel", "between", "anywhere", "edge")
 MOTION = {
-    "clearance": 4.0, "standoff": 0.3, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 0.7,
-    "hold": 0.7, "rest": 1.0,
-}  # fmt: skip
+    "clearance": 4.0,
+    "standoff": 0.3,
+    "travel_speed": 20.0,
+    "approach_speed": 5.0,
+    "press_speed": 0.7,
+    "hold": 0.7,
+    "rest": 1.0,
+}
 
 
 class Training(ShippedPlan):
@@ -93,11 +101,13 @@ def training_plan(
     entries.sort(key=lambda entry: mountings.index((entry["indenter"], entry["yaw"])))  # ty: ignore[invalid-argument-type]
     used = [name for name in indenters if any(entry["indenter"] == name for entry in entries)]
     document = {
-        "version": schemas.version("plan"), "name": f"training-{presses}-{seed}",
+        "version": schemas.version("plan"),
+        "name": f"training-{presses}-{seed}",
         "purpose": "random presses to train on",
         "indenters": {name: shapes[name] for name in used},
-        "motion": dict(MOTION), "presses": entries,
-    }  # fmt: skip
+        "motion": dict(MOTION),
+        "presses": entries,
+    }
     for name in used:
         from_document(document["indenters"][name], name)
     documents.check(document, "plan", "training plan")

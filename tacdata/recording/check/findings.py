@@ -98,11 +98,7 @@ def _recording(figures: RecordingFigures) -> list[Judgement]:
     registration = episode.rig.get("registration", {})
     if not registration.get("method") or not registration.get("date"):
         found.append(
-            (
-                WARNING,
-                "registration",
-                "the rig file does not say how and when the sensor was registered to the guide",
-            )
+            (WARNING, "registration", "the rig file does not say how and when the sensor was registered to the guide")
         )
     phases = {phase.name for phase in episode.phases}
     missing = [name for name in ("rest", "approach", "press", "hold", "release") if name not in phases]

@@ -59,8 +59,10 @@ def imported_findings(figures: RecordingFigures) -> list[tuple[str, str, str]]:
         found.append(("warning", "taxels", f"{lost} frames lost by the source's counter"))
     if not episode.phases:
         found.append(("warning", "recording", "the path is not of one whole press: its phases are not marked"))
-    for text, span in (("begins before", episode.tip_ns[0] - episode.taxels.sample_ns[0]),
-                       ("ends after", episode.taxels.sample_ns[-1] - episode.tip_ns[-1])):  # fmt: skip
+    for text, span in (
+        ("begins before", episode.tip_ns[0] - episode.taxels.sample_ns[0]),
+        ("ends after", episode.taxels.sample_ns[-1] - episode.tip_ns[-1]),
+    ):
         if span > 1_000_000_000:
             found.append(("warning", "position", f"the channels' time {text} the position's by {span / 1e9:.1f} s"))
     return found

@@ -195,11 +195,14 @@ def _louder(entries: list[RecordingFigures]) -> list[Finding]:
     quiet = max(float(np.percentile([value for _, value in known], 25)), 0.5)
     return [
         Finding(
-            WARNING, "taxels", entry.recording.episode.path.name,
+            WARNING,
+            "taxels",
+            entry.recording.episode.path.name,
             f"its noise is {value / quiet:.0f} times that of the session's quiet recordings",
         )
-        for entry, value in known if value > LOUDER * quiet
-    ]  # fmt: skip
+        for entry, value in known
+        if value > LOUDER * quiet
+    ]
 
 
 def _places(found: Answers, moved: dict[int, int]) -> list[str]:

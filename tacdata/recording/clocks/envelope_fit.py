@@ -169,9 +169,17 @@ class _Stretch:
         free = line == self._free_line()
         drift = 2 * uncertainty / self.span_ns
         return ClockModel(
-            x0, y0, slope, self.frames, self.origin[1], max(delay, 0.0), jitter, uncertainty,
-            drift if free else min(drift, 2 * CRYSTAL), axis,
-        )  # fmt: skip
+            x0,
+            y0,
+            slope,
+            self.frames,
+            self.origin[1],
+            max(delay, 0.0),
+            jitter,
+            uncertainty,
+            drift if free else min(drift, 2 * CRYSTAL),
+            axis,
+        )
 
     def _spread(self, line: tuple[int, int, float]) -> tuple[float, float, float]:
         """Return mean and standard deviation of the latencies above a line, and its uncertainty [ns]."""
@@ -297,9 +305,12 @@ class EnvelopeFit:
 
 
 def fit(
-    arrival_ns: np.ndarray, counter: np.ndarray, axis: str = "counter", rate: float = 1.0,
+    arrival_ns: np.ndarray,
+    counter: np.ndarray,
+    axis: str = "counter",
+    rate: float = 1.0,
     nominal_ns: float | None = None,
-) -> ClockModel | None:  # fmt: skip
+) -> ClockModel | None:
     """Fit a whole stream at once.
 
     Args:

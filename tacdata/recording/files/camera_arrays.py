@@ -79,11 +79,17 @@ def _stream(records: Records, camera: str, clock: ClockModel | None, pair: tuple
     own = device_times(records, camera)
     device = _array([own.get(int(k) & 0xFFFFFFFF, -1) for k in sequence])
     return TagStream(
-        camera, _sample(clock, arrival, sequence, device), position, quaternion,
+        camera,
+        _sample(clock, arrival, sequence, device),
+        position,
+        quaternion,
         np.array([v.reprojection if v.faces else np.nan for v in views], dtype=float),
-        _array([v.faces for v in views]), covariance, np.array([v.ambiguous for v in views], dtype=bool),
-        tuple(tuple(v.ids) for v in views), finger,
-    )  # fmt: skip
+        _array([v.faces for v in views]),
+        covariance,
+        np.array([v.ambiguous for v in views], dtype=bool),
+        tuple(tuple(v.ids) for v in views),
+        finger,
+    )
 
 
 def _sample(

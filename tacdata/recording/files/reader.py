@@ -113,14 +113,14 @@ def _recording(records: Records) -> Recording:
     rig, controller = _attachment(records, "rig.json"), _attachment(records, "controller.json")
     end = records.metadata.get("episode", {})
     complete = bool(json.loads(end.get("complete", "false"))) and not records.damage
-# The path is computed, not measured: commands say where, reports and acknowledgements say when.
+    # The path is computed, not measured: commands say where, reports and acknowledgements say when.
     statuses = _statuses(records)
     commands = [_command(message.data) for message in records.of_topic(topics.MOTION)]
     limits = AxisLimits(np.array(controller["acceleration"], float), np.array(controller["max_rate"], float))
     resolution = move_times.report_resolution(controller.get("settings", {}))
     moves = move_times.anchor(commands, statuses, limits, resolution)
     tip_ns, machine = move_times.machine_path(moves, statuses.stream, complete)
-# The path so far is in machine axes; the registration takes it to the sensor's frame.
+    # The path so far is in machine axes; the registration takes it to the sensor's frame.
     registration = registration_for(rig, press.indenter_name)
     log = tuple(entry.message for entry in map(_log, records.of_topic(topics.LOG)) if entry.level > Log.Level.INFO)
     cameras = [t.split("/")[2] for t in (c.topic for c in records.channels.values()) if t.endswith("/image")]

@@ -102,9 +102,14 @@ class EpisodeWriter:
     """A recording in progress. Thread-safe; a thread of its own writes."""
 
     def __init__(
-        self, path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...] = (),
-        fingers: tuple[str, ...] = (), boards: tuple[str, ...] = (),
-    ) -> None:  # fmt: skip
+        self,
+        path: Path,
+        header: Attached,
+        clock: Clock,
+        cameras: tuple[str, ...] = (),
+        fingers: tuple[str, ...] = (),
+        boards: tuple[str, ...] = (),
+    ) -> None:
         """Create the file under its partial name and write the attachments.
 
         Args:
@@ -230,9 +235,8 @@ class EpisodeWriter:
         self._add(topics.image(camera), arrival_ns, sample_ns, sequence, message)
 
     def cube(
-        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None,
-        finger: str = "",
-    ) -> None:  # fmt: skip
+        self, camera: str, arrival_ns: int, sample_ns: int, sequence: int, pose: CubePoseRecord | None, finger: str = ""
+    ) -> None:
         """Write the detection of the cube, or of a finger, in one image; ``None`` if no face was seen."""
         pair = topics.finger(camera, finger) if finger else (topics.cube(camera), topics.pose(camera))
         stamps = arrival_ns, sample_ns, sequence
@@ -319,9 +323,13 @@ def _view_message(stamps: tuple[int, int, int], pose: CubePoseRecord | None) -> 
 
 
 def _begun(
-    path: Path, header: Attached, clock: Clock, cameras: tuple[str, ...], fingers: tuple[str, ...],
+    path: Path,
+    header: Attached,
+    clock: Clock,
+    cameras: tuple[str, ...],
+    fingers: tuple[str, ...],
     boards: tuple[str, ...],
-) -> ChunkedFile:  # fmt: skip
+) -> ChunkedFile:
     """Create the file with its channels and attachments and sync it to the disk."""
     file = ChunkedFile(file_names.partial(path), host=clock.host)
     for topic, message in topics.FIXED.items():

@@ -77,10 +77,7 @@ class CameraStream:
         except Exception as error:  # any error of a detector: the press goes on
             self._detect = None
             if sink:
-                sink.note(
-                    f"camera {self.name}: the search for tags failed ({type(error).__name__}: {error})",
-                    "error",
-                )
+                sink.note(f"camera {self.name}: the search for tags failed ({type(error).__name__}: {error})", "error")
             return
         if sink:
             self._write(sink, (frame.arrival_ns, sample_ns, frame.sequence), found)
@@ -120,8 +117,12 @@ def _record(pose: Any) -> CubePoseRecord | None:
     cube = getattr(pose, "cube", pose)
     covariance = np.asarray(getattr(pose, "covariance", np.inf), float)
     return CubePoseRecord(
-        (x, y, z), (qx, qy, qz, qw), float(cube.reprojection), int(cube.faces),
-        tuple(getattr(cube, "ids", ())), bool(getattr(cube, "ambiguous", False)),
+        (x, y, z),
+        (qx, qy, qz, qw),
+        float(cube.reprojection),
+        int(cube.faces),
+        tuple(getattr(cube, "ids", ())),
+        bool(getattr(cube, "ambiguous", False)),
         tuple(covariance.ravel().tolist()) if covariance.shape == (6, 6) and np.isfinite(covariance).all() else (),
         tuple(getattr(cube, "strays", ())),
-    )  # fmt: skip
+    )

@@ -36,9 +36,14 @@ class DeviceStreams(ABC):
     """Time without data after which a stream counts as silent [s of real time]."""
 
     def __init__(
-        self, boards: dict[str, TaxelBoard], cameras: dict[str, Camera], entries: dict[str, dict[str, Any]],
-        fingers: dict[str, Any] | None = None, detect: Detect | None = None, watch: Watch | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        boards: dict[str, TaxelBoard],
+        cameras: dict[str, Camera],
+        entries: dict[str, dict[str, Any]],
+        fingers: dict[str, Any] | None = None,
+        detect: Detect | None = None,
+        watch: Watch | None = None,
+    ) -> None:
         """Prepare the threads.
 
         Args:
@@ -88,9 +93,7 @@ class DeviceStreams(ABC):
 
     def __enter__(self) -> DeviceStreams:
         """Start the threads."""
-        self._threads = [
-            self._host.thread(self._run, name, (name, read)) for name, read in self._work.items()
-        ]
+        self._threads = [self._host.thread(self._run, name, (name, read)) for name, read in self._work.items()]
         for thread in self._threads:
             thread.start()
         return self

@@ -135,11 +135,7 @@ class GuardedMotion:
             self._allowed.stand(self._rest, self._clock.now_ns())
 
     def _carry_out(
-        self,
-        path: tuple[Step, ...],
-        start: Position,
-        writer: EpisodeWriter | None,
-        failure: list[BaseException],
+        self, path: tuple[Step, ...], start: Position, writer: EpisodeWriter | None, failure: list[BaseException]
     ) -> None:
         position, phase = start, ""
         try:

@@ -120,9 +120,10 @@ class RigStreams(DeviceStreams):
                 "check cable, ground and baud rate, then the frame format",
             )
         return DeviceError(
-            f"{BOARD}: nothing received for {seconds:g} s", "a stream that goes on",
+            f"{BOARD}: nothing received for {seconds:g} s",
+            "a stream that goes on",
             "check cable and power, then start again",
-        )  # fmt: skip
+        )
 
     def _totals(self) -> dict[str, StreamCounts]:
         return {**super()._totals(), "cnc": StreamCounts(corrupt=self._cnc.damaged_reports)}
@@ -154,9 +155,10 @@ class RigStreams(DeviceStreams):
                     self._sink.note(f"{stream}: {words}", "warning")
             elif words:
                 raise BadReadings(
-                    f"{stream}: {words}", "readings that change, below their limit",
+                    f"{stream}: {words}",
+                    "readings that change, below their limit",
                     "check the board's supply, its ribbon cable and firmware, then start again",
-                )  # fmt: skip
+                )
 
     def _silence_of(self, name: str) -> float:
         return self._board_silence if name == BOARD else self.silence
@@ -167,9 +169,8 @@ class RigStreams(DeviceStreams):
         unreadable = "" if name.startswith("camera") else self._cnc.unreadable
         what = f"only reports that cannot be read, the latest {unreadable!r}," if unreadable else "nothing received"
         raise DeviceError(
-            f"{name}: {what} for {self.silence:g} s", "a stream that goes on",
-            "check cable and power, then start again",
-        )  # fmt: skip
+            f"{name}: {what} for {self.silence:g} s", "a stream that goes on", "check cable and power, then start again"
+        )
 
     def _broken(self, name: str, error: TacdataError) -> None:
         self._fail(error)

@@ -135,9 +135,12 @@ def anchor(
 
 
 def _anchor_move(
-    command: Command, following: Command | None, statuses: StatusTimes, limits: AxisLimits,
+    command: Command,
+    following: Command | None,
+    statuses: StatusTimes,
+    limits: AxisLimits,
     known: tuple[int, np.ndarray],
-) -> AnchoredMove:  # fmt: skip
+) -> AnchoredMove:
     quickest, resolution = known
     profile = limits.straight_move(command.start, command.target, command.speed)
     earliest, latest = [command.sent_ns], [command.acknowledged_ns + PLANNER_TURN_NS]

@@ -60,8 +60,12 @@ def steps(press: Press, motion: MotionSettings, registration: Registration) -> t
         beyond = registration.to_machine(press.x, press.y, press.deepest)
         path += [Step("press", beyond, press.speed), Step("press", seconds=SYNC)]
     up = registration.to_machine(press.x, press.y, press.depth - press.stroke)
-    turn = [Step("press", seconds=SYNC), Step("press", up, press.speed), Step("press", seconds=SYNC),
-            Step("press", target, press.speed)]  # fmt: skip
+    turn = [
+        Step("press", seconds=SYNC),
+        Step("press", up, press.speed),
+        Step("press", seconds=SYNC),
+        Step("press", target, press.speed),
+    ]
     turns = turn * press.strokes
     return (
         *path,

@@ -69,9 +69,10 @@ def read_robot(path: Path) -> Robot:
         unknown = sorted(set(given) - set(known))
         if unknown:
             raise FormatError(
-                f"{path}: {what} {', '.join(unknown)}, not in {origin.name}", ", ".join(sorted(known)),
+                f"{path}: {what} {', '.join(unknown)}, not in {origin.name}",
+                ", ".join(sorted(known)),
                 f"name a {what} of the URDF",
-            )  # fmt: skip
+            )
     velocity = urdf.velocity | document.get("velocity", {})
     tips = {
         name: (entry["link"], _pose({**HERE, **entry}, f"{path}: fingers/{name}", LONGEST))
@@ -80,11 +81,20 @@ def read_robot(path: Path) -> Robot:
     allowed = document.get("tolerance", {})
     tolerance = float(allowed.get("position", POSITION_TOLERANCE)), allowed.get("rotation")
     return Robot(
-        document["name"], urdf.text, provenance.file_hash(origin),
-        _pose(document.get("base", HERE), f"{path}: base", FARTHEST), tips, document.get("home", {}),
-        float(document.get("orientation_weight", ORIENTATION_WEIGHT)), tolerance, velocity,
-        document.get("acceleration", {}), _workspace(document, str(path)), document, urdf.remarks,
-    )  # fmt: skip
+        document["name"],
+        urdf.text,
+        provenance.file_hash(origin),
+        _pose(document.get("base", HERE), f"{path}: base", FARTHEST),
+        tips,
+        document.get("home", {}),
+        float(document.get("orientation_weight", ORIENTATION_WEIGHT)),
+        tolerance,
+        velocity,
+        document.get("acceleration", {}),
+        _workspace(document, str(path)),
+        document,
+        urdf.remarks,
+    )
 
 
 HERE = {"position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
@@ -95,9 +105,10 @@ def _pose(given: dict[str, Any], origin: str, farthest: float) -> np.ndarray:
     away = float(np.linalg.norm(given["position"]))
     if away > farthest:
         raise FormatError(
-            f"{origin}: a position {away:g} m away: are these millimetres?", f"metres, up to {farthest:g} m",
+            f"{origin}: a position {away:g} m away: are these millimetres?",
+            f"metres, up to {farthest:g} m",
             "give it in metres",
-        )  # fmt: skip
+        )
     return pose_matrix(given, origin)
 
 

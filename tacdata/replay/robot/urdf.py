@@ -73,15 +73,17 @@ def read_urdf(path: Path) -> Urdf:
         if b"\0" in text[:4] or not _is_utf8(text) or "encoding" in str(error):
             raise FormatError(
                 f"{path} is not in the encoding that it names, or that XML has without a name: {error}",
-                "UTF-8, or another whose name the first line gives", "save it as UTF-8, and name that or none",
-            ) from None  # fmt: skip
+                "UTF-8, or another whose name the first line gives",
+                "save it as UTF-8, and name that or none",
+            ) from None
         raise FormatError(f"{path} is no XML: {error}", "a URDF", "export it again from the CAD or xacro") from None
     words = [word for element in root.iter() for word in (element.tag, *element.attrib.values())]
     if any(mark in word for word in words for mark in ("xacro", "${", "$(")):
         raise FormatError(
-            f"{path} is a xacro whose macros are not expanded", "a URDF",
+            f"{path} is a xacro whose macros are not expanded",
+            "a URDF",
             f"make one: xacro {path.name} > {path.stem}_plain.urdf, and name that file",
-        )  # fmt: skip
+        )
     links = [str(link.get("name")) for link in root.findall("link")]
     if root.tag != "robot" or not links:
         raise FormatError(f"{path}: <{root.tag}> with {len(links)} links", "<robot> with links", "give a URDF")
@@ -129,9 +131,11 @@ def _check_tree(links: list[str], joints: list[ET.Element], path: Path) -> None:
         kind = joint.get("type")
         if kind not in MOVING and kind != "fixed":
             raise _wrong(
-                path, f"joint {_name(joint)} of type {kind!r}", f"fixed, {', '.join(MOVING)}",
+                path,
+                f"joint {_name(joint)} of type {kind!r}",
+                f"fixed, {', '.join(MOVING)}",
                 "fix the robot's base; put joints of one axis each in the place of others",
-            )  # fmt: skip
+            )
         for end in ("parent", "child"):
             element = joint.find(end)
             link = None if element is None else element.get("link")
@@ -169,14 +173,18 @@ def _check_place(joint: ET.Element, path: Path) -> None:
     place, turn, axis = (_numbers(joint, *key, path) for key in (("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz")))
     if place is not None and (far := np.linalg.norm(place)) > FARTHEST:
         raise _wrong(
-            path, f"{name} stands {far:g} m from the one before: are these millimetres?",
-            f"metres, up to {FARTHEST:g} m", "export it in metres",
-        )  # fmt: skip
+            path,
+            f"{name} stands {far:g} m from the one before: are these millimetres?",
+            f"metres, up to {FARTHEST:g} m",
+            "export it in metres",
+        )
     if turn is not None and (most := np.abs(turn).max()) > TURN:
         raise _wrong(
-            path, f"{name}: an origin turned by {most:g} rad: are these degrees?",
-            f"radians, up to {TURN:g} rad", "export it in radians",
-        )  # fmt: skip
+            path,
+            f"{name}: an origin turned by {most:g} rad: are these degrees?",
+            f"radians, up to {TURN:g} rad",
+            "export it in radians",
+        )
     if axis is not None and joint.get("type") in MOVING and not np.linalg.norm(axis) > 1e-6:
         raise _wrong(path, f"{name}: an axis of length 0", "a direction", "give the axis that it moves on")
 
@@ -228,10 +236,11 @@ def _bounded(joint: ET.Element, limit: ET.Element, ends: dict[str, float], path:
     if most > WIDEST[unit]:
         other = "degrees" if unit == "rad" else "millimetres"
         raise _wrong(
-            path, f"joint {name}: a limit of {most:g} {unit}: are these {other}?",
+            path,
+            f"joint {name}: a limit of {most:g} {unit}: are these {other}?",
             f"{'radians' if unit == 'rad' else 'metres'}, up to {WIDEST[unit]:g} {unit}",
             f"export it in {'radians' if unit == 'rad' else 'metres'}",
-        )  # fmt: skip
+        )
     if low > high:
         raise _wrong(path, f"joint {name}: lower {low:g} above upper {high:g} {unit}", "lower below upper")
     remarks = []

@@ -104,9 +104,11 @@ def _rivals(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
 
 
 def _gap(page: HtmlPage, gap: dict[str, Any]) -> None:
-    kept = "the verdict was reached without them" if gap["unseen"] else (
-        "the effects' parameters were fitted without them; the name was found with them"
-    )  # fmt: skip
+    kept = (
+        "the verdict was reached without them"
+        if gap["unseen"]
+        else ("the effects' parameters were fitted without them; the name was found with them")
+    )
     rows = [(f"sealed episodes: {kept}", gap["sealed"]), ("worst of them: " + gap["worst"]["name"], gap["worst"])]
     rows += [(f"{c['name']}, not fitted to", c) for c in gap["elsewhere"]]
     cells = [(name, c["episodes"], f"{c['before']:.3g}", f"{c['after']:.3g}") for name, c in rows]
@@ -132,13 +134,26 @@ def _slices(page: HtmlPage, told: list[dict[str, Any]]) -> None:
 
 def _tips(page: HtmlPage, told: list[dict[str, Any]]) -> None:
     rows = [
-        (t["session"], t["against"], t["episodes"], f"{t['before']:.4f} / {t['most_before']:.3f}",
-         f"{t['after']:.4f} / {t['most_after']:.3f}", f"{t['better']} / {t['worse']}",
-         f"{t['constant_before']:.4f} / {t['constant_after']:.4f}")
+        (
+            t["session"],
+            t["against"],
+            t["episodes"],
+            f"{t['before']:.4f} / {t['most_before']:.3f}",
+            f"{t['after']:.4f} / {t['most_after']:.3f}",
+            f"{t['better']} / {t['worse']}",
+            f"{t['constant_before']:.4f} / {t['constant_after']:.4f}",
+        )
         for t in told
-    ]  # fmt: skip
-    head = ("session", "reference", "episodes", "before, rms / most [mm]", "after, rms / most [mm]",
-            "episodes better / worse", "constant part, before / after [mm]")  # fmt: skip
+    ]
+    head = (
+        "session",
+        "reference",
+        "episodes",
+        "before, rms / most [mm]",
+        "after, rms / most [mm]",
+        "episodes better / worse",
+        "constant part, before / after [mm]",
+    )
     _table(page, "Tip error of the labels", head, rows)
 
 
@@ -159,20 +174,30 @@ def _labels(page: HtmlPage, revision: dict[str, Any]) -> None:
         )
         return
     rows = [
-        (m["session"], f"{m['paths']} of {m['episodes']}", f"{m['path_rms']:.3g} / {m['path_most']:.3g}",
-         m["labels"] or "not requested", f"{_number(m['rms'])} / {_number(m['most'])}" if m["labels"] else "–")
+        (
+            m["session"],
+            f"{m['paths']} of {m['episodes']}",
+            f"{m['path_rms']:.3g} / {m['path_most']:.3g}",
+            m["labels"] or "not requested",
+            f"{_number(m['rms'])} / {_number(m['most'])}" if m["labels"] else "–",
+        )
         for m in moved
-    ]  # fmt: skip
+    ]
     head = ("session", "paths that change", "tip, rms / most [mm]", "labels made again", "depth, rms / most [mm]")
     _table(page, "Labels", head, rows)
 
 
 def _confirmed(page: HtmlPage, found: list[dict[str, Any]]) -> None:
     rows = [
-        (c["tool"], "{:.2f}, {:.2f}".format(*c["place"]), f"{c['depth']:.3f}", f"{100 * c['change']:.1f} %",
-         f"{100 * c['difference']:.1f} %" if c["solved"] else "no equilibrium")
+        (
+            c["tool"],
+            "{:.2f}, {:.2f}".format(*c["place"]),
+            f"{c['depth']:.3f}",
+            f"{100 * c['change']:.1f} %",
+            f"{100 * c['difference']:.1f} %" if c["solved"] else "no equilibrium",
+        )
         for c in found
-    ]  # fmt: skip
+    ]
     head = ("tool", "place [mm]", "depth [mm]", "change by the effect", "surrogate minus finite elements (rms)")
     _table(page, "Solved again by finite elements", head, rows)
 

@@ -85,8 +85,12 @@ def _groups(axis: Any, found: GapReduction) -> None:
     axis.set_yticks(where, [f"{n} ({c.episodes})" for n, c in zip(names, rows, strict=True)], fontsize=8)
     axis.invert_yaxis()
     low = min(0.8, *(c.after for c in rows))
-    axis.set(xscale="log", xlim=(0.8 * low, None), xlabel="mean square of the residual; 1 is the noise floor",
-             title="the gap, where the numbers were not fitted")  # fmt: skip
+    axis.set(
+        xscale="log",
+        xlim=(0.8 * low, None),
+        xlabel="mean square of the residual; 1 is the noise floor",
+        title="the gap, where the numbers were not fitted",
+    )
     axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8)  # above every bar
 
 

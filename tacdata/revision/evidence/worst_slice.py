@@ -49,8 +49,9 @@ def _parts(course: Course, there: np.ndarray) -> list[tuple[str, np.ndarray]]:
     inside = there & (phase > 0)
     moving = inside & (phase != PHASES.index("hold"))
     for names, values, rows, unit in (
-        (("shallow", "middle", "deep"), depth, inside, "mm"), (("slow", "medium", "fast"), speed, moving, "mm/s"),
-    ):  # fmt: skip
+        (("shallow", "middle", "deep"), depth, inside, "mm"),
+        (("slow", "medium", "fast"), speed, moving, "mm/s"),
+    ):
         edges = np.quantile(values[rows], THIRDS) if rows.any() else np.zeros(4)
         for name, low, high in zip(names, edges[:-1], edges[1:], strict=True):
             parts.append((f"{name}, {low:.2g} to {high:.2g} {unit}", rows & (values >= low) & (values <= high)))

@@ -51,9 +51,14 @@ def touches_fem(placed: Sequence[Placed]) -> bool:
 
 
 def confirm(
-    held: Comparison, placed: Sequence[Placed], sensor: Sensor, reaches: dict[str, Reach], count: int,
-    mesh: MeshSettings, progress: Callable[[int, int, float], None] = lambda *_: None,
-) -> list[Confirmed]:  # fmt: skip
+    held: Comparison,
+    placed: Sequence[Placed],
+    sensor: Sensor,
+    reaches: dict[str, Reach],
+    count: int,
+    mesh: MeshSettings,
+    progress: Callable[[int, int, float], None] = lambda *_: None,
+) -> list[Confirmed]:
     """Solve a few presses where the effects change the loads most, each at another place.
 
     Args:

@@ -75,9 +75,14 @@ def _course(episodes: Sequence[Episode]) -> Course:
     episode = np.repeat(np.arange(len(episodes)), count)
     at = np.array([e.tip[np.argmax(e.tip[:, 2]), :2] for e in episodes])
     return Course(
-        time=np.concatenate([(e.tip_ns - origin) * 1e-9 for e in episodes]), episode=episode,
-        tip=np.concatenate([e.tip for e in episodes]), tool=np.array(number)[episode],
-        readings=np.zeros((sum(count), 0)), averaged=np.ones(sum(count)),
-        session=np.zeros(len(episodes), dtype=np.int64), site=places(at), tools=tools,
+        time=np.concatenate([(e.tip_ns - origin) * 1e-9 for e in episodes]),
+        episode=episode,
+        tip=np.concatenate([e.tip for e in episodes]),
+        tool=np.array(number)[episode],
+        readings=np.zeros((sum(count), 0)),
+        averaged=np.ones(sum(count)),
+        session=np.zeros(len(episodes), dtype=np.int64),
+        site=places(at),
+        tools=tools,
         names=tuple(e.path.stem for e in episodes),
-    )  # fmt: skip
+    )

@@ -81,11 +81,16 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
     each = np.array([[np.sqrt(np.mean(way**2)) for way in pair] for pair in far])
     first, last = (np.concatenate([pair[i] for pair in far]) for i in (0, 1))
     return TipError(
-        "tag" if truth is None else truth.name, len(far), float(np.sqrt(np.mean(first**2))),
-        float(np.sqrt(np.mean(last**2))), float(first.max()), float(last.max()),
-        int((each[:, 1] < BETTER * each[:, 0]).sum()), int((BETTER * each[:, 1] > each[:, 0]).sum()),
+        "tag" if truth is None else truth.name,
+        len(far),
+        float(np.sqrt(np.mean(first**2))),
+        float(np.sqrt(np.mean(last**2))),
+        float(first.max()),
+        float(last.max()),
+        int((each[:, 1] < BETTER * each[:, 0]).sum()),
+        int((BETTER * each[:, 1] > each[:, 0]).sum()),
         *constant,
-    )  # fmt: skip
+    )
 
 
 def _apart(before: Episode, after: Episode, time_ns: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -106,9 +111,10 @@ def _true_views(path: Path, episodes: Sequence[Episode]) -> dict[int, tuple[np.n
                 found[k] = time[rows], tip[rows]
     if not found:
         raise UsageError(
-            f"{path} covers none of the recordings' times", "the recordings' own clock, in ns",
+            f"{path} covers none of the recordings' times",
+            "the recordings' own clock, in ns",
             "check its column time_ns",
-        )  # fmt: skip
+        )
     return found
 
 

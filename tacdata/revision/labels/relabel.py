@@ -72,9 +72,13 @@ def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
 
 
 def relabelled(
-    session: Path, placed: Sequence[Placed], folder: Path, settings: FarmSettings,
-    store: Path | None = None, progress: Callable[[str, int, int], None] = lambda *_: None,
-) -> Moved:  # fmt: skip
+    session: Path,
+    placed: Sequence[Placed],
+    folder: Path,
+    settings: FarmSettings,
+    store: Path | None = None,
+    progress: Callable[[str, int, int], None] = lambda *_: None,
+) -> Moved:
     """Make a session's labels under a revised model, in a folder of their own, and compare them with the old ones.
 
     A path whose place, depths and model are the same is found in the store and not solved again.
@@ -118,7 +122,11 @@ def _compared(moved: Moved, before: Path, after: Path, summary: LabellingSummary
         squares, count = squares + float(np.square(change, dtype=float).sum()), count + int(dented.sum())
         most = max(most, float(np.abs(change).max(initial=0.0)))
     return replace(
-        moved, labels=labels, rms=float(np.sqrt(squares / count)) if count else (0.0 if labels else float("nan")),
-        most=most if labels else float("nan"), solved=len(summary.seconds), found=summary.found,
+        moved,
+        labels=labels,
+        rms=float(np.sqrt(squares / count)) if count else (0.0 if labels else float("nan")),
+        most=most if labels else float("nan"),
+        solved=len(summary.seconds),
+        found=summary.found,
         failed=dict(summary.failed),
-    )  # fmt: skip
+    )

@@ -55,9 +55,14 @@ class Retrained:
 
 
 def retrained(
-    sessions: Sequence[Path], labels: dict[Path, Path], held: Comparison, placed: Sequence[Placed], folder: Path,
-    recipe: Recipe, note: Callable[[str], None] = lambda text: None,
-) -> Retrained:  # fmt: skip
+    sessions: Sequence[Path],
+    labels: dict[Path, Path],
+    held: Comparison,
+    placed: Sequence[Placed],
+    folder: Path,
+    recipe: Recipe,
+    note: Callable[[str], None] = lambda text: None,
+) -> Retrained:
     """Pack, train and score twice.
 
     Args:
@@ -76,9 +81,10 @@ def retrained(
     pairs = _pairs(sessions, labels, placed)
     if len(pairs) < FEWEST:
         raise UsageError(
-            f"{len(pairs)} episodes with a label", f"{FEWEST} or more, to train on and to score",
+            f"{len(pairs)} episodes with a label",
+            f"{FEWEST} or more, to train on and to score",
             "run `tacdata label SESSION` first",
-        )  # fmt: skip
+        )
     note("datasets of both models")
     simulated = _Simulated(held) if by == READINGS else None
     sides = {}
@@ -200,13 +206,25 @@ def _told(by: str, recipe: Recipe, before: dict[str, Any], after: dict[str, Any]
     from training.scoring.evaluate import METRICS
 
     rows = [
-        {"name": name, "title": f"{METRICS[name][1]}, frames in contact", "unit": METRICS[name][2],
-         "before": before["contact_frames"][name]["mean"], "after": after["contact_frames"][name]["mean"]}
+        {
+            "name": name,
+            "title": f"{METRICS[name][1]}, frames in contact",
+            "unit": METRICS[name][2],
+            "before": before["contact_frames"][name]["mean"],
+            "after": after["contact_frames"][name]["mean"],
+        }
         for name in METRICS
-    ]  # fmt: skip
+    ]
     for name, title in (("centre_depth", "Depth at the contact's centre"), ("position", "Place of the contact")):
         pair = [d["prescribed"]["prediction"][name]["mean"] for d in (before, after)]
-        rows.append({"name": name, "title": f"{title}, off the pose, at full depth", "unit": "mm",
-                     "before": pair[0], "after": pair[1]})  # fmt: skip
+        rows.append(
+            {
+                "name": name,
+                "title": f"{title}, off the pose, at full depth",
+                "unit": "mm",
+                "before": pair[0],
+                "after": pair[1],
+            }
+        )
     frames = after["frames"]["in_contact"]
     return Retrained(by, len(after["split"]["episodes"]), frames, recipe.epochs, tuple(rows))

@@ -143,10 +143,13 @@ def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repea
     entries.sort(key=lambda e: tools.index(e["indenter"]))
     mechanisms = list(dict.fromkeys(m for c in chosen for pair in c.nats for m in pair))
     return {
-        "version": schemas.version("plan"), "name": name, "purpose": f"to tell apart: {', '.join(mechanisms)}",
-        "indenters": {k: v for k, v in document["indenters"].items() if k in used}, "motion": document["motion"],
+        "version": schemas.version("plan"),
+        "name": name,
+        "purpose": f"to tell apart: {', '.join(mechanisms)}",
+        "indenters": {k: v for k, v in document["indenters"].items() if k in used},
+        "motion": document["motion"],
         "presses": entries,
-    }  # fmt: skip
+    }
 
 
 def _probabilities(found: list[Rival]) -> dict[str, float]:

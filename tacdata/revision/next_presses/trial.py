@@ -80,9 +80,14 @@ class CandidatePress:
     def entry(self, indenter: str, yaw: float) -> dict[str, Any]:
         """Return it as an entry of a plan."""
         found: dict[str, Any] = {
-            "indenter": indenter, "x": round(self.x, 3), "y": round(self.y, 3), "yaw": yaw,
-            "depth": round(self.depth, 3), "speed": self.speed, "hold": self.hold,
-        }  # fmt: skip
+            "indenter": indenter,
+            "x": round(self.x, 3),
+            "y": round(self.y, 3),
+            "yaw": yaw,
+            "depth": round(self.depth, 3),
+            "speed": self.speed,
+            "hold": self.hold,
+        }
         if self.recovery:
             found["recovery"] = self.recovery
         if self.overshoot:
@@ -153,12 +158,21 @@ def laid_out(course: Course, trial: CandidatePress, limits: AxisLimits = USUAL_L
     tip = np.column_stack([np.full(len(time), trial.x), np.full(len(time), trial.y), np.interp(time, at, depth)])
     rows = len(time)
     return replace(
-        course, time=time, episode=np.zeros(rows, dtype=np.int64), tip=tip,
-        tool=np.full(rows, trial.tool, dtype=np.int64), readings=np.zeros((rows, course.channels)),
-        averaged=np.isin(time, frames).astype(float), session=np.zeros(1, dtype=np.int64), site=np.array([trial.site]),
-        names=("trial",), recording=None, force=None, tag=None,
+        course,
+        time=time,
+        episode=np.zeros(rows, dtype=np.int64),
+        tip=tip,
+        tool=np.full(rows, trial.tool, dtype=np.int64),
+        readings=np.zeros((rows, course.channels)),
+        averaged=np.isin(time, frames).astype(float),
+        session=np.zeros(1, dtype=np.int64),
+        site=np.array([trial.site]),
+        names=("trial",),
+        recording=None,
+        force=None,
+        tag=None,
         temperature=None if course.temperature is None else np.full(rows, float(np.median(course.temperature))),
-    )  # fmt: skip
+    )
 
 
 def _path(trial: CandidatePress, limits: AxisLimits) -> tuple[np.ndarray, np.ndarray]:

@@ -40,11 +40,7 @@ def volume(real: type) -> SimpleNamespace:
     @wp.func
     def shifted(A: mat33, d: real):
         # Adding d times the unit matrix would cost 15 operations on zeros.
-        return mat33(
-            A[0, 0] + d, A[0, 1], A[0, 2],
-            A[1, 0], A[1, 1] + d, A[1, 2],
-            A[2, 0], A[2, 1], A[2, 2] + d,
-        )  # fmt: skip
+        return mat33(A[0, 0] + d, A[0, 1], A[0, 2], A[1, 0], A[1, 1] + d, A[1, 2], A[2, 0], A[2, 1], A[2, 2] + d)
 
     @wp.func
     def cofactor(A: mat33):

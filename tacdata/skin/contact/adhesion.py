@@ -54,9 +54,14 @@ def _pull(distance, law: str):
 
     @wp.kernel(module="unique", enable_backward=False)
     def pull(
-        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, adhesion: AdhesionData,
-        chosen: wp.array(dtype=wp.int32), friction_tangent: wp.array(dtype=wp.float64),
-        force: wp.array3d(dtype=wp.float64), stiffness: wp.array4d(dtype=wp.float64),
+        u: wp.array3d(dtype=wp.float64),
+        surface: SurfaceData,
+        members: MemberData,
+        adhesion: AdhesionData,
+        chosen: wp.array(dtype=wp.int32),
+        friction_tangent: wp.array(dtype=wp.float64),
+        force: wp.array3d(dtype=wp.float64),
+        stiffness: wp.array4d(dtype=wp.float64),
         energy: wp.array(dtype=wp.float64),
     ):
         """Attraction of one point, added to the nodes: gap, traction by the law, slope and normal for the stiffness."""
@@ -97,8 +102,12 @@ def _product(real: type):
 
     @wp.kernel(module="unique", enable_backward=False)
     def product(
-        p: wp.array3d(dtype=real), faces: wp.array2d(dtype=wp.int32), shapes: wp.array2d(dtype=real),
-        weights: wp.array2d(dtype=real), stiffness: wp.array4d(dtype=wp.float64), result: wp.array3d(dtype=real),
+        p: wp.array3d(dtype=real),
+        faces: wp.array2d(dtype=wp.int32),
+        shapes: wp.array2d(dtype=real),
+        weights: wp.array2d(dtype=real),
+        stiffness: wp.array4d(dtype=wp.float64),
+        result: wp.array3d(dtype=real),
     ):
         f, k, b = wp.tid()
         along = real(stiffness[f, k, 0, b])
@@ -121,8 +130,15 @@ class AdhesiveSurface(ContactSurface):
     attracts = True
 
     def __init__(
-        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distances: Mapping[float, wp.Function],
-        rough: bool, activation: float, stick: float, adhesion: Adhesion,
+        self,
+        nodes: torch.Tensor,
+        faces: torch.Tensor,
+        held: torch.Tensor,
+        distances: Mapping[float, wp.Function],
+        rough: bool,
+        activation: float,
+        stick: float,
+        adhesion: Adhesion,
     ) -> None:
         """Bind faces of the mesh, shapes and a law; for the other arguments see `ContactSurface`.
 
@@ -132,13 +148,22 @@ class AdhesiveSurface(ContactSurface):
         super().__init__(nodes, faces, held, distances, rough, activation, stick)
         self._law = adhesion.law
         self._adhesion = filled(
-            AdhesionData, strength=adhesion.work * _PER_MM / adhesion.range, length=adhesion.range,
+            AdhesionData,
+            strength=adhesion.work * _PER_MM / adhesion.range,
+            length=adhesion.range,
             reach=load_adhesion_law(adhesion.law).reach,
         )
 
     def add_forces(
-        self, u: torch.Tensor, multiplier: torch.Tensor, pose: Pose, history: ContactHistory, conditions: Conditions,
-        friction_tangent: torch.Tensor, near: torch.Tensor, total: torch.Tensor,
+        self,
+        u: torch.Tensor,
+        multiplier: torch.Tensor,
+        pose: Pose,
+        history: ContactHistory,
+        conditions: Conditions,
+        friction_tangent: torch.Tensor,
+        near: torch.Tensor,
+        total: torch.Tensor,
     ) -> ContactForces:
         """Add the nodal forces of contact and attraction on the skin [N], as `ContactSurface.add_forces`.
 
@@ -151,11 +176,11 @@ class AdhesiveSurface(ContactSurface):
         members = member_data(conditions, pose)
         for distance, chosen in self.by_shape(conditions):
             wp.launch(
-                _pull(distance, self._law), dim=(*self.weights.shape, len(chosen)),
-                inputs=[
-                    argument(u), self.data, members, self._adhesion, argument(chosen), argument(friction_tangent),
-                ],
-                outputs=[argument(nodal), argument(stiffness), argument(energy)], device=self.device,
+                _pull(distance, self._law),
+                dim=(*self.weights.shape, len(chosen)),
+                inputs=[argument(u), self.data, members, self._adhesion, argument(chosen), argument(friction_tangent)],
+                outputs=[argument(nodal), argument(stiffness), argument(energy)],
+                device=self.device,
             )
         total += nodal
         tangent = replace(contact.tangent, attraction=stiffness)
@@ -166,7 +191,9 @@ class AdhesiveSurface(ContactSurface):
         super().add_product(at, p, result)
         shapes, weights = self.rule[p.dtype]
         wp.launch(
-            _product(REAL[p.dtype]), dim=(*weights.shape, p.shape[2]),
+            _product(REAL[p.dtype]),
+            dim=(*weights.shape, p.shape[2]),
             inputs=[argument(value) for value in (p, self.faces, shapes, weights, at.attraction)],
-            outputs=[argument(result)], device=self.device,
+            outputs=[argument(result)],
+            device=self.device,
         )

@@ -45,8 +45,15 @@ class ContactSurface:
     """Whether it pulls where it does not touch."""
 
     def __init__(
-        self, nodes: torch.Tensor, faces: torch.Tensor, held: torch.Tensor, distances: Mapping[float, wp.Function],
-        rough: bool, activation: float, stick: float, flat: bool = False,
+        self,
+        nodes: torch.Tensor,
+        faces: torch.Tensor,
+        held: torch.Tensor,
+        distances: Mapping[float, wp.Function],
+        rough: bool,
+        activation: float,
+        stick: float,
+        flat: bool = False,
     ) -> None:
         """Bind faces of the mesh and shapes.
 
@@ -66,7 +73,11 @@ class ContactSurface:
         self.weights, self.shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
         at_points = elements.triangle_hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
         self.mortar = Mortar(
-            faces.cpu().numpy(), self.weights.cpu().numpy(), self.shapes.cpu().numpy(), at_points, len(nodes),
+            faces.cpu().numpy(),
+            self.weights.cpu().numpy(),
+            self.shapes.cpu().numpy(),
+            at_points,
+            len(nodes),
             self.device,
         )
         """The projection onto the hats."""
@@ -79,15 +90,20 @@ class ContactSurface:
         rise = torch.zeros_like(nodes)
         rise[:, 2] = nodes[:, 2].clamp_min(0.0)
         self._mean_rise = self.mortar.means(rise[:, :, None].contiguous())
-        self.rule = {
-            dtype: (self.shapes.to(dtype).contiguous(), self.weights.to(dtype).contiguous()) for dtype in REAL
-        }
+        self.rule = {dtype: (self.shapes.to(dtype).contiguous(), self.weights.to(dtype).contiguous()) for dtype in REAL}
         """Shape functions, shape (k, 6), and weights [mm^2], shape (f, k), by precision."""
         slots = torch.as_tensor(self.mortar.slots.astype(np.int32), device=nodes.device)
         self._slots = slots
         self.data = filled(
-            kernels.SurfaceData, nodes=nodes, faces=faces, slots=slots, shapes=self.shapes,
-            hats=torch.as_tensor(at_points, device=nodes.device), weights=self.weights, area=self.area, stick=stick,
+            kernels.SurfaceData,
+            nodes=nodes,
+            faces=faces,
+            slots=slots,
+            shapes=self.shapes,
+            hats=torch.as_tensor(at_points, device=nodes.device),
+            weights=self.weights,
+            area=self.area,
+            stick=stick,
             rough=int(rough),
         )
         """The same, as kernels take it."""
@@ -121,8 +137,15 @@ class ContactSurface:
         return ContactHistory(anchor, anchor.clone(), gap, place)
 
     def add_forces(
-        self, u: torch.Tensor, multiplier: torch.Tensor, pose: Pose, history: ContactHistory, conditions: Conditions,
-        friction_tangent: torch.Tensor, near: torch.Tensor, total: torch.Tensor,
+        self,
+        u: torch.Tensor,
+        multiplier: torch.Tensor,
+        pose: Pose,
+        history: ContactHistory,
+        conditions: Conditions,
+        friction_tangent: torch.Tensor,
+        near: torch.Tensor,
+        total: torch.Tensor,
     ) -> ContactForces:
         """Add the contact's nodal forces on the skin [N] to ``total``, shape (n, 3, b).
 
@@ -152,19 +175,29 @@ class ContactSurface:
         turn = torch.zeros(*points, 6, b, dtype=torch.float32, device=u.device)
         for distance, chosen in pressed:
             wp.launch(
-                kernels.pressure_kernel(distance), dim=(len(self.faces), len(chosen)),
+                kernels.pressure_kernel(distance),
+                dim=(len(self.faces), len(chosen)),
                 inputs=[argument(u), self.data, members, argument(chosen), argument(pressure), argument(active)],
-                outputs=[argument(nodal), argument(normal), int(not self.flat), argument(turn)], device=self.device,
+                outputs=[argument(nodal), argument(normal), int(not self.flat), argument(turn)],
+                device=self.device,
             )
         normal = normal / torch.linalg.vector_norm(normal, dim=1, keepdim=True).clamp_min(1e-12)
         local, shear, force, stiffness = (self._zeros(u, size) for size in (3, 3, 3, 6))
         wp.launch(
-            kernels.friction, dim=(count, b),
+            kernels.friction,
+            dim=(count, b),
             inputs=[
-                argument(place), self.data, members, kernels.history_data(history), argument(pressure),
-                argument(active), argument(normal), argument(friction_tangent),
+                argument(place),
+                self.data,
+                members,
+                kernels.history_data(history),
+                argument(pressure),
+                argument(active),
+                argument(normal),
+                argument(friction_tangent),
             ],
-            outputs=[argument(value) for value in (local, shear, force, stiffness)], device=self.device,
+            outputs=[argument(value) for value in (local, shear, force, stiffness)],
+            device=self.device,
         )
         if self.rough:
             self.mortar.spread(force, nodal)
@@ -181,15 +214,20 @@ class ContactSurface:
         if not self.flat:
             inputs = [p, self.faces, self._slots, self.rule[p.dtype][0], at.active, at.turn]
             wp.launch(
-                kernels.turn_kernel(REAL[p.dtype]), dim=(len(self.faces), p.shape[2]),
-                inputs=[argument(value) for value in inputs], outputs=[argument(result)], device=self.device,
+                kernels.turn_kernel(REAL[p.dtype]),
+                dim=(len(self.faces), p.shape[2]),
+                inputs=[argument(value) for value in inputs],
+                outputs=[argument(result)],
+                device=self.device,
             )
         if not self.rough:
             return
         slips = self.mortar.means(p)
         wp.launch(
-            kernels.slip_kernel(REAL[p.dtype]), dim=(self.count, p.shape[2]),
-            inputs=[argument(at.friction), argument(slips)], device=self.device,
+            kernels.slip_kernel(REAL[p.dtype]),
+            dim=(self.count, p.shape[2]),
+            inputs=[argument(at.friction), argument(slips)],
+            device=self.device,
         )
         self.mortar.spread(slips, result)
 
@@ -218,8 +256,10 @@ class ContactSurface:
         members = kernels.member_data(conditions, pose)
         for distance, chosen in self.by_shape(conditions):
             wp.launch(
-                passage_kernel(distance), dim=(len(self.faces), len(chosen)),
-                inputs=[argument(u), self.data, members, argument(chosen)], outputs=[argument(above)],
+                passage_kernel(distance),
+                dim=(len(self.faces), len(chosen)),
+                inputs=[argument(u), self.data, members, argument(chosen)],
+                outputs=[argument(above)],
                 device=self.device,
             )
         return above > 0
@@ -229,7 +269,11 @@ class ContactSurface:
         return self.mortar.means(u) + self._mean_nodes + self._mean_rise * (conditions.thickness - 1)
 
     def _gaps(
-        self, u: torch.Tensor, place: torch.Tensor, pose: Pose, members: Any,
+        self,
+        u: torch.Tensor,
+        place: torch.Tensor,
+        pose: Pose,
+        members: Any,
         pressed: list[tuple[wp.Function, torch.Tensor]],
     ) -> torch.Tensor:
         """Return mean gaps [mm], shape (s, b); above a plane they are those of the mean places."""
@@ -238,8 +282,11 @@ class ContactSurface:
         gap = self._zeros(u)
         for distance, chosen in pressed:
             wp.launch(
-                kernels.gap_kernel(distance), dim=(len(self.faces), len(chosen)),
-                inputs=[argument(u), self.data, members, argument(chosen)], outputs=[argument(gap)], device=self.device,
+                kernels.gap_kernel(distance),
+                dim=(len(self.faces), len(chosen)),
+                inputs=[argument(u), self.data, members, argument(chosen)],
+                outputs=[argument(gap)],
+                device=self.device,
             )
         return gap
 

@@ -85,8 +85,10 @@ def reach(sensor: Sensor, request: PressRequest) -> tuple[float, float]:
     z = request.indenter.profile(x, y)
     local = np.stack([x, y, z])[:, np.isfinite(z)]
     place = turn @ local
-    there = [np.clip(c + place[k], -h / 2, h / 2) for k, (c, h) in
-             enumerate(((request.x, skin.size_x), (request.y, skin.size_y)))]
+    there = [
+        np.clip(c + place[k], -h / 2, h / 2)
+        for k, (c, h) in enumerate(((request.x, skin.size_x), (request.y, skin.size_y)))
+    ]
     here = float(skin.outer_height(request.x, request.y))
     bottom = here + rise(request.indenter, turn) - deepest
     within = bottom + place[2] <= skin.outer_height(*there)

@@ -61,8 +61,13 @@ class HistoryData:
 def member_data(conditions: Conditions, pose: Pose) -> MemberData:
     """Return conditions and pose as a kernel takes them; all tensors contiguous."""
     return filled(
-        MemberData, thickness=conditions.thickness, modulus=conditions.modulus, friction=conditions.friction,
-        indenter=conditions.indenter, place=pose.place, turn=pose.turn,
+        MemberData,
+        thickness=conditions.thickness,
+        modulus=conditions.modulus,
+        friction=conditions.friction,
+        indenter=conditions.indenter,
+        place=pose.place,
+        turn=pose.turn,
     )
 
 
@@ -102,8 +107,15 @@ def parameters_of(values: wp.array2d(dtype=wp.float64), b: int):
 def rotation_of(turn: wp.array3d(dtype=wp.float64), b: int):
     """Return the rotation from a member's shape to the sensor's frame."""
     return wp.mat33d(
-        turn[0, 0, b], turn[0, 1, b], turn[0, 2, b], turn[1, 0, b], turn[1, 1, b], turn[1, 2, b],
-        turn[2, 0, b], turn[2, 1, b], turn[2, 2, b],
+        turn[0, 0, b],
+        turn[0, 1, b],
+        turn[0, 2, b],
+        turn[1, 0, b],
+        turn[1, 1, b],
+        turn[1, 2, b],
+        turn[2, 0, b],
+        turn[2, 1, b],
+        turn[2, 2, b],
     )
 
 
@@ -162,11 +174,13 @@ def normal_function(distance: wp.Function) -> wp.Function:
     @wp.func
     def normal(p: wp.vec3d, q: Parameters):
         h, zero = wp.float64(1.0e-6), wp.float64(0.0)  # mm
-        return wp.normalize(wp.vec3d(
-            distance(p + wp.vec3d(h, zero, zero), q) - distance(p - wp.vec3d(h, zero, zero), q),
-            distance(p + wp.vec3d(zero, h, zero), q) - distance(p - wp.vec3d(zero, h, zero), q),
-            distance(p + wp.vec3d(zero, zero, h), q) - distance(p - wp.vec3d(zero, zero, h), q),
-        ))
+        return wp.normalize(
+            wp.vec3d(
+                distance(p + wp.vec3d(h, zero, zero), q) - distance(p - wp.vec3d(h, zero, zero), q),
+                distance(p + wp.vec3d(zero, h, zero), q) - distance(p - wp.vec3d(zero, h, zero), q),
+                distance(p + wp.vec3d(zero, zero, h), q) - distance(p - wp.vec3d(zero, zero, h), q),
+            )
+        )
 
     return normal
 
@@ -185,8 +199,15 @@ def curvature_function(distance: wp.Function) -> wp.Function:
         z = (normal(p + wp.vec3d(zero, zero, h), q) - normal(p - wp.vec3d(zero, zero, h), q)) / (wp.float64(2.0) * h)
         half = wp.float64(0.5)
         return wp.mat33d(
-            x[0], half * (x[1] + y[0]), half * (x[2] + z[0]), half * (x[1] + y[0]), y[1], half * (y[2] + z[1]),
-            half * (x[2] + z[0]), half * (y[2] + z[1]), z[2],
+            x[0],
+            half * (x[1] + y[0]),
+            half * (x[2] + z[0]),
+            half * (x[1] + y[0]),
+            y[1],
+            half * (y[2] + z[1]),
+            half * (x[2] + z[0]),
+            half * (y[2] + z[1]),
+            z[2],
         )
 
     return curvature
@@ -198,8 +219,11 @@ def gap_kernel(distance: wp.Function) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def gaps(
-        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData,
-        chosen: wp.array(dtype=wp.int32), gap: wp.array2d(dtype=wp.float64),
+        u: wp.array3d(dtype=wp.float64),
+        surface: SurfaceData,
+        members: MemberData,
+        chosen: wp.array(dtype=wp.int32),
+        gap: wp.array2d(dtype=wp.float64),
     ):
         """Add the share of one face to the mean gaps of its nodes, for one of the chosen members."""
         f, c = wp.tid()
@@ -227,9 +251,15 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def pressures(
-        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, chosen: wp.array(dtype=wp.int32),
-        pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool),
-        force: wp.array3d(dtype=wp.float64), mean_normal: wp.array3d(dtype=wp.float64), curved: int,
+        u: wp.array3d(dtype=wp.float64),
+        surface: SurfaceData,
+        members: MemberData,
+        chosen: wp.array(dtype=wp.int32),
+        pressure: wp.array2d(dtype=wp.float64),
+        active: wp.array2d(dtype=wp.bool),
+        force: wp.array3d(dtype=wp.float64),
+        mean_normal: wp.array3d(dtype=wp.float64),
+        curved: int,
         turn: wp.array4d(dtype=wp.float32),
     ):
         """Add the normal forces of one face to its nodes, and its share to the mean normals, for a chosen member.
@@ -283,10 +313,18 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
 
 @wp.kernel(enable_backward=False)
 def friction(
-    place: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, history: HistoryData,
-    pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool), normals: wp.array3d(dtype=wp.float64),
-    friction_tangent: wp.array(dtype=wp.float64), local: wp.array3d(dtype=wp.float64),
-    shear: wp.array3d(dtype=wp.float64), force: wp.array3d(dtype=wp.float64), stiffness: wp.array3d(dtype=wp.float64),
+    place: wp.array3d(dtype=wp.float64),
+    surface: SurfaceData,
+    members: MemberData,
+    history: HistoryData,
+    pressure: wp.array2d(dtype=wp.float64),
+    active: wp.array2d(dtype=wp.bool),
+    normals: wp.array3d(dtype=wp.float64),
+    friction_tangent: wp.array(dtype=wp.float64),
+    local: wp.array3d(dtype=wp.float64),
+    shear: wp.array3d(dtype=wp.float64),
+    force: wp.array3d(dtype=wp.float64),
+    stiffness: wp.array3d(dtype=wp.float64),
 ):
     """Coulomb friction of one hat.
 
@@ -355,8 +393,12 @@ def turn_kernel(real: type) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def turned(
-        p: wp.array3d(dtype=real), faces: wp.array2d(dtype=wp.int32), slots: wp.array2d(dtype=wp.int32),
-        shapes: wp.array2d(dtype=real), active: wp.array2d(dtype=wp.bool), turn: wp.array4d(dtype=wp.float32),
+        p: wp.array3d(dtype=real),
+        faces: wp.array2d(dtype=wp.int32),
+        slots: wp.array2d(dtype=wp.int32),
+        shapes: wp.array2d(dtype=real),
+        active: wp.array2d(dtype=wp.bool),
+        turn: wp.array4d(dtype=wp.float32),
         result: wp.array3d(dtype=real),
     ):
         """Take the turn of normal forces times nodal displacements ``p`` off the nodes; one face."""
@@ -378,8 +420,7 @@ def turn_kernel(real: type) -> wp.Kernel:
             xx, yy, zz = real(turn[f, k, 0, b]), real(turn[f, k, 1, b]), real(turn[f, k, 2, b])
             xy, yz, xz = real(turn[f, k, 3, b]), real(turn[f, k, 4, b]), real(turn[f, k, 5, b])
             r = vec3(
-                xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2],
-                xz * v[0] + yz * v[1] + zz * v[2],
+                xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2], xz * v[0] + yz * v[1] + zz * v[2]
             )
             for a in range(6):
                 for i in range(3):

@@ -24,8 +24,12 @@ def _product(real: type) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def product(
-        start: wp.array(dtype=wp.int32), column: wp.array(dtype=wp.int32), value: wp.array(dtype=real),
-        row: wp.array(dtype=wp.int32), field: wp.array3d(dtype=real), result: wp.array3d(dtype=real),
+        start: wp.array(dtype=wp.int32),
+        column: wp.array(dtype=wp.int32),
+        value: wp.array(dtype=real),
+        row: wp.array(dtype=wp.int32),
+        field: wp.array3d(dtype=real),
+        result: wp.array3d(dtype=real),
     ):
         """Add the matrix times a field: one row and member a thread, so that sums have a fixed order."""
         j, b = wp.tid()
@@ -48,17 +52,18 @@ class _Rows:
     def __init__(self, matrix: sp.csr_matrix, row: np.ndarray, device: str) -> None:
         self._device, self._count = device, len(row)
         self._where = tuple(
-            torch.as_tensor(values.astype(np.int32), device=device)
-            for values in (matrix.indptr, matrix.indices, row)
+            torch.as_tensor(values.astype(np.int32), device=device) for values in (matrix.indptr, matrix.indices, row)
         )
         self._value = {real: torch.as_tensor(matrix.data, device=device).to(real) for real in REAL}
 
     def add(self, field: torch.Tensor, result: torch.Tensor) -> None:
         start, column, row = self._where
         wp.launch(
-            _product(REAL[field.dtype]), dim=(self._count, field.shape[2]),
+            _product(REAL[field.dtype]),
+            dim=(self._count, field.shape[2]),
             inputs=[argument(value) for value in (start, column, self._value[field.dtype], row, field)],
-            outputs=[argument(result)], device=self._device,
+            outputs=[argument(result)],
+            device=self._device,
         )
 
 

@@ -14,14 +14,7 @@ from functools import cache
 
 import warp as wp
 
-from tacdata.skin.contact.kernels import (
-    MemberData,
-    SurfaceData,
-    deformed_point,
-    of_member,
-    parameters_of,
-    rotation_of,
-)
+from tacdata.skin.contact.kernels import MemberData, SurfaceData, deformed_point, of_member, parameters_of, rotation_of
 
 _SAMPLES = wp.constant(16)
 """Points of a ray where the distance is asked for [count]."""
@@ -36,7 +29,10 @@ def passage_kernel(distance: wp.Function) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def passages(
-        u: wp.array3d(dtype=wp.float64), surface: SurfaceData, members: MemberData, chosen: wp.array(dtype=wp.int32),
+        u: wp.array3d(dtype=wp.float64),
+        surface: SurfaceData,
+        members: MemberData,
+        chosen: wp.array(dtype=wp.int32),
         above: wp.array(dtype=wp.int32),
     ):
         """Mark a chosen member one of whose points of one face lies above the shape."""

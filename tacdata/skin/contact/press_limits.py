@@ -24,7 +24,8 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
         raise SolveError(f"depths {request.depths} mm", "one or more depths of 0 mm or more", "correct the press")
     if min(request.depths) < 0 and sensor.contact.adhesion is None:
         raise SolveError(
-            f"a depth of {min(request.depths):g} mm, above a skin that does not stick", "0 mm or more",
+            f"a depth of {min(request.depths):g} mm, above a skin that does not stick",
+            "0 mm or more",
             "correct the press, or state contact/adhesion in the sensor file",
         )
     angles = f"yaw {request.yaw} deg, tilts {request.tilt_x} and {request.tilt_y} deg"
@@ -35,13 +36,15 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
     if abs(request.x) > skin.size_x / 2 or abs(request.y) > skin.size_y / 2:
         raise SolveError(
             f"press at ({request.x:g}, {request.y:g}) mm, the skin spans {skin.size_x:g} x {skin.size_y:g} mm",
-            "a place on the skin", "move the press",
+            "a place on the skin",
+            "move the press",
         )
     thick = thickness_at(sensor, request)
     if max(request.depths) >= thick:
         raise SolveError(
             f"depth {max(request.depths):g} mm in a skin {thick:.3g} mm thick at ({request.x:g}, {request.y:g}) mm",
-            f"less than {thick:.3g} mm", "reduce the depth",
+            f"less than {thick:.3g} mm",
+            "reduce the depth",
         )
     high = request.indenter.height
     if max(request.depths) > high + 1e-9:
@@ -52,8 +55,10 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
             "reduce the depth, or give a mesh of the shape with its holder",
         )
     half_x, half_y = reach(sensor, request)
-    over = [abs(place) + half - size / 2 for place, half, size in
-            zip((request.x, request.y), (half_x, half_y), (skin.size_x, skin.size_y), strict=True)]
+    over = [
+        abs(place) + half - size / 2
+        for place, half, size in zip((request.x, request.y), (half_x, half_y), (skin.size_x, skin.size_y), strict=True)
+    ]
     if "sides" in sensor.contact.bonded and max(over) > 0 and max(request.depths) > 0:
         raise SolveError(
             f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm, {max(request.depths):g} mm deep, reaches "

@@ -37,9 +37,10 @@ class Bonding:
     def __init__(self, mesh: SkinMesh, fixed: np.ndarray) -> None:
         """Factorize the faces' mass matrix; ``fixed`` marks held nodes, shape (n,), bool."""
         faces = held_faces(mesh, fixed)
-        weights, shapes = (value.numpy() for value in face_quadrature(
-            torch.as_tensor(mesh.nodes), torch.as_tensor(faces.astype(np.int32)), 1
-        ))
+        weights, shapes = (
+            value.numpy()
+            for value in face_quadrature(torch.as_tensor(mesh.nodes), torch.as_tensor(faces.astype(np.int32)), 1)
+        )
         local = np.einsum("fk,ka,kb->fab", weights, shapes, shapes)
         self._nodes, place = np.unique(faces, return_inverse=True)
         place, count = place.reshape(faces.shape), len(self._nodes)

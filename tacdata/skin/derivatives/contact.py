@@ -74,8 +74,15 @@ class ContactPoint(Columns):
 
 
 def contact_change(
-    surface: ContactSurface, u: torch.Tensor, conditions: Conditions, point: ContactPoint, du: torch.Tensor,
-    pressure: torch.Tensor, change: ConditionsChange, history: ContactHistory, whole: bool = True,
+    surface: ContactSurface,
+    u: torch.Tensor,
+    conditions: Conditions,
+    point: ContactPoint,
+    du: torch.Tensor,
+    pressure: torch.Tensor,
+    change: ConditionsChange,
+    history: ContactHistory,
+    whole: bool = True,
 ) -> ContactChange:
     """Return how a contact changes along directions, at fixed status of its nodes.
 
@@ -105,18 +112,30 @@ def contact_change(
     carried = argument(now.pressure), argument(pressure), argument(active)
     force, gap, mean, d_mean = torch.zeros_like(moved), zeros(), zeros(3), zeros(3)
     wp.launch(
-        normal_change_kernel(surface.only), dim=(len(surface.faces), c),
+        normal_change_kernel(surface.only),
+        dim=(len(surface.faces), c),
         inputs=[argument(u), argument(moved), surface.data, members, d_members, *carried, int(whole)],
-        outputs=[argument(value) for value in (gap, force, mean, d_mean)], device=surface.device,
+        outputs=[argument(value) for value in (gap, force, mean, d_mean)],
+        device=surface.device,
     )
     local, shear, rub = zeros(3), zeros(3), zeros(3)
     wp.launch(
-        friction_change, dim=(count, c),
+        friction_change,
+        dim=(count, c),
         inputs=[
-            argument(now.local), argument(surface.mortar.means(moved)), surface.data, members, d_members,
-            history_data(point.history), history_data(history), *carried, argument(mean), argument(d_mean),
+            argument(now.local),
+            argument(surface.mortar.means(moved)),
+            surface.data,
+            members,
+            d_members,
+            history_data(point.history),
+            history_data(history),
+            *carried,
+            argument(mean),
+            argument(d_mean),
         ],
-        outputs=[argument(value) for value in (local, shear, rub)], device=surface.device,
+        outputs=[argument(value) for value in (local, shear, rub)],
+        device=surface.device,
     )
     if surface.rough:
         surface.mortar.spread(rub, force)

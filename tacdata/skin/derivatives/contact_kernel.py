@@ -104,11 +104,19 @@ def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def change(
-        u: wp.array3d(dtype=wp.float64), moved: wp.array3d(dtype=wp.float64), surface: SurfaceData,
-        members: MemberData, d_members: MemberData, pressure: wp.array2d(dtype=wp.float64),
-        d_pressure: wp.array2d(dtype=wp.float64), active: wp.array2d(dtype=wp.bool), whole: int,
-        d_gap: wp.array2d(dtype=wp.float64), d_force: wp.array3d(dtype=wp.float64),
-        mean: wp.array3d(dtype=wp.float64), d_mean: wp.array3d(dtype=wp.float64),
+        u: wp.array3d(dtype=wp.float64),
+        moved: wp.array3d(dtype=wp.float64),
+        surface: SurfaceData,
+        members: MemberData,
+        d_members: MemberData,
+        pressure: wp.array2d(dtype=wp.float64),
+        d_pressure: wp.array2d(dtype=wp.float64),
+        active: wp.array2d(dtype=wp.bool),
+        whole: int,
+        d_gap: wp.array2d(dtype=wp.float64),
+        d_force: wp.array3d(dtype=wp.float64),
+        mean: wp.array3d(dtype=wp.float64),
+        d_mean: wp.array3d(dtype=wp.float64),
     ):
         """Add the changes of one face to its nodes; mean normals and their changes in the shape's frame.
 
@@ -167,11 +175,20 @@ def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
 
 @wp.kernel(enable_backward=False)
 def friction_change(
-    local: wp.array3d(dtype=wp.float64), d_place: wp.array3d(dtype=wp.float64), surface: SurfaceData,
-    members: MemberData, d_members: MemberData, history: HistoryData, d_history: HistoryData,
-    pressure: wp.array2d(dtype=wp.float64), d_pressure: wp.array2d(dtype=wp.float64),
-    active: wp.array2d(dtype=wp.bool), mean: wp.array3d(dtype=wp.float64), d_mean: wp.array3d(dtype=wp.float64),
-    d_local: wp.array3d(dtype=wp.float64), d_shear: wp.array3d(dtype=wp.float64),
+    local: wp.array3d(dtype=wp.float64),
+    d_place: wp.array3d(dtype=wp.float64),
+    surface: SurfaceData,
+    members: MemberData,
+    d_members: MemberData,
+    history: HistoryData,
+    d_history: HistoryData,
+    pressure: wp.array2d(dtype=wp.float64),
+    d_pressure: wp.array2d(dtype=wp.float64),
+    active: wp.array2d(dtype=wp.bool),
+    mean: wp.array3d(dtype=wp.float64),
+    d_mean: wp.array3d(dtype=wp.float64),
+    d_local: wp.array3d(dtype=wp.float64),
+    d_shear: wp.array3d(dtype=wp.float64),
     d_force: wp.array3d(dtype=wp.float64),
 ):
     """Change of one hat's friction.

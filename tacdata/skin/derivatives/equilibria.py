@@ -60,7 +60,10 @@ class _Point:
     """Young's modulus [MPa]."""
 
     def changes(
-        self, du: torch.Tensor, pressures: Sequence[torch.Tensor], history: tuple[ContactHistory, ...],
+        self,
+        du: torch.Tensor,
+        pressures: Sequence[torch.Tensor],
+        history: tuple[ContactHistory, ...],
         whole: bool = True,
     ) -> list[ContactChange]:
         """Return each contact's change along the directions, with displacements, pressures and history.
@@ -86,8 +89,7 @@ class _Point:
         du, parts = self.halves(field.to(torch.float64))
         forces = parts.split([surface.count for surface in self.surfaces])
         pressures = [
-            force * self.modulus / surface.area[:, None]
-            for surface, force in zip(self.surfaces, forces, strict=True)
+            force * self.modulus / surface.area[:, None] for surface, force in zip(self.surfaces, forces, strict=True)
         ]
         return du.reshape(-1, 3, du.shape[1]), pressures
 
@@ -105,7 +107,12 @@ class _Point:
         return torch.cat([force.reshape(-1, force.shape[2]), *gaps])[:, None]
 
     def _change(
-        self, k: int, du: torch.Tensor, pressure: torch.Tensor, along: ConditionsChange, history: ContactHistory,
+        self,
+        k: int,
+        du: torch.Tensor,
+        pressure: torch.Tensor,
+        along: ConditionsChange,
+        history: ContactHistory,
         whole: bool = True,
     ) -> ContactChange:
         at = self.at
@@ -117,7 +124,12 @@ class PathDerivatives:
     """The derivatives on their way along the load path, one column a parameter."""
 
     def __init__(
-        self, newton: Newton, free: torch.Tensor, label: str, tolerance: float = TOLERANCE, slack: Slack | None = None,
+        self,
+        newton: Newton,
+        free: torch.Tensor,
+        label: str,
+        tolerance: float = TOLERANCE,
+        slack: Slack | None = None,
         weight: torch.Tensor | None = None,
     ) -> None:
         """Start.
@@ -232,7 +244,8 @@ class PathDerivatives:
         if not self.error <= self._tolerance:
             raise SolveError(
                 f"{self._label}: derivatives with an error of {self.error:.1e} after {found.products} products",
-                f"at most {self._tolerance:g}", "press less deep, or refine the mesh",
+                f"at most {self._tolerance:g}",
+                "press less deep, or refine the mesh",
             )
         return pressures
 

@@ -18,8 +18,17 @@ from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 
 UNITS = {
-    "x": "mm", "y": "mm", "z": "mm", "yaw": "deg", "tilt_x": "deg", "tilt_y": "deg", "thickness": "mm",
-    "youngs_modulus": "MPa", "poisson_ratio": "1", "friction": "1", "bonding": "mm/MPa",
+    "x": "mm",
+    "y": "mm",
+    "z": "mm",
+    "yaw": "deg",
+    "tilt_x": "deg",
+    "tilt_y": "deg",
+    "thickness": "mm",
+    "youngs_modulus": "MPa",
+    "poisson_ratio": "1",
+    "friction": "1",
+    "bonding": "mm/MPa",
 }
 """Units of the parameters that every press has.
 
@@ -57,12 +66,14 @@ def check(sensor: Sensor, indenter: Indenter, parameters: list[str]) -> None:
     allowed = known(sensor, indenter)
     if unknown := [name for name in parameters if name not in allowed]:
         raise UsageError(
-            f"derivatives by {', '.join(unknown)}", ", ".join(allowed),
+            f"derivatives by {', '.join(unknown)}",
+            ", ".join(allowed),
             "choose among these; the slash is part of the name",
         )
     if "friction" in parameters and not sensor.contact.friction:
         raise UsageError(
-            "derivatives by friction of a sensor without friction", "a positive contact/friction",
+            "derivatives by friction of a sensor without friction",
+            "a positive contact/friction",
             "set contact/friction in the sensor file, or leave the parameter out",
         )
 
@@ -122,9 +133,9 @@ def _turning(name: str, turn: torch.Tensor) -> torch.Tensor:
 
 def _cross(v: torch.Tensor) -> torch.Tensor:
     zero = torch.zeros_like(v[0])
-    return torch.stack([
-        torch.stack([zero, -v[2], v[1]]), torch.stack([v[2], zero, -v[0]]), torch.stack([-v[1], v[0], zero]),
-    ])
+    return torch.stack(
+        [torch.stack([zero, -v[2], v[1]]), torch.stack([v[2], zero, -v[0]]), torch.stack([-v[1], v[0], zero])]
+    )
 
 
 def _by_size(indenter: Indenter, name: str) -> np.ndarray:

@@ -65,10 +65,7 @@ def spreads_of(sensor: Sensor, indenter: Indenter) -> dict[str, float]:
     None of 0, none of sizes that its indenter lacks, and none of a friction of 0, by which there is no derivative.
     """
     has = set(known(sensor, indenter)) - (set() if sensor.contact.friction else {"friction"})
-    return {
-        name: value for name, value in sensor.uncertainty.items()
-        if value > 0 and name in has
-    }
+    return {name: value for name, value in sensor.uncertainty.items() if value > 0 and name in has}
 
 
 def check_spreads(sensor: Sensor, indenter: Indenter) -> None:
@@ -112,7 +109,8 @@ def with_uncertainty(
     passages = coarse.passages if coarse and len(coarse.passages) == len(loading(request).depths) else None
     ways: list[tuple[str, SkinModel, Callable[..., _Found]]] = [
         ("first_order", cheapest, lambda on, press, own: _first_order(on, press, own, passages)),
-        ("first_order", model, _first_order), ("sampled", cheapest, _sampled),
+        ("first_order", model, _first_order),
+        ("sampled", cheapest, _sampled),
     ]
     for name, on, way in ways:
         try:
@@ -145,7 +143,8 @@ def _first_order(
             steepest = float(np.abs(sensitivity.surface[sensitivity.parameters.index(name)]).max())
             if steepest > limit:
                 raise SolveError(
-                    f"at {depth:g} mm the map changes by {steepest:.1f} mm a mm of {name}", f"at most {limit:.1f}",
+                    f"at {depth:g} mm the map changes by {steepest:.1f} mm a mm of {name}",
+                    f"at most {limit:.1f}",
                     "sample whole presses",
                 )
         found.append((depth, propagate(sensitivity, spreads)))

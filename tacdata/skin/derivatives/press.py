@@ -53,8 +53,12 @@ class Sensitivity:
 
 
 def sensitivities(
-    model: SkinModel, request: PressRequest, parameters: Sequence[str], tolerance: float = TOLERANCE,
-    passages: Iterable[Passage] | None = None, spreads: Sequence[float] | None = None,
+    model: SkinModel,
+    request: PressRequest,
+    parameters: Sequence[str],
+    tolerance: float = TOLERANCE,
+    passages: Iterable[Passage] | None = None,
+    spreads: Sequence[float] | None = None,
 ) -> Iterator[tuple[float, Equilibrium, Sensitivity]]:
     """Yield the requested states of a press with their derivatives, in the order of its depths.
 
@@ -78,7 +82,8 @@ def sensitivities(
     check(model.sensor, request.indenter, names)
     if model.sensor.contact.adhesion:
         raise SolveError(
-            "derivatives of a press into a skin that sticks", "a sensor file without contact/adhesion",
+            "derivatives of a press into a skin that sticks",
+            "a sensor file without contact/adhesion",
             "sample whole presses (tacdata.skin.derivatives.uncertainty.sampled_spread)",
         )
     skin = model.skin
@@ -142,9 +147,13 @@ class _Reader:
         """Return the derivatives of one state."""
         taxel_force = self._taxel_force(derivatives)
         return Sensitivity(
-            tuple(self._names), self._units, self._map(state, derivatives.du, along.conditions.thickness),
-            -derivatives.changes[0].force.sum(dim=0).T.cpu().numpy(), taxel_force,
-            self._model.skin.reader.closure(derivatives.du).T.cpu().numpy(), self._area(state, taxel_force),
+            tuple(self._names),
+            self._units,
+            self._map(state, derivatives.du, along.conditions.thickness),
+            -derivatives.changes[0].force.sum(dim=0).T.cpu().numpy(),
+            taxel_force,
+            self._model.skin.reader.closure(derivatives.du).T.cpu().numpy(),
+            self._area(state, taxel_force),
             derivatives.error,
         )
 

@@ -26,8 +26,12 @@ class StatePreconditioner:
     """Approximate inverse of the derivative of forces and gaps by displacements and multipliers."""
 
     def __init__(
-        self, rest: RestSolver, surfaces: Sequence[ContactSurface], contacts: Sequence[ContactForces],
-        friction: torch.Tensor, turns: Sequence[torch.Tensor],
+        self,
+        rest: RestSolver,
+        surfaces: Sequence[ContactSurface],
+        contacts: Sequence[ContactForces],
+        friction: torch.Tensor,
+        turns: Sequence[torch.Tensor],
     ) -> None:
         """Factorize.
 

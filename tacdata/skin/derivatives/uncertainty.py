@@ -60,13 +60,14 @@ def propagate(sensitivity: Sensitivity, spreads: Mapping[str, float]) -> Uncerta
     """
     if missing := sorted(set(spreads) - set(sensitivity.parameters)):
         raise UsageError(
-            f"spreads of {', '.join(missing)} without derivatives", ", ".join(sensitivity.parameters),
+            f"spreads of {', '.join(missing)} without derivatives",
+            ", ".join(sensitivity.parameters),
             "ask `sensitivities` for these parameters too",
         )
     sigma = np.array([spreads.get(name, 0.0) for name in sensitivity.parameters])
-    return Uncertainty(*(
-        np.sqrt(np.tensordot(sigma**2, getattr(sensitivity, name) ** 2, axes=1)) for name in QUANTITIES
-    ))
+    return Uncertainty(
+        *(np.sqrt(np.tensordot(sigma**2, getattr(sensitivity, name) ** 2, axes=1)) for name in QUANTITIES)
+    )
 
 
 def uncertainties(
@@ -89,7 +90,11 @@ def uncertainties(
 
 
 def sampled_spread(
-    model: SkinModel, request: PressRequest, spreads: Mapping[str, float], samples: int, seed: int = 0,
+    model: SkinModel,
+    request: PressRequest,
+    spreads: Mapping[str, float],
+    samples: int,
+    seed: int = 0,
     capacity: int = 1,
 ) -> list[tuple[float, Uncertainty]]:
     """Return the standard deviations among whole presses with normally drawn parameters, for every depth.
@@ -140,7 +145,8 @@ def _checked(model: SkinModel, request: PressRequest, spreads: Mapping[str, floa
     spreads = model.sensor.uncertainty if spreads is None else spreads
     if not spreads or not all(0 <= value < np.inf for value in spreads.values()):
         raise UsageError(
-            f"spreads {dict(spreads)}", "a finite standard deviation of at least one parameter, in its unit",
+            f"spreads {dict(spreads)}",
+            "a finite standard deviation of at least one parameter, in its unit",
             "add them as uncertainty to the sensor file, for example thickness: 0.2",
         )
     check(model.sensor, request.indenter, list(spreads))
@@ -170,7 +176,9 @@ def _spread_of(model: SkinModel, states: list[Equilibrium]) -> Uncertainty:
     grid, face = model.sensor.map, model.skin.face
     values = [
         (
-            face.depth_map(grid.x, grid.y, state.displacement, grid.sampling), state.force, state.taxel_force,
+            face.depth_map(grid.x, grid.y, state.displacement, grid.sampling),
+            state.force,
+            state.taxel_force,
             state.taxel_closure,
         )
         for state in states

@@ -47,9 +47,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
         return value
 
     @wp.kernel(module="unique", enable_backward=False)
-    def dilatation(
-        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, sums: wp.array2d(dtype=real),
-    ):
+    def dilatation(u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, sums: wp.array2d(dtype=real)):
         """Volume change of one element, weighted by its corners' shape functions."""
         e, b = wp.tid()
         values, s = gather(u, mesh, e, b), stretch(mesh, own, e, b)
@@ -64,7 +62,10 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def dilatation_change(
-        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
+        u: wp.array3d(dtype=real),
+        p: wp.array3d(dtype=real),
+        mesh: ElementData,
+        own: ConstantData,
         sums: wp.array2d(dtype=real),
     ):
         """The same for the change of volume change along ``p``."""
@@ -81,8 +82,12 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def force(
-        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
-        average: wp.array2d(dtype=real), smallest: wp.array(dtype=real), total: wp.array3d(dtype=real),
+        u: wp.array3d(dtype=real),
+        mesh: ElementData,
+        own: ConstantData,
+        average: wp.array2d(dtype=real),
+        smallest: wp.array(dtype=real),
+        total: wp.array3d(dtype=real),
     ):
         """Nodal forces of one element, and the smallest det F."""
         e, b = wp.tid()
@@ -104,8 +109,13 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def product(
-        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
-        average: wp.array2d(dtype=real), change: wp.array2d(dtype=real), total: wp.array3d(dtype=real),
+        u: wp.array3d(dtype=real),
+        p: wp.array3d(dtype=real),
+        mesh: ElementData,
+        own: ConstantData,
+        average: wp.array2d(dtype=real),
+        change: wp.array2d(dtype=real),
+        total: wp.array3d(dtype=real),
     ):
         """Tangent stiffness of one element times nodal displacements ``p``.
 
@@ -137,8 +147,11 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def energy(
-        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
-        average: wp.array2d(dtype=real), total: wp.array(dtype=real),
+        u: wp.array3d(dtype=real),
+        mesh: ElementData,
+        own: ConstantData,
+        average: wp.array2d(dtype=real),
+        total: wp.array(dtype=real),
     ):
         """Strain energy of one element."""
         e, b = wp.tid()

@@ -34,9 +34,14 @@ CORRECTIONS = 3
 def _mass_kernel(real: type) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def correct(
-        first: wp.array(dtype=wp.int32), neighbour: wp.array(dtype=wp.int32), mass: wp.array2d(dtype=real),
-        lumped: wp.array2d(dtype=real), thickness: wp.array(dtype=real), sums: wp.array2d(dtype=real),
-        before: wp.array2d(dtype=real), after: wp.array2d(dtype=real),
+        first: wp.array(dtype=wp.int32),
+        neighbour: wp.array(dtype=wp.int32),
+        mass: wp.array2d(dtype=real),
+        lumped: wp.array2d(dtype=real),
+        thickness: wp.array(dtype=real),
+        sums: wp.array2d(dtype=real),
+        before: wp.array2d(dtype=real),
+        after: wp.array2d(dtype=real),
     ):
         # after = before + D^-1 (sums - M before); with before = 0 it is the lumped average.
         a, b = wp.tid()
@@ -78,9 +83,7 @@ class AveragedVolume:
             wp.array(a.astype(np.int32), dtype=wp.int32, device=device) for a in (pattern.indptr, pattern.indices)
         ]
         self.mass = {
-            dtype: [
-                wp.array(np.ascontiguousarray(a), dtype=real, device=device) for a in (np.stack(values), lumped)
-            ]
+            dtype: [wp.array(np.ascontiguousarray(a), dtype=real, device=device) for a in (np.stack(values), lumped)]
             for dtype, real in REAL.items()
         }
 
@@ -121,9 +124,11 @@ class AveragedVolume:
         for _ in range(CORRECTIONS + 1):
             after = torch.empty_like(sums)
             wp.launch(
-                _mass_kernel(REAL[sums.dtype]), dim=tuple(sums.shape),
+                _mass_kernel(REAL[sums.dtype]),
+                dim=tuple(sums.shape),
                 inputs=[*self.pattern, *self.mass[sums.dtype], *map(argument, (own.thickness, sums, average))],
-                outputs=[argument(after)], device=self._device,
+                outputs=[argument(after)],
+                device=self._device,
             )
             average = after
         return average
@@ -134,8 +139,10 @@ class AveragedVolume:
         real = REAL[dtype]
         constants = filled(constant_data(real), law=own.law, modulus=own.modulus, thickness=own.thickness)
         wp.launch(
-            getattr(averaged_kernels(self.law, real), name), dim=(self.elements, fields[0].shape[2]),
-            inputs=[*map(argument, fields), self.data[dtype], constants, *map(argument, rest)], device=self._device,
+            getattr(averaged_kernels(self.law, real), name),
+            dim=(self.elements, fields[0].shape[2]),
+            inputs=[*map(argument, fields), self.data[dtype], constants, *map(argument, rest)],
+            device=self._device,
         )
 
 

@@ -35,7 +35,10 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def internal_force(
-        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, force: wp.array3d(dtype=real),
+        u: wp.array3d(dtype=real),
+        mesh: ElementData,
+        own: ConstantData,
+        force: wp.array3d(dtype=real),
         smallest_volume_ratio: wp.array(dtype=real),
     ):
         """Nodal forces of one element, and the smallest det F."""
@@ -56,7 +59,10 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def tangent_product(
-        u: wp.array3d(dtype=real), p: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData,
+        u: wp.array3d(dtype=real),
+        p: wp.array3d(dtype=real),
+        mesh: ElementData,
+        own: ConstantData,
         product: wp.array3d(dtype=real),
     ):
         """Tangent stiffness of one element times nodal displacements ``p``."""
@@ -74,9 +80,7 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
         add(result, mesh, e, b, product)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def energy(
-        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, total: wp.array(dtype=real),
-    ):
+    def energy(u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, total: wp.array(dtype=real)):
         """Strain energy of one element."""
         e, b = wp.tid()
         values, c = gather(u, mesh, e, b), constants(own, b)
@@ -131,7 +135,11 @@ class Elasticity:
         return PreparedTangent(self._averaged) if self._averaged and self.device == "cpu" else None
 
     def tangent_product(
-        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, product: torch.Tensor,
+        self,
+        u: torch.Tensor,
+        p: torch.Tensor,
+        conditions: Conditions,
+        product: torch.Tensor,
         dilatation: torch.Tensor | None = None,
     ) -> None:
         """Add K(u) p [N] to ``product``; all of shape (n, 3, b) and of one precision.
@@ -154,16 +162,16 @@ class Elasticity:
             self._launch("energy", (u,), conditions, total)
         return total
 
-    def _launch(
-        self, name: str, fields: tuple[torch.Tensor, ...], conditions: Conditions, *out: torch.Tensor
-    ) -> None:
+    def _launch(self, name: str, fields: tuple[torch.Tensor, ...], conditions: Conditions, *out: torch.Tensor) -> None:
         real = REAL[fields[0].dtype]
         own = conditions.to(fields[0].dtype)
         constants = filled(constant_data(real), law=own.law, modulus=own.modulus, thickness=own.thickness)
         wp.launch(
-            getattr(_kernels(self.law, real), name), dim=(len(self.mesh.tets), fields[0].shape[2]),
+            getattr(_kernels(self.law, real), name),
+            dim=(len(self.mesh.tets), fields[0].shape[2]),
             inputs=[*map(argument, fields), self._data[fields[0].dtype], constants],
-            outputs=[*map(argument, out)], device=self.device,
+            outputs=[*map(argument, out)],
+            device=self.device,
         )
 
 
@@ -177,8 +185,11 @@ def _data(mesh: SkinMesh, slab: np.ndarray, device: str) -> dict[torch.dtype, An
     slopes, weights = mesh.shape_gradients()
     return {
         dtype: filled(
-            element_data(real), **whole, shapes=wp.array(corner_shapes(), dtype=real, device=device),
-            slopes=wp.array(slopes, dtype=real, device=device), weights=wp.array(weights, dtype=real, device=device),
+            element_data(real),
+            **whole,
+            shapes=wp.array(corner_shapes(), dtype=real, device=device),
+            slopes=wp.array(slopes, dtype=real, device=device),
+            weights=wp.array(weights, dtype=real, device=device),
         )
         for dtype, real in REAL.items()
     }

@@ -39,8 +39,14 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def moduli(
-        u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, average: wp.array2d(dtype=real),
-        lane: wp.array(dtype=wp.int32), moved: real, values: wp.array4d(dtype=real), bulk: wp.array(dtype=real),
+        u: wp.array3d(dtype=real),
+        mesh: ElementData,
+        own: ConstantData,
+        average: wp.array2d(dtype=real),
+        lane: wp.array(dtype=wp.int32),
+        moved: real,
+        values: wp.array4d(dtype=real),
+        bulk: wp.array(dtype=real),
     ):
         """Moduli and cofactors of one element of a member, times the volume of each point.
 
@@ -116,8 +122,11 @@ def product_kernels(real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def swelling(
-        p: wp.array3d(dtype=Lanes), mesh: ElementData, moduli: wp.array4d(dtype=Lanes),
-        block: wp.array(dtype=wp.int32), sums: wp.array2d(dtype=Lanes),
+        p: wp.array3d(dtype=Lanes),
+        mesh: ElementData,
+        moduli: wp.array4d(dtype=Lanes),
+        block: wp.array(dtype=wp.int32),
+        sums: wp.array2d(dtype=Lanes),
     ):
         """Change of one element's volume along ``p``, weighted by its corners' shape functions."""
         e, b = wp.tid()
@@ -132,9 +141,14 @@ def product_kernels(real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def correct(
-        first: wp.array(dtype=wp.int32), neighbour: wp.array(dtype=wp.int32), mass: wp.array2d(dtype=real),
-        lumped: wp.array2d(dtype=real), thickness: wp.array(dtype=Lanes), sums: wp.array2d(dtype=Lanes),
-        before: wp.array2d(dtype=Lanes), after: wp.array2d(dtype=Lanes),
+        first: wp.array(dtype=wp.int32),
+        neighbour: wp.array(dtype=wp.int32),
+        mass: wp.array2d(dtype=real),
+        lumped: wp.array2d(dtype=real),
+        thickness: wp.array(dtype=Lanes),
+        sums: wp.array2d(dtype=Lanes),
+        before: wp.array2d(dtype=Lanes),
+        after: wp.array2d(dtype=Lanes),
     ):
         """A step of Richardson's iteration towards the average, as in `averaged_volume`."""
         a, b = wp.tid()
@@ -151,8 +165,12 @@ def product_kernels(real: type) -> SimpleNamespace:
 
     @wp.kernel(module="unique", enable_backward=False)
     def product(
-        p: wp.array3d(dtype=Lanes), mesh: ElementData, moduli: wp.array4d(dtype=Lanes),
-        block: wp.array(dtype=wp.int32), pressure: wp.array2d(dtype=Lanes), total: wp.array3d(dtype=Lanes),
+        p: wp.array3d(dtype=Lanes),
+        mesh: ElementData,
+        moduli: wp.array4d(dtype=Lanes),
+        block: wp.array(dtype=wp.int32),
+        pressure: wp.array2d(dtype=Lanes),
+        total: wp.array3d(dtype=Lanes),
     ):
         """Moduli of one element times nodal displacements ``p``, and the averaged change of pressure at the corners."""
         e, b = wp.tid()

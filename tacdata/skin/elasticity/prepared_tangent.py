@@ -56,8 +56,17 @@ class PreparedTangent:
         u, own = u.index_select(2, member), own.take(member)
         constants = filled(constant_data(self._real), law=own.law, modulus=own.modulus, thickness=own.thickness)
         self._launch(
-            moduli_kernel(self._body.law, self._real), self._body.elements, u.shape[2], u, self._body.data[self._dtype],
-            constants, self._body.dilatation(u, own), lane.to(torch.int32), _MOVED, self._values, self._bulk,
+            moduli_kernel(self._body.law, self._real),
+            self._body.elements,
+            u.shape[2],
+            u,
+            self._body.data[self._dtype],
+            constants,
+            self._body.dilatation(u, own),
+            lane.to(torch.int32),
+            _MOVED,
+            self._values,
+            self._bulk,
         )
         self._thickness[lane] = own.thickness
 
@@ -93,7 +102,12 @@ class PreparedTangent:
         for _ in range(CORRECTIONS + 1):
             after = torch.empty_like(sums)
             self._launch(
-                kernels.correct, body.corners, count, *body.pattern, *body.mass[self._dtype], thickness,
+                kernels.correct,
+                body.corners,
+                count,
+                *body.pattern,
+                *body.mass[self._dtype],
+                thickness,
                 *map(self._lanes, (sums, average, after)),
             )
             average = after

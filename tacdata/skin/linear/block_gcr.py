@@ -53,7 +53,11 @@ class KrylovSpace:
         self._products = 0
 
     def solve(
-        self, rhs: torch.Tensor, guess: torch.Tensor, tolerance: float, limit: int = 300,
+        self,
+        rhs: torch.Tensor,
+        guess: torch.Tensor,
+        tolerance: float,
+        limit: int = 300,
         weight: torch.Tensor | None = None,
     ) -> GcrSolution:
         """Solve A x = rhs.
@@ -84,7 +88,12 @@ class KrylovSpace:
         return self._product(p)
 
     def _correction(
-        self, x: torch.Tensor, residual: torch.Tensor, size: torch.Tensor, tolerance: float, most: int,
+        self,
+        x: torch.Tensor,
+        residual: torch.Tensor,
+        size: torch.Tensor,
+        tolerance: float,
+        most: int,
         weight: torch.Tensor | None,
     ) -> torch.Tensor:
         """Return the correction of x over ``size`` that brings the error to the tolerance.

@@ -56,9 +56,16 @@ def put_row(rows: RowData, b: int, s: int, first: int, direction: wp.vec3, own: 
 
 @wp.kernel(enable_backward=False)
 def describe(
-    active: wp.array2d(dtype=wp.bool), slot: wp.array2d(dtype=wp.int64), normal: wp.array3d(dtype=wp.float64),
-    friction: wp.array3d(dtype=wp.float64), flat: int, rough: int, base: int, scale: wp.array(dtype=wp.float32),
-    table: wp.array2d(dtype=wp.float32), rows: RowData,
+    active: wp.array2d(dtype=wp.bool),
+    slot: wp.array2d(dtype=wp.int64),
+    normal: wp.array3d(dtype=wp.float64),
+    friction: wp.array3d(dtype=wp.float64),
+    flat: int,
+    rough: int,
+    base: int,
+    scale: wp.array(dtype=wp.float32),
+    table: wp.array2d(dtype=wp.float32),
+    rows: RowData,
 ):
     """Constraints of one contact's active nodes.
 
@@ -101,8 +108,11 @@ def describe(
 
 @wp.kernel(enable_backward=False)
 def assemble(
-    member: wp.array(dtype=wp.int64), rows: RowData, scale: wp.array(dtype=wp.float32),
-    table: wp.array2d(dtype=wp.float32), compliance: wp.array3d(dtype=wp.float32),
+    member: wp.array(dtype=wp.int64),
+    rows: RowData,
+    scale: wp.array(dtype=wp.float32),
+    table: wp.array2d(dtype=wp.float32),
+    compliance: wp.array3d(dtype=wp.float32),
 ):
     """Compliance of the constraints of some members, its lower triangle, bordered by a unit matrix.
 
@@ -130,8 +140,12 @@ def assemble(
 
 @wp.kernel(enable_backward=False)
 def along(
-    moved: wp.array2d(dtype=wp.float32), row_scale: wp.array(dtype=wp.float32), factor: wp.array(dtype=wp.float32),
-    member: wp.array(dtype=wp.int32), rows: RowData, result: wp.array2d(dtype=wp.float32),
+    moved: wp.array2d(dtype=wp.float32),
+    row_scale: wp.array(dtype=wp.float32),
+    factor: wp.array(dtype=wp.float32),
+    member: wp.array(dtype=wp.int32),
+    rows: RowData,
+    result: wp.array2d(dtype=wp.float32),
 ):
     """Displacements along the constraints, of those of all rows, scaled by row and member; shape (b, s)."""
     b, s = wp.tid()
@@ -147,8 +161,12 @@ def along(
 
 @wp.kernel(enable_backward=False)
 def answer(
-    inverse: wp.array3d(dtype=wp.float32), v: wp.array2d(dtype=wp.float32), member: wp.array(dtype=wp.int32),
-    going: wp.array(dtype=wp.int32), rows: RowData, y: wp.array2d(dtype=wp.float32),
+    inverse: wp.array3d(dtype=wp.float32),
+    v: wp.array2d(dtype=wp.float32),
+    member: wp.array(dtype=wp.int32),
+    going: wp.array(dtype=wp.int32),
+    rows: RowData,
+    y: wp.array2d(dtype=wp.float32),
     total: wp.array2d(dtype=wp.float32),
 ):
     """Let y = the inverse compliance times v, and add it to the total; symmetric, so neighbours read neighbours."""
@@ -164,8 +182,11 @@ def answer(
 
 @wp.kernel(enable_backward=False)
 def onto_rows(
-    y: wp.array2d(dtype=wp.float32), member: wp.array(dtype=wp.int32), rows: RowData,
-    hard: wp.array2d(dtype=wp.float32), soft: wp.array2d(dtype=wp.float32),
+    y: wp.array2d(dtype=wp.float32),
+    member: wp.array(dtype=wp.int32),
+    rows: RowData,
+    hard: wp.array2d(dtype=wp.float32),
+    soft: wp.array2d(dtype=wp.float32),
 ):
     """Add forces of constraints to those on all rows: of such that give way to ``soft``, of others to ``hard``."""
     b, s = wp.tid()

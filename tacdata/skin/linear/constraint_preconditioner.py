@@ -78,9 +78,7 @@ class ConstraintPreconditioner:
         if any(self.rows.sizes):
             number, one = which.to(torch.int32), torch.ones_like(scale)
             v, unit = torch.empty_like(y), torch.ones(self.rows.count, device=r.device)
-            self.rows.launch(
-                kernels.along, tuple(v.shape), self.rest.rows(z), unit, one, number, self.rows.data, v
-            )
+            self.rows.launch(kernels.along, tuple(v.shape), self.rest.rows(z), unit, one, number, self.rows.data, v)
             if gaps is not None:
                 v -= self.rows.wanted(gaps)[which]
             y = self.solver.times(v, which)

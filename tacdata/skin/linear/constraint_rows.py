@@ -37,9 +37,7 @@ class _Rows:
         """Number of constraints, shape (b,)."""
         self.scale = torch.zeros(members, device=device)
         """Nominal modulus over the member's, shape (b,)."""
-        self.data = filled(
-            kernels.RowData, first=self.first, direction=self.direction, give=self.give, own=self.own
-        )
+        self.data = filled(kernels.RowData, first=self.first, direction=self.direction, give=self.give, own=self.own)
         """The same, as kernels take it."""
 
     def differ(self, new: _Rows) -> torch.Tensor:
@@ -120,8 +118,16 @@ class ActiveRows:
         for surface, contact, base, slot in zip(self._surfaces, contacts, self._base, self._slots, strict=True):
             flags = int(surface.flat), int(_directions(surface) == 3), base
             self.launch(
-                kernels.describe, tuple(slot.shape), contact.active, slot, contact.normal, contact.friction, *flags,
-                scale, self._table, new.data,
+                kernels.describe,
+                tuple(slot.shape),
+                contact.active,
+                slot,
+                contact.normal,
+                contact.friction,
+                *flags,
+                scale,
+                self._table,
+                new.data,
             )
         if not self.most:
             return []

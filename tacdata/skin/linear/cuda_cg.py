@@ -85,7 +85,12 @@ class CudaConjugateGradients:
         return answer.view_as(r), forces, iteration
 
     def _begin(
-        self, at: Linearization, r: torch.Tensor, gaps: Sequence[torch.Tensor], wanted: torch.Tensor, count: int,
+        self,
+        at: Linearization,
+        r: torch.Tensor,
+        gaps: Sequence[torch.Tensor],
+        wanted: torch.Tensor,
+        count: int,
         tolerance: float,
     ) -> ActiveColumns:
         # Others, whose right-hand side is 0, fill the columns up.
@@ -117,15 +122,35 @@ class CudaConjugateGradients:
         self._tangent.add_product(now.at, now.p.view_as(now.at.u), now.q)
         self._sum(kernels.curve, now, now.p, q, rest.order, now.curvature)
         self._launch(
-            kernels.advance, (rows, now.width), now.x, now.r, now.p, q, now.rho, now.curvature, now.going, now.first,
-            rest.order, rest.scale, now.size, now.h,
+            kernels.advance,
+            (rows, now.width),
+            now.x,
+            now.r,
+            now.p,
+            q,
+            now.rho,
+            now.curvature,
+            now.going,
+            now.first,
+            rest.order,
+            rest.scale,
+            now.size,
+            now.h,
         )
         self._hold(now)
         w = rest.times(now.h)
         self._sum(kernels.measure, now, w, now.r, rest.order, rest.scale, now.factor, now.rho_new)
         self._launch(
-            kernels.judge, now.width, now.rho_new, now.curvature, now.tolerance, now.goal, now.rho, now.beta,
-            now.going, now.first,
+            kernels.judge,
+            now.width,
+            now.rho_new,
+            now.curvature,
+            now.tolerance,
+            now.goal,
+            now.rho,
+            now.beta,
+            now.going,
+            now.first,
         )
         self._turn(now, w)
 
@@ -139,7 +164,14 @@ class CudaConjugateGradients:
         if wanted is not None:
             now.v.sub_(wanted)
         rows.launch(
-            constraint_kernels.answer, shape, self._solver.inverse, now.v, now.row, now.going, rows.data, now.y,
+            constraint_kernels.answer,
+            shape,
+            self._solver.inverse,
+            now.v,
+            now.row,
+            now.going,
+            rows.data,
+            now.y,
             now.total,
         )
         now.hard.zero_()
@@ -147,8 +179,19 @@ class CudaConjugateGradients:
         rows.launch(constraint_kernels.onto_rows, shape, now.y, now.row, rows.data, now.hard, now.soft)
         up = rest.spreads
         self._launch(
-            kernels.spread, (len(up.row), now.width), up.start, up.column, up.value, up.row, now.hard, now.soft,
-            rest.order, rest.scale, now.size, now.r, now.h,
+            kernels.spread,
+            (len(up.row), now.width),
+            up.start,
+            up.column,
+            up.value,
+            up.row,
+            now.hard,
+            now.soft,
+            rest.order,
+            rest.scale,
+            now.size,
+            now.r,
+            now.h,
         )
 
     def _turn(self, now: ActiveColumns, w: torch.Tensor) -> None:

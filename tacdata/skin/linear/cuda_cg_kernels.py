@@ -21,8 +21,11 @@ def halved(value: wp.float32):
 
 @wp.kernel(enable_backward=False)
 def load(
-    r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
-    size: wp.array(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
+    r: wp.array2d(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32),
+    size: wp.array(dtype=wp.float32),
+    h: wp.array2d(dtype=wp.float16),
 ):
     """H = the residual, scaled, on the rows of the inverse."""
     k, b = wp.tid()
@@ -31,7 +34,9 @@ def load(
 
 @wp.kernel(enable_backward=False)
 def reach(
-    r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
+    r: wp.array2d(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32),
     largest: wp.array(dtype=wp.float32),
 ):
     """Largest = the largest magnitude of the residual, scaled."""
@@ -44,10 +49,17 @@ def reach(
 
 @wp.kernel(enable_backward=False)
 def spread(
-    start: wp.array(dtype=wp.int32), column: wp.array(dtype=wp.int32), value: wp.array(dtype=wp.float32),
-    row: wp.array(dtype=wp.int32), hard: wp.array2d(dtype=wp.float32), soft: wp.array2d(dtype=wp.float32),
-    order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32),
-    r: wp.array2d(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
+    start: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=wp.float32),
+    row: wp.array(dtype=wp.int32),
+    hard: wp.array2d(dtype=wp.float32),
+    soft: wp.array2d(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32),
+    size: wp.array(dtype=wp.float32),
+    r: wp.array2d(dtype=wp.float32),
+    h: wp.array2d(dtype=wp.float16),
 ):
     """Take the constraints' forces off the residual.
 
@@ -67,7 +79,9 @@ def spread(
 
 @wp.kernel(enable_backward=False)
 def curve(
-    p: wp.array2d(dtype=wp.float32), q: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32),
+    p: wp.array2d(dtype=wp.float32),
+    q: wp.array2d(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
     curvature: wp.array(dtype=wp.float32),
 ):
     """Curvature += p q."""
@@ -80,10 +94,18 @@ def curve(
 
 @wp.kernel(enable_backward=False)
 def advance(
-    x: wp.array2d(dtype=wp.float32), r: wp.array2d(dtype=wp.float32), p: wp.array2d(dtype=wp.float32),
-    q: wp.array2d(dtype=wp.float32), rho: wp.array(dtype=wp.float32), curvature: wp.array(dtype=wp.float32),
-    going: wp.array(dtype=wp.int32), first: wp.array(dtype=wp.int32), order: wp.array(dtype=wp.int32),
-    scale: wp.array(dtype=wp.float32), size: wp.array(dtype=wp.float32), h: wp.array2d(dtype=wp.float16),
+    x: wp.array2d(dtype=wp.float32),
+    r: wp.array2d(dtype=wp.float32),
+    p: wp.array2d(dtype=wp.float32),
+    q: wp.array2d(dtype=wp.float32),
+    rho: wp.array(dtype=wp.float32),
+    curvature: wp.array(dtype=wp.float32),
+    going: wp.array(dtype=wp.int32),
+    first: wp.array(dtype=wp.int32),
+    order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32),
+    size: wp.array(dtype=wp.float32),
+    h: wp.array2d(dtype=wp.float16),
 ):
     """Let x += alpha p, r -= alpha q, h = r scaled; at first x = p, as that one keeps the constraints."""
     k, b = wp.tid()
@@ -102,8 +124,12 @@ def advance(
 
 @wp.kernel(enable_backward=False)
 def measure(
-    w: wp.array2d(dtype=wp.float32), r: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32),
-    scale: wp.array(dtype=wp.float32), factor: wp.array(dtype=wp.float32), rho: wp.array(dtype=wp.float32),
+    w: wp.array2d(dtype=wp.float32),
+    r: wp.array2d(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32),
+    factor: wp.array(dtype=wp.float32),
+    rho: wp.array(dtype=wp.float32),
 ):
     """Rho += r z, with z = w scaled back."""
     strip, b = wp.tid()
@@ -115,9 +141,14 @@ def measure(
 
 @wp.kernel(enable_backward=False)
 def judge(
-    rho_new: wp.array(dtype=wp.float32), curvature: wp.array(dtype=wp.float32), tolerance: wp.array(dtype=wp.float32),
-    goal: wp.array(dtype=wp.float32), rho: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32),
-    going: wp.array(dtype=wp.int32), first: wp.array(dtype=wp.int32),
+    rho_new: wp.array(dtype=wp.float32),
+    curvature: wp.array(dtype=wp.float32),
+    tolerance: wp.array(dtype=wp.float32),
+    goal: wp.array(dtype=wp.float32),
+    rho: wp.array(dtype=wp.float32),
+    beta: wp.array(dtype=wp.float32),
+    going: wp.array(dtype=wp.int32),
+    first: wp.array(dtype=wp.int32),
 ):
     """Stop members that are done; leave nothing in the sums. The first x says what is small."""
     b = wp.tid()
@@ -139,8 +170,12 @@ def judge(
 
 @wp.kernel(enable_backward=False)
 def turn(
-    w: wp.array2d(dtype=wp.float32), order: wp.array(dtype=wp.int32), scale: wp.array(dtype=wp.float32),
-    factor: wp.array(dtype=wp.float32), beta: wp.array(dtype=wp.float32), p: wp.array2d(dtype=wp.float32),
+    w: wp.array2d(dtype=wp.float32),
+    order: wp.array(dtype=wp.int32),
+    scale: wp.array(dtype=wp.float32),
+    factor: wp.array(dtype=wp.float32),
+    beta: wp.array(dtype=wp.float32),
+    p: wp.array2d(dtype=wp.float32),
 ):
     """P = z + beta p."""
     k, b = wp.tid()

@@ -62,7 +62,8 @@ class PardisoFactor:
         if code:
             raise SolveError(
                 f"a stiffness of {self._memory.size} degrees of freedom that PARDISO cannot factorize (error {code})",
-                "a positive definite one", "hold some part of the skin (bonding), and check the mesh and the material",
+                "a positive definite one",
+                "hold some part of the skin (bonding), and check the mesh and the material",
             )
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -77,7 +78,8 @@ class PardisoFactor:
         if code:
             raise SolveError(
                 f"{len(columns)} right-hand sides of {self._memory.size} that PARDISO cannot solve (error {code})",
-                "as many as memory holds", "solve fewer presses at once",
+                "as many as memory holds",
+                "solve fewer presses at once",
             )
         return solution.T
 
@@ -96,16 +98,32 @@ class _Memory:
         self._parameters[list(_PARAMETERS)] = list(_PARAMETERS.values())
 
     def call(
-        self, phase: int, matrix: tuple[np.ndarray | None, ...], rhs: np.ndarray | None = None,
+        self,
+        phase: int,
+        matrix: tuple[np.ndarray | None, ...],
+        rhs: np.ndarray | None = None,
         solution: np.ndarray | None = None,
     ) -> int:
         """Return the library's error code, 0 for none; ``rhs`` and ``solution`` of shape (b, n)."""
         error = ctypes.c_int(0)
         values, starts, columns = map(_at, matrix)
         self._library.pardiso(
-            _at(self._handle), _number(1), _number(1), _number(_POSITIVE_DEFINITE), _number(phase), _number(self.size),
-            values, starts, columns, None, _number(1 if rhs is None else len(rhs)), _at(self._parameters), _number(0),
-            _at(rhs), _at(solution), ctypes.byref(error),
+            _at(self._handle),
+            _number(1),
+            _number(1),
+            _number(_POSITIVE_DEFINITE),
+            _number(phase),
+            _number(self.size),
+            values,
+            starts,
+            columns,
+            None,
+            _number(1 if rhs is None else len(rhs)),
+            _at(self._parameters),
+            _number(0),
+            _at(rhs),
+            _at(solution),
+            ctypes.byref(error),
         )
         return error.value
 

@@ -39,8 +39,13 @@ class Stopping:
 
 
 def projected_conjugate_gradients(
-    product: Product, at: Linearization, preconditioner: ConstraintPreconditioner, rhs: torch.Tensor,
-    gaps: Sequence[torch.Tensor], wanted: torch.Tensor, stopping: Stopping,
+    product: Product,
+    at: Linearization,
+    preconditioner: ConstraintPreconditioner,
+    rhs: torch.Tensor,
+    gaps: Sequence[torch.Tensor],
+    wanted: torch.Tensor,
+    stopping: Stopping,
 ) -> tuple[torch.Tensor, torch.Tensor, int]:
     """Solve for every batch member that is wanted; each stops by itself, and costs nothing from then on.
 

@@ -200,7 +200,8 @@ class DenseRest:
         if need > have:
             raise SolveError(
                 f"a mesh with {len(free)} degrees of freedom, whose inverse takes {need / 2**30:.0f} GiB on {device}",
-                f"at most {have / 2**30:.0f} GiB", "coarsen the mesh, or use device cpu",
+                f"at most {have / 2**30:.0f} GiB",
+                "coarsen the mesh, or use device cpu",
             )
         reduced = stiffness[free][:, free].tocoo()
         place = torch.as_tensor(np.stack([reduced.row, reduced.col]), dtype=torch.int64, device=device)

@@ -80,8 +80,11 @@ def invert_in_place(matrices: torch.Tensor) -> None:
     """Invert symmetric positive definite matrices on a GPU, shape (b, 128, 128), contiguous."""
     kind = (wp.float64, "double") if matrices.dtype == torch.float64 else (wp.float32, "float")
     wp.launch(
-        _kernel(*kind), dim=(len(matrices), _THREADS), inputs=[argument(matrices.view(-1))],
-        device=str(matrices.device), block_dim=_THREADS,
+        _kernel(*kind),
+        dim=(len(matrices), _THREADS),
+        inputs=[argument(matrices.view(-1))],
+        device=str(matrices.device),
+        block_dim=_THREADS,
     )
 
 

@@ -41,7 +41,10 @@ class TangentStiffness:
         self.body, self.surfaces, self._prepared = body, tuple(surfaces), body.prepared()
 
     def at(
-        self, u: torch.Tensor, conditions: Conditions, contacts: Sequence[ContactTangent],
+        self,
+        u: torch.Tensor,
+        conditions: Conditions,
+        contacts: Sequence[ContactTangent],
         wanted: torch.Tensor | None = None,
     ) -> Linearization:
         """Return the state that `add_product` takes.

@@ -55,7 +55,9 @@ def conditions(
     """Return the conditions of one member, in float64."""
     return Conditions(
         _column(load_law(material.law).parameters(material), device),
-        _scalar(material.youngs_modulus, device), _scalar(thickness, device), _scalar(friction, device),
+        _scalar(material.youngs_modulus, device),
+        _scalar(thickness, device),
+        _scalar(friction, device),
         _column(indenter.device_parameters(device) if indenter else (), device),
         _scalar(shape_number(indenter) if indenter else 0.0, device),
     )

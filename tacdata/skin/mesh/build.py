@@ -87,4 +87,3 @@ def make_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
             "choose a smaller element size, or check the skin's sizes against one another",
         )
     return mesh
-

@@ -22,8 +22,12 @@ def coarser(settings: MeshSettings, ratio: float) -> MeshSettings:
     """Return settings whose edge lengths are ``ratio`` [1] times as long."""
     focus = settings.focus and (*settings.focus[:3], ratio * settings.focus[3], *settings.focus[4:])
     return replace(
-        settings, outer=ratio * settings.outer, interior=ratio * settings.interior,
-        protrusion=ratio * settings.protrusion, tip=settings.tip and ratio * settings.tip, focus=focus,
+        settings,
+        outer=ratio * settings.outer,
+        interior=ratio * settings.interior,
+        protrusion=ratio * settings.protrusion,
+        tip=settings.tip and ratio * settings.tip,
+        focus=focus,
     )
 
 

@@ -29,9 +29,7 @@ def tetrahedron_gradients(points: np.ndarray) -> np.ndarray:
     barycentric = np.concatenate([1 - points.sum(axis=1, keepdims=True), points], axis=1)
     slopes = np.concatenate([-np.ones((1, 3)), np.eye(3)])
     corners = (4 * barycentric - 1)[:, :, None] * slopes
-    edges = [
-        4 * (barycentric[:, a, None] * slopes[b] + barycentric[:, b, None] * slopes[a]) for a, b in EDGES
-    ]
+    edges = [4 * (barycentric[:, a, None] * slopes[b] + barycentric[:, b, None] * slopes[a]) for a, b in EDGES]
     return np.concatenate([corners, np.stack(edges, axis=1)], axis=1)
 
 

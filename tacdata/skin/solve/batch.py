@@ -230,8 +230,14 @@ class Batch:
             spent = [self._press(column).path.taken() for column in wanted]
             states = collect(
                 Equilibria(
-                    columns, at.u[:, :, columns], at.poses[0].turn[:, :, columns], relative, penetration, spent,
-                    changed, now.contacts,
+                    columns,
+                    at.u[:, :, columns],
+                    at.poses[0].turn[:, :, columns],
+                    relative,
+                    penetration,
+                    spent,
+                    changed,
+                    now.contacts,
                 )
             )
             for column, state in zip(wanted, states, strict=True):

@@ -34,6 +34,4 @@ class ContactStatus:
         self._before = tuple(status[:, which] for status in self._before)
 
     def _of(self, contacts: Sequence[ContactForces], friction: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return tuple(
-            surface.status(now, friction) for surface, now in zip(self._surfaces, contacts, strict=True)
-        )
+        return tuple(surface.status(now, friction) for surface, now in zip(self._surfaces, contacts, strict=True))

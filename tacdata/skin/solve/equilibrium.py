@@ -107,9 +107,7 @@ class StateReader:
             pressure, hat = found.contacts[1].pressure[:, column], self._board.area[:, None]
             load.index_add_(0, self._taxel, pressure * hat)
             area.index_add_(0, self._taxel, (pressure > 0) * hat)
-        force, load, area, closure = (
-            value.T.cpu().numpy() for value in (force, load, area, self.closure(found.u))
-        )
+        force, load, area, closure = (value.T.cpu().numpy() for value in (force, load, area, self.closure(found.u)))
         u = traction = [np.empty((0, 3))] * len(column)
         board = [np.empty(0)] * len(column)
         if with_displacement:
@@ -118,8 +116,17 @@ class StateReader:
             u, traction = (field.permute(2, 0, 1).cpu().numpy() for field in (found.u, _on_indenter(found)))
         return [
             Equilibrium(
-                u[k], traction[k], board[k], force[k], load[k], closure[k], area[k], float(found.relative[k]),
-                float(found.penetration[k]), found.newton[k], found.changed[k],
+                u[k],
+                traction[k],
+                board[k],
+                force[k],
+                load[k],
+                closure[k],
+                area[k],
+                float(found.relative[k]),
+                float(found.penetration[k]),
+                found.newton[k],
+                found.changed[k],
             )
             for k in range(len(column))
         ]

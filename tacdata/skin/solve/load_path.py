@@ -59,9 +59,7 @@ class LoadPath:
         self.attempt = self.depths[self._wanted] if step == way else self.depth + step
         self.newton, self._best, self._best_at = 0, math.inf, 0
 
-    def judge(
-        self, error: float, penetration: float, mean: float, volume: float, settings: SolverSettings
-    ) -> str:
+    def judge(self, error: float, penetration: float, mean: float, volume: float, settings: SolverSettings) -> str:
         """Say what to do at the present iterate: "found", "failed" or "go on".
 
         Args:
@@ -74,7 +72,8 @@ class LoadPath:
         deep = max(self.attempt, _SHALLOW)
         # What is farthest from what is allowed says how near the solution is, from the first step on.
         shares = (
-            error / settings.residual, penetration / (settings.penetration * deep),
+            error / settings.residual,
+            penetration / (settings.penetration * deep),
             mean / (settings.mean_penetration * deep),
         )
         off = max(shares) if all(map(math.isfinite, shares)) else math.inf

@@ -48,9 +48,9 @@ class LoadingStates:
             self._values = torch.cat([self._values, torch.zeros_like(self._values)])
         self._depth[row, column] = depth[column]
         taken = state.take(column)
-        flat = torch.cat([field.reshape(size, -1) for field, size in zip(
-            (taken.u, *taken.multipliers), self._sizes, strict=True
-        )])
+        flat = torch.cat(
+            [field.reshape(size, -1) for field, size in zip((taken.u, *taken.multipliers), self._sizes, strict=True)]
+        )
         self._values[row, :, column] = flat.T.to(torch.float32)
         self._count[column] += 1
 

@@ -51,9 +51,7 @@ def nodal(coarse: SkinMesh, fine: SkinMesh) -> sp.csr_matrix:
     return _matrix(np.concatenate([corners, np.stack(edges, axis=1)], axis=1), coarse.tets[element], len(coarse.nodes))
 
 
-def tractions(
-    coarse: np.ndarray, coarse_nodes: np.ndarray, fine: np.ndarray, fine_nodes: np.ndarray
-) -> sp.csr_matrix:
+def tractions(coarse: np.ndarray, coarse_nodes: np.ndarray, fine: np.ndarray, fine_nodes: np.ndarray) -> sp.csr_matrix:
     """Return the matrix from tractions at the contact nodes of coarse faces to the same of fine ones, shape (s, r).
 
     Contact nodes are those of the faces in ascending order. Tractions are linear on the four sub-triangles of a face.

@@ -112,8 +112,11 @@ class MeshedSkin:
         """Return a press as a batch takes it: its load path, its indenter at depth 0, its conditions."""
         adhesion = self.sensor.contact.adhesion
         path = LoadPath(
-            request.depths, self.settings.step, f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
-            _FIRST * request.indenter.sharpest, _LIFT * adhesion.range if adhesion else _BACK * self.settings.step,
+            request.depths,
+            self.settings.step,
+            f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm",
+            _FIRST * request.indenter.sharpest,
+            _LIFT * adhesion.range if adhesion else _BACK * self.settings.step,
         )
         origin, own = touch(self.sensor, self.face, request), self.conditions.pressed_by(request.indenter)
         return PlacedPress(number, path, origin, rotation(request), own)

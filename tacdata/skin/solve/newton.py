@@ -66,8 +66,12 @@ class Newton:
     """Residual and Newton step of one body and its contacts."""
 
     def __init__(
-        self, body: Elasticity, surfaces: Sequence[ContactSurface], fixed: torch.Tensor,
-        preconditioner: ConstraintPreconditioner, settings: SolverSettings,
+        self,
+        body: Elasticity,
+        surfaces: Sequence[ContactSurface],
+        fixed: torch.Tensor,
+        preconditioner: ConstraintPreconditioner,
+        settings: SolverSettings,
     ) -> None:
         """Bind the parts; ``fixed`` marks held nodes, shape (n,), bool."""
         self.body, self.surfaces, self.preconditioner, self.settings = body, tuple(surfaces), preconditioner, settings
@@ -95,9 +99,7 @@ class Newton:
     def add_contact_forces(self, at: Configuration, total: torch.Tensor) -> tuple[ContactForces, ...]:
         """Add the contacts' nodal forces on the skin [N] to ``total``, shape (n, 3, b); return them by contact."""
         return tuple(
-            surface.add_forces(
-                at.u, multiplier, pose, history, at.conditions, at.friction_tangent, at.near, total
-            )
+            surface.add_forces(at.u, multiplier, pose, history, at.conditions, at.friction_tangent, at.near, total)
             for surface, multiplier, pose, history in zip(
                 self.surfaces, at.multipliers, at.poses, at.histories, strict=True
             )
@@ -151,9 +153,7 @@ class Newton:
             )
         # What is not active ends at 0.
         changes = tuple(
-            torch.where(
-                wanted, own.pressure - multiplier - force * size / surface.area[:, None], 0.0
-            )
+            torch.where(wanted, own.pressure - multiplier - force * size / surface.area[:, None], 0.0)
             for surface, own, multiplier, force in zip(
                 self.surfaces, now.contacts, at.multipliers, self.preconditioner.forces(y), strict=True
             )

@@ -111,7 +111,8 @@ class DepthRaster:
     def _scan(self, u: torch.Tensor, height: torch.Tensor, touching: torch.Tensor, share: torch.Tensor) -> None:
         fields = [wp.from_torch(field) for field in (height, touching, share)]
         wp.launch(
-            highest, dim=(len(self._faces), u.shape[2]),
+            highest,
+            dim=(len(self._faces), u.shape[2]),
             inputs=[self._nodes, self._faces, wp.from_torch(u.detach()), self._x, self._y, *fields],
             device=self._device,
         )
@@ -127,7 +128,8 @@ def _spread(centers: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return ``points`` in [-1, 1] placed within each of evenly spaced pixels [mm]."""
     if len(centers) < 2 or np.ptp(np.diff(centers)) > 1e-9:
         raise UsageError(
-            f"{len(centers)} pixel centres that are not evenly spaced", "two or more at one pitch for area means",
+            f"{len(centers)} pixel centres that are not evenly spaced",
+            "two or more at one pitch for area means",
             "take sampling: point, or an even grid",
         )
     pitch = float(centers[1] - centers[0])

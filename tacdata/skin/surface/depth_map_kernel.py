@@ -31,12 +31,8 @@ def _flat(a: wp.vec3d):
 
 
 @wp.func
-def _position(
-    nodes: wp.array(dtype=wp.vec3d), u: wp.array3d(dtype=Any), node: wp.int32, state: wp.int32
-):
-    moved = wp.vec3d(
-        wp.float64(u[node, 0, state]), wp.float64(u[node, 1, state]), wp.float64(u[node, 2, state])
-    )
+def _position(nodes: wp.array(dtype=wp.vec3d), u: wp.array3d(dtype=Any), node: wp.int32, state: wp.int32):
+    moved = wp.vec3d(wp.float64(u[node, 0, state]), wp.float64(u[node, 1, state]), wp.float64(u[node, 2, state]))
     return nodes[node] + moved
 
 
@@ -55,9 +51,7 @@ def _first_at_least(values: wp.array(dtype=wp.float64), bound: wp.float64):
 
 
 @wp.func
-def _jacobian(
-    b: wp.vec2d, c: wp.vec2d, d: wp.vec2d, e: wp.vec2d, f: wp.vec2d, xi: wp.float64, eta: wp.float64
-):
+def _jacobian(b: wp.vec2d, c: wp.vec2d, d: wp.vec2d, e: wp.vec2d, f: wp.vec2d, xi: wp.float64, eta: wp.float64):
     two = wp.float64(2.0)
     return _cross(b + two * xi * d + eta * e, c + xi * e + two * eta * f)
 
@@ -107,15 +101,20 @@ def _center(k: wp.int32):
             row = row + 1
     turned = place % 2
     third = wp.float64(1.0 / 12.0)
-    return wp.vec2d(
-        wp.float64(3 * (place // 2) + 1 + turned) * third, wp.float64(3 * row + 1 + turned) * third
-    )
+    return wp.vec2d(wp.float64(3 * (place // 2) + 1 + turned) * third, wp.float64(3 * row + 1 + turned) * third)
 
 
 @wp.func
 def _above(
-    target: wp.vec2d, p: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, e: wp.vec3d, f: wp.vec3d,
-    inverse: wp.mat22d, mild: bool,
+    target: wp.vec2d,
+    p: wp.vec3d,
+    b: wp.vec3d,
+    c: wp.vec3d,
+    d: wp.vec3d,
+    e: wp.vec3d,
+    f: wp.vec3d,
+    inverse: wp.mat22d,
+    mild: bool,
 ):
     """Greatest height of one triangle above a sample, or NOTHING, after the (xi, eta) where it has it."""
     a2, b2, c2, d2, e2, f2 = _flat(p), _flat(b), _flat(c), _flat(d), _flat(e), _flat(f)
@@ -162,9 +161,14 @@ def _of_touching(marks: wp.array2d(dtype=wp.float64), faces: wp.array2d(dtype=wp
 
 @wp.kernel(module="unique", enable_backward=False)
 def highest(
-    nodes: wp.array(dtype=wp.vec3d), faces: wp.array2d(dtype=wp.int32), u: wp.array3d(dtype=Any),
-    xs: wp.array(dtype=wp.float64), ys: wp.array(dtype=wp.float64), height: wp.array3d(dtype=wp.float64),
-    touching: wp.array2d(dtype=wp.float64), share: wp.array3d(dtype=wp.float64),
+    nodes: wp.array(dtype=wp.vec3d),
+    faces: wp.array2d(dtype=wp.int32),
+    u: wp.array3d(dtype=Any),
+    xs: wp.array(dtype=wp.float64),
+    ys: wp.array(dtype=wp.float64),
+    height: wp.array3d(dtype=wp.float64),
+    touching: wp.array2d(dtype=wp.float64),
+    share: wp.array3d(dtype=wp.float64),
 ):
     """Raise ``height`` (len(xs), len(ys), b) [mm] to that of the triangles above each sample.
 
@@ -200,8 +204,10 @@ def highest(
     e3 = four * (p0 - p3 + p4 - p5)
     a, b, c, d, e, f = _flat(p0), _flat(b3), _flat(c3), _flat(d3), _flat(e3), _flat(f3)
     # Bezier coefficients of the Jacobian determinant: all of one sign, and it has that sign everywhere.
-    j00, j10, j01 = _jacobian(b, c, d, e, f, zero, zero), _jacobian(b, c, d, e, f, one, zero), _jacobian(
-        b, c, d, e, f, zero, one
+    j00, j10, j01 = (
+        _jacobian(b, c, d, e, f, zero, zero),
+        _jacobian(b, c, d, e, f, one, zero),
+        _jacobian(b, c, d, e, f, zero, one),
     )
     m0 = two * _jacobian(b, c, d, e, f, half, zero) - half * (j00 + j10)
     m1 = two * _jacobian(b, c, d, e, f, half, half) - half * (j10 + j01)

@@ -83,9 +83,15 @@ def _laying_kernel(distance: wp.Function) -> wp.Kernel:
 
     @wp.kernel(module="unique", enable_backward=False)
     def laying(
-        x: wp.array(dtype=wp.float64), y: wp.array(dtype=wp.float64), place: wp.vec3d, turn: wp.mat33d,
-        size: _Parameters, lowest: wp.float64, share: wp.array2d(dtype=wp.float64),
-        around: wp.array2d(dtype=wp.float64), height: wp.array2d(dtype=wp.float64),
+        x: wp.array(dtype=wp.float64),
+        y: wp.array(dtype=wp.float64),
+        place: wp.vec3d,
+        turn: wp.mat33d,
+        size: _Parameters,
+        lowest: wp.float64,
+        share: wp.array2d(dtype=wp.float64),
+        around: wp.array2d(dtype=wp.float64),
+        height: wp.array2d(dtype=wp.float64),
     ):
         """Move heights (len(x), len(y)) onto the shape."""
         i, j = wp.tid()
@@ -150,10 +156,18 @@ class PressedShape:
         device = str(height.device)
         size = _Parameters(*np.pad(np.array(self.indenter.device_parameters(device)), (0, 8))[:8].tolist())
         wp.launch(
-            _laying_kernel(self.indenter.distance_function()), dim=tuple(height.shape),
+            _laying_kernel(self.indenter.distance_function()),
+            dim=tuple(height.shape),
             inputs=[
-                x, y, wp.vec3d(*self.place.tolist()), wp.mat33d(*self.turn.ravel().tolist()), size,
-                self.lowest, wp.from_torch(share.contiguous()), wp.from_torch(around.contiguous()),
+                x,
+                y,
+                wp.vec3d(*self.place.tolist()),
+                wp.mat33d(*self.turn.ravel().tolist()),
+                size,
+                self.lowest,
+                wp.from_torch(share.contiguous()),
+                wp.from_torch(around.contiguous()),
             ],
-            outputs=[wp.from_torch(height)], device=device,
+            outputs=[wp.from_torch(height)],
+            device=device,
         )

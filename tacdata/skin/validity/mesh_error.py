@@ -115,7 +115,6 @@ def estimate(
     taxel = _local(coarse.taxel_force - fine.taxel_force[rows], taxels, max(_STEEP * reach, apart))
     force = _along(coarse, fine.force[rows])
 
-
     def at_all(values: np.ndarray) -> np.ndarray:
         return _by_depth(coarse.depth, values, depths)
 

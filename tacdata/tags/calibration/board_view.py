@@ -53,9 +53,7 @@ def find_markers(image: np.ndarray, dictionary: str) -> Markers:
     return Markers(corners, np.zeros(0, np.int32) if ids is None else np.ravel(ids))
 
 
-def find_board(
-    image: np.ndarray, board: Board, name: str = "", markers: Markers | None = None
-) -> BoardView | None:
+def find_board(image: np.ndarray, board: Board, name: str = "", markers: Markers | None = None) -> BoardView | None:
     """Return a board's corners to a fraction of a pixel, or None if fewer than `LEAST_CORNERS` are seen.
 
     Args:

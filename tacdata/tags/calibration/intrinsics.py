@@ -86,20 +86,30 @@ class Calibration:
         width, height = self.size
         plain = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
         return {
-            "width": width, "height": height, **{key: round(value, 4) for key, value in plain.items()},
+            "width": width,
+            "height": height,
+            **{key: round(value, 4) for key, value in plain.items()},
             "distortion": [round(value, 7) for value in self.distortion.tolist()],
-        }  # fmt: skip
+        }
 
     def document(self, board: Board, source: str, code_version: str, date: str) -> dict[str, Any]:
         """Return the calibration's file (`schemas/camera_calibration.schema.json`)."""
         return {
-            "version": "1.0", "date": date, "code_version": code_version, "source": source, "model": self.model,
+            "version": "1.0",
+            "date": date,
+            "code_version": code_version,
+            "source": source,
+            "model": self.model,
             "intrinsics": self.intrinsics,
             "uncertainty": dict(zip(("fx", "fy", "cx", "cy"), self.spread.round(4).tolist(), strict=True)),
-            "rms": round(self.rms, 4), "held_out_rms": round(self.held_out_rms, 4),
-            "coverage": round(self.coverage, 3), "tilt": round(self.tilt, 1), "board": board.document,
-            "views": [_record(used) for used in self.views], "remarks": list(self.remarks),
-        }  # fmt: skip
+            "rms": round(self.rms, 4),
+            "held_out_rms": round(self.held_out_rms, 4),
+            "coverage": round(self.coverage, 3),
+            "tilt": round(self.tilt, 1),
+            "board": board.document,
+            "views": [_record(used) for used in self.views],
+            "remarks": list(self.remarks),
+        }
 
 
 def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model: str = "auto") -> Calibration:

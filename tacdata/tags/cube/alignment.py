@@ -83,16 +83,23 @@ def align(
         detected = [p for f, p in patches.items() if f in seen]
         found = _step(used, pose, matrix, cube, None if step == 0 else pose.residual) if steps else None
         pose = Alignment(
-            pose.rotation, pose.translation, pose.blur, {f: p.likeness for f, p in patches.items()},
-            _residual(detected, np.zeros(7)), pose.covariance,
-        )  # fmt: skip
+            pose.rotation,
+            pose.translation,
+            pose.blur,
+            {f: p.likeness for f, p in patches.items()},
+            _residual(detected, np.zeros(7)),
+            pose.covariance,
+        )
         if found is None:
             return pose if step == 0 else replace(start, likeness=pose.likeness)
         pose = Alignment(
-            _rotation(found.move[:3]) @ pose.rotation, pose.translation + found.move[3:6],
+            _rotation(found.move[:3]) @ pose.rotation,
+            pose.translation + found.move[3:6],
             float(np.sqrt(np.clip(pose.blur**2 + found.move[6], 0.2**2, 3.0**2))),
-            pose.likeness, _residual(detected, found.move), found.covariance,
-        )  # fmt: skip
+            pose.likeness,
+            _residual(detected, found.move),
+            found.covariance,
+        )
         if step > 0 and found.pixels < SETTLED:
             break
     return replace(pose, covariance=pose.covariance + _grain(pose, seen, cube, matrix))

@@ -147,9 +147,13 @@ def _inset(corners: list[list[float]], depth: float) -> list[tuple[float, float]
 
 
 def slopes_of(
-    slope_x: np.ndarray, slope_y: np.ndarray, arm: np.ndarray, translation: np.ndarray, matrix: np.ndarray,
+    slope_x: np.ndarray,
+    slope_y: np.ndarray,
+    arm: np.ndarray,
+    translation: np.ndarray,
+    matrix: np.ndarray,
     columns: np.ndarray,
-) -> None:  # fmt: skip
+) -> None:
     """Write the derivatives of the rendering by rotation about the cube's centre and translation to six columns.
 
     A point that moves by dx in the image takes its value along: the rendering changes by -slope . dx.

@@ -54,9 +54,11 @@ class Suspect:
         """Return left, top, right, bottom [px] with a margin of ``room`` [px], clipped to the image."""
         extra = int(np.ceil(room))
         return (
-            max(self.low[0] - extra, 0), max(self.low[1] - extra, 0),
-            min(self.high[0] + extra, width), min(self.high[1] + extra, height),
-        )  # fmt: skip
+            max(self.low[0] - extra, 0),
+            max(self.low[1] - extra, 0),
+            min(self.high[0] + extra, width),
+            min(self.high[1] + extra, height),
+        )
 
 
 def suspects(grey: np.ndarray) -> list[Suspect]:

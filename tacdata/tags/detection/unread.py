@@ -10,9 +10,13 @@ import numpy as np
 from tacdata.tags.detection.detector import detect_tags, to_grey
 
 OTHERS = {
-    "25h9": "APRILTAG_25H9", "36h10": "APRILTAG_36H10", "16h5": "APRILTAG_16H5",
-    "ArUco 4x4": "4X4_1000", "ArUco 5x5": "5X5_1000", "ArUco 6x6": "6X6_1000",
-}  # fmt: skip
+    "25h9": "APRILTAG_25H9",
+    "36h10": "APRILTAG_36H10",
+    "16h5": "APRILTAG_16H5",
+    "ArUco 4x4": "4X4_1000",
+    "ArUco 5x5": "5X5_1000",
+    "ArUco 6x6": "6X6_1000",
+}
 """Families that cubes are printed with by mistake, and OpenCV's names for them."""
 SHARE = 0.5
 """Smallest share [1] of the images that must show a tag: small families are read by chance in a single image."""

@@ -35,11 +35,18 @@ class Controller:
     """
 
     def __init__(
-        self, clock: Clock, seed: int = 0, position: tuple[float, float, float] = (-1.0, -1.0, -1.0),
-        homed: bool = True, settings: dict[str, str] | None = None,
-        offset: tuple[float, float, float] = (0.0, 0.0, 0.0), firmware: str = "Grbl", fresh: bool = False,
-        port: VirtualPort | None = None, echo: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        clock: Clock,
+        seed: int = 0,
+        position: tuple[float, float, float] = (-1.0, -1.0, -1.0),
+        homed: bool = True,
+        settings: dict[str, str] | None = None,
+        offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        firmware: str = "Grbl",
+        fresh: bool = False,
+        port: VirtualPort | None = None,
+        echo: bool = False,
+    ) -> None:
         """Switch on a machine at ``position`` [mm, machine]; ``offset`` is its G54 [mm].
 
         ``firmware`` is Grbl or grblHAL; a ``fresh`` one has empty memory. ``port`` is the line to the host, by

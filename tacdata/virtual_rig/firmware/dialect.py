@@ -48,24 +48,48 @@ class Firmware:
 GRBL = Firmware(
     "Grbl 1.1h ['$' for help]",
     ("[VER:1.1h.20190830:virtual]", "[OPT:V,15,128]"),
-    planner_blocks=15, rx_bytes=128, line_bytes=79, dwell_step=0.05, alarm_pause=0.5,
-    answers_in_critical_alarm=False, refuses_after_error=False, prepared=0.045, report_bits={"Bf": 2, "alarm": 0},
-)  # fmt: skip
+    planner_blocks=15,
+    rx_bytes=128,
+    line_bytes=79,
+    dwell_step=0.05,
+    alarm_pause=0.5,
+    answers_in_critical_alarm=False,
+    refuses_after_error=False,
+    prepared=0.045,
+    report_bits={"Bf": 2, "alarm": 0},
+)
 """Grbl 1.1h on an ATmega328p (`config.h`, `protocol.c`, `report.c` of that version)."""
 
 GRBLHAL = Firmware(
     "GrblHAL 1.1f ['$' or '$HELP' for help]",
     (
-        "[VER:1.1f.20250401:]", "[OPT:VNMSL,100,1024,3,0]", "[AXS:3:XYZ]", "[NEWOPT:ENUMS,RT+,REBOOT]",
-        "[FIRMWARE:grblHAL]", "[SIGNALS:HSEP]", "[NVS STORAGE:*EEPROM 2K]", "[DRIVER:virtual]", "[PLUGIN:none v0.1]",
+        "[VER:1.1f.20250401:]",
+        "[OPT:VNMSL,100,1024,3,0]",
+        "[AXS:3:XYZ]",
+        "[NEWOPT:ENUMS,RT+,REBOOT]",
+        "[FIRMWARE:grblHAL]",
+        "[SIGNALS:HSEP]",
+        "[NVS STORAGE:*EEPROM 2K]",
+        "[DRIVER:virtual]",
+        "[PLUGIN:none v0.1]",
         "[PLUGIN:another v0.2]",
     ),
-    planner_blocks=100, rx_bytes=1024, line_bytes=256, dwell_step=0.001, alarm_pause=0.1,
-    answers_in_critical_alarm=True, refuses_after_error=True, prepared=0.09,
-    stop_byte=0x19, names_length=True, asks_only_at_rest=False, scales=True, answers_questions_in_critical_alarm=True,
+    planner_blocks=100,
+    rx_bytes=1024,
+    line_bytes=256,
+    dwell_step=0.001,
+    alarm_pause=0.1,
+    answers_in_critical_alarm=True,
+    refuses_after_error=True,
+    prepared=0.09,
+    stop_byte=0x19,
+    names_length=True,
+    asks_only_at_rest=False,
+    scales=True,
+    answers_questions_in_critical_alarm=True,
     report_bits={"Bf": 2, "FS": 8, "Pn": 16, "WCO": 32, "Ov": 64, "alarm": 1024},
     changed={"$10": "511", "$22": "1", "$481": "0"},
-)  # fmt: skip
+)
 """grblHAL (`report.c`, `protocol.c` of its core)."""
 
 NAMES = {"Grbl": GRBL, "grblHAL": GRBLHAL}

@@ -9,18 +9,33 @@ import numpy as np
 
 AXES = "XYZ"
 GROUPS = {
-    "motion": ("G0", "G1", "G80"), "plane": ("G17", "G18", "G19"), "units": ("G20", "G21"),
-    "distance": ("G90", "G91"), "feed": ("G93", "G94"), "offset": ("G54", "G55", "G56", "G57", "G58", "G59"),
-    "cutter": ("G40",), "length": ("G49", "G43.1"), "path": ("G61",), "once": ("G4", "G53", "G92", "G92.1"),
+    "motion": ("G0", "G1", "G80"),
+    "plane": ("G17", "G18", "G19"),
+    "units": ("G20", "G21"),
+    "distance": ("G90", "G91"),
+    "feed": ("G93", "G94"),
+    "offset": ("G54", "G55", "G56", "G57", "G58", "G59"),
+    "cutter": ("G40",),
+    "length": ("G49", "G43.1"),
+    "path": ("G61",),
+    "once": ("G4", "G53", "G92", "G92.1"),
     "scaling": ("G50", "G51"),
-    "stop": ("M0", "M2", "M30"), "spindle": ("M3", "M4", "M5"), "coolant": ("M7", "M8", "M9"),
-}  # fmt: skip
+    "stop": ("M0", "M2", "M30"),
+    "spindle": ("M3", "M4", "M5"),
+    "coolant": ("M7", "M8", "M9"),
+}
 """Modal group -> the words that the emulator accepts; ``once`` stands for GRBL's non-modal group."""
 GROUP_OF = {word: group for group, words in GROUPS.items() for word in words}
 POWER_ON = {
-    "motion": "G0", "offset": "G54", "plane": "G17", "units": "G21", "distance": "G90", "feed": "G94",
-    "spindle": "M5", "coolant": "M9",
-}  # fmt: skip
+    "motion": "G0",
+    "offset": "G54",
+    "plane": "G17",
+    "units": "G21",
+    "distance": "G90",
+    "feed": "G94",
+    "spindle": "M5",
+    "coolant": "M9",
+}
 """Modal state after a reset, in the order of ``$G``."""
 
 WORD = re.compile(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -142,8 +157,10 @@ def _takes_axes(
     if commands.get("once") == "G92.1":
         state.shift = np.zeros(3)
     if commands.get("once") == "G92":
-        told = [p - o - values[a] * state.unit if a in values else s
-                for a, p, o, s in zip(AXES, position, offset, state.shift, strict=True)]  # fmt: skip
+        told = [
+            p - o - values[a] * state.unit if a in values else s
+            for a, p, o, s in zip(AXES, position, offset, state.shift, strict=True)
+        ]
         state.shift = np.array(told)
     elif commands.get("scaling") == "G51":
         state.scale = np.array([values.get(axis, 1.0) for axis in AXES])

@@ -26,9 +26,15 @@ class Machine:
     """Grbl 1.1's or grblHAL's behaviour in closed form (`protocol.c`); `serve` brings it to the present time."""
 
     def __init__(
-        self, firmware: Firmware, settings: dict[str, str], position: np.ndarray, offset: np.ndarray, homed: bool,
-        rng: np.random.Generator, say: Callable[[int, str], None],
-    ) -> None:  # fmt: skip
+        self,
+        firmware: Firmware,
+        settings: dict[str, str],
+        position: np.ndarray,
+        offset: np.ndarray,
+        homed: bool,
+        rng: np.random.Generator,
+        say: Callable[[int, str], None],
+    ) -> None:
         """Stand still at ``position`` [mm, machine]; ``offset`` is the G54 [mm]; ``say`` gets (time [ns], line)."""
         self.firmware, self.settings, self.offset = firmware, settings, offset
         self.planner = Planner(position, firmware.prepared)
@@ -176,9 +182,17 @@ class Machine:
         offset = self.offset + self.modal.shift + (0.0, 0.0, self.modal.length)
         state, self.whole = self.state(now), False
         return texts.report(
-            self.settings, self.firmware.report_bits, state, believed, self.planner.speed(now), offset, free,
-            self.counters, self.override, "D" if self.door_open else "",
-        )  # fmt: skip
+            self.settings,
+            self.firmware.report_bits,
+            state,
+            believed,
+            self.planner.speed(now),
+            offset,
+            free,
+            self.counters,
+            self.override,
+            "D" if self.door_open else "",
+        )
 
     def reset(self, now: int) -> None:
         """Process 0x18: in motion the motors are cut off and steps are lost.

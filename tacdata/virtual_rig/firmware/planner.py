@@ -212,8 +212,7 @@ class Planner:
         return last.block.start + last.at(self._end_of(last))[0] * last.block.unit
 
     def _cut(self, now_ns: int) -> tuple[float, float]:
-        """Discard the planned motion; return the distance along the first unfinished block [mm] and the speed [mm/s].
-        """
+        """Discard the planned motion; return distance along the first unfinished block [mm] and speed [mm/s]."""
         self.retire(now_ns)
         stretch, moving = self._stretch(now_ns), self.moving(now_ns)
         while self._past and self._starts[-1] >= now_ns:

@@ -10,13 +10,41 @@ import numpy as np
 from tacdata.virtual_rig.firmware.dialect import Firmware
 
 DEFAULTS = {
-    "$0": "10", "$1": "255", "$2": "0", "$3": "0", "$4": "0", "$5": "0", "$6": "0", "$10": "1",
-    "$11": "0.010", "$12": "0.002", "$13": "0", "$20": "1", "$21": "0", "$22": "1", "$23": "0",
-    "$24": "25.000", "$25": "500.000", "$26": "250", "$27": "1.000", "$30": "1000", "$31": "0", "$32": "0",
-    "$100": "400.000", "$101": "400.000", "$102": "400.000", "$110": "1800.000", "$111": "1800.000",
-    "$112": "900.000", "$120": "200.000", "$121": "200.000", "$122": "150.000", "$130": "200.000",
-    "$131": "200.000", "$132": "60.000",
-}  # fmt: skip
+    "$0": "10",
+    "$1": "255",
+    "$2": "0",
+    "$3": "0",
+    "$4": "0",
+    "$5": "0",
+    "$6": "0",
+    "$10": "1",
+    "$11": "0.010",
+    "$12": "0.002",
+    "$13": "0",
+    "$20": "1",
+    "$21": "0",
+    "$22": "1",
+    "$23": "0",
+    "$24": "25.000",
+    "$25": "500.000",
+    "$26": "250",
+    "$27": "1.000",
+    "$30": "1000",
+    "$31": "0",
+    "$32": "0",
+    "$100": "400.000",
+    "$101": "400.000",
+    "$102": "400.000",
+    "$110": "1800.000",
+    "$111": "1800.000",
+    "$112": "900.000",
+    "$120": "200.000",
+    "$121": "200.000",
+    "$122": "150.000",
+    "$130": "200.000",
+    "$131": "200.000",
+    "$132": "60.000",
+}
 """Settings of a small three-axis stage: mm, mm/min, mm/s^2, steps/mm."""
 LOCKED = "[MSG:'$H'|'$X' to unlock]"
 WCO_PERIOD, OV_PERIOD = {True: 30, False: 10}, {True: 20, False: 10}
@@ -34,9 +62,14 @@ def triple(values: np.ndarray, digits: int = 3) -> str:
 
 
 def information(
-    command: str, firmware: Firmware, settings: Mapping[str, str], offset: np.ndarray, startup: list[str],
-    shift: np.ndarray | None = None, length: float = 0.0,
-) -> list[str] | None:  # fmt: skip
+    command: str,
+    firmware: Firmware,
+    settings: Mapping[str, str],
+    offset: np.ndarray,
+    startup: list[str],
+    shift: np.ndarray | None = None,
+    length: float = 0.0,
+) -> list[str] | None:
     """Return the answer to a ``$`` command that asks for information; None for other commands.
 
     ``offset`` [mm], shape (3,), is the G54; ``shift`` [mm], shape (3,), the G92; ``length`` [mm] the tool's.
@@ -66,9 +99,17 @@ class Counters:
 
 
 def report(
-    settings: Mapping[str, str], bits: Mapping[str, int], state: str, machine: np.ndarray, speed: float,
-    offset: np.ndarray, free: tuple[int, int], counters: Counters, override: int, pins: str,
-) -> str:  # fmt: skip
+    settings: Mapping[str, str],
+    bits: Mapping[str, int],
+    state: str,
+    machine: np.ndarray,
+    speed: float,
+    offset: np.ndarray,
+    free: tuple[int, int],
+    counters: Counters,
+    override: int,
+    pins: str,
+) -> str:
     """Return a status report (Grbl's `report_realtime_status`).
 
     Args:

@@ -38,9 +38,11 @@ CELL = 24
 
 
 def render_cube(
-    pose_camera_cube: np.ndarray, intrinsics: dict[str, Any], cube: dict[str, Any],
+    pose_camera_cube: np.ndarray,
+    intrinsics: dict[str, Any],
+    cube: dict[str, Any],
     rng: np.random.Generator | NoiseStretch,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return a grey image, uint8, shape (height, width).
 
     Args:
@@ -55,9 +57,11 @@ def render_cube(
 
 
 def render_scene(
-    cubes: Sequence[tuple[np.ndarray, dict[str, Any]]], intrinsics: dict[str, Any],
-    rng: np.random.Generator | NoiseStretch, look: Look | None = None,
-) -> np.ndarray:  # fmt: skip
+    cubes: Sequence[tuple[np.ndarray, dict[str, Any]]],
+    intrinsics: dict[str, Any],
+    rng: np.random.Generator | NoiseStretch,
+    look: Look | None = None,
+) -> np.ndarray:
     """Return a grey image of several cubes, uint8, shape (height, width).
 
     Args:

@@ -34,10 +34,7 @@ class CubeScene:
     @property
     def document(self) -> dict[str, Any]:
         """The poses as plain data."""
-        return {
-            "pose_machine_camera": self.machine_camera.tolist(),
-            "cube_on_carriage": self.carriage_cube.tolist(),
-        }
+        return {"pose_machine_camera": self.machine_camera.tolist(), "cube_on_carriage": self.carriage_cube.tolist()}
 
 
 def draw_scene(seed: int, over: tuple[float, float, float]) -> CubeScene:

@@ -19,9 +19,14 @@ def whole_lens(intrinsics: dict[str, Any]) -> Lens:
 
 
 def render_sheet(
-    print_of: np.ndarray, width: float, pose: np.ndarray, intrinsics: dict[str, Any], rng: np.random.Generator,
-    look: Look | None = None, lens: Lens | None = None,
-) -> np.ndarray:  # fmt: skip
+    print_of: np.ndarray,
+    width: float,
+    pose: np.ndarray,
+    intrinsics: dict[str, Any],
+    rng: np.random.Generator,
+    look: Look | None = None,
+    lens: Lens | None = None,
+) -> np.ndarray:
     """Return a grey image, uint8, shape (height, width).
 
     Args:

@@ -36,9 +36,10 @@ def hidden_from(words: list[str]) -> dict[str, float]:
             value = 0.0
         if kind not in KINDS or not 0 < value < 10:
             raise UsageError(
-                f"--hide {word}", "; ".join(f"{name}=SIZE, {meaning}" for name, meaning in KINDS.items()),
+                f"--hide {word}",
+                "; ".join(f"{name}=SIZE, {meaning}" for name, meaning in KINDS.items()),
                 "for example --hide play=0.06",
-            )  # fmt: skip
+            )
         found[kind] = value
     return found
 

@@ -126,9 +126,10 @@ def _check_consistency(document: dict[str, Any], origin: str, present: list[str]
     sync = document.get("sync", [] if "framing" in document else "")
     if "framing" in document and not binary:
         raise FormatError(
-            f"{origin}: framing {document['framing']} in an ascii format", "framing of a binary format only",
+            f"{origin}: framing {document['framing']} in an ascii format",
+            "framing of a binary format only",
             "remove framing; lines tell ascii frames apart",
-        )  # fmt: skip
+        )
     if binary != isinstance(sync, list):
         raise FormatError(
             f"{origin}: sync {sync!r} in a {document['encoding']} format",
@@ -141,11 +142,7 @@ def _check_consistency(document: dict[str, Any], origin: str, present: list[str]
             "each field that exists, once",
             "correct order, or describe the missing field",
         )
-    texts = (
-        document.get("separator", ","),
-        document.get("checksum", {}).get("mark", "*"),
-        "" if binary else sync,
-    )
+    texts = (document.get("separator", ","), document.get("checksum", {}).get("mark", "*"), "" if binary else sync)
     if not all(text.isascii() and "\n" not in text for text in texts):
         raise FormatError(f"{origin}: {texts!r}", "plain ASCII without a line break", "correct sync, separator or mark")
     kind = document["channels"]["type"]

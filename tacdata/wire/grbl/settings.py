@@ -19,13 +19,21 @@ AXIS_WORD = re.compile(r"[XYZ]")
 STATE = ("$G", "$#")
 """Query for the modal state alone."""
 UNDONE_BY = {
-    "G51": ("G50", "scaling of the axes"), "G68": ("G69", "rotation of the axes"),
-    "G43": ("G49", "tool length offset"), "G43.1": ("G49", "tool length offset"),
-    "G43.2": ("G49", "tool length offset"), "G92": ("G92.1", "offset of the axes"), "G20": ("G21", "inches"),
-    "G91": ("G90", "relative positions"), "G93": ("G94", "inverse time feed"), "G95": ("G94", "feed per turn"),
-    "G7": ("G8", "x as a diameter"), "M3": ("M5", "spindle on"), "M4": ("M5", "spindle on, backwards"),
+    "G51": ("G50", "scaling of the axes"),
+    "G68": ("G69", "rotation of the axes"),
+    "G43": ("G49", "tool length offset"),
+    "G43.1": ("G49", "tool length offset"),
+    "G43.2": ("G49", "tool length offset"),
+    "G92": ("G92.1", "offset of the axes"),
+    "G20": ("G21", "inches"),
+    "G91": ("G90", "relative positions"),
+    "G93": ("G94", "inverse time feed"),
+    "G95": ("G94", "feed per turn"),
+    "G7": ("G8", "x as a diameter"),
+    "M3": ("M5", "spindle on"),
+    "M4": ("M5", "spindle on, backwards"),
     "M53": ("M53P1", "feed hold switched off"),
-}  # fmt: skip
+}
 """Modal state that changes coordinates or speeds, turns the tip, or lets it go on -> the word that ends it, and its
 description. Every move contains G53, G90, G21 and G94, but grblHAL scales and rotates G53 lines too.
 """

@@ -64,7 +64,7 @@ def stopped_by(number: int | None, line: str) -> Words:
 
 def what_is_wrong(
     report: StatusReport, held: bool, homing: bool, again: bool = False, still: bool = False
-) -> tuple[Words | None, bool]:  # fmt: skip
+) -> tuple[Words | None, bool]:
     """Return what is wrong by a report, or None, and whether that is permanent.
 
     Args:
@@ -88,8 +88,11 @@ def what_is_wrong(
     if state in UNASKED and not ours:
         return UNASKED[state], state in LOST
     if state not in KNOWN and again:
-        return (f"the controller reports the state {report.state!r}, which is not known here", "Idle or Run",
-                f"see its firmware's manual, bring it to Idle, then {AGAIN}"), False  # fmt: skip
+        return (
+            f"the controller reports the state {report.state!r}, which is not known here",
+            "Idle or Run",
+            f"see its firmware's manual, bring it to Idle, then {AGAIN}",
+        ), False
     if report.pendant:
         return PENDANT, False
     if report.scaled:

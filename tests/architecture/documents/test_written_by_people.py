@@ -51,9 +51,19 @@ def test_an_umlaut_of_two_characters_is_the_same_name(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("010", 10), ("1:30", "1:30"), ("1_0", "1_0"), ("0x10", 16), ("0o10", 8), ("2e-1", 0.2), ("-.5", -0.5),
-     ("1.", 1.0), ("+3", 3), ("0b11", "0b11")],
-)  # fmt: skip
+    [
+        ("010", 10),
+        ("1:30", "1:30"),
+        ("1_0", "1_0"),
+        ("0x10", 16),
+        ("0o10", 8),
+        ("2e-1", 0.2),
+        ("-.5", -0.5),
+        ("1.", 1.0),
+        ("+3", 3),
+        ("0b11", "0b11"),
+    ],
+)
 def test_numbers_are_those_of_yaml_1_2(text, value):
     found = documents.parsed(f"a: {text}", "here")["a"]
     assert found == value and type(found) is type(value)
@@ -66,12 +76,20 @@ def test_a_number_that_is_not_finite_is_named(tmp_path, number):
 
 @pytest.mark.parametrize(
     ("data", "words"),
-    [(b"", "is empty"), (" \n", "is empty"), ("[" * 100_000, "nested too deeply"),
-     ("a: " + "[" * 3000, "nested too deeply"),
-     (PLAN.replace("name: p", "name: M\u00fcller").encode("latin-1"), "no text in UTF-8: invalid start byte in line 2"),
-     ("? [1, 2]\n: 3\n", "a list or mapping as a key"), (PLAN.replace("depth: 1.0", "depth: " + "9" * 5000), "digits"),
-     (PLAN + "---\n" + PLAN, "single document")],
-)  # fmt: skip
+    [
+        (b"", "is empty"),
+        (" \n", "is empty"),
+        ("[" * 100_000, "nested too deeply"),
+        ("a: " + "[" * 3000, "nested too deeply"),
+        (
+            PLAN.replace("name: p", "name: M\u00fcller").encode("latin-1"),
+            "no text in UTF-8: invalid start byte in line 2",
+        ),
+        ("? [1, 2]\n: 3\n", "a list or mapping as a key"),
+        (PLAN.replace("depth: 1.0", "depth: " + "9" * 5000), "digits"),
+        (PLAN + "---\n" + PLAN, "single document"),
+    ],
+)
 def test_what_cannot_be_read_ends_in_words(tmp_path, data, words):
     assert words in refusal(tmp_path / "plan.yaml", data)
 

@@ -121,11 +121,14 @@ def test_clipped_readings_count_as_not_read_and_those_beside_them_do():
 
 
 MAPPING = {
-    "version": "1.0", "name": "bench", "sensor": {"name": "pads"}, "indenter": {"shape": "sphere", "radius": 3.0},
+    "version": "1.0",
+    "name": "bench",
+    "sensor": {"name": "pads"},
+    "indenter": {"shape": "sphere", "radius": 3.0},
     "files": {"log": {"path": "press_{trial}.csv", "time": {"column": "t", "unit": "s", "zero": "shared"}}},
     "taxels": {"file": "log", "columns": ["p*"], "unit": "pF"},
     "position": {"file": "log", "depth": {"column": "depth", "unit": "mm"}},
-}  # fmt: skip
+}
 
 
 def test_a_verdict_speaks_of_channels_by_the_columns_of_the_file(tmp_path):
@@ -142,8 +145,10 @@ def test_a_verdict_speaks_of_channels_by_the_columns_of_the_file(tmp_path):
         if k % 3 == 0:
             values[:, 3] = 50.0
         lines = ["t,depth,p0,p1,p2,p3,p4"]
-        lines += [f"{20 * k + t:.3f},{d:.5f}," + ",".join(f"{v:.4f}" for v in row)
-                  for t, d, row in zip(time, depth, values, strict=True)]  # fmt: skip
+        lines += [
+            f"{20 * k + t:.3f},{d:.5f}," + ",".join(f"{v:.4f}" for v in row)
+            for t, d, row in zip(time, depth, values, strict=True)
+        ]
         (tmp_path / f"press_{k}.csv").write_text("\n".join(lines))
     (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(MAPPING))
     session = import_session(tmp_path, tmp_path / "mapping.yaml", tmp_path / "session").folder

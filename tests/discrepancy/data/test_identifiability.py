@@ -81,10 +81,14 @@ def stepped(pressing, letting_go, hold=2.0):
     tip[:, 2] = np.concatenate([depth for _, _, depth in parts])
     last = np.cumsum([0, *(time[-1] + 5 for time, _, _ in parts[:-1])])
     whole = replace(
-        made, time=np.concatenate([t + begin for (t, _, _), begin in zip(parts, last, strict=True)]), tip=tip,
-        episode=np.concatenate([e for _, e, _ in parts]), tool=np.zeros(rows, dtype=int),
-        readings=np.zeros((rows, 3)), averaged=np.ones(rows),
-    )  # fmt: skip
+        made,
+        time=np.concatenate([t + begin for (t, _, _), begin in zip(parts, last, strict=True)]),
+        tip=tip,
+        episode=np.concatenate([e for _, e, _ in parts]),
+        tool=np.zeros(rows, dtype=int),
+        readings=np.zeros((rows, 3)),
+        averaged=np.ones(rows),
+    )
     return measured(whole)
 
 
@@ -123,9 +127,14 @@ def staircase(stop):
     clock = np.concatenate([time + k * (at[-1] + 5.0) for k in range(4)])
     tip = np.column_stack([0 * parts, 0 * parts, parts])
     return replace(
-        made, time=clock, tip=tip, tool=np.zeros(4 * rows, dtype=int), readings=np.zeros((4 * rows, 3)),
-        averaged=np.zeros(4 * rows, dtype=bool), episode=np.repeat(np.arange(4), rows),
-    )  # fmt: skip
+        made,
+        time=clock,
+        tip=tip,
+        tool=np.zeros(4 * rows, dtype=int),
+        readings=np.zeros((4 * rows, 3)),
+        averaged=np.zeros(4 * rows, dtype=bool),
+        episode=np.repeat(np.arange(4), rows),
+    )
 
 
 def test_a_staircase_of_one_rate_tells_what_stays_from_what_catches_up():

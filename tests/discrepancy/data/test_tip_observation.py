@@ -23,9 +23,12 @@ def episode(number, turn, shift=0.0, gauge=None, sites=((0, 0), (3, 1), (-2, 2))
     tags = SimpleNamespace(sample_ns=ns, position=seen / 1e3, faces=np.ones(80, int), ambiguous=None)
     stream = SimpleNamespace(name="displacement", unit="mm", sample_ns=ns, values=5 - 1.0 * true[:, 2:3])
     return SimpleNamespace(
-        tags=() if gauge else (tags,), measured=(stream,) if gauge else (), tip=tip,
-        tip_at=lambda at: np.stack([np.interp(at, ns, tip[:, k]) for k in range(3)], axis=-1), ns=ns,
-    )  # fmt: skip
+        tags=() if gauge else (tags,),
+        measured=(stream,) if gauge else (),
+        tip=tip,
+        tip_at=lambda at: np.stack([np.interp(at, ns, tip[:, k]) for k in range(3)], axis=-1),
+        ns=ns,
+    )
 
 
 @pytest.mark.parametrize("gauge", [False, True])

@@ -33,10 +33,18 @@ def pressed(order=None, sign=None):
     rise = rise * (sign if sign is not None else 1.0)
     readings = 500 + rise[:, order if order is not None else np.arange(6)] + rng.normal(0, 1, (360, 6))
     return Course(
-        time=np.arange(360) / 30 + episode, episode=episode, tip=tip, tool=episode * 0, readings=readings,
-        averaged=np.ones(360), session=np.zeros(12, int), site=np.arange(12) % 6, tools=(Tool("a", "sphere", 2.0),),
-        names=tuple(f"press {k}" for k in range(12)), centers=CENTERS,
-    )  # fmt: skip
+        time=np.arange(360) / 30 + episode,
+        episode=episode,
+        tip=tip,
+        tool=episode * 0,
+        readings=readings,
+        averaged=np.ones(360),
+        session=np.zeros(12, int),
+        site=np.arange(12) % 6,
+        tools=(Tool("a", "sphere", 2.0),),
+        names=tuple(f"press {k}" for k in range(12)),
+        centers=CENTERS,
+    )
 
 
 def test_right_channels_are_not_told_of():

@@ -81,10 +81,14 @@ def test_the_size_is_what_columns_explain_beyond_noise(planted):
 
 @pytest.mark.parametrize(
     ("family", "lacking", "other"),
-    [(Family.SKIN_MEMORY, Lack(30.0, 4.0, 40.0), True), (Family.SKIN_MEMORY, Lack(30.0, 1.5, 40.0), True),
-     (Family.SKIN_MEMORY, Lack(30.0, 0.9, 40.0), False), (Family.SKIN_MEMORY, Lack(6.0, 1.5, 40.0), False),
-     (Family.SKIN_MEMORY, Lack(5.0, 4.0, 10.0), False)],
-)  # fmt: skip
+    [
+        (Family.SKIN_MEMORY, Lack(30.0, 4.0, 40.0), True),
+        (Family.SKIN_MEMORY, Lack(30.0, 1.5, 40.0), True),
+        (Family.SKIN_MEMORY, Lack(30.0, 0.9, 40.0), False),
+        (Family.SKIN_MEMORY, Lack(6.0, 1.5, 40.0), False),
+        (Family.SKIN_MEMORY, Lack(5.0, 4.0, 10.0), False),
+    ],
+)
 def test_a_mechanism_falls_to_its_family_by_what_that_explains_of_its_own(family, lacking, other):
     decision, words = decided(family, lacking)
     said = decision.status, decision.effects[0].level
@@ -110,9 +114,13 @@ def test_what_another_family_surely_explains_makes_a_verdict_incomplete(lacking,
 
 @pytest.mark.parametrize(
     ("own", "other", "named"),
-    [(Lack(2500.0, 3.0, 2900.0), 1200.0, True), (Lack(2500.0, 1.9, 2900.0), 1200.0, False),
-     (Lack(2500.0, 3.0, 2900.0), 1300.0, False), (Lack(1000.0, 3.0, 1100.0), 0.0, False)],
-)  # fmt: skip
+    [
+        (Lack(2500.0, 3.0, 2900.0), 1200.0, True),
+        (Lack(2500.0, 1.9, 2900.0), 1200.0, False),
+        (Lack(2500.0, 3.0, 2900.0), 1300.0, False),
+        (Lack(1000.0, 3.0, 1100.0), 0.0, False),
+    ],
+)
 def test_what_another_law_of_its_family_fills_leaves_the_family(own, other, named):
     """Steps lost and found beside a frame that grows: neither law is right, and both are kinematics.
 
@@ -120,9 +128,12 @@ def test_what_another_law_of_its_family_fills_leaves_the_family(own, other, name
     """
     found = findings()
     mine = replace(
-        found.effects[0], placed=Placed(load("lost_steps"), {}), bought=4900.0, margins={"gain_drift": 2.9},
+        found.effects[0],
+        placed=Placed(load("lost_steps"), {}),
+        bought=4900.0,
+        margins={"gain_drift": 2.9},
         losses={"gain_drift": 1000.0},
-    )  # fmt: skip
+    )
     found = replace(found, effects=(mine,), explained=4900.0, left=Leftovers(1500.0, 2.4))
     lacking = {Family.KINEMATICS: own, Family.RESPONSE_CURVE: Lack(other, 1.7, other)}
     decision = decide(found, DataChecks(44), lacking=lacking)
@@ -145,9 +156,13 @@ def test_where_no_name_holds_what_shows_of_another_family_is_told(t):
 
 @pytest.mark.parametrize(
     ("family", "gain", "t", "left"),
-    [(Family.FRICTION_AND_PLAY, 60.0, 3.0, 60.0), (Family.FRICTION_AND_PLAY, 60.0, 1.0, 1.0),
-     (Family.FRICTION_AND_PLAY, 10.0, 3.0, 1.0), (Family.SKIN_MEMORY, 60.0, 3.0, 1.0)],
-)  # fmt: skip
+    [
+        (Family.FRICTION_AND_PLAY, 60.0, 3.0, 60.0),
+        (Family.FRICTION_AND_PLAY, 60.0, 1.0, 1.0),
+        (Family.FRICTION_AND_PLAY, 10.0, 3.0, 1.0),
+        (Family.SKIN_MEMORY, 60.0, 3.0, 1.0),
+    ],
+)
 def test_much_that_another_family_explains_is_left_over(family, gain, t, left):
     """A stand-in fits a part: what its own family explains besides is another form of it, and no such sign."""
     found = findings()
@@ -175,9 +190,13 @@ def test_a_law_beside_one_that_is_open_is_held_against_its_family_too(size, leve
 
 @pytest.mark.parametrize(
     ("family", "own", "level"),
-    [(Family.FRICTION_AND_PLAY, Lack(100.0, 2.5, 110.0), None), (Family.FRICTION_AND_PLAY, Lack(100.0, 1.0, 110.0), 3),
-     (Family.FRICTION_AND_PLAY, Lack(10.0, 2.5, 110.0), 3), (Family.KINEMATICS, Lack(5.0, 2.5, 15.0), 3)],
-)  # fmt: skip
+    [
+        (Family.FRICTION_AND_PLAY, Lack(100.0, 2.5, 110.0), None),
+        (Family.FRICTION_AND_PLAY, Lack(100.0, 1.0, 110.0), 3),
+        (Family.FRICTION_AND_PLAY, Lack(10.0, 2.5, 110.0), 3),
+        (Family.KINEMATICS, Lack(5.0, 2.5, 15.0), 3),
+    ],
+)
 def test_a_second_name_explains_more_than_a_family_without_a_name(family, own, level):
     """A tool that slides in its holder looks like a screw of the drive, and as much like friction that none names."""
     found = findings()
@@ -224,7 +243,17 @@ def findings():
     tests: Any = SimpleNamespace(p_generic=0.001)
     ones, zeros = np.ones(40), np.zeros(3)
     return Findings(
-        gap=True, tests=tests, effects=(mine,), left=Leftovers(1.0, 0.0), explained=100.0, energy=(ones, ones),
-        values=ones, given=problem, problem=problem, final=problem, limits={}, gains=zeros,
+        gap=True,
+        tests=tests,
+        effects=(mine,),
+        left=Leftovers(1.0, 0.0),
+        explained=100.0,
+        energy=(ones, ones),
+        values=ones,
+        given=problem,
+        problem=problem,
+        final=problem,
+        limits={},
+        gains=zeros,
         halves=np.stack([zeros, zeros]),
-    )  # fmt: skip
+    )

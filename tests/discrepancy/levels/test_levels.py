@@ -88,10 +88,13 @@ def test_one_that_looks_like_another_family_is_there_without_a_name():
 @pytest.mark.parametrize(
     ("spread", "after", "margin", "there"),
     [
-        (0.05, 1.5, 9.0, True), (0.22, 1.5, 9.0, True), (0.22, 1.5, 4.0, False), (0.05, 8.0, 9.0, False),
+        (0.05, 1.5, 9.0, True),
+        (0.22, 1.5, 9.0, True),
+        (0.22, 1.5, 4.0, False),
+        (0.05, 8.0, 9.0, False),
         (0.3, 1.5, 9.0, False),
     ],
-)  # fmt: skip
+)
 def test_a_sealed_gap_that_surely_closes_says_that_an_effect_is_there(spread, after, margin, there):
     """What is left of the open presses may be more: it is not in the sealed ones. Then its size may differ a little."""
     shown = Gap(np.full(5, 10.0), np.full(5, after), np.ones(5), tuple("abcde"))
@@ -118,9 +121,14 @@ def test_a_shape_at_its_bound_leaves_the_family():
 
 @pytest.mark.parametrize(
     ("name", "share", "t", "lent"),
-    [("low_pass_filter", 0.11, 5.0, True), ("latency", 0.11, 5.0, True), ("low_pass_filter", 0.02, 5.0, False),
-     ("low_pass_filter", 0.11, 1.0, False), ("relaxation", 0.11, 5.0, False)],
-)  # fmt: skip
+    [
+        ("low_pass_filter", 0.11, 5.0, True),
+        ("latency", 0.11, 5.0, True),
+        ("low_pass_filter", 0.02, 5.0, False),
+        ("low_pass_filter", 0.11, 1.0, False),
+        ("relaxation", 0.11, 5.0, False),
+    ],
+)
 def test_the_form_of_a_lag_is_no_name_where_much_is_left(name, share, t, lent):
     found = cast(Any, SimpleNamespace(left=SimpleNamespace(t=t), share_left=share))
     one = replace(ONE, placed=Placed(load(name), {}))
@@ -188,7 +196,7 @@ def test_a_further_name_may_stand_in_for_what_is_left(bought, left, t, part):
 @pytest.mark.parametrize(
     ("bought", "left", "t", "part"),
     [(100, 150, 1.2, True), (100, 90, 1.2, False), (100, 150, 0.8, False), (3, 5, 1.2, False), (300, 900, 1.2, False)],
-)  # fmt: skip
+)
 def test_where_more_is_left_than_a_further_name_explains_less_of_that_need_be_sure(bought, left, t, part):
     """A cable that moves along is left, and an air gap with a number for each channel takes up a part of it."""
     large, mine = replace(ONE, placed=Placed(load("latency"), {}), bought=200.0), replace(ONE, bought=bought)

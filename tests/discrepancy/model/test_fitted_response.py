@@ -120,10 +120,13 @@ def test_splines_that_go_through_an_effect_gain_no_freedom(name):
     keep = np.isin(made.episode, np.flatnonzero((made.site == 0) | (np.arange(made.episodes) < 4)))
     kept = np.unique(made.episode[keep])
     part = replace(
-        made, **{n: getattr(made, n)[keep] for n in ("time", "tip", "tool", "readings", "averaged")},
-        episode=np.searchsorted(kept, made.episode[keep]), session=made.session[kept], site=made.site[kept],
+        made,
+        **{n: getattr(made, n)[keep] for n in ("time", "tip", "tool", "readings", "averaged")},
+        episode=np.searchsorted(kept, made.episode[keep]),
+        session=made.session[kept],
+        site=made.site[kept],
         names=tuple(made.names[k] for k in kept),
-    )  # fmt: skip
+    )
     response = FittedResponse(part)
     plain = response.features(part.reduced)
     through = taken_up(part, response, [placed(name)])

@@ -22,10 +22,12 @@ def read_as(rise, seed=0, made=None):
 @pytest.mark.parametrize(
     ("rise", "words"),
     [
-        (lambda d: d, "Winkler"), (lambda d: d**1.5, "Hertz"), (lambda d: d**2.5, "to the power 2."),
+        (lambda d: d, "Winkler"),
+        (lambda d: d**1.5, "Hertz"),
+        (lambda d: d**2.5, "to the power 2."),
         (lambda d: d / (1 - 0.8 * d / 0.77), "gap that closes"),
     ],
-)  # fmt: skip
+)
 def test_the_law_that_made_the_readings_is_told(rise, words):
     found = response_curve(read_as(rise))
     assert found is not None

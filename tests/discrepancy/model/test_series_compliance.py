@@ -43,11 +43,17 @@ def presses(compliance=0.0, powers=(1.5, 1.5, 1.5), materials=MATERIALS, noise=0
     lengths = [len(t) for t in times]
     count = sum(lengths)
     return Course(
-        time=np.concatenate(times), episode=np.repeat(np.arange(18), lengths), tip=np.concatenate(tips),
-        tool=np.zeros(count, dtype=np.int64), readings=np.concatenate(readings)[:, None], averaged=np.ones(count),
-        session=np.zeros(18, dtype=np.int64), site=np.array(sites), tools=(Tool("ball", "sphere", 4.0),),
+        time=np.concatenate(times),
+        episode=np.repeat(np.arange(18), lengths),
+        tip=np.concatenate(tips),
+        tool=np.zeros(count, dtype=np.int64),
+        readings=np.concatenate(readings)[:, None],
+        averaged=np.ones(count),
+        session=np.zeros(18, dtype=np.int64),
+        site=np.array(sites),
+        tools=(Tool("ball", "sphere", 4.0),),
         names=tuple(f"press {k}" for k in range(18)),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("compliance", "power"), [(0.035, 1.5), (0.02, 2.0)])
@@ -62,12 +68,13 @@ def test_the_compliance_that_bent_all_of_them_is_told(compliance, power):
 @pytest.mark.parametrize(
     "made",
     [
-        {"seed": 1}, {"seed": 2, "noise": 0.02},
+        {"seed": 1},
+        {"seed": 2, "noise": 0.02},
         {"compliance": 0.035, "materials": (1.0, 1.2, 1.4)},  # bent alike: their own curve
         {"powers": (1.4, 2.0, 1.6)},  # each follows a law of its own
         {"powers": (1.8, 1.5, 1.35)},  # in the order of their stiffness, too
     ],
-)  # fmt: skip
+)
 def test_nothing_is_told_where_specimens_do_not_show_it(made):
     assert series_compliance(presses(**made)) is None
 

@@ -87,11 +87,13 @@ def test_products_are_those_of_generalized_least_squares(prior, features, modes)
     parts = (given[name] for name in ("offset", "gain_error", "pose_errors", "features", "random_walk"))
     expected = dense(given["columns"], spans, prior, *parts)
     own = EpisodeErrorModel(
-        given["offset"].astype(np.float32), np.full(len(spans), prior), given["gain_error"].astype(np.float32),
+        given["offset"].astype(np.float32),
+        np.full(len(spans), prior),
+        given["gain_error"].astype(np.float32),
         given["pose_errors"].astype(np.float32),
         given["features"].astype(np.float32) if features else None,
         given["random_walk"].astype(np.float32) if modes else None,
-    )  # fmt: skip
+    )
     left = taken_out(FactoredErrors(spans, own), given["columns"]).reshape(-1, WIDTH)
     assert left.T @ left == pytest.approx(expected, rel=2e-4, abs=2e-4 * np.abs(expected).max())
 
@@ -132,9 +134,11 @@ def test_columns_in_one_stream_of_an_episode_are_told_like_any_others(free):
     parts = made(rng)
     spans = within(LENGTHS)
     own = EpisodeErrorModel(
-        parts["offset"], np.array([np.inf, 0.5, np.inf]), pose_errors=parts["pose_errors"],
+        parts["offset"],
+        np.array([np.inf, 0.5, np.inf]),
+        pose_errors=parts["pose_errors"],
         features=parts["features"] if free else None,
-    )  # fmt: skip
+    )
     factored, alone = FactoredErrors(spans, own), parts["gain_error"]
     left = taken_out(factored, parts["columns"])[:, :, 0]
     score, information = factored.stream_scores(left, alone)

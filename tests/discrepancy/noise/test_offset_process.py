@@ -18,10 +18,18 @@ def course(count):
     episode = np.repeat(np.arange(count), 2 * ROWS)
     depth = np.tile(np.repeat([-0.3, 1.0], ROWS), count)
     return SimpleNamespace(
-        episode=episode, episodes=count, time=APART * episode + np.tile(np.linspace(0, 3, 2 * ROWS), count),
-        tip=np.column_stack([0 * depth, 0 * depth, depth]), stroke=1.3, channels=24, rows=len(depth), temperature=None,
-        read=np.arange(len(depth)), readings=np.full((len(depth), 24), 9000.0), averaged=np.ones(len(depth)),
-    )  # fmt: skip
+        episode=episode,
+        episodes=count,
+        time=APART * episode + np.tile(np.linspace(0, 3, 2 * ROWS), count),
+        tip=np.column_stack([0 * depth, 0 * depth, depth]),
+        stroke=1.3,
+        channels=24,
+        rows=len(depth),
+        temperature=None,
+        read=np.arange(len(depth)),
+        readings=np.full((len(depth), 24), 9000.0),
+        averaged=np.ones(len(depth)),
+    )
 
 
 def followed(rng, count, length, spread):

@@ -75,9 +75,9 @@ def test_places_that_are_not_pressed_again_are_compared_with_the_next_ones():
     drift = np.linspace(0.0, 10.0, 40)[:, None]
     errors = drift + 0.5 * rng.normal(size=(40, 1))
     order = rng.permutation(40)
-    (told,) = together(one_by_one([
-        JointScores(order, 400 * errors[order] + 20 * rng.normal(size=(40, 1)), 400 * np.eye(40))
-    ]))  # fmt: skip
+    (told,) = together(
+        one_by_one([JointScores(order, 400 * errors[order] + 20 * rng.normal(size=(40, 1)), 400 * np.eye(40))])
+    )
     assert np.array_equal(told.episodes, np.arange(40))
     assert sizes_of([told], [np.arange(40) // 4]) == pytest.approx([0.5], rel=0.3)
     assert sizes_of([told], [np.zeros(40, dtype=int)]) > 2.0

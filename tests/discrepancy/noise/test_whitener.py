@@ -43,9 +43,14 @@ def test_successive_readings_have_in_common_what_the_noise_says():
 def test_noise_of_some_rows_keeps_what_belongs_to_them():
     rng, rows = np.random.default_rng(2), np.arange(10) % 3 > 0
     whole = Noise(
-        np.ones(2), 0.3, 0.02, gain_error=rng.normal(size=(10, 2)), missing=rng.random((10, 2)) > 0.5,
-        random_walk=rng.normal(size=(10, 4)), relative_scale=1 + rng.random((10, 2)),
-    )  # fmt: skip
+        np.ones(2),
+        0.3,
+        0.02,
+        gain_error=rng.normal(size=(10, 2)),
+        missing=rng.random((10, 2)) > 0.5,
+        random_walk=rng.normal(size=(10, 4)),
+        relative_scale=1 + rng.random((10, 2)),
+    )
     some = whole.of(rows)
     for name in ("gain_error", "missing", "random_walk", "relative_scale"):
         assert np.array_equal(getattr(some, name), getattr(whole, name)[rows]), name

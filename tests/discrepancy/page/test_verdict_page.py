@@ -73,9 +73,14 @@ def test_the_page_the_document_and_the_text_are_of_one_mind(judged):
 def test_what_only_specimens_tell_together_is_drawn_into_no_press(judged):
     verdict, residuals = judged
     told = {
-        "effect": "frame_compliance", "mechanism": "frame_compliance", "family": "kinematics", "status": "ambiguous",
-        "alternatives": ["stiffening"], "margins": {}, "confidence": None,
-    }  # fmt: skip
+        "effect": "frame_compliance",
+        "mechanism": "frame_compliance",
+        "family": "kinematics",
+        "status": "ambiguous",
+        "alternatives": ["stiffening"],
+        "margins": {},
+        "confidence": None,
+    }
     for gap in (True, False):
         shown = verdict | {"status": "ambiguous", "effects": [told], "gate": verdict["gate"] | {"gap": gap}}
         page = verdict_page(shown, residuals)
@@ -102,9 +107,14 @@ def test_what_the_effects_change_is_shown_without_what_a_press_has_of_its_own(ju
     """A map under poses and gains of single presses hardly changes, whatever is explained."""
     verdict, residuals = judged
     told = {
-        "effect": "creep", "mechanism": "creep", "family": "memory of the skin", "status": "named",
-        "alternatives": [], "margins": {}, "confidence": 0.9,
-    }  # fmt: skip
+        "effect": "creep",
+        "mechanism": "creep",
+        "family": "memory of the skin",
+        "status": "named",
+        "alternatives": [],
+        "margins": {},
+        "confidence": 0.9,
+    }
     parts = [{"by": "phase", "name": "unloading", "before": 21.5, "after": 4.25}]
     page = verdict_page(verdict | {"effects": [told], "slices": parts, "path": []}, residuals)
     where = page[page.index(TAKEN_OUT.split("'")[1]) :]

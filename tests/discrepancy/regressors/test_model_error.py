@@ -68,12 +68,21 @@ def test_a_mechanism_may_have_any_of_its_forms_and_shapes(pressed):
             counts[name][other.effect.name] += 1
     # Beside the grid, half and twice its own time constant.
     assert counts["relaxation"] == {
-        "relaxation": 10, "relaxation_let_go": 8, "relaxation_read": 12, "power_creep": 3, "power_creep_let_go": 3,
-        "power_creep_read": 9, "nonlinear_relaxation": 4,
-    }  # fmt: skip
+        "relaxation": 10,
+        "relaxation_let_go": 8,
+        "relaxation_read": 12,
+        "power_creep": 3,
+        "power_creep_let_go": 3,
+        "power_creep_read": 9,
+        "nonlinear_relaxation": 4,
+    }
     assert counts["proportional_hysteresis"] == {
-        "proportional_hysteresis": 5, "hysteresis": 1, "bouc_wen": 3, "hysteresis_read": 6, "hysteresis_apart": 4,
-    }  # fmt: skip
+        "proportional_hysteresis": 5,
+        "hysteresis": 1,
+        "bouc_wen": 3,
+        "hysteresis_read": 6,
+        "hysteresis_apart": 4,
+    }
     assert counts["low_pass_filter"] == {"low_pass_filter": 4}
     wide = Placed(load("low_pass_filter"), {"tau": np.array(1.0)})
     assert [float(v.values["tau"]) for v in variants(wide, 3)] == [0.25, 0.5, 2.0, 2.0], "within its bounds"

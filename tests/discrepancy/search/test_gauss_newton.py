@@ -47,7 +47,5 @@ def test_nothing_placed_has_no_covariance():
 def test_an_equation_ends_at_a_lower_bound_that_is_known(w, error, told):
     """What is not known there makes no difference below."""
     placed = (Placed(load("bouc_wen"), {"a": np.array(0.2), "w": np.array(w)}),)
-    model = SimpleNamespace(
-        placed=placed, knobs=knobs_of(placed, 1), covariance=np.diag([0.1**2, error**2])
-    )
+    model = SimpleNamespace(placed=placed, knobs=knobs_of(placed, 1), covariance=np.diag([0.1**2, error**2]))
     assert Refined.narrowest(cast(Any, model), 0) == told

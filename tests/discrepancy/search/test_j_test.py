@@ -31,10 +31,16 @@ def model(left, *names):
     energy = 0.5 * np.bincount(episode, np.square(left).sum(axis=1))
     placed = tuple(SimpleNamespace(effect=load(name)) for name in names)
     return SimpleNamespace(
-        left=left, episode=episode, energy=energy, placed=placed, loss=energy.sum(), freedom=0.0,
+        left=left,
+        episode=episode,
+        energy=energy,
+        placed=placed,
+        loss=energy.sum(),
+        freedom=0.0,
         projected_draws=UNSHAKEN,
-        knobs=[], place=episode // 4,
-    )  # fmt: skip
+        knobs=[],
+        place=episode // 4,
+    )
 
 
 def signal(size, episodes, rng):

@@ -36,11 +36,14 @@ def test_two_delays_are_one_unless_presses_tell_them_apart(recovery, left):
 @pytest.mark.parametrize(
     ("delay", "lag", "found", "open_too"),
     [
-        (0.05, 0.0, {"latency"}, False), (0.0, 0.05, {"low_pass_filter"}, False),
-        (0.1, 0.03, {"latency", "low_pass_filter"}, False), (0.06, 0.06, {"latency", "low_pass_filter"}, False),
-        (0.1, 0.02, {"latency", "low_pass_filter"}, False), (0.015, 0.1, {"low_pass_filter"}, True),
+        (0.05, 0.0, {"latency"}, False),
+        (0.0, 0.05, {"low_pass_filter"}, False),
+        (0.1, 0.03, {"latency", "low_pass_filter"}, False),
+        (0.06, 0.06, {"latency", "low_pass_filter"}, False),
+        (0.1, 0.02, {"latency", "low_pass_filter"}, False),
+        (0.015, 0.1, {"low_pass_filter"}, True),
     ],
-)  # fmt: skip
+)
 def test_a_second_lag_is_there_where_no_single_one_explains_the_presses(delay, lag, found, open_too):
     """Where a law may be off by what a second lag explains, which lags there are is open."""
     name, of = ("latency", "L") if delay > lag else ("low_pass_filter", "tau")

@@ -16,8 +16,10 @@ FEW = ("latency", "tilt", "gain", "xy_offset", "softening", "adhesion", "z_offse
 def problem(monkeypatch):
     """Ten effects of one number ahead by the BIC of one with 24, which alone explains held-out episodes."""
     names = [*FEW, MANY]
-    made = {n: SimpleNamespace(effect=load(n), called=load(n).called, columns=np.arange(24 if n == MANY else 1))
-            for n in names}  # fmt: skip
+    made = {
+        n: SimpleNamespace(effect=load(n), called=load(n).called, columns=np.arange(24 if n == MANY else 1))
+        for n in names
+    }
     monkeypatch.setattr(module, "best_shapes", lambda problem: made)
     monkeypatch.setattr(module, "_gain", lambda problem, chosen: -3.0 if chosen[0].effect.name == MANY else 1.0)
     monkeypatch.setattr(module, "held_out", lambda problem, chosen: np.full(8, float(chosen[0].effect.name == MANY)))

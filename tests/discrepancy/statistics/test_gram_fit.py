@@ -31,9 +31,12 @@ def test_a_fit_beside_free_columns_is_the_fit_of_all():
         low, high = np.full(2, -bound), np.full(2, bound)
         everywhere = np.full(5, np.inf)
         wanted = solve(
-            gram[train].sum(axis=0), np.concatenate([own, free]), np.concatenate([weak, ridge]),
-            np.concatenate([low, -everywhere]), np.concatenate([high, everywhere]),
-        )  # fmt: skip
+            gram[train].sum(axis=0),
+            np.concatenate([own, free]),
+            np.concatenate([weak, ridge]),
+            np.concatenate([low, -everywhere]),
+            np.concatenate([high, everywhere]),
+        )
         beside = Beside(gram, gram[train].sum(axis=0), free, ridge)
         found = beside.fit(own, weak, low, high)
         assert np.allclose(np.concatenate(found), wanted, rtol=1e-6, atol=1e-9)

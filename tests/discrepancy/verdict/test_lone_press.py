@@ -28,13 +28,18 @@ def softened(tops=(1.0, 2.0, 3.0, 4.0), cycles=4, share=0.25):
         clock += at[-1] + 1.0
     episode = np.repeat(np.arange(len(parts)), [len(rows.time) for _, rows in parts])
     return Course(
-        time=np.concatenate([begin + rows.time for begin, rows in parts]), episode=episode,
-        tip=np.concatenate([rows.tip for _, rows in parts]), tool=np.zeros(len(episode), dtype=int),
+        time=np.concatenate([begin + rows.time for begin, rows in parts]),
+        episode=episode,
+        tip=np.concatenate([rows.tip for _, rows in parts]),
+        tool=np.zeros(len(episode), dtype=int),
         readings=np.concatenate([rows.values for _, rows in parts]),
-        averaged=np.concatenate([rows.averaged for _, rows in parts]), session=np.zeros(len(parts), dtype=int),
-        site=np.zeros(len(parts), dtype=int), tools=(Tool("ball", "sphere", 4.0),),
-        names=tuple(f"press {k}" for k in range(len(parts))), centers=np.array([[-1.0, 0], [1, 0]]),
-    )  # fmt: skip
+        averaged=np.concatenate([rows.averaged for _, rows in parts]),
+        session=np.zeros(len(parts), dtype=int),
+        site=np.zeros(len(parts), dtype=int),
+        tools=(Tool("ball", "sphere", 4.0),),
+        names=tuple(f"press {k}" for k in range(len(parts))),
+        centers=np.array([[-1.0, 0], [1, 0]]),
+    )
 
 
 def test_softening_that_one_first_loading_holds_is_told_with_its_press_and_what_to_repeat():

@@ -24,22 +24,43 @@ def effect(name, alternatives=(), margins=None, status="named"):
     """Return an entry of ``effects``."""
     own = load(name)
     return {
-        "mechanism": own.called, "effect": name, "stage": own.stage, "status": status, "confidence": None,
-        "parameters": {"a": {"value": 0.2, "unit": "1", "error": 0.01}}, "alternatives": list(alternatives),
+        "mechanism": own.called,
+        "effect": name,
+        "stage": own.stage,
+        "status": status,
+        "confidence": None,
+        "parameters": {"a": {"value": 0.2, "unit": "1", "error": 0.01}},
+        "alternatives": list(alternatives),
         "margins": margins or {},
-    }  # fmt: skip
+    }
 
 
 def document(status="named", effects=(), limits=None, sealed=None, share=0.02) -> dict[str, Any]:
     """Return what the text reads of a verdict."""
     return {
-        "status": status, "why": "so it is", "effects": list(effects),
+        "status": status,
+        "why": "so it is",
+        "effects": list(effects),
         "gate": {"gap": True, "p": 0.001, "p_generic": 1.0},
-        "left": {"before": 3.316, "after": 1.612, "share": share, "t": 3.0}, "located": ["everywhere"], "next": [],
-        "remarks": [], "limits": limits or {}, "untested": [], "unjudgeable": {"frame_compliance": "x", "tilt": "y"},
-        "sealed": {"episodes": 4, "before": 18.489, "after": 20.374, "ceiling": 1.286, "closed": -0.11,
-                   "interval": [-0.58, 0.66], "certain": False, "after_interval": [15.1, 26.3]} | (sealed or {}),
-    }  # fmt: skip
+        "left": {"before": 3.316, "after": 1.612, "share": share, "t": 3.0},
+        "located": ["everywhere"],
+        "next": [],
+        "remarks": [],
+        "limits": limits or {},
+        "untested": [],
+        "unjudgeable": {"frame_compliance": "x", "tilt": "y"},
+        "sealed": {
+            "episodes": 4,
+            "before": 18.489,
+            "after": 20.374,
+            "ceiling": 1.286,
+            "closed": -0.11,
+            "interval": [-0.58, 0.66],
+            "certain": False,
+            "after_interval": [15.1, 26.3],
+        }
+        | (sealed or {}),
+    }
 
 
 def line(text, beginning):
@@ -142,11 +163,13 @@ def test_what_may_stand_in_is_not_called_worse_in_the_same_breath():
 @pytest.mark.parametrize(
     ("status", "reason", "begins"),
     [
-        ("named", Reason.NAMED, "give it to the model"), ("none", Reason.QUIET, "nothing: below the limits"),
-        ("unknown", Reason.TOO_FEW, "the diagnostic plan"), ("unknown", Reason.UNEXPLAINED, "the diagnostic plan"),
+        ("named", Reason.NAMED, "give it to the model"),
+        ("none", Reason.QUIET, "nothing: below the limits"),
+        ("unknown", Reason.TOO_FEW, "the diagnostic plan"),
+        ("unknown", Reason.UNEXPLAINED, "the diagnostic plan"),
         ("ambiguous", Reason.RIVALS, "the same presses at three rates"),
     ],
-)  # fmt: skip
+)
 def test_every_status_says_what_to_do_next(status, reason, begins):
     answer = [] if status in ("none", "unknown") else [finding("latency", *(["backlash"] * (status == "ambiguous")))]
     decision = Decision(status, reason, tuple(Decided(f, status, {}, None) for f in answer))
@@ -158,10 +181,17 @@ def quiet():
     tests, null = SimpleNamespace(p_generic=0.5, p=np.ones(1)), SimpleNamespace(odd=())
     setting = SimpleNamespace(course=course(episodes=4), channel_gain=None, response=SimpleNamespace(fitted=False))
     made = SimpleNamespace(
-        until="decide", effects=(), gap=False, tests=tests, left=SimpleNamespace(t=0.0, gain=0.0), share_left=0.0,
-        loudness=1.0, problem=SimpleNamespace(null=null, setting=setting),
-        gains=np.zeros(3), halves=np.zeros((2, 3)),
-    )  # fmt: skip
+        until="decide",
+        effects=(),
+        gap=False,
+        tests=tests,
+        left=SimpleNamespace(t=0.0, gain=0.0),
+        share_left=0.0,
+        loudness=1.0,
+        problem=SimpleNamespace(null=null, setting=setting),
+        gains=np.zeros(3),
+        halves=np.zeros((2, 3)),
+    )
     return cast(Findings, made)
 
 
@@ -280,8 +310,9 @@ def test_a_rival_that_fits_as_well_is_not_said_to_fit_better():
 def test_numbers_that_are_known_only_together_are_said_to_be():
     entry = effect("thermal_growth")
     entry["parameters"] = {
-        "dz": {"value": -0.5807, "unit": "mm", "error": 3.3}, "tau": {"value": 4623.0, "unit": "s", "error": 29000.0},
-    }  # fmt: skip
+        "dz": {"value": -0.5807, "unit": "mm", "error": 3.3},
+        "tau": {"value": 4623.0, "unit": "s", "error": 29000.0},
+    }
     text = in_text(document("named", [entry]))
     assert line(text, "dz =") == "    dz = -0.58 mm (final growth)" and "+-" not in text
     assert line(text, "dz and tau").endswith("are not known, each by itself: other pairs fit as well")

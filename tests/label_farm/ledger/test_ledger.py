@@ -44,10 +44,7 @@ def test_a_higher_priority_comes_first_and_other_models_are_left_alone(ledger):
 
 
 def test_a_silent_worker_loses_its_job_and_a_beating_one_keeps_it(tmp_path):
-    with (
-        Ledger(tmp_path / "ledger.sqlite", lease_seconds=-1.0) as short,
-        Ledger(tmp_path / "ledger.sqlite") as long,
-    ):
+    with Ledger(tmp_path / "ledger.sqlite", lease_seconds=-1.0) as short, Ledger(tmp_path / "ledger.sqlite") as long:
         short.enqueue(jobs(2))
         first, second = short.claim("silent", MODEL)[0], short.claim("beating", MODEL)[0]
         long.heartbeat("beating")

@@ -42,22 +42,41 @@ def drawn(*effects, plan=STILL):
 def verdict(*effects, status="named"):
     """A verdict with these entries; everything else is empty."""
     return {
-        "version": schemas.version("verdict"), "status": status, "why": "", "effects": list(effects),
+        "version": schemas.version("verdict"),
+        "status": status,
+        "why": "",
+        "effects": list(effects),
         "gate": {"gap": True, "p": 0.0, "p_generic": 0.0, "noise": [1.0], "memory": 0.0},
-        "left": {"share": 0.0, "t": 0.0, "before": 2.0, "after": 1.0, "floor": 1.0}, "located": [],
-        "unjudgeable": {}, "limits": {}, "untested": [], "data": {}, "remarks": [], "next": [], "provenance": {},
-    }  # fmt: skip
+        "left": {"share": 0.0, "t": 0.0, "before": 2.0, "after": 1.0, "floor": 1.0},
+        "located": [],
+        "unjudgeable": {},
+        "limits": {},
+        "untested": [],
+        "data": {},
+        "remarks": [],
+        "next": [],
+        "provenance": {},
+    }
 
 
 def entry(effect="creep", status="named"):
     return {
-        "mechanism": effect, "effect": effect, "title": "", "stage": "mechanics", "moves": ["signal"], "status": status,
-        "alternatives": [], "margins": {}, "necessity": 9.0, "at_bound": [], "experiment": "",
+        "mechanism": effect,
+        "effect": effect,
+        "title": "",
+        "stage": "mechanics",
+        "moves": ["signal"],
+        "status": status,
+        "alternatives": [],
+        "margins": {},
+        "necessity": 9.0,
+        "at_bound": [],
+        "experiment": "",
         "parameters": {
             "f": {"value": 0.1, "unit": "1", "error": 0.1, "interval": [-0.06, 0.26]},
             "tau": {"value": 2.0, "unit": "s", "error": None},
         },
-    }  # fmt: skip
+    }
 
 
 @pytest.fixture(scope="module")
@@ -103,9 +122,11 @@ def test_relaxation_takes_its_share_of_the_rise_by_the_end_of_the_hold(folder):
 
 def test_effects_of_a_range_are_drawn_once_for_each_specimen():
     plan = SimulationPlan.from_document(
-        with_effects({"effect": "gain", "values": {"e": [0.1, 0.3]}},
-                     {"effect": "channel_gain", "values": {"e": [-0.05, 0.05]}}), "plan"
-    )  # fmt: skip
+        with_effects(
+            {"effect": "gain", "values": {"e": [0.1, 0.3]}}, {"effect": "channel_gain", "values": {"e": [-0.05, 0.05]}}
+        ),
+        "plan",
+    )
     found = [specimen_effects(plan, SENSOR, 3, number) for number in (0, 1, 0)]
     common = [float(effects[0].values["e"]) for effects in found]
     assert common[0] == common[2] != common[1]
@@ -123,10 +144,16 @@ def test_a_verdict_gives_its_named_effects_with_their_intervals_within_bounds(tm
 
 
 def test_a_revised_model_gives_its_effects(tmp_path):
-    path, spec = tmp_path / "spec.json", {
-        "version": schemas.version("model_spec"), "name": "revised", "parent": None, "response": {"kind": "fitted"},
-        "effects": [{**RELAXATION, "stage": "mechanics", "error": {}, "evidence": ""}],
-    }  # fmt: skip
+    path, spec = (
+        tmp_path / "spec.json",
+        {
+            "version": schemas.version("model_spec"),
+            "name": "revised",
+            "parent": None,
+            "response": {"kind": "fitted"},
+            "effects": [{**RELAXATION, "stage": "mechanics", "error": {}, "evidence": ""}],
+        },
+    )
     documents.write(path, spec, "model_spec")
     assert effects_of(path) == [RELAXATION]
 

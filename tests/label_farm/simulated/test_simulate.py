@@ -236,8 +236,9 @@ def test_another_model_does_not_go_on_in_a_folder(bumps, tmp_path, monkeypatch):
     simulate(tmp_path)
     monkeypatch.setattr(BumpSkin, "content_hash", "cd" * 32)
     simulate(tmp_path)  # nothing is left to solve
-    done = tacdata("simulate", "plan.yaml", "--out", "sim", "--presses", 5, "--device", "cpu", "--workers", 1,
-                   folder=tmp_path)  # fmt: skip
+    done = tacdata(
+        "simulate", "plan.yaml", "--out", "sim", "--presses", 5, "--device", "cpu", "--workers", 1, folder=tmp_path
+    )
     assert done.returncode != 0
     assert "was solved by model abababababab, this release's is cdcdcdcdcdcd" in done.stderr
 

@@ -19,15 +19,7 @@ from label_farm.store.failure import Failure
 from label_farm.store.store import Store
 from tacdata.errors import FormatError, SolveError, UsageError
 
-JOB = Job(
-    SENSOR.content_hash,
-    "a" * 64,
-    {"shape": "sphere", "radius": 2.0},
-    0.5,
-    0.0,
-    0.0,
-    (0.0, 0.3, 1.0, 0.4, 0.0),
-)
+JOB = Job(SENSOR.content_hash, "a" * 64, {"shape": "sphere", "radius": 2.0}, 0.5, 0.0, 0.0, (0.0, 0.3, 1.0, 0.4, 0.0))
 SOLUTION = path(SENSOR, JOB.depths, lambda d: d**1.5)
 
 

@@ -32,9 +32,15 @@ def test_a_cluster_labels_and_a_press_that_kills_its_worker_is_a_failure(tmp_pat
     session(tmp_path / "s", 6)
     # The second press kills its worker once, the third always, the fourth finds no equilibrium.
     shown = label(
-        tmp_path, "--dask", "here", "--workers", "2",
-        FAST_MODEL_KILLS_ONCE="-5.95", FAST_MODEL_KILLS="-5.9", FAST_MODEL_FAILS="-5.85",
-    )  # fmt: skip
+        tmp_path,
+        "--dask",
+        "here",
+        "--workers",
+        "2",
+        FAST_MODEL_KILLS_ONCE="-5.95",
+        FAST_MODEL_KILLS="-5.9",
+        FAST_MODEL_FAILS="-5.85",
+    )
     assert shown.returncode == 5, shown.stderr
     assert "labels written: 4" in shown.stdout and "failed: 2" in shown.stdout, shown.stdout
     assert "episode 2: no label: its Dask worker died" in shown.stdout

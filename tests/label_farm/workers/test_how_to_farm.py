@@ -56,9 +56,12 @@ def started(folder, words, *more, says="", **variables):
     command = [sys.executable, "-m", "tacdata.cli", *words[1:]] if words[0] == "tacdata" else words
     environment = {**os.environ, **variables}
     log = (folder / "log").open("w")
-    with log, subprocess.Popen(
-        [*command, *more], cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=log, text=True
-    ) as process:  # fmt: skip
+    with (
+        log,
+        subprocess.Popen(
+            [*command, *more], cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=log, text=True
+        ) as process,
+    ):
         try:
             yield next((line for line in process.stdout if says in line), "") if says else ""
         finally:
@@ -115,9 +118,11 @@ def test_recordings_go_to_another_computer_and_labels_come_back(bench):
     export, up = PARTS[2]
     made = subprocess.run(
         ["sh", "-c", blocks(PAGE, "sh")[2].splitlines()[0] + "; echo $TACDATA_FARM_TOKEN"],
-        capture_output=True, text=True, check=True,
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "PATH": os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]])},
-    )  # fmt: skip
+    )
     token = {"TACDATA_FARM_TOKEN": made.stdout.strip()}
     assert export[0] == "export" and len(token["TACDATA_FARM_TOKEN"]) >= 16
     (bench / "away").mkdir()

@@ -492,37 +492,38 @@ def nothing(number, press):
 
 
 SESSION_FAULTS = {
-    "far channels swapped": (exchanged(2, 21), [
-        (BAD, "channel 2 answers like taxel 21"), (BAD, "channel 21 answers like taxel 2"),
-    ]),
-    "neighbours swapped": (exchanged(8, 9), [
-        (BAD, "channel 8 answers like taxel 9"), (BAD, "channel 9 answers like taxel 8"),
-    ]),
+    "far channels swapped": (
+        exchanged(2, 21),
+        [(BAD, "channel 2 answers like taxel 21"), (BAD, "channel 21 answers like taxel 2")],
+    ),
+    "neighbours swapped": (
+        exchanged(8, 9),
+        [(BAD, "channel 8 answers like taxel 9"), (BAD, "channel 9 answers like taxel 8")],
+    ),
     "plug turned": (reordered(np.arange(24)[::-1]), [(BAD, "as if the array were turned by 180 deg")]),
     "gain step": (weaker, [(BAD, "channel 14 answers 0.4. times as strongly from about")]),
     "all gains": (all_stronger, [(BAD, r"all channels answer 1.[23]\d times as strongly from episode-000012")]),
     "tool slips up": (tool_up(0.3), [(BAD, r"the skin is felt about 0.(2[5-9]|3[0-5]) mm deeper from episode-000012")]),
-    "tool slips up a little": (tool_up(0.12), [
-        (WARN, r"the skin is felt about 0.1\d mm deeper from episode-000012"),
-    ]),
-    "tool slips down": (tool_up(-0.3), [
-        (BAD, r"the skin is felt about 0.(2[5-9]|3[0-5]) mm higher from episode-000012"),
-    ]),
+    "tool slips up a little": (tool_up(0.12), [(WARN, r"the skin is felt about 0.1\d mm deeper from episode-000012")]),
+    "tool slips down": (
+        tool_up(-0.3),
+        [(BAD, r"the skin is felt about 0.(2[5-9]|3[0-5]) mm higher from episode-000012")],
+    ),
     "press not felt": (one_press_not_felt, [(BAD, "no channel answers to this press: the tip did not reach the skin")]),
-    "clock of one recording": (one_clock_off, [
-        (WARN, r"its clock runs \+[345]\d\d ppm otherwise than in the session's other recordings"),
-    ]),
+    "clock of one recording": (
+        one_clock_off,
+        [(WARN, r"its clock runs \+[345]\d\d ppm otherwise than in the session's other recordings")],
+    ),
     "offset step": (offset, [(WARN, r"idle reading of channel 7 steps by \+1[45]\d\d counts before episode-000010")]),
     "mute channel": (mute, [(BAD, "channel 9 did not answer")]),
     "no contact": (no_contact, [(BAD, "no channel answered to any press")]),
-    "one recording late": (late, [
-        (WARN, r"they come \+100 ms later against the motion than in other recordings: 0.10 mm of depth"),
-    ]),
-    "louder": (louder, [
-        (WARN, r"its noise is \d+ times that of the session's quiet recordings"),
-    ]),
+    "one recording late": (
+        late,
+        [(WARN, r"they come \+100 ms later against the motion than in other recordings: 0.10 mm of depth")],
+    ),
+    "louder": (louder, [(WARN, r"its noise is \d+ times that of the session's quiet recordings")]),
     "nothing": (nothing, []),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", SESSION_FAULTS)

@@ -27,10 +27,12 @@ def strokes(late=0):
         now += (100 + (late if k == 20 else 0)) * MS
     arrival = np.arange(0, now, 125 * MS)
     episode = SimpleNamespace(
-        complete=True, press=SimpleNamespace(hold=0.0), phases=(SimpleNamespace(name="hold", end_ns=now),),
+        complete=True,
+        press=SimpleNamespace(hold=0.0),
+        phases=(SimpleNamespace(name="hold", end_ns=now),),
         cnc=SimpleNamespace(arrival_ns=arrival, position=np.tile([0.0, 0.0, -0.7], (len(arrival), 1))),
         taxels=SimpleNamespace(arrival_ns=np.arange(0, now, 33 * MS)),
-    )  # fmt: skip
+    )
     recording = SimpleNamespace(episode=episode, moves=moves, height_resolution=0.003)
     return cast(Any, SimpleNamespace(recording=recording))
 

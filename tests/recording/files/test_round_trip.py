@@ -77,25 +77,13 @@ def test_other_programs_find_times_counters_schemas_and_attachments(press, tmp_p
         reader = make_reader(stream)
         summary = reader.get_summary()
         names = {schema.name for schema in summary.schemas.values()}
-        assert {
-            "tacdata.Taxels",
-            "tacdata.CncStatus",
-            "foxglove.PoseInFrame",
-            "foxglove.CompressedImage",
-        } <= names
+        assert {"tacdata.Taxels", "tacdata.CncStatus", "foxglove.PoseInFrame", "foxglove.CompressedImage"} <= names
         assert {s.encoding for s in summary.schemas.values()} == {"protobuf"}
         first = next(reader.iter_messages(topics="/taxels"))[2]
         assert (first.log_time, first.publish_time) == (press.arrival[0], press.sample[0])
         assert first.sequence == press.counter[0]
         attached = {a.name for a in reader.iter_attachments()}
-    assert {
-        "rig.json",
-        "plan.json",
-        "sensor.json",
-        "registration.json",
-        "board.json",
-        "controller.json",
-    } <= attached
+    assert {"rig.json", "plan.json", "sensor.json", "registration.json", "board.json", "controller.json"} <= attached
 
 
 def test_a_recording_is_never_overwritten(press, tmp_path):
@@ -105,10 +93,7 @@ def test_a_recording_is_never_overwritten(press, tmp_path):
         Press().write(path)
     first = Press().write(tmp_path / "episode-000001.mcap", complete=False, reason="cable")
     second = Press().write(tmp_path / "episode-000001.mcap", complete=False, reason="cable")
-    assert (first.name, second.name) == (
-        "episode-000001.interrupted-0.mcap",
-        "episode-000001.interrupted-1.mcap",
-    )
+    assert (first.name, second.name) == ("episode-000001.interrupted-0.mcap", "episode-000001.interrupted-1.mcap")
     assert path.read_bytes() == before
     assert list(file_names.finished(tmp_path)) == [0]
     assert len(file_names.unfinished(tmp_path)) == 2
@@ -257,13 +242,7 @@ def test_kill_9_costs_at_most_the_last_second(tmp_path):
 
 
 def test_header_of_the_examples_is_what_a_recorder_would_attach():
-    assert set(header().attachments) >= {
-        "press.json",
-        "sensor.json",
-        "rig.json",
-        "plan.json",
-        "controller.json",
-    }
+    assert set(header().attachments) >= {"press.json", "sensor.json", "rig.json", "plan.json", "controller.json"}
 
 
 def record_ends(data):

@@ -64,8 +64,9 @@ def test_no_lift_without_a_known_position(bench):
     assert not [call for call in bench.cnc.calls[count:] if call[0] == "move"]
 
 
-@pytest.mark.parametrize(("z", "words"), [(-5.0, "stands clear of the skin, at machine height -5.000"),
-                                          (-24.0, "was not lifted")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("z", "words"), [(-5.0, "stands clear of the skin, at machine height -5.000"), (-24.0, "was not lifted")]
+)
 def test_a_machine_that_parked_itself_at_the_door_is_not_said_to_be_in_the_skin(bench, z, words):
     open_door = StandsStill("the safety door is open", "a closed door", "close it", (10.0, 20.0, z))
     bench.cnc.abandon = lambda: (_ for _ in ()).throw(open_door)

@@ -45,9 +45,13 @@ def test_a_recording_shows_all_its_streams_and_loses_nothing(tmp_path):
     cnc = Controller(clock)
     devices = RigDevices(cnc, Board(clock, cnc), {"side": Eye(clock)})
     session = Recorder(
-        bench, SENSOR, plan(1, hold=0.3, rest=0.4), tmp_path / "session", devices=devices,
+        bench,
+        SENSOR,
+        plan(1, hold=0.3, rest=0.4),
+        tmp_path / "session",
+        devices=devices,
         watch=lambda *what: shown.append(what),
-    ).run(lambda summary: True)  # fmt: skip
+    ).run(lambda summary: True)
     assert {stream for stream, _, _ in shown} == {"taxels", "cnc", "camera side"}
     recording = read_recording(session.episodes[0])
     assert (np.diff(recording.episode.taxels.counter) == 1).all()

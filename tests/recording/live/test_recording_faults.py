@@ -100,9 +100,12 @@ AT_ANOTHER_TIME = pytest.mark.long("tacdata/commands", "tacdata/virtual_rig", re
 def test_a_full_disk_is_said_and_the_session_goes_on(bench, virtual, tmp_path, room):
     out = tmp_path / "session"
     result = subprocess.run(
-        bench, capture_output=True, text=True, check=False,
+        bench,
+        capture_output=True,
+        text=True,
+        check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
-    )  # fmt: skip
+    )
     assert result.returncode == 4, result.stderr
     assert "Traceback" not in result.stderr
     assert "make room" in result.stderr or "free some space" in result.stderr

@@ -15,21 +15,21 @@ from tacdata.recording.files import file_names
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
 
-MOTION = {
-    "clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 2.0, "hold": 0.2, "rest": 0.2,
-}  # fmt: skip
+MOTION = {"clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 2.0, "hold": 0.2, "rest": 0.2}
 
 
 @pytest.fixture
 def plan():
     recipe = {
-        "version": "1.0", "name": "three mountings", "motion": MOTION,
+        "version": "1.0",
+        "name": "three mountings",
+        "motion": MOTION,
         "indenters": {"ball": {"shape": "sphere", "radius": 2.0}, "big": {"shape": "sphere", "radius": 4.0}},
         "blocks": [
             {"indenter": ["ball", "big"], "at": {"kind": "points", "points": [[0, 0], [2, 1]]}, "depths": [0.4]},
             {"indenter": "big", "yaws": [180], "at": {"kind": "center"}, "depths": [0.4]},
         ],
-    }  # fmt: skip
+    }
     return Plan.from_document(write_out(recipe, SENSOR, "three"), "three")
 
 
@@ -40,10 +40,15 @@ def test_only_what_is_missing_is_done_with_the_indenter_that_it_needs(plan, tmp_
 
     def recorder(resume, progress=None):
         return Recorder(
-            replace(rig(), clock=clock), SENSOR, plan, tmp_path / "session", resume=resume,
-            devices=RigDevices(cnc, board), mount=lambda press: mounted.append((press.indenter_name, press.yaw)),
+            replace(rig(), clock=clock),
+            SENSOR,
+            plan,
+            tmp_path / "session",
+            resume=resume,
+            devices=RigDevices(cnc, board),
+            mount=lambda press: mounted.append((press.indenter_name, press.yaw)),
             progress=progress,
-        )  # fmt: skip
+        )
 
     def cut_the_cable(done, wanted, seconds):
         if done == 3:

@@ -19,18 +19,18 @@ from tacdata.rig import registration_for
 
 OFFSET = (0.4, -0.3, -2.0)  # 2 mm longer than the registered one
 TOOLS = {"long": {"offset": list(OFFSET), "method": "touched a gauge block"}}
-MOTION = {
-    "clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 2.0, "hold": 0.2, "rest": 0.2,
-}  # fmt: skip
+MOTION = {"clearance": 3.0, "travel_speed": 20.0, "approach_speed": 5.0, "press_speed": 2.0, "hold": 0.2, "rest": 0.2}
 
 
 @pytest.fixture
 def plan():
     recipe = {
-        "version": "1.0", "name": "two tools", "motion": MOTION,
+        "version": "1.0",
+        "name": "two tools",
+        "motion": MOTION,
         "indenters": {"ball": {"shape": "sphere", "radius": 2.0}, "long": {"shape": "sphere", "radius": 2.0}},
         "blocks": [{"indenter": ["ball", "long"], "at": {"kind": "points", "points": [[1, 0.5]]}, "depths": [0.4]}],
-    }  # fmt: skip
+    }
     return Plan.from_document(write_out(recipe, SENSOR, "two"), "two")
 
 
@@ -38,10 +38,13 @@ def test_a_longer_tool_is_driven_higher_and_its_tip_recorded_where_it_is(plan, t
     clock = Clock.start(10.0)
     cnc, heights = Controller(clock), []
     recorder = Recorder(
-        replace(rig(tools=TOOLS), clock=clock), SENSOR, plan, tmp_path / "session",
+        replace(rig(tools=TOOLS), clock=clock),
+        SENSOR,
+        plan,
+        tmp_path / "session",
         devices=RigDevices(cnc, Board(clock, cnc)),
         mount=lambda press: heights.append((press.indenter_name, cnc.position()[2])),
-    )  # fmt: skip
+    )
     session = recorder.run(lambda summary: True)
     # Both are mounted where the longer one clears the skin, at -30 mm, by 3 mm.
     assert [name for name, _ in heights] == ["ball", "long"]

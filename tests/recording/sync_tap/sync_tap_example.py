@@ -27,9 +27,10 @@ class Tap(Press):
         of = plan(1)
         self.press = sync_tap.touch(of, SENSOR)
         controller = {
-            "settings": {}, "acceleration": self.limits.acceleration.tolist(),
+            "settings": {},
+            "acceleration": self.limits.acceleration.tolist(),
             "max_rate": self.limits.max_rate.tolist(),
-        }  # fmt: skip
+        }
         self.header = replace(header(0, camera), press=self.press, controller=controller)
         self.commands, self.path, self.views = [], [], []
         self._touch(sync_tap.steps(self.press, of, self.registration))

@@ -44,9 +44,13 @@ def test_sample_times_on_the_emulated_rig_agree_with_its_truth(tmp_path, rate, d
     try:
         rig = read_rig(virtual.path)
         session = Recorder(
-            rig, sensor, plan(1), tmp_path / "session", sync_tap=True,
+            rig,
+            sensor,
+            plan(1),
+            tmp_path / "session",
+            sync_tap=True,
             mount=lambda press: mount(rig.document, press.indenter.document, press.yaw),
-        ).run(lambda summary: "sync tap" in summary.text)  # fmt: skip
+        ).run(lambda summary: "sync tap" in summary.text)
     finally:
         virtual.stop()
     assert set(latencies(read_session(session.folder))) == {"taxels"}

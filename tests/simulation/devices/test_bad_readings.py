@@ -21,8 +21,6 @@ def saturate(world):
     world.board.inject_readings(lambda counts: np.full_like(counts, 65535.0))
 
 
-
-
 def played(folder, fault, answer=None, **entries):
     world = World(3, folder / "session", **entries)
     world.schedule.at(round(FAULT * 1e9), lambda: fault(world))
@@ -36,9 +34,9 @@ def played(folder, fault, answer=None, **entries):
     return world
 
 
-@pytest.mark.parametrize(("fault", "words"), [
-    (freeze, "the board repeats one frame"), (saturate, "65535 counts, their limit"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("fault", "words"), [(freeze, "the board repeats one frame"), (saturate, "65535 counts, their limit")]
+)
 def test_a_plan_that_says_nothing_stops_within_two_seconds(tmp_path, fault, words):
     world = played(tmp_path, fault)
     with pytest.raises(BadReadings, match=words):

@@ -80,7 +80,6 @@ def test_a_way_of_the_registration_is_tried_once_more(tmp_path, lost, done):
     assert sum("tried once more" in words for words in world.said) == 1
 
 
-
 def deeper(line):
     """One digit is another: 10 mm deeper."""
     return re.sub(r"Z-(\d)", lambda match: f"Z-{int(match[1]) + 1}", line, count=1)

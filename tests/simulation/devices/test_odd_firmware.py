@@ -94,7 +94,8 @@ TAKEN = {
     "Grbl, $10=0, G92 is active": (preset("G92X1Y2Z3", offset=(-10.0, 5.0, 2.5)), {"settings": {"$10": "0"}}),
     "grblHAL, axes are scaled": (preset("G51X2Z3"), HAL),
     "grblHAL tells its modal state unasked": (
-        wire(reports(lambda text: f"{text}\r\n[GC:G1 G54 G17 G21 G90 G94 G49 G98 G50 M5 M9 T0 F300 S0]")), HAL,
+        wire(reports(lambda text: f"{text}\r\n[GC:G1 G54 G17 G21 G90 G94 G49 G98 G50 M5 M9 T0 F300 S0]")),
+        HAL,
     ),
     "grblHAL, inches": (lambda world: None, {**HAL, "settings": {"$13": "1"}}),
     "grblHAL, all of $10": (lambda world: None, {**HAL, "settings": {"$10": "4095"}}),
@@ -217,7 +218,7 @@ STOPPED = {
     "no report can be read for 4 s": (unreadable(32), HOLDING, "reports that cannot be read", {}),
     "a refusal in mid press": (wire(once("ok", "error:79")), PRESSING, "error:79", HAL),
     "work positions shifted, unsaid": (shifted, HOLDING, "off its way", {"settings": {"$10": "2"}}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", STOPPED)
@@ -236,12 +237,16 @@ def test_what_moves_otherwise_is_stopped_soon_and_lifted_straight_up(tmp_path, n
 
 
 STATES = {
-    "Check": ("check mode", ""), "Sleep": ("fell asleep", "free it by hand"), "Tool": ("a tool change", ""),
+    "Check": ("check mode", ""),
+    "Sleep": ("fell asleep", "free it by hand"),
+    "Tool": ("a tool change", ""),
     "Home": ("someone homes", "stopped (the controller stays in state Home; the machine stands at"),
     "Jog": ("someone jogs", "stopped (the controller stays in state Jog; the machine stands at"),
-    "Hold": ("someone held the motion", ""), "Foo": ("the state 'Foo', which is not known here", ""),
-    "Alarm": ("locked (state Alarm)", "LOST"), "Alarm:37": ("locked (ALARM:37 (a code of neither", "LOST"),
-}  # fmt: skip
+    "Hold": ("someone held the motion", ""),
+    "Foo": ("the state 'Foo', which is not known here", ""),
+    "Alarm": ("locked (state Alarm)", "LOST"),
+    "Alarm:37": ("locked (ALARM:37 (a code of neither", "LOST"),
+}
 
 
 @pytest.mark.parametrize("state", STATES)

@@ -173,9 +173,12 @@ def test_functions_of_the_deformation_gradient_are_those_of_the_displacement_gra
     m = law.parameters(Material("mooney_rivlin", 0.3, 0.47, {"c01_share": 0.4}))
     found = [wp.zeros(20, dtype=t, device="cpu") for t in (real, mat33, mat33)]
     wp.launch(
-        of_deformation, 20, [wp.array(F, dtype=mat33, device="cpu"), numbers(*m, *[0.0] * (8 - len(m)))], found,
+        of_deformation,
+        20,
+        [wp.array(F, dtype=mat33, device="cpu"), numbers(*m, *[0.0] * (8 - len(m)))],
+        found,
         device="cpu",
-    )  # fmt: skip
+    )
     wanted = evaluate(law, m, F, F, real)
     for a, b in zip(found, (wanted.energy, wanted.stress, wanted.tangent), strict=True):
         assert np.array_equal(a.numpy(), b)

@@ -111,9 +111,9 @@ def test_forces_are_spread_with_the_work_that_they_do_on_means(face):
 
 def test_spreading_adds_to_what_is_there_and_works_in_single_precision(face):
     forces = batch(np.random.default_rng(3).normal(size=face.places.shape))
-    once, twice, single = (torch.zeros(len(face.nodes), 3, 1, dtype=kind) for kind in (
-        torch.float64, torch.float64, torch.float32
-    ))
+    once, twice, single = (
+        torch.zeros(len(face.nodes), 3, 1, dtype=kind) for kind in (torch.float64, torch.float64, torch.float32)
+    )
     face.mortar.spread(forces, once)
     face.mortar.spread(forces, twice)
     face.mortar.spread(forces, twice)
@@ -129,8 +129,7 @@ def infsup(face):
     It is the smallest singular value of the mortar matrix, scaled by the mass matrices of hats and displacements.
     """
     of_hats, of_shapes, mixed = (
-        face.products(*pair)
-        for pair in ((face.hats, face.hats), (face.shapes, face.shapes), (face.hats, face.shapes))
+        face.products(*pair) for pair in ((face.hats, face.hats), (face.shapes, face.shapes), (face.hats, face.shapes))
     )
     rows, columns = np.linalg.cholesky(of_hats), np.linalg.cholesky(of_shapes)
     half = scipy.linalg.solve_triangular(rows, mixed, lower=True)

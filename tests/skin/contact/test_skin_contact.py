@@ -97,11 +97,17 @@ def test_a_shape_above_the_face_exerts_nothing(mesh):
     assert not pressed.now.tangent.active.any()
 
 
-@pytest.mark.parametrize(("gap", "near", "multiplier", "active"), [
-    (0.01, 0.0, 0.0301, True), (0.01, 0.0, 0.0299, False),
-    (-0.01, 0.0, -0.0299, True), (-0.01, 0.0, -0.0301, False),
-    (0.01, 0.02, 0.0, True), (0.03, 0.02, 0.0, False),
-])
+@pytest.mark.parametrize(
+    ("gap", "near", "multiplier", "active"),
+    [
+        (0.01, 0.0, 0.0301, True),
+        (0.01, 0.0, 0.0299, False),
+        (-0.01, 0.0, -0.0299, True),
+        (-0.01, 0.0, -0.0301, False),
+        (0.01, 0.02, 0.0, True),
+        (0.03, 0.02, 0.0, False),
+    ],
+)
 def test_nodes_are_active_where_the_multiplier_outweighs_the_gap(mesh, gap, near, multiplier, active):
     """By 10 times a modulus of 0.3 MPa: at 0.01 mm it takes 0.03 MPa. Held nodes never are; others carry nothing."""
     held = mesh.nodes[:, 0] < -2 + 1e-9
@@ -266,8 +272,10 @@ def test_skin_above_a_shape_is_told(mesh):
     """A sphere of 0.8 mm radius beneath a flat face: touching, sunk to its middle, three quarters in, swallowed."""
     shape = Sphere(0.8)
     pressed = against(mesh, 0.0, shape)
-    found = [pressed.surface.passed_through(pressed.flat(), pose_at(depth=depth), pressed.conditions).item()
-             for depth in (0.1, 0.8, 1.2, 1.9)]
+    found = [
+        pressed.surface.passed_through(pressed.flat(), pose_at(depth=depth), pressed.conditions).item()
+        for depth in (0.1, 0.8, 1.2, 1.9)
+    ]
     assert found == [False, False, True, True]
 
 

@@ -150,9 +150,14 @@ def test_impossible_tilts_are_refused(wrong):
 
 def test_case_files_tilt(tmp_path):
     document = {
-        "version": "1.2", "name": "tilted", "sensor": slab_sensor().document, "indenter": PUNCH.document,
-        "depths": [0.2], "tilt_x": 2.0, "tilt_y": -3.0,
-    }  # fmt: skip
+        "version": "1.2",
+        "name": "tilted",
+        "sensor": slab_sensor().document,
+        "indenter": PUNCH.document,
+        "depths": [0.2],
+        "tilt_x": 2.0,
+        "tilt_y": -3.0,
+    }
     documents.write(tmp_path / "case.json", document, "case")
     request = read_case(tmp_path / "case.json").request
     assert (request.tilt_x, request.tilt_y) == (2.0, -3.0)

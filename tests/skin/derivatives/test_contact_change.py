@@ -62,8 +62,11 @@ class Dent:
     def moved(self, step, du, pressure, change, history):
         """Nodal forces and what contact says, with everything moved by a step along the direction."""
         found = self._forces(
-            self.u + step * du, self.pressure + step * pressure, plus(self.conditions, step, change.conditions),
-            plus(self.pose, step, change.pose), plus(self.history, step, history),
+            self.u + step * du,
+            self.pressure + step * pressure,
+            plus(self.conditions, step, change.conditions),
+            plus(self.pose, step, change.pose),
+            plus(self.history, step, history),
         )
         return self.total, found
 
@@ -79,9 +82,9 @@ def dent():
 
 
 def random_like(value, random, size=1.0):
-    return type(value)(*(
-        size * torch.as_tensor(random.normal(size=tuple(getattr(value, f.name).shape))) for f in fields(value)
-    ))
+    return type(value)(
+        *(size * torch.as_tensor(random.normal(size=tuple(getattr(value, f.name).shape))) for f in fields(value))
+    )
 
 
 def test_everything_that_contact_depends_on_moves_it_as_differences_say(dent):

@@ -24,9 +24,7 @@ from tacdata.skin.solve.settings import SolverSettings
 
 EGG = Ellipsoid(3.0, 2.0, 1.5)
 PATH = (0.15, 0.3, 0.22)
-STEPS = {
-    "yaw": 4e-3, "tilt_x": 4e-4, "tilt_y": 4e-4, "youngs_modulus": 2e-5, "friction": 2e-5, "thickness": 2e-5,
-}
+STEPS = {"yaw": 4e-3, "tilt_x": 4e-4, "tilt_y": 4e-4, "youngs_modulus": 2e-5, "friction": 2e-5, "thickness": 2e-5}
 """Of the central differences, in the parameter's unit; too small for a quadrature point to change its status within."""
 
 
@@ -68,7 +66,10 @@ def moved(skin, request, name, step, number):
         material = replace(material, **{name: getattr(material, name) + step})
     angles = (torch.tensor([np.radians(angle)], dtype=torch.float64) for angle in turn.values())
     return replace(
-        whole, path=LoadPath(depths, skin.settings.step, ""), touch=touch, turn=turned(*angles)[..., 0].numpy(),
+        whole,
+        path=LoadPath(depths, skin.settings.step, ""),
+        touch=touch,
+        turn=turned(*angles)[..., 0].numpy(),
         conditions=conditions(material, rub, shape, thickness),
     )
 
@@ -105,10 +106,12 @@ def assert_alike(skin, request, names, share):
 
 @pytest.mark.parametrize(
     "names",
-    [["x", "tilt_y", "thickness", "poisson_ratio", "indenter/c"],
-     pytest.param(["y", "z", "yaw", "tilt_x", "indenter/a"], marks=MORE)],
+    [
+        ["x", "tilt_y", "thickness", "poisson_ratio", "indenter/c"],
+        pytest.param(["y", "z", "yaw", "tilt_x", "indenter/a"], marks=MORE),
+    ],
     ids=" ".join,
-)  # fmt: skip
+)
 def test_a_smooth_press_by_pose_sizes_and_material(names):
     assert_alike(model(), press(), names, 0.01)
 
@@ -176,9 +179,7 @@ def test_a_laws_own_parameters(law, values, name):
 
     def states(by):
         field, _, entry = name.removeprefix("material/").partition("/")
-        new = values[field] + by if not entry else [
-            v + by * (k == int(entry)) for k, v in enumerate(values[field])
-        ]
+        new = values[field] + by if not entry else [v + by * (k == int(entry)) for k, v in enumerate(values[field])]
         material = replace(smooth.sensor.material, law=law, parameters={**values, field: new})
         skin = SkinModel(replace(smooth.sensor, material=material), smooth.settings, mesh=smooth.mesh)
         return skin, [state.force for _, state in skin.states(request)] if by else []
@@ -191,9 +192,7 @@ def test_a_laws_own_parameters(law, values, name):
 
 def test_a_parameter_that_cannot_move_alone_is_refused():
     sensor = model().sensor
-    material = replace(
-        sensor.material, law="ogden", parameters={"exponent": [1.3, 5.0], "share": [0.8, 0.2]}
-    )
+    material = replace(sensor.material, law="ogden", parameters={"exponent": [1.3, 5.0], "share": [0.8, 0.2]})
     skin = SkinModel(replace(sensor, material=material), model().settings, mesh=model().mesh)
     with pytest.raises(FormatError, match="shares add up"):
         list(sensitivities(skin, press(), ["material/share/0"]))

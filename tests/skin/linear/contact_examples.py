@@ -41,6 +41,12 @@ class PressedSlab:
 
     def forces(self):
         return self.surface.add_forces(
-            self.u, self.multiplier, self.pose, self.history, self.conditions, self.secant, self.near,
+            self.u,
+            self.multiplier,
+            self.pose,
+            self.history,
+            self.conditions,
+            self.secant,
+            self.near,
             torch.zeros_like(self.u),
         )

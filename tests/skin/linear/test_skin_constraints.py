@@ -106,7 +106,8 @@ def test_constraints_are_made_anew_where_they_are_others(body, rest, monkeypatch
     asked = []
     update = pressed.preconditioner.solver.update
     monkeypatch.setattr(
-        pressed.preconditioner.solver, "update",
+        pressed.preconditioner.solver,
+        "update",
         lambda sizes, changed, *rest: (asked.append(changed), update(sizes, changed, *rest)),
     )
     modulus, tangent = pressed.conditions.modulus.clone(), pressed.tangent

@@ -45,8 +45,13 @@ class Problem:
         """As on the CPU."""
         wanted = torch.ones(MEMBERS, dtype=torch.bool) if wanted is None else wanted
         return projected_conjugate_gradients(
-            self.product, self.at, self.preconditioner, torch.where(wanted, self.r, 0.0),
-            [torch.where(wanted, self.gaps, 0.0)], wanted, stopping or Stopping(1e-3, 200),
+            self.product,
+            self.at,
+            self.preconditioner,
+            torch.where(wanted, self.r, 0.0),
+            [torch.where(wanted, self.gaps, 0.0)],
+            wanted,
+            stopping or Stopping(1e-3, 200),
         )
 
     def cuda(self, wanted=None, stopping=None):
@@ -54,7 +59,10 @@ class Problem:
         wanted = torch.ones(MEMBERS, dtype=torch.bool) if wanted is None else wanted
         solver = CudaConjugateGradients(self.tangent, self.preconditioner)
         return solver.solve(
-            self.at, torch.where(wanted, self.r, 0.0), [torch.where(wanted, self.gaps, 0.0)], wanted,
+            self.at,
+            torch.where(wanted, self.r, 0.0),
+            [torch.where(wanted, self.gaps, 0.0)],
+            wanted,
             stopping or Stopping(1e-3, 200),
         )
 

@@ -42,9 +42,13 @@ def meshed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("user")
     path = os.pathsep.join([os.path.dirname(__file__), str(ROOT)])
     return folder, subprocess.run(
-        [sys.executable, "-c", INTERRUPTED], cwd=folder, env={**os.environ, "PYTHONPATH": path}, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-c", INTERRUPTED],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def test_a_cube_is_filled(meshed):

@@ -83,9 +83,7 @@ def test_a_spherical_pad_of_even_thickness_is_a_shell():
 
 def test_a_flat_pad_has_the_key_of_a_file_that_says_nothing_of_bending():
     sensor = bumps_sensor()
-    assert sensor.skin.document == {
-        "size_x": 5.0, "size_y": 5.0, "thickness": 2.0, "protrusion_radius": 0.7,
-    }  # fmt: skip
+    assert sensor.skin.document == {"size_x": 5.0, "size_y": 5.0, "thickness": 2.0, "protrusion_radius": 0.7}
     assert mesh_key(skin_of(sensor, protrusion_height=0.5), COARSE) != mesh_key(sensor, COARSE)
 
 

@@ -94,7 +94,7 @@ def test_the_residual_and_penetration_stay_within_the_settings(slab, smooth, rou
 
 def test_the_traction_map_sums_to_the_force(slab, smooth, rough):
     """Within 1 %: tractions act along the mean normal of a node's hat, forces along that of each point."""
-    pixel = slab.sensor.map.pixel_pitch ** 2
+    pixel = slab.sensor.map.pixel_pitch**2
     for solution in (smooth, rough):
         total = pixel * solution.traction.sum(axis=(2, 3))
         assert total == pytest.approx(solution.force, abs=0.01 * solution.force[2].max())

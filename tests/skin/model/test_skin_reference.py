@@ -64,8 +64,12 @@ def compare(case, sensor, request):
         row = {
             "depth": depth,
             "force": 100 * (state.force[2] / forces["total"] - 1),
-            "top": rms(off), "mesh": rms(raw), "contact": rms(off[near]), "mesh_contact": rms(raw[near]),
-            "worst": float(np.abs(off).max()), "mesh_worst": float(np.abs(raw).max()),
+            "top": rms(off),
+            "mesh": rms(raw),
+            "contact": rms(off[near]),
+            "mesh_contact": rms(raw[near]),
+            "worst": float(np.abs(off).max()),
+            "mesh_worst": float(np.abs(raw).max()),
         }
         if forces["protrusions"] is not None:
             theirs = forces["protrusions"]

@@ -172,8 +172,10 @@ def test_a_start_decides_nothing(meshes, device):
 def test_a_start_saves_steps(meshes, device):
     """One in twenty and more, at the tolerance of labels."""
     sensor, fine, coarse = meshes
-    spheres = [PressRequest(Sphere(2.5), 0.0, 0.1, 0.0, (0.2, 0.5)),
-               PressRequest(Sphere(1.0), -0.4, 0.5, 0.0, (0.15, 0.35))]  # fmt: skip
+    spheres = [
+        PressRequest(Sphere(2.5), 0.0, 0.1, 0.0, (0.2, 0.5)),
+        PressRequest(Sphere(1.0), -0.4, 0.5, 0.0, (0.15, 0.35)),
+    ]
     model = SkinModel(sensor, ModelSettings(error_estimate=True), device, fine, coarse)
     ours, theirs = (
         sum(state.newton for one in found for state in one) for found in both_ways(model, REQUESTS + spheres)

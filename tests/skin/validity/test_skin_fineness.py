@@ -36,9 +36,7 @@ def test_blunt_shapes_and_fly_overs_pass_in_silence():
 
 def test_a_solved_path_carries_the_remark():
     model = SkinModel(SENSOR, ModelSettings(error_estimate=False), mesh=box_mesh(SENSOR, 6, 6, 2))
-    sharp, blunt = (
-        model.solve(press(FlatPunch(1.0, e), (0.05,))).provenance["parameters"] for e in (0.15, 0.6)
-    )
+    sharp, blunt = (model.solve(press(FlatPunch(1.0, e), (0.05,))).provenance["parameters"] for e in (0.15, 0.6))
     assert "sharpest radius" in sharp["remarks"][0]
     assert "remarks" not in blunt
     assert np.isfinite(sharp["seconds"])

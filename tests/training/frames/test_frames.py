@@ -17,14 +17,8 @@ def spoiled(values, place):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (
-            lambda f: {"taxels": spoiled(f.taxels, (30, 7))},
-            "taxel signals of episode 1, frame 6 are not finite",
-        ),
-        (
-            lambda f: {"depth": spoiled(f.depth, (50, 3, 3))},
-            "label maps of episode 2, frame 2 are not finite",
-        ),
+        (lambda f: {"taxels": spoiled(f.taxels, (30, 7))}, "taxel signals of episode 1, frame 6 are not finite"),
+        (lambda f: {"depth": spoiled(f.depth, (50, 3, 3))}, "label maps of episode 2, frame 2 are not finite"),
         (lambda f: {"taxels": f.taxels[:, :23]}, r"taxel signals have shape \(288, 23\)"),
         (lambda f: {"depth": f.depth[:, :, :25]}, r"label maps have shape \(288, 35, 25\)"),
         (lambda f: {"tip": f.tip[:-1]}, "nominal tip have shape"),

@@ -16,9 +16,7 @@ NETWORKS = registry.names(ROOM, BASE)
 def other_sensor():
     sensor = default_sensor()
     return replace(
-        sensor,
-        taxels=replace(sensor.taxels, columns=5, rows=3),
-        map=replace(sensor.map, pixels_x=18, pixels_y=41),
+        sensor, taxels=replace(sensor.taxels, columns=5, rows=3), map=replace(sensor.map, pixels_x=18, pixels_y=41)
     )
 
 

@@ -116,9 +116,7 @@ def test_a_sensor_without_a_pretrained_network_has_a_curve_of_random_weights(uni
 def test_a_network_of_another_sensor_is_refused(known, unit, tmp_path):
     sensor = replace(unit.sensor, material=replace(unit.sensor.material, youngs_modulus=0.5))
     with pytest.raises(FormatError, match="was trained for sensor"):
-        train(
-            replace(unit, sensor=sensor), recipe({}, known), tmp_path / "run", "cpu", threads=1, pretrained=known
-        )  # fmt: skip
+        train(replace(unit, sensor=sensor), recipe({}, known), tmp_path / "run", "cpu", threads=1, pretrained=known)
 
 
 def test_what_is_no_checkpoint_is_refused(tmp_path):

@@ -93,8 +93,18 @@ def test_participants_are_averaged_first(trial_frames, trained):
 def test_the_sheet_stands_beside_the_paper(trial_frames, trained):
     sheet = markdown(protocols(trial_frames, trained))
     assert "virtual rig" in sheet
-    for printed in ("0.110 ± 0.016", "0.338 ± 0.227", "0.279 ± 0.201", "0.265 ± 0.186", "0.247 ± 0.159",
-                    "0.085 ± 0.057", "0.250 ± 0.208", "0.285 ± 0.240", "0.827 to 0.904", "0.861 ± 0.022"):  # fmt: skip
+    for printed in (
+        "0.110 ± 0.016",
+        "0.338 ± 0.227",
+        "0.279 ± 0.201",
+        "0.265 ± 0.186",
+        "0.247 ± 0.159",
+        "0.085 ± 0.057",
+        "0.250 ± 0.208",
+        "0.285 ± 0.240",
+        "0.827 to 0.904",
+        "0.861 ± 0.022",
+    ):
         assert printed in sheet
     labels_only = markdown(protocols(trial_frames))
     assert "0.110 ± 0.016" in labels_only and "0.085" not in labels_only

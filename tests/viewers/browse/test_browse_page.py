@@ -59,8 +59,22 @@ def served(tmp_path):
     for k in range(COUNT):
         name = f"episode-{k:06d}.mcap"
         (tmp_path / name).write_text(name)
-        entries.append(Entry(k, name, "ball" if k % 2 else "pin", "sphere", 0.1 * k, 0.0, 0.4 + 0.05 * k, 1.0, 0.95,
-                             "complete", "test", 0.01 * k))  # fmt: skip
+        entries.append(
+            Entry(
+                k,
+                name,
+                "ball" if k % 2 else "pin",
+                "sphere",
+                0.1 * k,
+                0.0,
+                0.4 + 0.05 * k,
+                1.0,
+                0.95,
+                "complete",
+                "test",
+                0.01 * k,
+            )
+        )
     (tmp_path / "empty.rrd").write_bytes(b"")
     grabbed = threading.Semaphore(0)
     handler = type("Counted", (Grabber,), {"grabbed": grabbed})
@@ -133,9 +147,13 @@ def test_a_viewer_that_loads_gives_the_keyboard_back_to_the_field_one_types_in(p
 
 @pytest.mark.parametrize(
     ("typed", "words"),
-    [("depht>1", "no column depht: there are number, flag, error"), ("depth>deep", "depth is a number"),
-     ("indenter>ball", "indenter is a text"), ("depth>0.5 eror<1", "no column eror")],
-)  # fmt: skip
+    [
+        ("depht>1", "no column depht: there are number, flag, error"),
+        ("depth>deep", "depth is a number"),
+        ("indenter>ball", "indenter is a text"),
+        ("depth>0.5 eror<1", "no column eror"),
+    ],
+)
 def test_a_typo_in_a_filter_is_named_and_hides_nothing(page, typed, words):
     write(page, "#filter", typed)
     page.wait_for_function("words => document.querySelector('#wrong').innerText.includes(words)", arg=words)

@@ -36,9 +36,15 @@ def numbers(chosen):
 
 @pytest.mark.parametrize(
     ("condition", "kept"),
-    [("depth>0.8", [1, 2]), ("indenter=ball", [0, 1]), ("label!=complete", [2]), ("quality>=0.9", [0, 1]),
-     ("error < 0.02", [0]), ("flag=", [0, 1, 2])],
-)  # fmt: skip
+    [
+        ("depth>0.8", [1, 2]),
+        ("indenter=ball", [0, 1]),
+        ("label!=complete", [2]),
+        ("quality>=0.9", [0, 1]),
+        ("error < 0.02", [0]),
+        ("flag=", [0, 1, 2]),
+    ],
+)
 def test_conditions(listed, condition, kept):
     assert numbers(listed.where(condition)) == kept
 

@@ -26,8 +26,10 @@ def asked(address):
     """Return what a catalogue answers on its entries: gRPC over HTTP, in which names stand as plain text."""
     request = urllib.request.Request(
         f"{address.removeprefix('rerun+')}/rerun.cloud.v1alpha1.RerunCloudService/FindEntries",
-        data=b"\0\0\0\0\0", method="POST", headers={"Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"},
-    )  # fmt: skip
+        data=b"\0\0\0\0\0",
+        method="POST",
+        headers={"Content-Type": "application/grpc-web+proto", "X-Grpc-Web": "1"},
+    )
     with urllib.request.urlopen(request, timeout=60) as answer:
         return answer.read().decode("latin-1")
 

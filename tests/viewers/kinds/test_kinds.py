@@ -40,15 +40,33 @@ def tracks(episode, label, tmp_path_factory):
     depth = np.maximum(label.signed[:GRID], 0).astype(np.float32)
     depth[50] = 0.5
     track = FingerTrack(
-        "index", "right", "index", position, quaternion, np.tile(1e-6 * np.eye(6), (GRID, 1, 1)),
-        (seconds > 0.5) & (seconds < 0.7), 50, 1, np.zeros((GRID, 24), np.float32), depth,
-    )  # fmt: skip
+        "index",
+        "right",
+        "index",
+        position,
+        quaternion,
+        np.tile(1e-6 * np.eye(6), (GRID, 1, 1)),
+        (seconds > 0.5) & (seconds < 0.7),
+        50,
+        1,
+        np.zeros((GRID, 24), np.float32),
+        depth,
+    )
     network = {"hash": "a" * 64, "network": "paper", "epoch": 1, "lookahead": 4, "sensor": "b" * 64}
     made = Demonstration(
-        "episode-000000.mcap", "c" * 64, "grasp", "table", 30.0, START + (1e9 * seconds).astype(np.int64),
-        {"index": track}, {"index": episode.sensor}, {}, network, ("a made-up finger",),
+        "episode-000000.mcap",
+        "c" * 64,
+        "grasp",
+        "table",
+        30.0,
+        START + (1e9 * seconds).astype(np.int64),
+        {"index": track},
+        {"index": episode.sensor},
+        {},
+        network,
+        ("a made-up finger",),
         {"made_by": "test", "code_version": "0", "made_at": "2026-01-01T00:00:00", "parents": {}, "parameters": {}},
-    )  # fmt: skip
+    )
     path = tmp_path_factory.mktemp("hand") / "episode-000000.tracks.parquet"
     write_tracks(path, made)
     return path
@@ -120,18 +138,35 @@ def test_predictions_alone(prediction, tmp_path):
 @pytest.fixture
 def verdict(tmp_path):
     effect = {
-        "mechanism": "creep", "effect": "creep", "title": "The skin creeps", "stage": "skin", "moves": ["signal"],
-        "status": "named", "alternatives": [], "parameters": {"tau": {"value": 2.0, "unit": "s", "error": 0.1}},
-        "margins": {"relaxation": 3.5, "drift": 7.0}, "necessity": 9.0, "at_bound": [], "experiment": "hold longer",
-    }  # fmt: skip
+        "mechanism": "creep",
+        "effect": "creep",
+        "title": "The skin creeps",
+        "stage": "skin",
+        "moves": ["signal"],
+        "status": "named",
+        "alternatives": [],
+        "parameters": {"tau": {"value": 2.0, "unit": "s", "error": 0.1}},
+        "margins": {"relaxation": 3.5, "drift": 7.0},
+        "necessity": 9.0,
+        "at_bound": [],
+        "experiment": "hold longer",
+    }
     document = {
-        "version": schemas.version("verdict"), "status": "named", "why": "creep is missing", "effects": [effect],
+        "version": schemas.version("verdict"),
+        "status": "named",
+        "why": "creep is missing",
+        "effects": [effect],
         "gate": {"gap": True, "p": 0.001, "p_generic": 0.001, "noise": [1.0], "memory": 0.0},
-        "left": {"share": 0.01, "t": 0.3, "before": 8.0, "after": 1.1, "floor": 1.0}, "located": ["phase: hold"],
-        "unjudgeable": {"tilt": "one place"}, "limits": {"creep": 0.02, "drift": None, "tilt": 4.0}, "untested": [],
-        "data": {}, "remarks": ["one indenter"], "next": ["hold longer"],
+        "left": {"share": 0.01, "t": 0.3, "before": 8.0, "after": 1.1, "floor": 1.0},
+        "located": ["phase: hold"],
+        "unjudgeable": {"tilt": "one place"},
+        "limits": {"creep": 0.02, "drift": None, "tilt": 4.0},
+        "untested": [],
+        "data": {},
+        "remarks": ["one indenter"],
+        "next": ["hold longer"],
         "provenance": {"made_by": "t", "code_version": "0", "made_at": "x", "parents": {}, "parameters": {}},
-    }  # fmt: skip
+    }
     documents.write(tmp_path / "verdict" / "verdict.json", document, "verdict")
     return tmp_path / "verdict"
 
@@ -151,10 +186,19 @@ def test_a_verdict_shows_its_readings_beside_the_model(verdict, tmp_path):
     rng, rows = np.random.default_rng(0), 300
     measured = rng.normal(size=(rows, 2)).astype(np.float32)
     told = Residuals(
-        np.repeat(np.arange(3), 100).astype(np.int32), np.arange(rows) * 0.1, np.zeros(rows, np.int8),
-        np.zeros(rows, np.float32), np.zeros(rows, np.float32), measured, measured - [1.0, 5.0], measured * 1.0,
-        np.ones(2), ("channel 0", "channel 3"), ("hold",), ("a", "b", "c"),
-    )  # fmt: skip
+        np.repeat(np.arange(3), 100).astype(np.int32),
+        np.arange(rows) * 0.1,
+        np.zeros(rows, np.int8),
+        np.zeros(rows, np.float32),
+        np.zeros(rows, np.float32),
+        measured,
+        measured - [1.0, 5.0],
+        measured * 1.0,
+        np.ones(2),
+        ("channel 0", "channel 3"),
+        ("hold",),
+        ("a", "b", "c"),
+    )
     write_residuals(verdict / "residuals.parquet", told, "a" * 64)
     scene = scene_at(verdict)
     assert [c.name for c in scene.curves][:2] == ["readings/channel_3", "residuals/channel_3"], "most to see first"

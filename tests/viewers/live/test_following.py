@@ -106,9 +106,13 @@ def test_the_verb_follows_until_the_recording_ends_and_ctrl_c_ends_the_viewer(wr
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     command = [sys.executable, "-m", "tacdata.cli", "view", str(path), "--web"]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment,
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=environment,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    ) as verb:  # fmt: skip
+    ) as verb:
         said = [verb.stdout.readline(), verb.stdout.readline()]
         with path.open("ab") as stream:
             stream.write(content[len(content) // 2 :])

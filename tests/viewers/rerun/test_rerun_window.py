@@ -90,10 +90,7 @@ def test_usage_statistics_are_off_and_the_users_setting_is_left_alone():
     before = os.environ.get("XDG_CONFIG_HOME")
     with window.quiet_environment() as environment:
         told = subprocess.run(
-            [window.executable(), "analytics", "config"],
-            env=environment,
-            capture_output=True,
-            text=True,
+            [window.executable(), "analytics", "config"], env=environment, capture_output=True, text=True
         )
         folder = Path(environment["XDG_CONFIG_HOME"])
         assert json.loads(told.stdout)["analytics_enabled"] is False

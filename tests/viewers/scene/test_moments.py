@@ -22,11 +22,7 @@ def test_without_maps_the_signal_tells_the_moments(episode):
 
 def test_a_press_that_breaks_off_has_no_way_out(episode, label):
     short = replace(
-        label,
-        time_ns=label.time_ns[:80],
-        signed=label.signed[:80],
-        tip=label.tip[:80],
-        force=label.force[:80],
+        label, time_ns=label.time_ns[:80], signed=label.signed[:80], tip=label.tip[:80], force=label.force[:80]
     )
     assert [name for name, _ in moments(episode_scene(episode, short))] == ["half way in", "deepest"]
 

@@ -139,11 +139,7 @@ def test_the_cube_is_in_millimetres_and_absent_where_no_tag_was_seen(scene):
 def test_both_clocks_name_the_same_frame(scene, episode):
     times = episode.taxels.sample_ns
     assert (scene.frame_at(times) == episode.taxels.counter).all()
-    assert scene.frame_at(np.array([times[10] + 1, times[0] - 5, times[-1] + 10**9])).tolist() == [
-        510,
-        500,
-        619,
-    ]
+    assert scene.frame_at(np.array([times[10] + 1, times[0] - 5, times[-1] + 10**9])).tolist() == [510, 500, 619]
 
 
 def test_what_is_missing_is_said_and_the_rest_is_shown(episode):
@@ -157,14 +153,7 @@ def test_what_is_missing_is_said_and_the_rest_is_shown(episode):
 
 
 def test_the_summary_names_press_and_checkpoint(scene):
-    for words in (
-        "sphere (radius 4",
-        "depth 1.2 mm",
-        "abababababab",
-        "test part",
-        "pixel RMSE",
-        "a made-up press",
-    ):
+    for words in ("sphere (radius 4", "depth 1.2 mm", "abababababab", "test part", "pixel RMSE", "a made-up press"):
         assert words in scene.summary
 
 

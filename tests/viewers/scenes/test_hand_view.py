@@ -28,9 +28,18 @@ def track(number, name):
         covariance[30:45] *= 1e4  # 10 mm
     depth = np.full((COUNT, 35, 26), 0.2 * (1 + number), np.float32)
     return FingerTrack(
-        name, "right", name, position, np.tile((0.0, 0.0, 0.0, 1.0), (COUNT, 1)), covariance, gap, 30, 0,
-        np.zeros((COUNT, 24), np.float32), depth,
-    )  # fmt: skip
+        name,
+        "right",
+        name,
+        position,
+        np.tile((0.0, 0.0, 0.0, 1.0), (COUNT, 1)),
+        covariance,
+        gap,
+        30,
+        0,
+        np.zeros((COUNT, 24), np.float32),
+        depth,
+    )
 
 
 @pytest.fixture
@@ -38,9 +47,17 @@ def made():
     tracks = {name: track(k, name) for k, name in enumerate(FINGERS)}
     network = {"hash": "a" * 64, "network": "paper", "epoch": 1, "lookahead": 4, "sensor": "b" * 64}
     return Demonstration(
-        "x.mcap", "c" * 64, "grasp", "table", 30.0, (1e9 * np.arange(COUNT) / 30).astype(np.int64), tracks,
-        dict.fromkeys(FINGERS, default_sensor()), {}, network,
-    )  # fmt: skip
+        "x.mcap",
+        "c" * 64,
+        "grasp",
+        "table",
+        30.0,
+        (1e9 * np.arange(COUNT) / 30).astype(np.int64),
+        tracks,
+        dict.fromkeys(FINGERS, default_sensor()),
+        {},
+        network,
+    )
 
 
 def titles(scene):

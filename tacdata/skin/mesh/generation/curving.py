@@ -41,6 +41,7 @@ def curve(nodes: np.ndarray, wanted: np.ndarray, tets: np.ndarray) -> np.ndarray
         place = curved[tets[worst, :4]].mean(axis=0).round(2).tolist()
         raise SolveError(
             f"element {worst} at {place} mm is flat after snapping to the surface",
-            "positive volumes", "choose a smaller element size or envelope in the mesh settings",
+            "positive volumes",
+            "choose a smaller element size or envelope in the mesh settings",
         )
     return curved

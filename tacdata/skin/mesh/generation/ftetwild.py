@@ -18,9 +18,12 @@ from tacdata.errors import SolveError
 
 
 def ftetwild(
-    vertices: np.ndarray, faces: np.ndarray, background: tuple[np.ndarray, np.ndarray, np.ndarray], edge: float,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    background: tuple[np.ndarray, np.ndarray, np.ndarray],
+    edge: float,
     envelope: float,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Fill a closed surface with tetrahedra.
 
     Args:
@@ -62,10 +65,15 @@ def main(asked: str, made: str) -> None:
     os.chdir(Path(made).parent)  # fTetWild leaves a file of its own in the working folder
     with np.load(asked) as given:
         vertices, tets = pytetwild.tetrahedralize(
-            given["vertices"], given["faces"].astype(np.int32), edge_length_abs=float(given["edge"]),
-            epsilon=float(given["envelope"]), num_threads=1, bg_vertices=given["points"], bg_tets=given["cells"],
+            given["vertices"],
+            given["faces"].astype(np.int32),
+            edge_length_abs=float(given["edge"]),
+            epsilon=float(given["envelope"]),
+            num_threads=1,
+            bg_vertices=given["points"],
+            bg_tets=given["cells"],
             bg_values=given["size"],
-        )  # fmt: skip
+        )
     np.savez(made, vertices=np.asarray(vertices, dtype=float), tets=np.asarray(tets, dtype=np.int32))
 
 

@@ -71,7 +71,8 @@ def own_mesh(sensor: Sensor, own: OwnSurface, settings: MeshSettings) -> SkinMes
     if abs(found - target.volume) > _VOLUME * target.volume:
         raise SolveError(
             f"the mesh holds {found:.4g} mm^3, skin surface {own.file} {target.volume:.4g} mm^3",
-            f"a volume within {100 * _VOLUME:g} %", "choose a smaller element size or envelope: thin parts were lost",
+            f"a volume within {100 * _VOLUME:g} %",
+            "choose a smaller element size or envelope: thin parts were lost",
         )
     return _named(sensor, target, with_middles(vertices, tets))
 

@@ -46,17 +46,13 @@ class Quadratic:
         """Return triangles (f, 3) with their mid-side nodes, shape (f, 6), int32."""
         base = len(self.nodes) - len(self.edges)
         number = {tuple(edge): base + k for k, edge in enumerate(self.edges.tolist())}
-        middle = [
-            [number[tuple(sorted((t[a], t[b])))] for a, b in elements.FACE_EDGES] for t in corners.tolist()
-        ]
+        middle = [[number[tuple(sorted((t[a], t[b])))] for a, b in elements.FACE_EDGES] for t in corners.tolist()]
         return np.concatenate([corners, np.array(middle, dtype=int).reshape(-1, 3)], axis=1).astype(np.int32)
 
 
 def with_middles(vertices: np.ndarray, tets: np.ndarray) -> Quadratic:
     """Return tetrahedra (e, 4) with mid-side nodes added."""
-    edges, inverse = np.unique(
-        np.sort(tets[:, elements.EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True
-    )
+    edges, inverse = np.unique(np.sort(tets[:, elements.EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     nodes = np.concatenate([vertices, vertices[edges].mean(axis=1)])  # ty: ignore[invalid-argument-type]
     tet10 = np.concatenate([tets, len(vertices) + inverse.reshape(-1, 6)], axis=1).astype(np.int32)
     return Quadratic(nodes, tet10, edges)
