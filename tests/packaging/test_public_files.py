@@ -38,7 +38,9 @@ def test_workflows_test_every_python_that_the_package_allows():
     assert {name.split("-")[0] for name in matrix["os"]} == {"ubuntu", "macos"}
 
 
-@pytest.mark.parametrize("path", [*WORKFLOWS, *DOCKERFILES, ROOT / ".pre-commit-config.yaml"], ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", [*WORKFLOWS, *DOCKERFILES, ROOT / ".pre-commit-config.yaml"], ids=lambda path: path.name
+)
 def test_paths_are_there(path):
     assert not [name for name in IN_THE_CLONE.findall(path.read_text()) if not (ROOT / name).exists()]
 
@@ -81,4 +83,6 @@ def test_dockerfiles_install_extras_that_exist_and_run_as_nobody_special(path):
 def test_pre_commit_runs_the_checks_of_the_suite():
     hooks = document(ROOT / ".pre-commit-config.yaml")["repos"][0]["hooks"]
     suite = (ROOT / ".dev" / "suite.py").read_text()
-    assert {hook["entry"].split()[0].rpartition("/")[2] for hook in hooks} == set(re.findall(r'BIN / "([\w-]+)"', suite))
+    assert {hook["entry"].split()[0].rpartition("/")[2] for hook in hooks} == set(
+        re.findall(r'BIN / "([\w-]+)"', suite)
+    )
