@@ -1,6 +1,6 @@
 """Run the checks and the tests.
 
-Without arguments: lint, import directions, types and the quick tests, side by side. `--long`: those that are long by
+Without arguments: lint, import directions, types, the site and the quick tests. `--long`: those that are long by
 nature (tests/running/long_part.py). `--ci`: the quick ones, then of the long ones what changed since they last passed.
 Other arguments go to pytest: to one process, unless with one of these two.
 
@@ -119,6 +119,8 @@ def main(arguments):
     checks.run("format", [str(BIN / "ruff"), "format", "--check", "--quiet", "."])
     checks.run("imports", [str(BIN / "lint-imports")])
     checks.run("types", [str(BIN / "ty"), "check", "--no-progress"])
+    site = ["-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(ROOT / "build" / "site")]
+    checks.run("site", [sys.executable, *site], env={**os.environ, "NO_MKDOCS_2_WARNING": "1"})
     for process in compiling:
         process.wait()
     rest = [argument for argument in arguments if argument not in ours]
