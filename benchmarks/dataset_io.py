@@ -42,7 +42,9 @@ def episode(number: int, count: int, sensor: Sensor) -> Episode:
     times = number * 10**12 + np.arange(count) * (10**9 // RATE)
     counts = random.normal(5000, 30, (count, sensor.taxels.count))
     tip = np.stack([np.zeros(count), np.zeros(count), np.linspace(-1, 1.5, count)], axis=1)
-    press = Press(number, from_document({"shape": "sphere", "radius": 3.0}), "sphere", 0.0, 0.0, 0.0, 1.5, 1.0, 0.1)
+    press = Press(
+        from_document({"shape": "sphere", "radius": 3.0}), 1.5, hold=0.1, index=number, indenter_name="sphere"
+    )
     return Episode(
         path=Path(f"episode-{number:06d}.mcap"),
         press=press,
@@ -144,7 +146,7 @@ def measure(work: Path, episodes: int, count: int, large: int) -> Iterator[tuple
         return 1
 
     yield "windows, lerobot", rate_of(one_of_theirs, 4.0), "windows/s"
-    ours = WindowDataset(work / "ours")
+    ours = WindowDataset(read_dataset(work / "ours"))
     yield (
         "windows, ours, one by one, all columns",
         rate_of(lambda: len([ours[int(i)] for i in chosen[:100]])),
@@ -158,7 +160,7 @@ def measure(work: Path, episodes: int, count: int, large: int) -> Iterator[tuple
         pack((episode(n, count, sensor) for n in range(large)), label, work / "large")
         many = large * count
         yield f"cold maps, {many} frames", many / seconds(lambda: read_dataset(work / "large")), "frames/s"
-        far = WindowDataset(work / "large", keys=[features.DEPTH])
+        far = WindowDataset(read_dataset(work / "large"), keys=[features.DEPTH])
         spread = np.random.default_rng(1).integers(0, many, 50_000)
         yield (f"windows, ours, batches of 256 of {many} frames", rate_of(lambda: batches(far, spread)), "windows/s")
         held = replace(far.data, columns={key: np.array(values) for key, values in far.data.columns.items()})

@@ -66,7 +66,7 @@ def pictures(count: int = 30) -> list[bytes]:
 def write(folder: Path, minutes: float, rate: float, camera_rate: float, labelled: bool) -> Path:
     """Write a recording, and its label if it is to have one; return the recording's path."""
     sensor = default_sensor()
-    press = Press(0, Sphere(radius=4.0), "ball", x=1.0, y=-0.5, yaw=0.0, depth=DEEPEST, speed=6.2, hold=2.0)
+    press = Press(Sphere(radius=4.0), DEEPEST, x=1.0, y=-0.5, speed=6.2, hold=2.0, indenter_name="ball")
     cameras = ("top",) if camera_rate else ()
     rig = RIG if cameras else {**RIG, "cameras": {}}
     controller = {"settings": {}, "acceleration": [200.0] * 3, "max_rate": [50.0] * 3}

@@ -18,6 +18,7 @@ from jsonschema import Draft202012Validator
 
 import schemas
 from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 
 BYTE_ORDER_MARKS = {
@@ -47,7 +48,7 @@ WRITTEN_BY_PEOPLE = {
 """Documents in which a number that is not finite is a mistake; ours may state one."""
 
 
-def read(path: Path, schema: str) -> dict[str, Any]:
+def read(path: StrPath, schema: str) -> dict[str, Any]:
     """Return the document at ``path``, checked against a schema.
 
     Raises:
@@ -61,6 +62,7 @@ def read(path: Path, schema: str) -> dict[str, Any]:
         >>> case["indenter"]
         {'shape': 'sphere', 'radius': 4.0}
     """
+    path = Path(path)
     document = content_of(path, schema)
     if schema in WRITTEN_BY_PEOPLE and (place := _not_finite(document)):
         raise FormatError(f"{path}: {place}", "finite numbers", f"correct {place.split(':')[0]}, or leave it out")
@@ -68,13 +70,14 @@ def read(path: Path, schema: str) -> dict[str, Any]:
     return document
 
 
-def content_of(path: Path, schema: str) -> Any:
+def content_of(path: StrPath, schema: str) -> Any:
     """Return what a YAML or JSON file holds, unchecked; ``schema`` names its kind in errors.
 
     Raises:
         UsageError: If there is no such file.
         FormatError: If it is neither, or gives a key twice.
     """
+    path = Path(path)
     if not path.is_file():
         raise UsageError(f"no file {path}", f"a {schema} file (YAML or JSON)", "check the path")
     text = _decoded(path, schema)

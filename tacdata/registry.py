@@ -36,6 +36,11 @@ def folders(room: str) -> tuple[str, ...]:
     return tuple(importlib.import_module(room).__path__)
 
 
+def has(room: str, base: str, name: str) -> bool:
+    """Return whether a room has a member of this name; nothing is imported but the room."""
+    return name not in (base, "__init__") and name.isidentifier() and find_spec(f"{room}.{name}") is not None
+
+
 def load_module(room: str, base: str, name: str) -> ModuleType:
     """Import one member of a room.
 
@@ -43,7 +48,7 @@ def load_module(room: str, base: str, name: str) -> ModuleType:
         UsageError: If no file of that name lies in the room.
     """
     # Asked by its name: listing the folder for each of its members would read it as often as it has members.
-    if name in (base, "__init__") or not name.isidentifier() or find_spec(f"{room}.{name}") is None:
+    if not has(room, base, name):
         known = names(room, base)
         close = difflib.get_close_matches(name, known, n=1)
         kind = room.rsplit(".", 1)[-1]

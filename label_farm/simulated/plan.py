@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 
 DEFAULT = Path(__file__).parent / "random_presses.yaml"
 """The plan that ships."""
@@ -140,13 +141,14 @@ class SimulationPlan:
         )
 
 
-def read_simulation_plan(path: Path) -> SimulationPlan:
+def read_simulation_plan(path: StrPath) -> SimulationPlan:
     """Read a plan file.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
     """
+    path = Path(path)
     return SimulationPlan.from_document(documents.read(path, "simulation_plan"), str(path))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.labels import PathSolution
+from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 
 GRAIN = 1e-4
@@ -78,12 +79,13 @@ class ShardContents:
     """What decided the solutions."""
 
 
-def read_about(path: Path) -> ShardContents:
+def read_about(path: StrPath) -> ShardContents:
     """Return what a file holds, without reading its arrays.
 
     Raises:
         FormatError: If the file is damaged.
     """
+    path = Path(path)
     try:
         with path.open("rb") as stream, np.load(stream) as arrays:
             about = json.loads(str(arrays["about"]))
@@ -92,12 +94,13 @@ def read_about(path: Path) -> ShardContents:
         raise _damaged(path, error) from None
 
 
-def read_shard(path: Path) -> Shard:
+def read_shard(path: StrPath) -> Shard:
     """Read a file.
 
     Raises:
         FormatError: If it is damaged.
     """
+    path = Path(path)
     try:
         with path.open("rb") as stream, np.load(stream) as file:
             arrays = {name: file[name] for name in file.files}

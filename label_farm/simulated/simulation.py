@@ -19,6 +19,7 @@ from label_farm.simulated.specimen import draw_specimen
 from tacdata import documents, provenance
 from tacdata.effects import Placed
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
 
@@ -104,13 +105,14 @@ class Simulation:
             )
 
     @classmethod
-    def read(cls, folder: Path) -> Simulation:
+    def read(cls, folder: StrPath) -> Simulation:
         """Read what a folder of presses is drawn from.
 
         Raises:
             UsageError: If there is no such folder.
             FormatError: If its file is damaged.
         """
+        folder = Path(folder)
         held = documents.read(folder / FILE, "simulation")
         plan = SimulationPlan.from_document(held["plan"], str(folder / FILE))
         sensor = Sensor.from_document(held["sensor"], str(folder / FILE))

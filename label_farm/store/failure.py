@@ -10,6 +10,7 @@ from typing import Any
 import schemas
 from label_farm.presses.job import Job
 from tacdata import documents, provenance
+from tacdata.paths import StrPath
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,12 @@ class Failure:
         }
 
     @classmethod
-    def read(cls, path: Path) -> Failure:
+    def read(cls, path: StrPath) -> Failure:
         """Read a failure's file.
 
         Raises:
             FormatError: If it is damaged or of another version.
         """
+        path = Path(path)
         document = documents.read(path, "label_failure")
         return cls(document["kind"], document["reason"], document.get("log", ""), document.get("tries", 1))

@@ -12,6 +12,7 @@ from tacdata.cases.answer import CaseAnswer, answer
 from tacdata.cases.mesh import mesh_for
 from tacdata.errors import UsageError
 from tacdata.indenters import from_document
+from tacdata.paths import StrPath
 from tacdata.plans.beside_skin import check_touch
 from tacdata.sensor import Sensor, default_sensor, read_sensor
 from tacdata.skin.mesh.build import MeshSettings
@@ -33,13 +34,14 @@ class Case:
     """Whether the numerical error is wanted as well; costs about a third more, and a coarser mesh once."""
 
 
-def read_case(path: Path) -> Case:
+def read_case(path: StrPath) -> Case:
     """Read a case file.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
     """
+    path = Path(path)
     document = documents.read(path, "case")
     given = document.get("sensor")
     if given is None:

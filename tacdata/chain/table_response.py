@@ -13,6 +13,7 @@ from scipy.ndimage import spline_filter1d
 
 from tacdata.chain.response import Response
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 
 FIELDS = ("x", "y", "depth", "load", "force", "curve_load", "curve_signal", "gain", "offset", "tools")
 
@@ -78,13 +79,14 @@ class TableResponse(Response):
         return other
 
     @classmethod
-    def read(cls, path: Path) -> TableResponse:
+    def read(cls, path: StrPath) -> TableResponse:
         """Read a table.
 
         Raises:
             UsageError: If there is no such file.
             FormatError: If it is no such table.
         """
+        path = Path(path)
         if not path.is_file():
             raise UsageError(f"no file {path}", "a response table (.npz)", "check response/file in the model spec")
         try:

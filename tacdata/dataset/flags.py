@@ -19,6 +19,7 @@ from tacdata import documents
 from tacdata.dataset.format import metadata
 from tacdata.dataset.reader import Dataset
 from tacdata.errors import UsageError
+from tacdata.paths import StrPath
 
 IN_SESSION, IN_DATASET = Path("flags.json"), Path("meta/tacdata_flags.json")
 LONGEST = 500
@@ -62,12 +63,13 @@ def path_of(folder: Path) -> Path:
     return folder / (IN_DATASET if (folder / "meta" / "info.json").is_file() else IN_SESSION)
 
 
-def read_flags(folder: Path) -> dict[str, Flag]:
+def read_flags(folder: StrPath) -> dict[str, Flag]:
     """Return the flags of a session or dataset by the recording's hash; none if nothing was ever flagged.
 
     Raises:
         FormatError: If the file is damaged.
     """
+    folder = Path(folder)
     path = path_of(folder)
     if not path.is_file():
         return {}
@@ -105,12 +107,13 @@ def clear_flag(folder: Path, recording: str) -> None:
         _write(folder, flags, [FlagChange(recording, flag.file, "", who(), at)])
 
 
-def read_history(folder: Path) -> list[FlagChange]:
+def read_history(folder: StrPath) -> list[FlagChange]:
     """Return every change of a session's or dataset's flags, the oldest first; those before version 1.1 are not known.
 
     Raises:
         FormatError: If the file is damaged.
     """
+    folder = Path(folder)
     path = path_of(folder)
     entries = documents.read(path, "flags").get("history", []) if path.is_file() else []
     return [FlagChange(**entry) for entry in entries]

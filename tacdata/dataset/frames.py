@@ -12,7 +12,7 @@ from tacdata.dataset.format import features
 from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import FormatError
 from tacdata.labels import Label
-from tacdata.recording.episode import PHASES, Episode
+from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
 
 
@@ -64,22 +64,6 @@ def check_pair(episode: Episode, label: Label, wanted: dict[str, str | None]) ->
         )
 
 
-def baseline(episode: Episode) -> np.ndarray:
-    """Return the mean reading of each taxel in the rest phase [counts], shape (taxels,).
-
-    Raises:
-        FormatError: If no frame lies in the rest phase, so that the readings cannot be tared.
-    """
-    resting = episode.phase_at(episode.taxels.sample_ns) == PHASES.index("rest")
-    if not resting.any():
-        raise FormatError(
-            f"{episode.path.name}: no taxel frame lies in the rest phase",
-            "at least one frame without contact, to tare with",
-            "record with a longer rest (motion/rest in the plan)",
-        )
-    return episode.taxels.counts[resting].mean(axis=0)
-
-
 LOST = 1.8
 """A time between frames of so many usual ones has lost a frame [1]."""
 
@@ -110,7 +94,7 @@ def episode_columns(episode: Episode, label: Label, extra: Iterable[str] = ()) -
     """
     counts = episode.taxels.counts
     return {
-        features.STATE: (counts - baseline(episode)).astype(np.float32),
+        features.STATE: episode.tared.astype(np.float32),
         features.RAW: counts.astype(np.float32),
         features.DEPTH: label.depth.astype(np.float32),
         features.TIP: label.tip.astype(np.float32),
@@ -145,7 +129,7 @@ def episode_record(episode: Episode, label: Label, recording: str, sensor: Senso
         press=episode.press.document,
         rig=str(episode.rig.get("name", "")),
         virtual="clock" in episode.rig,
-        baseline=tuple(baseline(episode).tolist()),
+        baseline=tuple(episode.baseline.tolist()),
         quality=float(valid(episode).mean()),
         complete=episode.complete,
         notes=episode.notes,

@@ -14,6 +14,7 @@ from tacdata import documents
 from tacdata.dataset.flags import LONGEST, who
 from tacdata.dataset.format import metadata
 from tacdata.errors import UsageError
+from tacdata.paths import StrPath
 
 IN_SESSION, IN_DATASET = Path("notes.json"), Path("meta/tacdata_notes.json")
 
@@ -43,12 +44,13 @@ def notes_path(folder: Path) -> Path:
     return folder / (IN_DATASET if (folder / "meta" / "info.json").is_file() else IN_SESSION)
 
 
-def read_notes(folder: Path) -> list[Note]:
+def read_notes(folder: StrPath) -> list[Note]:
     """Return the notes of a session or dataset, by recording and time; none if nothing was ever noted.
 
     Raises:
         FormatError: If the file is damaged.
     """
+    folder = Path(folder)
     path = notes_path(folder)
     if not path.is_file():
         return []

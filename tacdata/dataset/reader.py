@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -15,9 +16,14 @@ import pyarrow.parquet as pq
 from tacdata.dataset import cache
 from tacdata.dataset.format import features, folder, metadata
 from tacdata.dataset.format.metadata import EpisodeRecord
+from tacdata.display import Displayed
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
+
+if TYPE_CHECKING:
+    from tacdata.dataset.windows import WindowDataset
 
 
 class LostProvenanceWarning(UserWarning):
@@ -47,8 +53,8 @@ class DatasetEpisode:
         return self.record.configuration if self.record else None
 
 
-@dataclass(frozen=True)
-class Dataset:
+@dataclass(frozen=True, repr=False)
+class Dataset(Displayed):
     """A dataset on disk. ``dataset[key]`` is a column, frames first, in the units of `units`."""
 
     root: Path
@@ -77,6 +83,30 @@ class Dataset:
         if key not in self.columns:
             raise FormatError(f"{self.root} has no column {key!r}", ", ".join(self.columns), "name one of them")
         return self.columns[key]
+
+    def windows(
+        self, offsets: Mapping[str, Iterable[int]] | None = None, keys: Sequence[str] | None = None
+    ) -> WindowDataset:
+        """Return the frames with windows around them as a torch dataset, for a DataLoader.
+
+        Args:
+            offsets: Column -> frames of its window relative to the frame asked for; None takes the paper's nine around
+                it for the tared readings. Columns not named here give the one frame.
+            keys: Columns to return; None returns all.
+
+        Raises:
+            FormatError: If a column is not in the dataset.
+        """
+        from tacdata.dataset.windows import WindowDataset
+
+        return WindowDataset(self, offsets, keys)
+
+    def description(self) -> Iterator[str]:
+        """Yield what it is: episodes, frames, sensors, columns."""
+        simulated = f", {self.simulated} of them simulated" if self.simulated else ""
+        yield f"Dataset {self.root}: {len(self.episodes)} episodes{simulated}, {len(self)} frames at {self.fps} Hz"
+        yield f"sensor {', '.join(sensor.name for sensor in self.sensors.values())}"
+        yield f"columns {', '.join(self.columns)}"
 
     @property
     def units(self) -> dict[str, str]:
@@ -119,7 +149,7 @@ class Dataset:
         return self.sensors[used.pop()]
 
 
-def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
+def read_dataset(root: StrPath, cache_folder: StrPath | None = None) -> Dataset:
     """Open a dataset folder, also one that lerobot's own tools have edited.
 
     The first call after a change decodes the data files into memory maps (`tacdata.dataset.cache`); later
@@ -137,9 +167,8 @@ def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
         LostProvenanceWarning: If an edit dropped what can be missed or found again.
 
     Example:
-        >>> from pathlib import Path
         >>> from tacdata.dataset import read_dataset
-        >>> dataset = read_dataset(Path("dataset"), Path("cache"))
+        >>> dataset = read_dataset("dataset", "cache")
         >>> len(dataset.episodes), dataset.fps
         (2, 30)
         >>> dataset["observation.state"].shape  # frames, taxels
@@ -154,7 +183,7 @@ def read_dataset(root: Path, cache_folder: Path | None = None) -> Dataset:
     if not rows:
         raise FormatError(f"{root} holds no episodes", "at least one", "pack a session into it")
     paths = cache.data_files(root, rows)
-    place = cache.place_of(root, cache_folder)
+    place = cache.place_of(root, None if cache_folder is None else Path(cache_folder))
     digest = cache.dataset_hash(root, info, paths, place)
     columns = cache.open_columns(root, info, paths, place, digest)
     sensors, records = _provenance(root, paths)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import torch  # noqa: TID253 - only who trains imports this module
 
 from tacdata.dataset.format import features
-from tacdata.dataset.reader import Dataset, read_dataset
 from tacdata.errors import UsageError
 
 
@@ -25,6 +23,47 @@ def centred(length: int = 9) -> tuple[int, ...]:
     return tuple(range(-(length // 2), length // 2 + 1))
 
 
+class EpisodeBounds(Protocol):
+    """The frames of one episode."""
+
+    @property
+    def start(self) -> int:
+        """First frame."""
+        ...
+
+    @property
+    def stop(self) -> int:
+        """One past the last frame."""
+        ...
+
+    @property
+    def task(self) -> str:
+        """What is done in it, in words."""
+        ...
+
+
+class FrameColumns(Protocol):
+    """The part of a dataset that windows are gathered from (`tacdata.dataset.reader.Dataset`)."""
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Column by name, frames first."""
+        ...
+
+    @property
+    def episodes(self) -> Sequence[EpisodeBounds]:
+        """Episodes in order."""
+        ...
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        ...
+
+    def __getitem__(self, key: str) -> np.ndarray:
+        """Return a column."""
+        ...
+
+
 class WindowDataset(torch.utils.data.Dataset):
     """Frames with windows around them, as ``LeRobotDataset(delta_timestamps=...)`` gives them.
 
@@ -33,33 +72,30 @@ class WindowDataset(torch.utils.data.Dataset):
     ``batch_size=None`` and a BatchSampler reads whole batches at once.
 
     Example:
-        >>> from pathlib import Path
         >>> from tacdata.dataset import read_dataset
-        >>> from tacdata.dataset.windows import WindowDataset
-        >>> windows = WindowDataset(read_dataset(Path("dataset"), Path("cache")))
+        >>> windows = read_dataset("dataset", "cache").windows()
         >>> windows[50]["observation.state"].shape  # nine frames around frame 50, taxels
         torch.Size([9, 24])
     """
 
     def __init__(
         self,
-        dataset: Dataset | Path,
+        dataset: FrameColumns,
         offsets: Mapping[str, Iterable[int]] | None = None,
         keys: Sequence[str] | None = None,
     ) -> None:
         """Prepare the gather.
 
         Args:
-            dataset: The dataset or its folder.
+            dataset: The dataset.
             offsets: Column -> frames of its window relative to the frame asked for; None takes the paper's
-            nine
-                around it for `features.STATE`. Columns not named here give the one frame.
+                nine around it for `features.STATE`. Columns not named here give the one frame.
             keys: Columns to return; None returns all.
 
         Raises:
             FormatError: If a column is not in the dataset.
         """
-        self.data = dataset if isinstance(dataset, Dataset) else read_dataset(dataset)
+        self.data = dataset
         given = {features.STATE: centred()} if offsets is None else offsets
         self.offsets = {key: np.array(tuple(frames), dtype=np.int64) for key, frames in given.items()}
         self.keys = tuple(self.data.columns) if keys is None else tuple(keys)

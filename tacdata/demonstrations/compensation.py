@@ -9,6 +9,7 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 
 LARGEST = 10
 """Number of largest depths of a map whose mean is the scalar depth (paper)."""
@@ -43,13 +44,14 @@ class Gains:
         return self.tasks[task]
 
 
-def read_gains(path: Path | None = None) -> Gains:
+def read_gains(path: StrPath | None = None) -> Gains:
     """Read a gains file (`schemas/gains.schema.json`); without a path, the paper's gains.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged, or a task has another number of gains than there are fingers.
     """
+    path = None if path is None else Path(path)
     document = documents.read(path or DEFAULT, "gains")
     order = document["fingers"]
     for task, values in document["tasks"].items():

@@ -15,6 +15,7 @@ import numpy as np
 from tacdata import provenance
 from tacdata.errors import FormatError, SolveError
 from tacdata.labels import PathSolution
+from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 from tacdata.sensor import Sensor
 from tacdata.transduction import Loads, Transducer
@@ -79,12 +80,13 @@ class PressSet:
             stream.write(buffer.getvalue())
 
 
-def read_presses(path: Path, sensor: Sensor) -> PressSet:
+def read_presses(path: StrPath, sensor: Sensor) -> PressSet:
     """Read presses of a sensor.
 
     Raises:
         FormatError: If the file is damaged, missing or of another sensor.
     """
+    path = Path(path)
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
             values = {name: data[name] for name in FIELDS}

@@ -17,6 +17,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.health.estimate import Spread, UncertainValue, mean
 from tacdata.health.response import PressResponse, press_response, unusable
 from tacdata.labels import file_names, read_label
+from tacdata.paths import StrPath
 from tacdata.recording.check.channel_health import in_phase
 from tacdata.recording.check.figures import RecordingFigures, figures
 from tacdata.recording.files.reader import read_recording
@@ -124,7 +125,7 @@ def _slope(time: np.ndarray, values: np.ndarray) -> UncertainValue:
     return UncertainValue(float(fit.slope), float(fit.stderr), float(known.sum() - 2))
 
 
-def read_visit(folder: Path, done: Callable[[str], None] = lambda name: None) -> Visit:
+def read_visit(folder: StrPath, done: Callable[[str], None] = lambda name: None) -> Visit:
     """Read a session; recordings that say nothing are named with the reason.
 
     Args:
@@ -135,6 +136,7 @@ def read_visit(folder: Path, done: Callable[[str], None] = lambda name: None) ->
         UsageError: If it is no session, or none of its recordings can be used.
         FormatError: If its document is damaged.
     """
+    folder = Path(folder)
     session = read_session(folder)
     entries, left_out = [], [(path.name, "it was interrupted") for path in session.unfinished]
     for path in session.episodes:

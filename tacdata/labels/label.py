@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from tacdata.display import Displayed
 
-@dataclass(frozen=True)
-class PathSolution:
+_OPTIONAL = ("traction", "taxel_pressure", "uncertainty", "taxel_capacitance", "taxel_counts")
+"""Quantities that a description names where they are known."""
+
+
+@dataclass(frozen=True, repr=False)
+class PathSolution(Displayed):
     """Equilibria along one press: loading to the deepest point, then unloading. Content of one entry of the store."""
 
     depth: np.ndarray
@@ -61,9 +67,19 @@ class PathSolution:
     taxel_closure_uncertainty: np.ndarray | None = None
     """The same of ``taxel_closure`` [mm], shape (k, taxels)."""
 
+    def description(self) -> Iterator[str]:
+        """Yield what it is: states, map, force, error."""
+        states, *pixels = self.surface.shape
+        yield f"PathSolution: {states} states down to {self.depth.max():g} mm, maps of {pixels[0]} × {pixels[1]} pixels"
+        deepest = int(np.argmax(self.depth))
+        yield f"normal force {self.force[deepest, 2]:.3g} N ± {self.force_error[deepest]:.2g} N by the mesh"
+        yield f"map error by the mesh: {np.sqrt((self.numerical[deepest] ** 2).mean()):.2g} mm (root mean square)"
+        optional = [name for name, value in vars(self).items() if value is not None and name in _OPTIONAL]
+        yield f"with {', '.join(optional)}" if optional else "without tractions"
 
-@dataclass(frozen=True)
-class Label:
+
+@dataclass(frozen=True, repr=False)
+class Label(Displayed):
     """The depth maps of one episode, one per taxel frame.
 
     Example:
@@ -126,6 +142,20 @@ class Label:
     float32; None if the file says nothing of it."""
     taxel_counts: np.ndarray | None = None
     """The readings that go with it [counts], shape (n, taxels), float32: neither rounded nor noisy, not tared."""
+
+    def description(self) -> Iterator[str]:
+        """Yield what it is: frames, map, force, error."""
+        frames, *pixels = self.signed.shape
+        yield f"Label of episode {self.episode}: {frames} maps of {pixels[0]} × {pixels[1]} pixels"
+        yield f"deepest pixel {self.signed.max():.3g} mm, largest normal force {self.force[:, 2].max():.3g} N"
+        yield f"numerical error up to {self.error.max():.2g} mm (root mean square over a map)"
+        optional = [name for name, value in vars(self).items() if value is not None and name in _OPTIONAL]
+        yield f"with {', '.join(optional)}" if optional else "without tractions and uncertainty"
+
+    @property
+    def deepest(self) -> np.ndarray:
+        """The depth map of the frame with the deepest tip [mm], shape (pixels_x, pixels_y), float32."""
+        return np.maximum(self.signed[int(np.argmax(self.tip[:, 2]))], 0.0)
 
     @property
     def depth(self) -> np.ndarray:

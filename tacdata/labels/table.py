@@ -16,6 +16,7 @@ from tacdata import documents
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import columns
 from tacdata.labels.label import Label
+from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 
 HEADER = b"tacdata.label"
@@ -31,7 +32,7 @@ def _column(values: np.ndarray) -> pa.Array:
     return flat if values.ndim == 1 else pa.FixedSizeListArray.from_arrays(flat, int(np.prod(values.shape[1:])))
 
 
-def write(path: Path, label: Label) -> None:
+def write(path: StrPath, label: Label) -> None:
     """Write a label file so that a crash leaves the old file or the new one, never a half.
 
     Values are kept bit for bit in the types that `Label` documents.
@@ -39,6 +40,7 @@ def write(path: Path, label: Label) -> None:
     Raises:
         FormatError: If the arrays' shapes contradict each other or a value is not finite.
     """
+    path = Path(path)
     columns.check(label, str(path))
     names = columns.present(label)
     header: dict[str, Any] = {
@@ -59,7 +61,7 @@ def write(path: Path, label: Label) -> None:
         pq.write_table(table, stream, compression="zstd", use_dictionary=False, write_page_checksum=True)
 
 
-def read(path: Path) -> Label:
+def read(path: StrPath) -> Label:
     """Read a label file.
 
     Raises:
@@ -75,12 +77,13 @@ def read(path: Path) -> Label:
         >>> round(float(label.signed.max()), 1)  # deepest pixel, mm
         0.8
     """
+    path = Path(path)
     file = _open(path)
     header, arrays = _arrays(file, path, file.schema_arrow.names)
     return Label(episode=header["episode"], provenance=header["provenance"], **arrays)
 
 
-def read_columns(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+def read_columns(path: StrPath, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Return some columns of a label file, as `Label` documents them; the others are not read, nor checked.
 
     Args:
@@ -91,10 +94,11 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
         UsageError: If it does not exist.
         FormatError: If these columns are damaged, it is no label file, or of another major format version.
     """
+    path = Path(path)
     return _arrays(_open(path), path, names)[1]
 
 
-def map_batches(path: Path, name: str, rows: int) -> Iterator[np.ndarray]:
+def map_batches(path: StrPath, name: str, rows: int) -> Iterator[np.ndarray]:
     """Yield the maps of a label file, ``rows`` at most at a time, so that a long one needs little memory.
 
     Args:
@@ -109,6 +113,7 @@ def map_batches(path: Path, name: str, rows: int) -> Iterator[np.ndarray]:
         UsageError: If it does not exist.
         FormatError: As `read_columns`.
     """
+    path = Path(path)
     file = _open(path)
     header = _checked(file, path)
     pixels = header["pixels_x"], header["pixels_y"]
@@ -147,13 +152,14 @@ def _checked(file: pq.ParquetFile, path: Path) -> dict[str, Any]:
     return header
 
 
-def read_header(path: Path) -> dict[str, Any]:
+def read_header(path: StrPath) -> dict[str, Any]:
     """Return a label file's header (`schemas/label.schema.json`) without reading its columns.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged, no label file, or of another major format version.
     """
+    path = Path(path)
     return _header(_open(path).schema_arrow, path)
 
 

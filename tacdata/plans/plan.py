@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
 from tacdata import documents
 from tacdata.errors import FormatError
 from tacdata.indenters import Indenter, from_document
+from tacdata.paths import StrPath
 from tacdata.plans.beside_skin import check_touch
 from tacdata.sensor import Sensor
 
@@ -20,33 +21,31 @@ class Press:
     Example:
         >>> from tacdata.indenters.sphere import Sphere
         >>> from tacdata.plans import Press
-        >>> press = Press(
-        ...     index=0, indenter=Sphere(4.0), indenter_name="sphere_4",
-        ...     x=2.0, y=0.0, yaw=0.0, depth=0.8, speed=1.0, hold=0.5,
-        ... )
-        >>> press.deepest  # mm
-        0.8
+        >>> press = Press(Sphere(4.0), depth=0.8, x=2.0)
+        >>> print(press)
+        sphere (radius 4) at x 2, y 0 mm, 0.8 mm deep
     """
 
-    index: int
-    """Number in the plan, from 0; also the episode's number."""
     indenter: Indenter
     """The indenter."""
-    indenter_name: str
-    """The plan's name for that indenter."""
-    x: float
-    """Location of the indenter's tip [mm]: its lowest point, if it stands upright."""
-    y: float
-    """Location of the indenter's tip [mm]."""
-    yaw: float
-    """Rotation of the indenter about its own axis [deg]."""
     depth: float
     """Depth of the lowest point below the undeformed outer face at (x, y) [mm]; negative passes above without contact.
     """
-    speed: float
+    x: float = 0.0
+    """Location of the indenter's tip [mm]: its lowest point, if it stands upright."""
+    y: float = 0.0
+    """Location of the indenter's tip [mm]."""
+    yaw: float = 0.0
+    """Rotation of the indenter about its own axis [deg]."""
+    speed: float = 1.0
     """Loading and unloading speed [mm/s]."""
-    hold: float
+    hold: float = 0.5
     """Time at full depth [s]."""
+    _: KW_ONLY
+    index: int = 0
+    """Number in the plan, from 0; also the episode's number."""
+    indenter_name: str = ""
+    """The plan's name for that indenter."""
     repeat: int = 0
     """Which repetition of the same configuration this is, from 0."""
     rest: float | None = None
@@ -67,6 +66,15 @@ class Press:
     """Tilt of the indenter's axis about x [deg], applied after the yaw and the tilt about y."""
     tilt_y: float = 0.0
     """Tilt of the indenter's axis about y [deg], applied after the yaw."""
+
+    def __str__(self) -> str:
+        """Return shape, place and depth as text."""
+        sizes = [
+            f"{name.replace('_', ' ')} {value:g}" for name, value in self.indenter.document.items() if _number(value)
+        ]
+        turn = f", turned by {self.turned}" if any(self.angles.values()) else ""
+        shape = f"{self.indenter.shape} ({', '.join(sizes)})" if sizes else self.indenter.shape
+        return f"{shape} at x {self.x:g}, y {self.y:g} mm, {self.depth:g} mm deep{turn}"
 
     @property
     def angles(self) -> dict[str, float]:
@@ -212,6 +220,10 @@ class Plan:
                 check_touch(press.indenter, size, (press.x, press.y), press.yaw, press.deepest, where)
 
 
+def _number(value: object) -> bool:
+    return isinstance(value, int | float)
+
+
 def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: MotionSettings) -> Press:
     return Press(
         index=index,
@@ -236,11 +248,12 @@ def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: Motion
     )
 
 
-def read_plan(path: Path) -> Plan:
+def read_plan(path: StrPath) -> Plan:
     """Read a plan file.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
     """
+    path = Path(path)
     return Plan.from_document(documents.read(path, "plan"), str(path), path.parent)

@@ -11,6 +11,7 @@ import numpy as np
 import schemas
 from tacdata import documents
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.plans.plan import Plan
 from tacdata.plans.sites import sites
 from tacdata.sensor import Sensor
@@ -57,13 +58,14 @@ def write_out(recipe: dict[str, Any], sensor: Sensor, origin: str, seed: int = 0
     return document
 
 
-def read_recipe(path: Path) -> dict[str, Any]:
+def read_recipe(path: StrPath) -> dict[str, Any]:
     """Read a recipe file.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged.
     """
+    path = Path(path)
     return documents.read(path, "plan_recipe")
 
 

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tacdata.display import Displayed
+from tacdata.errors import FormatError, PackageError
+from tacdata.labels import Label, file_names, read_label
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True)
@@ -101,14 +109,15 @@ class Phase:
 PHASES = ("rest", "approach", "press", "hold", "release")
 
 
-@dataclass(frozen=True)
-class Episode:
+@dataclass(frozen=True, repr=False)
+class Episode(Displayed):
     """One recorded press: taxel readings, tip path, tags and everything that is attached to them.
 
     Example:
-        >>> from pathlib import Path
         >>> from tacdata.recording import PHASES, read_episode
-        >>> episode = read_episode(Path("session/episode-000000.mcap"))
+        >>> episode = read_episode("session/episode-000000.mcap")
+        >>> episode.tared.shape, round(float(episode.times[-1]), 1)  # frames and taxels; seconds
+        ((170, 24), 5.6)
         >>> times = episode.taxels.sample_ns
         >>> round(float(episode.tip_at(times)[:, 2].max()), 3)  # largest depth, mm
         0.8
@@ -148,6 +157,83 @@ class Episode:
     def number(self) -> int:
         """The episode's number in its session."""
         return self.press.index
+
+    @property
+    def readings(self) -> np.ndarray:
+        """Raw readings of the taxels [counts], shape (n, taxels), float64."""
+        return self.taxels.counts
+
+    @property
+    def baseline(self) -> np.ndarray:
+        """Mean reading of each taxel in the rest phase [counts], shape (taxels,).
+
+        Raises:
+            FormatError: If no frame lies in the rest phase, so that the readings cannot be tared.
+        """
+        resting = self.phase_at(self.taxels.sample_ns) == PHASES.index("rest")
+        if not resting.any():
+            raise FormatError(
+                f"{self.path.name}: no taxel frame lies in the rest phase",
+                "at least one frame without contact, to tare with",
+                "record with a longer rest (motion/rest in the plan)",
+            )
+        return self.taxels.counts[resting].mean(axis=0)
+
+    @property
+    def tared(self) -> np.ndarray:
+        """Readings minus their `baseline` [counts], shape (n, taxels), float64; raises as `baseline`."""
+        return self.readings - self.baseline
+
+    @property
+    def times(self) -> np.ndarray:
+        """Estimated time of each reading since the first [s], shape (n,)."""
+        return (self.taxels.sample_ns - self.taxels.sample_ns[:1]) / 1e9
+
+    @property
+    def depth(self) -> np.ndarray:
+        """Nominal depth of the tip at each reading [mm], shape (n,); NaN where no path is known."""
+        if not len(self.tip_ns):
+            return np.full(len(self.times), np.nan)
+        return self.tip_at(self.taxels.sample_ns)[:, 2]
+
+    @cached_property
+    def label(self) -> Label | None:
+        """The label in the folder ``labels`` beside the recording; None without one.
+
+        Raises:
+            FormatError: If its file is damaged.
+        """
+        path = file_names.label(file_names.folder(self.path.parent), self.path)
+        return read_label(path) if path.is_file() else None
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with one row a reading: time [s], phase, tip x, y, depth [mm], raw readings [counts].
+
+        Raises:
+            PackageError: If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise PackageError("a table needs pandas, which is not installed", "pandas", "pip install pandas") from None
+        phase = self.phase_at(self.taxels.sample_ns)
+        x, y, depth = self.tip_at(self.taxels.sample_ns).T if len(self.tip_ns) else np.full((3, len(phase)), np.nan)
+        taxels = {f"taxel_{k}": self.readings[:, k] for k in range(self.readings.shape[1])}
+        names = [PHASES[index] if index >= 0 else "" for index in phase]
+        return pandas.DataFrame({"time_s": self.times, "phase": names, "x": x, "y": y, "depth": depth, **taxels})
+
+    def description(self) -> Iterator[str]:
+        """Yield what it is: press, readings, label."""
+        frames, taxels = self.readings.shape
+        yield f"Episode {self.path.name}: {self.press}"
+        seconds = self.times[-1] if frames else 0.0
+        yield f"sensor {self.sensor.name}, {frames} readings of {taxels} taxels in {seconds:.1f} s"
+        streams = [f"{len(self.cnc.sample_ns)} motion reports", *(f"camera {tags.camera}" for tags in self.tags)]
+        yield ", ".join([*streams, *(stream.name for stream in self.measured)])
+        labelled = file_names.label(file_names.folder(self.path.parent), self.path).is_file()
+        yield "labelled" if labelled else "not labelled"
+        if not self.complete:
+            yield "incomplete: the recording was interrupted"
 
     def tip_at(self, time_ns: np.ndarray) -> np.ndarray:
         """Return the nominal x, y, depth [mm], shape (n, 3), at times [ns], shape (n,); constant beyond both ends."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,10 +11,14 @@ from typing import Any
 
 import schemas
 from tacdata import documents, provenance
+from tacdata.display import Displayed
 from tacdata.errors import DeviceError, FormatError, TacdataError, UsageError
+from tacdata.labels import file_names as label_files
+from tacdata.paths import StrPath
 from tacdata.plans import Plan
+from tacdata.recording.episode import Episode
 from tacdata.recording.files import file_names
-from tacdata.recording.files.reader import read_recording
+from tacdata.recording.files.reader import read_episode, read_recording
 from tacdata.sensor import Sensor
 
 FILE = "session.json"
@@ -25,9 +30,18 @@ _OTHERS = {
 """File of another kind of folder -> what to do with it."""
 
 
-@dataclass(frozen=True)
-class Session:
-    """A session folder: its recordings and its document."""
+@dataclass(frozen=True, repr=False)
+class Session(Displayed):
+    """A session folder: its recordings and its document. Iterating reads its episodes one by one.
+
+    Example:
+        >>> from tacdata.recording import read_session
+        >>> session = read_session("session")
+        >>> len(session), [episode.press.depth for episode in session]
+        (2, [0.8, 0.8])
+        >>> session[1].number
+        1
+    """
 
     folder: Path
     """The folder."""
@@ -39,6 +53,42 @@ class Session:
     sensor: Sensor
     document: dict[str, Any]
     """`session.json` (`schemas/session.schema.json`)."""
+
+    def __len__(self) -> int:
+        """Number of finished recordings."""
+        return len(self.episodes)
+
+    def __getitem__(self, number: int) -> Episode:
+        """Read the episode of this number.
+
+        Raises:
+            UsageError: If no press of that number is recorded.
+        """
+        recorded = file_names.finished(self.folder)
+        if number not in recorded:
+            allowed = ", ".join(map(str, recorded)) if len(recorded) <= 20 else f"one of {len(recorded)} numbers"
+            raise UsageError(f"{self.folder} has no episode {number}", allowed or "none yet", "choose one of them")
+        return read_episode(recorded[number])
+
+    def __iter__(self) -> Iterator[Episode]:
+        """Read the finished recordings one by one, in the order of the plan."""
+        return map(read_episode, self.episodes)
+
+    def description(self) -> Iterator[str]:
+        """Yield what it is: recordings, sensor, plan."""
+        yield f"Session {self.folder}: {len(self)} of {len(self.plan.presses)} presses of plan {self.plan.name!r}"
+        yield f"sensor {self.sensor.name}, {self.sensor.taxels.columns} × {self.sensor.taxels.rows} taxels"
+        labels = [path for path in self.episodes if label_files.label(self.labels, path).is_file()]
+        yield f"{len(labels)} labelled"
+        if self.unfinished:
+            yield f"{len(self.unfinished)} recordings interrupted"
+        if self.position_lost:
+            yield f"the machine's position is lost: {self.position_lost}"
+
+    @property
+    def labels(self) -> Path:
+        """The folder of its labels."""
+        return label_files.folder(self.folder)
 
     @property
     def position_lost(self) -> str:
@@ -57,7 +107,7 @@ class Session:
         return tuple(press.index for press in self.plan.presses if press.index not in done)
 
 
-def read_session(folder: Path) -> Session:
+def read_session(folder: StrPath) -> Session:
     """Read a session folder.
 
     Raises:
@@ -65,9 +115,8 @@ def read_session(folder: Path) -> Session:
         FormatError: If its document is damaged or names recordings that are missing.
 
     Example:
-        >>> from pathlib import Path
         >>> from tacdata.recording import read_session
-        >>> session = read_session(Path("session"))
+        >>> session = read_session("session")
         >>> [path.name for path in session.episodes]
         ['episode-000000.mcap', 'episode-000001.mcap']
         >>> session.remaining  # presses of the plan that are not recorded yet

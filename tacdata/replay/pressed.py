@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.dataset.frames import baseline, recording_hash
+from tacdata.dataset.frames import recording_hash
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.recording.episode import Episode
 
@@ -34,7 +34,7 @@ def pressed(episode: Episode) -> Demonstration:
         np.zeros(count, bool),
         count,
         0,
-        (episode.taxels.counts - baseline(episode)).astype(np.float32),
+        episode.tared.astype(np.float32),
     )
     return Demonstration(
         episode.path.name,

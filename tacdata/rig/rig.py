@@ -11,6 +11,7 @@ import numpy as np
 from tacdata import documents, provenance
 from tacdata.clock import Clock
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 
 
 @dataclass(frozen=True)
@@ -174,11 +175,12 @@ def from_document(document: dict[str, Any], origin: str) -> Rig:
     )
 
 
-def read_rig(path: Path) -> Rig:
+def read_rig(path: StrPath) -> Rig:
     """Read a rig file.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
     """
+    path = Path(path)
     return from_document(documents.read(path, "rig"), str(path))

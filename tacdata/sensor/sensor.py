@@ -13,6 +13,7 @@ import numpy as np
 import schemas
 from tacdata import documents, provenance
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.sensor.adhesion import Adhesion
 from tacdata.sensor.material import Material
 from tacdata.sensor.skin import Skin
@@ -246,7 +247,7 @@ def _check_contact(sensor: Sensor, origin: str) -> None:
         )
 
 
-def read_sensor(path: Path) -> Sensor:
+def read_sensor(path: StrPath) -> Sensor:
     """Read a sensor file.
 
     Raises:
@@ -262,6 +263,7 @@ def read_sensor(path: Path) -> Sensor:
         >>> sensor.taxels.centers[0]  # of the first taxel, mm
         array([-7.5, -7.5])
     """
+    path = Path(path)
     return Sensor.from_document(documents.read(path, "sensor"), str(path), path.parent)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.paths import StrPath
 from tacdata.surfaces import step_file
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _FEWEST = 1e-9
 """Volume over that of the bounding box below which a surface counts as flat [1]."""
 
 
-def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
+def read_closed(path: StrPath, scale: float, what: str) -> trimesh.Trimesh:
     """Return the surface in a file, in mm, after checking that it bounds a solid.
 
     Args:
@@ -42,6 +43,7 @@ def read_closed(path: Path, scale: float, what: str) -> trimesh.Trimesh:
         >>> surface.is_watertight
         True
     """
+    path = Path(path)
     import trimesh
 
     _check_name(path, what)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tacdata.errors import FormatError
 from tacdata.extras import missing_package
+from tacdata.paths import StrPath
 
 if TYPE_CHECKING:
     import trimesh
@@ -25,7 +26,7 @@ _DIGITS = 6
 """Decimal places [mm] to which corners of neighbouring faces agree, by single precision."""
 
 
-def read_step(path: Path, what: str) -> trimesh.Trimesh:
+def read_step(path: StrPath, what: str) -> trimesh.Trimesh:
     """Return all solids of a file as one surface [mm], with corners of neighbouring faces merged; not checked further.
 
     Args:
@@ -36,6 +37,7 @@ def read_step(path: Path, what: str) -> trimesh.Trimesh:
         PackageError: If cascadio is not installed.
         FormatError: If the file cannot be read.
     """
+    path = Path(path)
     import trimesh
 
     try:

@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 
 PAPER = {"a4": (297.0, 210.0), "a3": (420.0, 297.0), "letter": (279.4, 215.9)}
 """Width and height of a sheet that lies on its side [mm]."""
@@ -77,7 +78,7 @@ class Board:
         return board
 
 
-def read_board(path: Path) -> Board:
+def read_board(path: StrPath) -> Board:
     """Read a board's file.
 
     Raises:

@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.tags.cube.cube import Cube
 
 FARTHEST = 0.5
@@ -59,7 +60,7 @@ def fingers_of(document: dict[str, Any], origin: str = "fingers") -> dict[str, F
     return found
 
 
-def read_fingers(path: Path) -> dict[str, Finger]:
+def read_fingers(path: StrPath) -> dict[str, Finger]:
     """Read a fingers file.
 
     Raises:

@@ -29,7 +29,7 @@ def episode(number: int = 0, count: int = 20, sensor: Sensor | None = None, rest
     tip = np.array([[x, y, -1.0], [x, y, -0.3], [x, y, 1.2], [x, y, 1.2], [x, y, -1.0]])
     return Episode(
         path=Path(f"episode-{number:06d}.mcap"),
-        press=Press(number, Sphere(2.0 + number), f"sphere{number % 2}", x, y, 0.0, 1.2, 1.0, 0.2),
+        press=Press(Sphere(2.0 + number), 1.2, x, y, hold=0.2, index=number, indenter_name=f"sphere{number % 2}"),
         sensor=sensor,
         rig={"name": "bench", "clock": {}},
         taxels=TaxelStream(

@@ -93,13 +93,13 @@ def test_state_is_tared_by_the_rest_phase() -> None:
     assert resting.sum() == 4
     assert np.abs(columns[features.STATE][resting].mean(axis=0)).max() < 1e-3
     moved = columns[features.RAW] - columns[features.STATE]
-    assert np.allclose(moved, frames.baseline(episode), atol=1e-3)
+    assert np.allclose(moved, episode.baseline, atol=1e-3)
     assert columns[features.DEPTH].min() == 0
 
 
 def test_no_rest_no_tare() -> None:
     with pytest.raises(FormatError, match="rest phase"):
-        frames.baseline(example.episode(rest=False))
+        _ = example.episode(rest=False).baseline
 
 
 def test_lost_frames_and_frames_off_the_path_are_not_valid() -> None:

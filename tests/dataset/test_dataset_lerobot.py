@@ -82,7 +82,7 @@ def same_as_recorded(dataset, numbers) -> None:
 def test_lerobot_opens_it_and_gives_the_same_windows(lerobot, packed: Path) -> None:
     deltas = {key: [offset / 30 for offset in offsets] for key, offsets in WINDOW.items()}
     theirs = lerobot.open(packed, delta_timestamps=deltas)
-    ours = WindowDataset(packed, WINDOW)
+    ours = WindowDataset(read_dataset(packed), WINDOW)
     assert len(ours) == len(theirs) == COUNT * FRAMES
     assert theirs.meta.robot_type == "tacprint"
     for frame in (*range(2 * FRAMES), len(ours) - 1):
@@ -99,7 +99,7 @@ def test_columns_that_were_asked_for_open_and_outlive_an_edit(lerobot, tmp_path:
     extra = features.asked_for(["uncertainty", "interpolation_error"])
     pack([example.episode(n, FRAMES) for n in range(2)], knowing, tmp_path / "d", extra=extra)
     whole = lerobot.open(tmp_path / "d")
-    frame = WindowDataset(tmp_path / "d", {features.STATE: (0,)})[FRAMES + 3]
+    frame = WindowDataset(read_dataset(tmp_path / "d"), {features.STATE: (0,)})[FRAMES + 3]
     for key in extra:
         assert torch.equal(frame[key], whole[FRAMES + 3][key]), key
     fewer = lerobot.tools.delete_episodes(whole, [0], output_dir=tmp_path / "fewer", repo_id="local/fewer")
@@ -113,7 +113,7 @@ def test_lerobot_streams_it(lerobot, packed: Path) -> None:
     from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
 
     deltas = {features.STATE: [offset / 30 for offset in centred(9)]}
-    ours, seen = WindowDataset(packed), 0
+    ours, seen = WindowDataset(read_dataset(packed)), 0
     for item in StreamingLeRobotDataset("local/test", root=packed, delta_timestamps=deltas, shuffle=False):
         wanted = ours[int(item["index"])]
         assert torch.equal(item[features.STATE], wanted[features.STATE])

@@ -23,7 +23,7 @@ def root(tmp_path: Path) -> Path:
 
 
 def test_nine_frames_around_each_with_the_ends_repeated(root: Path) -> None:
-    windows = WindowDataset(root)
+    windows = WindowDataset(read_dataset(root))
     state = read_dataset(root)[features.STATE]
     for episode in windows.data.episodes:
         for frame in range(episode.start, episode.stop):
@@ -38,7 +38,7 @@ def test_nine_frames_around_each_with_the_ends_repeated(root: Path) -> None:
 
 def test_a_batch_is_its_frames(root: Path) -> None:
     offsets = {features.STATE: range(-8, 1), features.DEPTH: (-1, 0)}
-    windows = WindowDataset(root, offsets, keys=[features.TIP, features.TIME])
+    windows = WindowDataset(read_dataset(root), offsets, keys=[features.TIP, features.TIME])
     frames = [0, 19, 20, 24, 25, 35, -1]
     batch = windows[frames]
     assert set(batch) == {features.TIP, features.TIME, *offsets, *(f"{key}_is_pad" for key in offsets)}
@@ -52,7 +52,7 @@ def test_a_batch_is_its_frames(root: Path) -> None:
 
 
 def test_a_data_loader_reads_whole_batches(root: Path) -> None:
-    windows = WindowDataset(root, keys=[features.DEPTH])
+    windows = WindowDataset(read_dataset(root), keys=[features.DEPTH])
     sampler = torch.utils.data.BatchSampler(torch.utils.data.SequentialSampler(windows), 16, drop_last=False)
     batches = list(torch.utils.data.DataLoader(windows, sampler=sampler, batch_size=None))
     assert [len(batch[features.DEPTH]) for batch in batches] == [16, 16, 4]
@@ -61,18 +61,18 @@ def test_a_data_loader_reads_whole_batches(root: Path) -> None:
 
 
 def test_batches_may_be_changed_without_harm(root: Path) -> None:
-    windows = WindowDataset(root)
+    windows = WindowDataset(read_dataset(root))
     windows.batch([3])[features.STATE].fill_(7.0)
     assert windows.batch([3])[features.STATE].max() != 7.0
 
 
 def test_refusals(root: Path) -> None:
-    windows = WindowDataset(root)
+    windows = WindowDataset(read_dataset(root))
     for frame in (36, -37):
         with pytest.raises(IndexError, match="of a dataset of 36"):
             windows[frame]
     with pytest.raises(FormatError, match="no column 'action'"):
-        WindowDataset(root, keys=["action"])
+        WindowDataset(read_dataset(root), keys=["action"])
     for length in (0, 8, -3):
         with pytest.raises(UsageError, match="odd"):
             centred(length)

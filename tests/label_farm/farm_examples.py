@@ -27,7 +27,7 @@ def press_episode(folder, number=0, x=0.0, depth=1.0, reached=None, frames=40, *
     reached = depth if reached is None else reached
     tip = np.array([[x, 0.0, -0.5], [x, 0.0, reached], [x, 0.0, reached], [x, 0.0, -0.5]])
     times = start + np.linspace(0, 3000, frames).astype(np.int64) * MILLISECOND
-    press = Press(number, Sphere(2.0), "ball", x, 0.0, 0.0, depth, 1.5, 1.0)
+    press = Press(Sphere(2.0), depth, x, speed=1.5, hold=1.0, index=number, indenter_name="ball")
     stream = TaxelStream(times, times, np.arange(frames), np.zeros((frames, SENSOR.taxels.count)))
     episode = Episode(
         path=path,

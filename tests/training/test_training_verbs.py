@@ -24,7 +24,7 @@ def write_dataset(root, frames, virtual=True, indenters=(BALL,)):
     for e in frames.episodes:
         here, n = slice(e.start, e.stop), e.stop - e.start
         indenter = from_document(indenters[e.number % len(indenters)])
-        press = Press(e.number, indenter, f"ball {e.number % 2}", e.x, e.y, 0.0, e.depth, 1.0, 1.0)
+        press = Press(indenter, e.depth, e.x, e.y, hold=1.0, index=e.number, indenter_name=f"ball {e.number % 2}")
         record = EpisodeRecord(
             sensor=frames.sensor.content_hash,
             recording=f"{e.number:064x}",

@@ -52,7 +52,7 @@ def made(episode):
 @pytest.fixture(scope="session")
 def episode():
     sensor = default_sensor()
-    press = Press(3, Sphere(radius=4.0), "ball", x=1.0, y=-0.5, yaw=0.0, depth=DEEPEST, speed=1.5, hold=0.6)
+    press = Press(Sphere(radius=4.0), DEEPEST, x=1.0, y=-0.5, speed=1.5, hold=0.6, index=3, indenter_name="ball")
     time = START + (np.arange(FRAMES) * 1e9 / RATE).astype(np.int64)
     tip_ns, tip = tip_path()
     at = np.stack([np.interp(time, tip_ns, tip[:, k]) for k in range(3)], axis=-1)

@@ -10,19 +10,21 @@ from tacdata.dataset import Dataset, read_dataset
 from tacdata.dataset.flags import flagged_episodes
 from tacdata.dataset.format import features as key
 from tacdata.dataset.reader import DatasetEpisode
+from tacdata.paths import StrPath
 from training.frames.frames import EpisodeSpan, Frames
 
 UNKNOWN = "unknown"
 """Indenter of an episode whose record an edit of the dataset lost."""
 
 
-def read_frames(path: Path) -> Frames:
+def read_frames(path: StrPath) -> Frames:
     """Read a dataset folder.
 
     Raises:
         UsageError: If there is no dataset.
         FormatError: If it is damaged, of several sensors, or holds values that are no numbers.
     """
+    path = Path(path)
     return frames_of(read_dataset(path))
 
 

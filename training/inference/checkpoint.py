@@ -20,6 +20,7 @@ from safetensors.torch import save_file
 
 from tacdata import documents, provenance
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.sensor import Sensor
 from training.frames.channel_calibration import ChannelCalibration
 from training.networks.network import Network, create
@@ -110,13 +111,14 @@ def save(path: Path, network: Network, optimizer: torch.optim.Optimizer | None, 
     os.replace(temporary, path)
 
 
-def load(path: Path, device: torch.device | str = "cpu") -> Checkpoint:
+def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
     """Read a checkpoint: a file, or a run's folder, of which the best epoch is taken.
 
     Raises:
         UsageError: If there is none.
         FormatError: If the file is damaged, of another version, or its weights do not fit its document.
     """
+    path = Path(path)
     path = path / BEST if path.is_dir() else path
     if not path.is_file():
         raise UsageError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,9 @@ import pyarrow.parquet as pq
 
 import schemas
 from tacdata import documents
+from tacdata.display import Displayed
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 
 HEADER = b"tacdata.prediction"
@@ -21,8 +24,8 @@ UNITS = {"time_ns": "ns", "depth": "mm"}
 REMEDY = "run `tacdata evaluate` again: predictions can always be made anew"
 
 
-@dataclass(frozen=True)
-class PredictedMaps:
+@dataclass(frozen=True, repr=False)
+class PredictedMaps(Displayed):
     """The predicted maps of one episode, frame by frame."""
 
     episode: int
@@ -43,6 +46,13 @@ class PredictedMaps:
     """Content hash of the sensor."""
     provenance: dict[str, Any]
     """What made it."""
+
+    def description(self) -> Iterator[str]:
+        """Yield what it is: maps, network, deepest pixel."""
+        frames, *pixels = self.depth.shape
+        yield f"Prediction for episode {self.episode}: {frames} maps of {pixels[0]} × {pixels[1]} pixels"
+        yield f"network {self.network} ({self.checkpoint[:12]}), which knew the episode as: {self.part}"
+        yield f"deepest pixel {self.depth.max(initial=0.0):.3g} mm"
 
 
 def file_name(episode: int) -> str:
@@ -82,13 +92,14 @@ def write_prediction(path: Path, prediction: PredictedMaps) -> None:
         pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
 
 
-def read_prediction(path: Path) -> PredictedMaps:
+def read_prediction(path: StrPath) -> PredictedMaps:
     """Read a prediction file.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged, no prediction file, or of another major format version.
     """
+    path = Path(path)
     if not path.is_file():
         raise UsageError(f"no prediction file {path}", "a file that `tacdata evaluate` wrote", "run `tacdata evaluate`")
     try:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 from training.scoring import published
 
 TRUE, FALSE = {"1", "true", "yes", "success"}, {"0", "false", "no", "failure"}
@@ -90,13 +91,14 @@ def rates(attempts: list[Attempt], groups: Mapping[str, set[str]] | None = None)
     return found
 
 
-def read_attempts(path: Path) -> list[Attempt]:
+def read_attempts(path: StrPath) -> list[Attempt]:
     """Read trials from a CSV file with columns condition, success and, if known, position and adjustments.
 
     Raises:
         UsageError: If there is no such file.
         FormatError: If a column or a value is missing or is none of the allowed ones; the line is named.
     """
+    path = Path(path)
     if not path.is_file():
         raise UsageError(f"no file {path}", "a CSV file of trials", "check the path")
     with path.open(newline="", encoding="utf-8-sig") as stream:

@@ -15,6 +15,7 @@ import schemas
 from tacdata import documents
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 from tacdata.sensor import Sensor
 
@@ -75,13 +76,14 @@ def write_tracks(path: Path, made: Demonstration) -> None:
         raise DeviceError(given, "a disk with room", "make room, then track again") from error
 
 
-def read_tracks(path: Path) -> Demonstration:
+def read_tracks(path: StrPath) -> Demonstration:
     """Read a processed demonstration.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged or of another kind.
     """
+    path = Path(path)
     folder = path.with_name(path.name.removesuffix(ENDING))
     if not path.is_file() and folder.is_dir():
         known = ", ".join(sorted(found.name for found in folder.glob(f"*{ENDING}"))) or "none yet"

@@ -13,6 +13,7 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from schemas import tacdata_pb2 as pb
 from tacdata.demonstrations.recording.rig import DemoRig, demo_rig_of
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.clocks.envelope_fit import fit
 from tacdata.recording.clocks.running_clock import nominal_period_ns
@@ -52,7 +53,7 @@ class DemoRecording:
         return (min(int(t[0]) for t in times), max(int(t[-1]) for t in times)) if times else (0, 0)
 
 
-def read_demo(path: Path) -> DemoRecording:
+def read_demo(path: StrPath) -> DemoRecording:
     """Read one demonstration.
 
     Raises:

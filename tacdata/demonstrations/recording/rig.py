@@ -12,6 +12,7 @@ from tacdata import documents
 from tacdata.clock import Clock
 from tacdata.demonstrations.camera_world import CameraWorld, check_worlds
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.tags.camera import PinholeCamera
@@ -86,7 +87,7 @@ def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
     return DemoRig(document["name"], document["boards"], sensors, devices, worlds, known, delays, clock, whole)
 
 
-def read_demo_rig(path: Path) -> DemoRig:
+def read_demo_rig(path: StrPath) -> DemoRig:
     """Read a demo rig file. Raises as `demo_rig_of`."""
     return demo_rig_of(documents.read(Path(path), "demo_rig"), str(path))
 

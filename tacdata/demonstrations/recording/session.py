@@ -11,6 +11,7 @@ import schemas
 from tacdata import documents, provenance
 from tacdata.demonstrations.recording.rig import DemoRig, demo_rig_of
 from tacdata.errors import UsageError
+from tacdata.paths import StrPath
 from tacdata.recording.files import file_names
 
 FILE = "demonstrations.json"
@@ -40,7 +41,7 @@ class DemoSession:
         return file_names.episode(self.folder, 1 + max(file_names.finished(self.folder), default=-1))
 
 
-def read_demo_session(folder: Path) -> DemoSession:
+def read_demo_session(folder: StrPath) -> DemoSession:
     """Read a folder of demonstrations.
 
     Raises:

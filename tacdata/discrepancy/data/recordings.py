@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from tacdata.discrepancy.data.specimens import specimens
 from tacdata.discrepancy.data.strokes import strokes
 from tacdata.discrepancy.data.tip_observation import Views, second_views
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.recording import Episode, read_session
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.session import FILE
@@ -44,16 +47,17 @@ class _Stroke:
     """What the source calls what was pressed; empty where it says nothing."""
 
 
-def course_of(paths: list[Path]) -> Course:
+def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
     """Read recordings, in the order of their time.
 
     Args:
-        paths: Recordings, or folders of sessions.
+        paths: Recordings or folders of sessions, one or several.
 
     Raises:
         UsageError: If there is none, or a path is neither.
         FormatError: If they do not have the same channels, or hold no readings.
     """
+    paths = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
     every = [(number, read_recording(file)) for number, path in enumerate(paths) for file in _files(path)]
     every = [(number, r) for number, r in every if len(r.episode.taxels.sample_ns) > 1]
     every.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))

@@ -16,6 +16,7 @@ from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import NUISANCE
 from tacdata.effects import Placed, load
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class Spec:
         return {**self.document, "parent": self.content_hash, "effects": [*self.document["effects"], *entries]}
 
 
-def read_spec(path: Path | None) -> Spec:
+def read_spec(path: StrPath | None) -> Spec:
     """Read a spec; without a path, a response fitted to the recordings and no effect.
 
     Raises:
@@ -116,6 +117,7 @@ def read_spec(path: Path | None) -> Spec:
         >>> spec.effects()
         ()
     """
+    path = None if path is None else Path(path)
     if path is None:
         document = {
             "version": schemas.version("model_spec"),

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import schemas
 from tacdata import documents
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 
 FILE = "residuals.parquet"
@@ -90,12 +91,13 @@ def _wide(values: np.ndarray) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(pa.array(np.ascontiguousarray(values).reshape(-1)), values.shape[1])
 
 
-def read(path: Path) -> Residuals:
+def read(path: StrPath) -> Residuals:
     """Read the file.
 
     Raises:
         FormatError: If it is damaged, none of `tacdata discrepancy`, or of another major format version.
     """
+    path = Path(path)
     try:
         table = pq.read_table(path, page_checksum_verification=True)
         header = json.loads((table.schema.metadata or {})[HEADER])

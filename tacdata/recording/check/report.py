@@ -10,6 +10,7 @@ import numpy as np
 
 import schemas
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 from tacdata.recording.check.clocks import clock_words
 from tacdata.recording.check.figures import RecordingFigures, figures
 from tacdata.recording.check.findings import UNUSABLE, WARNING, Finding, findings
@@ -61,7 +62,7 @@ class Report:
         return "\n".join([*lines, "usable" if self.usable else "NOT usable as it is"])
 
 
-def check(path: Path) -> Report:
+def check(path: StrPath) -> Report:
     """Check a recording or a session folder.
 
     Raises:

@@ -13,6 +13,7 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from schemas import tacdata_pb2 as pb
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.plans import Press
 from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.envelope_fit import fit
@@ -57,7 +58,7 @@ class Recording:
     """Largest difference between reported and commanded height at rest [mm]."""
 
 
-def read_episode(path: Path) -> Episode:
+def read_episode(path: StrPath) -> Episode:
     """Read one recording as an `Episode`; a file that a crash cut off is salvaged.
 
     Raises:
@@ -73,11 +74,12 @@ def read_episode(path: Path) -> Episode:
         >>> episode.press.indenter
         Sphere(radius=3.0)
     """
+    path = Path(path)
     return read_recording(path).episode
 
 
 def read_recording(
-    path: Path, digests: bool = True, seen: Callable[[str, memoryview], None] | None = None
+    path: StrPath, digests: bool = True, seen: Callable[[str, memoryview], None] | None = None
 ) -> Recording:
     """Read one recording with everything in it, also what `Episode` leaves out.
 

@@ -11,6 +11,7 @@ import numpy as np
 from tacdata import documents, provenance
 from tacdata.demonstrations.camera_world import pose_matrix
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.replay.robot.urdf import FARTHEST, read_urdf
 
 POSITION_TOLERANCE = 0.0005
@@ -52,7 +53,7 @@ class Robot:
     """What a person should know of the URDF's limits."""
 
 
-def read_robot(path: Path) -> Robot:
+def read_robot(path: StrPath) -> Robot:
     """Read a robot file and the URDF that it names.
 
     Raises:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
+from tacdata.paths import StrPath
 
 HAIR = 1e-6
 """Range given to a joint whose limits are equal [rad or m]."""
@@ -57,13 +58,14 @@ def _is_utf8(text: bytes) -> bool:
     return True
 
 
-def read_urdf(path: Path) -> Urdf:
+def read_urdf(path: StrPath) -> Urdf:
     """Read a URDF.
 
     Raises:
         UsageError: If there is no such file.
         FormatError: If it is damaged, no tree of joints with one axis each, or in degrees or millimetres.
     """
+    path = Path(path)
     if not path.is_file():
         raise UsageError(f"no URDF {path}", "a file named relative to the robot file", "correct urdf")
     text = path.read_bytes()

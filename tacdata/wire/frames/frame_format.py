@@ -12,6 +12,7 @@ import numpy as np
 
 from tacdata import documents
 from tacdata.errors import FormatError
+from tacdata.paths import StrPath
 from tacdata.wire.frames.checksum import WIDTHS
 
 BITS = {f"{sign}int{bits}": bits for bits in (8, 16, 24, 32) for sign in ("", "u")}
@@ -150,13 +151,14 @@ def _check_consistency(document: dict[str, Any], origin: str, present: list[str]
         raise FormatError(f"{origin}: {kind} channels with radix 16", "radix 10 for numbers like 1.5", "correct radix")
 
 
-def read_format(path: Path) -> FrameFormat:
+def read_format(path: StrPath) -> FrameFormat:
     """Read a frame format file.
 
     Raises:
         UsageError: If it does not exist.
         FormatError: If it is damaged or contradicts itself.
     """
+    path = Path(path)
     return from_document(documents.read(path, "frame_format"), str(path))
 
 

@@ -1,0 +1,55 @@
+"""Scores of a network on a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tacdata.dataset.reader import Dataset, read_dataset
+from tacdata.errors import UsageError
+from tacdata.paths import StrPath
+from tacdata.pipeline.trained_network import TrainedNetwork, read_network
+from training.frames.data import frames_of
+from training.scoring.evaluate import Evaluation
+from training.scoring.evaluate import evaluate as score_network
+
+
+def evaluate(
+    network: TrainedNetwork | StrPath,
+    dataset: Dataset | StrPath | None = None,
+    *,
+    device: str = "auto",
+    threads: int | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Evaluation:
+    """Score a network on the test episodes of its dataset, or on all episodes of another one.
+
+    Args:
+        network: The network, a run's folder or a checkpoint file.
+        dataset: The dataset or its folder; None takes the one that the network was trained on.
+        device: "auto", "cpu", "cuda" or "cuda:N".
+        threads: CPU threads; None takes one a core, at most 4.
+        progress: Called after each episode with the number done and the number of all.
+
+    Returns:
+        The scores: `document` (`schemas/scores.schema.json`) and the predicted maps of each episode.
+
+    Raises:
+        UsageError: If there is no network, or no dataset.
+        FormatError: If the dataset is of another sensor, or lacks episodes of the split.
+    """
+    trained = network if isinstance(network, TrainedNetwork) else read_network(network)
+    scored = dataset if isinstance(dataset, Dataset) else read_dataset(dataset or training_dataset(trained))
+    return score_network(trained.checkpoint, frames_of(scored), device, threads, progress)
+
+
+def training_dataset(trained: TrainedNetwork) -> Path:
+    """Return the folder of the dataset that a network was trained on.
+
+    Raises:
+        UsageError: If it is not there.
+    """
+    recorded = Path(trained.checkpoint.document["dataset"]["path"])
+    if not recorded.is_dir():
+        raise UsageError(f"the dataset {recorded} of {trained.path} is not there", "a dataset folder", "give --dataset")
+    return recorded

@@ -1,0 +1,1 @@
+"""Pictures of nouns for a notebook, one class a file."""

@@ -1,0 +1,25 @@
+"""The maps that a network predicts for an episode: the deepest of them, and the greatest depth over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewers.portraits import portrait as parts
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from training.inference.prediction import PredictedMaps
+
+
+def portrait(noun: PredictedMaps) -> Figure:
+    """Draw the deepest predicted map and the greatest depth of each frame."""
+    figure = parts.figure()
+    left, right = figure.subplots(1, 2)
+    greatest = noun.depth.max(axis=(1, 2))
+    frame = int(np.argmax(greatest))
+    parts.depth_map(left, noun.depth[frame], f"{noun.network}: frame {frame} of episode {noun.episode}")
+    parts.curves(right, (noun.time_ns - noun.time_ns[0]) / 1e9, greatest, "greatest predicted depth [mm]")
+    return figure
