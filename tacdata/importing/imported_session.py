@@ -18,7 +18,7 @@ from tacdata.chain.at_rest import below_zero
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.formats.source_format import SourceTable, read_table
-from tacdata.importing.presses import centre_of, presses_of
+from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
 from tacdata.importing.trials import split_tables
@@ -122,7 +122,10 @@ class _Import:
             named = " ".join(part for part in (files.label, label) if part)
             try:
                 for imported in self._presses(files, named, tables, rows):
-                    self._write(imported)
+                    if isinstance(imported, Refusal):
+                        self.failures.append((imported.trial or self.source.name, imported.error))
+                    else:
+                        self._write(imported)
             except TacdataError as error:
                 self.failures.append((named or self.source.name, error))
 
@@ -139,7 +142,7 @@ class _Import:
 
     def _presses(
         self, files: FileSet, label: str, whole: dict[str, SourceTable], rows: dict[str, SourceTable]
-    ) -> Iterator[ImportedPress]:
+    ) -> Iterator[ImportedPress | Refusal]:
         below = self.source.parent if is_one(self.source) else self.source
         record = {
             "version": schemas.version("import_record"),

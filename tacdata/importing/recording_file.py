@@ -53,8 +53,6 @@ class ImportedPress:
     @property
     def attachments(self) -> dict[str, Any]:
         """Name of each attachment and its document."""
-        spans = np.diff(self.taxels.time_ns)
-        rate = float(1e9 / np.median(spans[spans > 0])) if (spans > 0).any() else self.sensor.taxels.rate
         return {
             "press.json": self.press.document,
             "sensor.json": self.sensor.document,
@@ -65,7 +63,7 @@ class ImportedPress:
                 "channels": len(self.taxels.names),
                 "names": list(self.taxels.names),
                 "unit": self.taxels.unit,
-                "rate": {"nominal": rate, "unit": "Hz"},
+                "rate": {"nominal": self.taxels.stated_rate or self.sensor.taxels.rate, "unit": "Hz"},
             },
             "controller.json": {"settings": {}, "acceleration": [1e6] * 3, "max_rate": [1e6] * 3},
             "import.json": self.record,

@@ -11,6 +11,7 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, numbers, select, single, unit_of
 from tacdata.importing.formats.source_format import INNER, SourceTable
+from tacdata.importing.plausibility.time_order import time_order
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, plain, quantity_of, split_unit
 
@@ -35,11 +36,18 @@ class Stream:
     notes: tuple[str, ...] = ()
     assumed: bool = False
     """Whether no file and no mapping says the unit."""
+    stated_rate: float = 0.0
+    """Rate that the source states beside its times [Hz]; 0 if it states none."""
+    steps_back: tuple[str, ...] = ()
+    """Row and size of each step back at which a stretch of the source ends, as words."""
+
+    def chosen(self, rows: np.ndarray | slice) -> Stream:
+        """Return some of the rows, by a mask or by their numbers."""
+        return replace(self, time_ns=self.time_ns[rows], values=self.values[rows])
 
     def within(self, begin_ns: int, end_ns: int) -> Stream:
         """Return the rows from a time [ns] to before another."""
-        rows = slice(*np.searchsorted(self.time_ns, (begin_ns, end_ns)))
-        return replace(self, time_ns=self.time_ns[rows], values=self.values[rows])
+        return self.chosen(slice(*np.searchsorted(self.time_ns, (begin_ns, end_ns))))
 
 
 @dataclass(frozen=True)
@@ -68,23 +76,46 @@ class ImportedStreams:
         return replace(self, taxels=self.taxels.within(begin_ns, end_ns), position=position, measured=measured)
 
 
-def read_streams(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> ImportedStreams:
-    """Return the streams that a mapping describes.
+def read_streams(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> list[ImportedStreams]:
+    """Return the streams that a mapping describes, for each stretch in which time never goes back.
 
     Args:
         mapping: The mapping's document.
         tables: Name under ``files`` -> its table.
 
     Raises:
-        FormatError: If a column, unit or clock is wrong, or clocks have no zero in common.
+        FormatError: If a column, unit or clock is wrong, clocks have no zero in common, or not all of them begin again.
     """
     taxels, counted = _taxels(mapping, tables)
     position, depth_given = _position(mapping, tables)
-    measured = tuple(_measured(mapping, name, entry, tables) for name, entry in mapping.get("measured", {}).items())
-    streams = ImportedStreams(taxels, position, measured, counted, depth_given)
-    _check_zeros(streams)
-    _check_overlap(streams)
-    return replace(streams, notes=tuple(note for stream in streams.all for note in stream.notes))
+    measured = [_measured(mapping, name, entry, tables) for name, entry in mapping.get("measured", {}).items()]
+    _check_stretches([taxels, *([position] if position else []), *measured])
+    stretches = []
+    for number, readings in enumerate(taxels):
+        path, further = position[number] if position else None, tuple(streams[number] for streams in measured)
+        streams = ImportedStreams(readings, path, further, counted, depth_given)
+        _check_zeros(streams)
+        if len(taxels) == 1:
+            _check_overlap(streams)
+        stretches.append(replace(streams, notes=tuple(note for stream in streams.all for note in stream.notes)))
+    return stretches
+
+
+def _check_stretches(streams: list[list[Stream]]) -> None:
+    """Refuse clocks of which some begin again and others do not: which rows belong together is then unknown.
+
+    Raises:
+        FormatError: With the row and the size of each step back.
+    """
+    if len({len(stretches) for stretches in streams}) > 1:
+        listed = ", ".join(
+            f"{stretches[0].name} {'; '.join(stretches[0].steps_back[:3]) or 'nowhere'}" for stretches in streams
+        )
+        raise FormatError(
+            f"time goes back in some streams and not in others ({listed})",
+            "clocks that begin again together, or never",
+            "import the parts before and behind the step as files of their own, or leave a stream out of the mapping",
+        )
 
 
 def _clock(mapping: dict[str, Any], entry: dict[str, Any]) -> dict[str, Any]:
@@ -117,26 +148,54 @@ def _timed(
     values: np.ndarray,
     names: tuple[str, ...],
     unit: str,
-) -> Stream:
+) -> list[Stream]:
+    """Return a stream for each stretch of a file in which time never goes back."""
     clock = _clock(mapping, entry)
-    time_ns, zero = times(table, clock, f"{name}: time")
+    bare = {key: value for key, value in clock.items() if key != "offset"}
+    time_ns, zero = times(table, bare, f"{name}: time")
+    tick_ns = 0.0 if zero == "unix" else _tick(table, bare, time_ns, name)
     zero = "aligned" if "offset" in clock else f"own: {entry['file']}" if zero == "own" else zero
-    known = time_ns != NEVER
-    notes = []
-    if not known.all():
-        notes.append(f"{name}: {(~known).sum()} rows without a time are left out")
-    time_ns, values = time_ns[known], values[known]
-    if back := int((np.diff(time_ns) < 0).sum()):
-        notes.append(f"{name}: time runs backwards {back} times; rows are put in the order of time")
-        order = np.argsort(time_ns, kind="stable")
-        time_ns, values = time_ns[order], values[order]
-    time_ns, shared = _apart(time_ns)
-    if shared:
-        notes.append(
-            f"{name}: {shared} of {len(time_ns)} rows have the time of the row before; they are spread evenly up to "
-            "the next time"
+    order = time_order(time_ns, f"{table.path.name}: {_clock_name(clock)}", tick_ns=tick_ns)
+    offset_ns, stretches = round(clock.get("offset", 0.0) * 1e9), []
+    for rows in order.stretches:
+        spread, shared = _apart(order.time_ns[rows] + offset_ns)
+        notes = [*table.notes, *order.notes]
+        if shared:
+            notes.append(
+                f"{name}: {shared} of {len(rows)} rows have the time of the row before; they are spread evenly up to "
+                "the next time"
+            )
+        stretches.append(
+            Stream(
+                name,
+                spread,
+                values[rows],
+                names,
+                unit,
+                zero,
+                tuple(notes),
+                stated_rate=table.rate,
+                steps_back=order.steps_back,
+            )
         )
-    return Stream(name, time_ns, values, names, unit, zero, (*table.notes, *notes))
+    return stretches
+
+
+def _clock_name(clock: dict[str, Any]) -> str:
+    column = clock.get("column", "time")
+    return " ".join(map(str, column)) if isinstance(column, list) else str(column)
+
+
+def _tick(table: SourceTable, clock: dict[str, Any], time_ns: np.ndarray, name: str) -> float:
+    """Return one step of a clock's numbers [ns]; 0 where no column of numbers holds the times."""
+    if not isinstance(clock.get("column"), str | int):
+        return 0.0
+    numbers = table.column(single(table, clock["column"], f"{name}: time"))
+    if numbers.dtype == object:
+        return 0.0
+    known = time_ns != NEVER
+    span = float(np.ptp(numbers[known].astype(float))) if known.any() else 0.0
+    return float(np.ptp(time_ns[known])) / span if span > 0 else 0.0
 
 
 def _apart(time_ns: np.ndarray) -> tuple[np.ndarray, int]:
@@ -155,7 +214,7 @@ def _apart(time_ns: np.ndarray) -> tuple[np.ndarray, int]:
     return time_ns + np.rint(inside * np.repeat(widths / counts, counts)).astype(np.int64), shared
 
 
-def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[Stream, bool]:
+def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[list[Stream], bool]:
     entry = mapping["taxels"]
     table = _table(mapping, tables, entry["file"], "taxels")
     if ("long" in entry) == ("columns" in entry):
@@ -186,22 +245,49 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
         raise FormatError("taxels: long without a time column", "time: {column: NAME}", "add it to the mapping")
     channel = table.column(single(table, entry["long"]["channel"], "taxels: long: channel"))
     value = numbers(table, [single(table, entry["long"]["value"], "taxels: long: value")], [], "taxels: long")[:, 0]
-    clocked = table.column(time)
-    moments, row = np.unique(clocked.astype(str) if clocked.dtype == object else clocked, return_inverse=True)
     known, column = np.unique(channel.astype(str) if channel.dtype == object else channel, return_inverse=True)
+    moments, first, row, notes = _moments(times(table, clock, "taxels: time")[0], column, table.path.name)
     wide = np.full((len(moments), len(known)), np.nan)
     wide[row, column] = value
     labels = [f"{k:g}" if isinstance(k, float) else str(k) for k in known.tolist()]
-    moments = moments.astype(object) if moments.dtype.kind == "U" else moments
-    columns = {time: moments, **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
+    columns = {time: table.column(time)[first], **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
     unit = {time: table.units[time]} if time in table.units else {}
-    return SourceTable(table.path, columns, unit, table.notes), [f"channel {label}" for label in labels]
+    return SourceTable(table.path, columns, unit, (*table.notes, *notes)), [f"channel {label}" for label in labels]
 
 
-def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[Stream | None, bool]:
+def _moments(
+    time_ns: np.ndarray, channel: np.ndarray, name: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Group the rows of a table with one row per channel by their time.
+
+    Where a channel's times begin again, the groups do, too.
+
+    Args:
+        time_ns: Time of each row [ns], shape (rows,).
+        channel: Number of each row's channel, shape (rows,), from 0.
+        name: The file's name, for notes.
+
+    Returns:
+        Stretch and time of each group, shape (groups, 2); its first row; the group of each row; notes.
+    """
+    stretch = np.zeros(len(time_ns), dtype=np.int64)
+    for number in range(int(channel.max(initial=0)) + 1):
+        rows = np.flatnonzero(channel == number)
+        order = time_order(time_ns[rows], name)
+        for count, part in enumerate(order.stretches):
+            stretch[rows[part]] = count
+    keys = np.stack([stretch, time_ns], axis=1)
+    moments, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    pairs = np.stack([group.ravel(), channel], axis=1)
+    twice = len(pairs) - len(np.unique(pairs, axis=0))
+    notes = [f"{name}: {twice} readings have the channel and the time of another; the later one counts"] * bool(twice)
+    return moments, first, group.ravel(), notes
+
+
+def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[list[Stream], bool]:
     entry = mapping.get("position")
     if entry is None:
-        return None, False
+        return [], False
     if ("depth" in entry) == ("z" in entry):
         raise FormatError("position with both or neither of z and depth", "one of them", "correct the mapping")
     table = _table(mapping, tables, entry["file"], "position")
@@ -216,13 +302,18 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     columns.append(-down if depth_given else down)
     values = np.stack(np.broadcast_arrays(*columns, np.zeros(table.rows))[:3], axis=1)
     whole = np.isfinite(values).all(axis=1)
-    stream = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm")
+    stretches = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm")
     if not whole.any():
         raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
-    kept = np.isfinite(stream.values).all(axis=1)
     assumed = tuple(_taken_as_mm(table, entry))
-    stream = replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept], assumed=bool(assumed))
-    return replace(stream, notes=(*stream.notes, *assumed)), depth_given
+    return [
+        replace(
+            stream.chosen(np.flatnonzero(np.isfinite(stream.values).all(axis=1))),
+            assumed=bool(assumed),
+            notes=(*stream.notes, *assumed),
+        )
+        for stream in stretches
+    ], depth_given
 
 
 def _taken_as_mm(table: SourceTable, entry: dict[str, Any]) -> Iterator[str]:
@@ -233,7 +324,9 @@ def _taken_as_mm(table: SourceTable, entry: dict[str, Any]) -> Iterator[str]:
             yield f"position: {name} has no unit and is taken in mm; else give unit under position/{key} in the mapping"
 
 
-def _measured(mapping: dict[str, Any], name: str, entry: dict[str, Any], tables: dict[str, SourceTable]) -> Stream:
+def _measured(
+    mapping: dict[str, Any], name: str, entry: dict[str, Any], tables: dict[str, SourceTable]
+) -> list[Stream]:
     table = _table(mapping, tables, entry["file"], f"measured: {name}")
     names = select(table, entry["columns"], f"measured: {name}")
     given = plain(entry.get("unit") or next((table.units[n] for n in names if n in table.units), ""))
@@ -244,9 +337,9 @@ def _measured(mapping: dict[str, Any], name: str, entry: dict[str, Any], tables:
     else:
         unit = given
     labels = tuple(split_unit(n)[0] for n in names) if len(names) == values.shape[1] else None
-    stream = _timed(mapping, entry, table, name, values, labels or tuple(str(k) for k in range(values.shape[1])), unit)
-    kept = np.isfinite(stream.values).any(axis=1)
-    return replace(stream, time_ns=stream.time_ns[kept], values=stream.values[kept])
+    labels = labels or tuple(str(k) for k in range(values.shape[1]))
+    stretches = _timed(mapping, entry, table, name, values, labels, unit)
+    return [stream.chosen(np.flatnonzero(np.isfinite(stream.values).any(axis=1))) for stream in stretches]
 
 
 def _check_zeros(streams: ImportedStreams) -> None:

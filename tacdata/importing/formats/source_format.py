@@ -58,6 +58,8 @@ class SourceTable:
     """Name -> unit, where the file gives one."""
     notes: tuple[str, ...] = ()
     """Remarks on the reading, as sentences."""
+    rate: float = 0.0
+    """Rows a second as the file states them beside its columns [Hz]; 0 if it states none."""
 
     def column(self, name: str) -> np.ndarray:
         """Return a column's values, or one column of a table in it, named ``name[k]`` (from 0).

@@ -45,10 +45,10 @@ class Zarr(SourceFormat):
                 notes.append(f"{path.name}: {name} of {shape} values a row is left out")
                 continue
             _refuse_cut_chunks(folder)
-            if lost := found.nchunks - found.nchunks_initialized:
-                stands = f"{found.fill_value} stands for their values"
-                notes.append(f"{path.name}: {name}: {lost} of {found.nchunks} chunks are not there; {stands}")
             values = np.asarray(found[:])
+            if found.nchunks > found.nchunks_initialized:
+                values, words = _without_lost(found, folder, values)
+                notes.append(f"{path.name}: {name}: {words}")
             arrays[name] = np.char.strip(values) if values.dtype.kind == "U" else values
         ends = arrays.pop(ENDS, None)
         columns = {
@@ -58,6 +58,31 @@ class Zarr(SourceFormat):
             columns["episode"] = np.searchsorted(ends, np.arange(int(ends[-1])), side="right")
         table = rows_of(path, columns, options)
         return SourceTable(path, table.columns, table.units, (*notes, *table.notes))
+
+
+def _without_lost(array: Any, folder: Path, values: np.ndarray) -> tuple[np.ndarray, str]:
+    """Return an array's values with NaN for those of chunks that are not there, and how many chunks that are, as words.
+
+    A store leaves out chunks that hold the fill value alone. Where the rows before and behind hold it too, it stays.
+    """
+    if values.dtype.kind not in "biuf" or array.shards is not None:
+        return values, f"some of {array.nchunks} chunks are not there; {array.fill_value} stands for their values"
+    result, lost, empty = values.astype(float), 0, 0
+    for place in np.ndindex(*(-(-size // chunk) for size, chunk in zip(array.shape, array.chunks, strict=True))):
+        names = [str(number) for number in place]
+        spelled = ("/".join(("c", *names)), ".".join(("c", *names)), ".".join(names), "/".join(names))
+        if any((folder / name).is_file() for name in spelled):
+            continue
+        block = tuple(slice(k * n, (k + 1) * n) for k, n in zip(place, array.chunks, strict=True))
+        ends = [block[0].start - 1, block[0].stop]
+        beside = np.array([values[(row, *block[1:])].ravel() for row in ends if 0 <= row < len(values)])
+        if beside.size and (beside == array.fill_value).all():
+            empty += 1
+            continue
+        result[block], lost = np.nan, lost + 1
+    words = f"{lost} of {array.nchunks} chunks are not there; their values are missing" * bool(lost)
+    more = f"{empty} chunks are left out by the store, as they hold {array.fill_value} alone" * bool(empty)
+    return (result if lost else values), "; ".join(filter(None, (words, more)))
 
 
 def _refuse_cut_chunks(folder: Path) -> None:

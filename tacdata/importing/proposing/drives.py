@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.press_path import strokes
-from tacdata.importing.presses import DEEPEST
+from tacdata.importing.pressing.press_path import strokes
+from tacdata.importing.pressing.presses import DEEPEST
 from tacdata.importing.proposing.strokes import CLEAR
 from tacdata.importing.units import plain
 

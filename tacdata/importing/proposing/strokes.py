@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tacdata.importing.press_path import strokes
+from tacdata.importing.pressing.press_path import strokes
 from tacdata.importing.times import NEVER
 
 PAUSE, TIMES = 1.0, 10.0

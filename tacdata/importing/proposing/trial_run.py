@@ -9,7 +9,8 @@ import numpy as np
 
 from tacdata.errors import TacdataError
 from tacdata.importing.formats.source_format import read_table
-from tacdata.importing.presses import centre_of, presses_of
+from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
+from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import file_sets
 from tacdata.importing.trials import split_tables
 
@@ -30,11 +31,14 @@ def tried(source: Path, mapping: dict[str, Any], beside: Path) -> str:
             raise first.fault
         tables = {name: read_table(path, first.options(name, mapping)) for name, path in first.paths.items()}
         centre = centre_of(mapping, tables)
-        presses = [
+        outcomes = [
             press
             for label, rows in split_tables(tables, mapping)
             for press in presses_of(mapping, beside, rows, first.parts, {**record, "trial": label}, centre)
         ]
+        presses = [outcome for outcome in outcomes if isinstance(outcome, ImportedPress)]
+        if not presses:
+            raise next(outcome.error for outcome in outcomes if isinstance(outcome, Refusal))
     except TacdataError as error:
         return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
     depths = sorted(press.press.depth for press in presses)

@@ -170,4 +170,6 @@ def _longest(time_ns: np.ndarray) -> float:
 
 
 def _rounded(value: Any) -> float:
-    return round(float(value), 4)
+    """Return a figure to four places, or to five digits where it is small: capacitances in farad are 1e-12."""
+    value = float(value)
+    return round(value, 4) if abs(value) >= 1 or not np.isfinite(value) else float(f"{value:.5g}")

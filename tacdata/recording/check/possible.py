@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.recording.check.figures import RecordingFigures
+from tacdata.recording.check.imported import is_imported
 from tacdata.recording.episode import Episode
 from tacdata.recording.files.reader import Recording
 
@@ -17,6 +18,13 @@ BACKWARD = 0.01
 """Share of rows that may come before the row ahead of them [1]."""
 DISTINCT = 0.2
 """Share of rows that must have a time of their own [1]; coarse time stamps repeat a few times each."""
+UNEVEN, LONG, RARE = 1.5, 10.0, 0.05
+"""Largest ratio of the mean and the median interval between rows [1]. Intervals of so many medians are pauses, if no
+larger share of all intervals is so long."""
+REPEATED, VARIED = 50, 25
+"""Rows in a row that repeat earlier ones, and different rows among them, from which a recording is a loop [count]."""
+RATE_RATIO = 1.2
+"""Largest ratio of the rate that the source states and the rate of its rows [1]."""
 FASTER = 1.2
 """How much faster than commanded a guide may seem to move between two reports [1]."""
 SPEED = 1000.0
@@ -33,7 +41,16 @@ Doubt = tuple[str, str, str]
 def impossible(figures: RecordingFigures) -> list[Doubt]:
     """Return what cannot be in a recording, as (severity, stream, text)."""
     episode = figures.recording.episode
-    return [*_times(episode.taxels.sample_ns), *_motion(figures.recording), *_force(episode)]
+    times = [] if figures.document["taxels"]["lost"] else _uneven(episode.taxels.sample_ns)
+    stated = _other_rate(figures.document["taxels"]["rate"], figures.document["taxels"]["nominal_rate"])
+    return [
+        *_times(episode.taxels.sample_ns),
+        *times,
+        *(stated if is_imported(episode) else []),
+        *_repeats(episode.taxels.counts),
+        *_motion(figures.recording),
+        *_force(episode),
+    ]
 
 
 def _times(time_ns: np.ndarray) -> list[Doubt]:
@@ -58,6 +75,58 @@ def _times(time_ns: np.ndarray) -> list[Doubt]:
     elif not SPANS[0] <= span <= SPANS[1]:
         found.append((UNUSABLE, "taxels", f"it lasts {span:.3g} s: no press does"))
     return found
+
+
+def _uneven(time_ns: np.ndarray) -> list[Doubt]:
+    """Judge the mean interval by the median one: they differ where rows of two recordings alternate, and in bursts."""
+    steps = np.diff(time_ns) * 1e-6
+    if len(steps) < REPEATED or (usual := float(np.median(steps))) <= 0 or len(np.unique(time_ns)) < len(time_ns):
+        return []
+    pauses = steps > LONG * usual
+    mean = float(steps[~pauses].mean() if pauses.mean() <= RARE else steps.mean())
+    if max(mean / usual, usual / max(mean, 1e-300)) <= UNEVEN:
+        return []
+    text = (
+        f"rows come every {usual:.4g} ms in the median and every {mean:.4g} ms in the mean: they come in bursts, or "
+        "rows of two recordings alternate; their times are not those of the measurement"
+    )
+    return [(UNUSABLE, "taxels", text)]
+
+
+def _other_rate(found: float | None, stated: float) -> list[Doubt]:
+    """Compare the rate of the rows with the one that the source states [Hz]."""
+    if not found or max(found / stated, stated / found) <= RATE_RATIO:
+        return []
+    text = f"{found:.4g} rows a second, and the source states {stated:.4g}: the unit of the times or the rate is wrong"
+    return [(UNUSABLE, "taxels", text)]
+
+
+def _repeats(counts: np.ndarray) -> list[Doubt]:
+    """Judge rows that repeat earlier ones, value for value: noise never does, a file played in a loop does."""
+    known = np.nan_to_num(np.ascontiguousarray(counts, dtype=float))
+    if len(known) < 2 * REPEATED:
+        return []
+    _, kind = np.unique(known, axis=0, return_inverse=True)
+    kind = kind.ravel().astype(np.uint64)
+    # A key of the rows in each window; equal windows have equal keys.
+    factors = np.random.default_rng(0).integers(1, 2**63, REPEATED, dtype=np.uint64)
+    windows = len(kind) - REPEATED + 1
+    keys = np.zeros(windows, dtype=np.uint64)
+    for place, factor in enumerate(factors):
+        keys += kind[place : place + windows] * factor
+    _, first, group = np.unique(keys, return_index=True, return_inverse=True)
+    for later in np.flatnonzero(first[group] <= np.arange(windows) - REPEATED).tolist():
+        earlier = int(first[group[later]])
+        if len(np.unique(kind[later : later + REPEATED])) < VARIED:
+            continue
+        same = kind[later:] == kind[earlier : earlier + len(kind) - later]
+        rows = len(same) if same.all() else int(np.argmin(same))
+        text = (
+            f"rows {later + 1} to {later + rows} repeat rows {earlier + 1} to {earlier + rows}, value for value: the "
+            "source was played in a loop, or it was computed and not measured"
+        )
+        return [(UNUSABLE, "taxels", text)]
+    return []
 
 
 def _motion(recording: Recording) -> list[Doubt]:
@@ -109,4 +178,9 @@ def answer(figures: RecordingFigures) -> float | None:
     if not known.any():
         return None
     change = np.abs(np.nanmedian(counts[inside][:, known], axis=0) - np.nanmedian(counts[away][:, known], axis=0))
-    return float((change / np.maximum(noise[known], 1e-9)).max())
+    return float((change / np.maximum(noise[known], _quantum(counts[:, known]))).max())
+
+
+def _quantum(counts: np.ndarray) -> np.ndarray:
+    """Return a bound of what noise can be, relative to each channel's own range, shape (channels,)."""
+    return np.maximum(1e-9 * np.nan_to_num(np.nanmax(counts, axis=0) - np.nanmin(counts, axis=0)), 1e-300)

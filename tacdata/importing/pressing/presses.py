@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
@@ -16,9 +16,9 @@ from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, label_of, single
 from tacdata.importing.foreign_sensor import foreign_sensor
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.press_path import PressPath, press_path
+from tacdata.importing.pressing.press_path import PressPath, press_path
+from tacdata.importing.pressing.schedule import ScheduledPress, read_schedule
 from tacdata.importing.recording_file import ImportedPress
-from tacdata.importing.schedule import ScheduledPress, read_schedule
 from tacdata.importing.streams import ImportedStreams, Stream, read_streams
 from tacdata.importing.trials import windows
 from tacdata.importing.units import factor
@@ -30,6 +30,8 @@ DEEPEST, FARTHEST = 100.0, 1000.0
 """Largest plausible depth with an assumed unit, and with a stated one [mm]. A plan allows no more."""
 NO_INDENTER = {"shape": "sphere", "radius": 2.0}
 """Stand-in for an unknown indenter."""
+FEWEST = 10
+"""Fewest rows of a stretch between two steps back of the time that is a recording [rows]."""
 SLOWEST = 1e-4
 """Smallest speed that a press is given [mm/s]."""
 UNITS = {
@@ -45,6 +47,14 @@ UNITS = {
 }
 
 
+@dataclass(frozen=True)
+class Refusal:
+    """A stretch of a trial that cannot be a recording, and why. The rest of the trial is imported."""
+
+    trial: str
+    error: FormatError
+
+
 def presses_of(
     mapping: dict[str, Any],
     beside: Path,
@@ -52,8 +62,8 @@ def presses_of(
     parts: dict[str, str],
     record: dict[str, Any],
     centre: tuple[float, float] = (0.0, 0.0),
-) -> Iterator[ImportedPress]:
-    """Yield the recordings that the rows of a trial hold.
+) -> Iterator[ImportedPress | Refusal]:
+    """Yield the recordings that the rows of a trial hold, and a refusal for each stretch that cannot be one.
 
     Args:
         mapping: The mapping's document.
@@ -73,7 +83,35 @@ def presses_of(
     contact = mapping.get("contact", {})
     resolved = _known({k: v for k, v in contact.items() if k != "known_from"}, tables, parts, "contact")
     mapping = {**mapping, "press": {**stated, **known}, "contact": {**contact, **resolved}}
-    streams = read_streams(mapping, tables)
+    stretches = read_streams(mapping, tables)
+    if len(stretches) > 1 and mapping.get("schedule"):
+        raise FormatError(
+            f"a schedule, and channels whose time goes back {'; '.join(stretches[0].taxels.steps_back)}",
+            "one clock for the presses of a schedule",
+            "import the parts before and behind the step as files of their own",
+        )
+    shift = max(-min(int(s.time_ns.min(initial=0)) for streams in stretches for s in streams.all), 0)
+    for number, streams in enumerate(stretches):
+        label = f"{record['trial']} stretch {number}".strip() if len(stretches) > 1 else record["trial"]
+        if len(stretches) > 1 and len(streams.taxels.time_ns) < FEWEST:
+            note = f"stretch {number} has {len(streams.taxels.time_ns)} rows and is left out"
+            yield Refusal(label, FormatError(note, f"{FEWEST} rows or more", "leave it out"))
+            continue
+        yield from _of_stretch(
+            mapping, beside, tables, streams, known, centre, {**record, "trial": label, "time_shift_ns": shift}
+        )
+
+
+def _of_stretch(
+    mapping: dict[str, Any],
+    beside: Path,
+    tables: dict[str, SourceTable],
+    streams: ImportedStreams,
+    known: dict[str, float],
+    centre: tuple[float, float],
+    record: dict[str, Any],
+) -> Iterator[ImportedPress | Refusal]:
+    """Yield the recordings of a stretch, and what cannot be one."""
     scheduled = read_schedule(mapping, tables, streams.taxels)
     if streams.position is None and not scheduled:
         raise FormatError(
@@ -81,35 +119,49 @@ def presses_of(
             "one of them: without it the presses are unknown",
             "add position or schedule to the mapping; for a sensor left alone: position: {file: ..., depth: -1}",
         )
-    shift = max(-min(int(stream.time_ns[0]) for stream in streams.all if len(stream.time_ns)), 0)
+    shift = record["time_shift_ns"]
     streams, scheduled = _shifted(streams, shift), [replace(s, start_ns=s.start_ns + shift) for s in scheduled]
+    if streams.position is not None and not len(streams.position.time_ns) and not scheduled:
+        error = FormatError(f"trial {record['trial']}: no position in it", "a position", "split otherwise")
+        yield Refusal(record["trial"], error)
+        return
     place, unsaid = _registration(mapping, streams, centre)
-    cuts, short = _cuts(mapping, streams, scheduled, place), 0
+    cuts = _cuts(mapping, streams, scheduled, place)
     for number, (begin, end, planned) in enumerate(cuts):
-        trial = record["trial"] + (f" #{number}" if len(cuts) > 1 else "")
+        trial = (record["trial"] + (f" #{number}" if len(cuts) > 1 else "")).strip()
         part = streams.within(begin, end)
-        if len(part.taxels.time_ns) < 2:
-            short += 1
-            continue
         if planned:
             part = replace(part, position=_commanded(planned, begin, end))
-        if part.position is None or not len(part.position.time_ns):
-            raise FormatError(f"trial {trial or 'without a name'}: no position in it", "a position", "split otherwise")
-        yield _imported(
-            mapping,
-            beside,
-            part,
-            place,
-            planned,
-            known,
-            [*unsaid],
-            {**record, "trial": trial.strip(), "time_shift_ns": shift, "notes": list(streams.notes)},
-        )
-    if short:
+        try:
+            _check_rows(part, trial)
+            yield _imported(
+                mapping,
+                beside,
+                part,
+                place,
+                planned,
+                known,
+                [*unsaid],
+                {**record, "trial": trial, "notes": list(streams.notes)},
+            )
+        except FormatError as error:
+            yield Refusal(trial, error)
+
+
+def _check_rows(streams: ImportedStreams, trial: str) -> None:
+    """Refuse a press without rows.
+
+    Raises:
+        FormatError: Naming the trial.
+    """
+    rows = len(streams.taxels.time_ns)
+    if rows < 2:
         raise FormatError(
-            f"{short} of {len(cuts)} stretches hold fewer than two rows of the channels",
-            "two rows or more",
-            "leave the file out, or split the trials otherwise",
+            f"{rows} rows: fewer than two rows of the channels", "two rows or more", "split the trials otherwise"
+        )
+    if streams.position is None or not len(streams.position.time_ns):
+        raise FormatError(
+            f"trial {trial or 'without a name'}: no position in it", "a position", "split the trials otherwise"
         )
 
 

@@ -1,0 +1,181 @@
+"""The order of a clock's times: wraps of a counter undone, restarts cut, rows without a believable time set aside.
+
+Inside a recording time never goes back. A step back of a few intervals is a row that came late; such rows are put in
+order. A larger one is the wrap of a counter, a wrong time in a few rows, or a restart, behind which another stretch
+begins. Where rows of several recordings alternate, no order can be restored and the file is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tacdata.errors import FormatError
+from tacdata.importing.times import NEVER
+
+
+@dataclass(frozen=True)
+class OrderPolicy:
+    """Limits of what a clock may do. None was tuned on data: each is a count of rows or intervals."""
+
+    late: float = 5.0
+    """Largest step back of a row that came late [usual intervals]."""
+    late_share: float = 0.05
+    """Largest share of late rows [1]. Above it rows of several recordings alternate."""
+    wrong: int = 3
+    """Longest run of wrong times ahead of the clock [rows]. A run behind it is longer if all its times are equal."""
+    wrap: float = 3.0
+    """Largest distance of the rows before and behind a wrap from its limits [usual intervals]."""
+    shortest: float = 10.0
+    """Fewest rows of a stretch, on average [rows]. Below it rows of several recordings alternate."""
+
+
+POLICY = OrderPolicy()
+BITS = (16, 24, 32)
+"""Widths of counters that wrap [bit]."""
+TICKS = {1_000: "microseconds", 1_000_000: "milliseconds"}
+"""Ticks that boards count, as micros() and millis() do [ns]."""
+DAY_NS = 86_400_000_000_000
+"""After a day the seconds since midnight begin again [ns]."""
+
+
+@dataclass(frozen=True)
+class TimeOrder:
+    """Times that never go back inside a stretch."""
+
+    stretches: tuple[np.ndarray, ...]
+    """Rows of each stretch in the order of time, shape (n,) each."""
+    time_ns: np.ndarray
+    """Time of each row [ns], shape (rows,), int64; wraps undone."""
+    notes: tuple[str, ...]
+    """What was undone, cut and set aside, as sentences."""
+    steps_back: tuple[str, ...] = ()
+    """The row and the size of each step back at which a stretch ends, as words."""
+
+
+def time_order(time_ns: np.ndarray, where: str, *, tick_ns: float = 0.0, policy: OrderPolicy = POLICY) -> TimeOrder:
+    """Return the rows of a clock in stretches in which time never goes back.
+
+    Args:
+        time_ns: Time of each row [ns], shape (rows,), int64; `NEVER` where there is none.
+        where: The file and its clock, for notes and errors.
+        tick_ns: One step of the clock's numbers [ns]; 0 for a clock that never wraps, as Unix time.
+        policy: The limits.
+
+    Raises:
+        FormatError: If time goes back so often that rows of several recordings alternate.
+    """
+    rows = np.flatnonzero(time_ns != NEVER)
+    known = time_ns[rows]
+    notes = [f"{where}: {len(time_ns) - len(rows)} rows without a time are left out"] * (len(rows) < len(time_ns))
+    steps = np.diff(known)
+    if not (steps < 0).any():
+        return TimeOrder((rows,), time_ns, tuple(notes))
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    if tick_ns:
+        known, words = _unwrapped(known, usual, tick_ns, policy)
+        notes += [f"{where}: {words}"] * bool(words)
+    believed = _believed(known, usual, policy)
+    if not believed.all():
+        row = int(rows[~believed][0]) + 1
+        notes.append(
+            f"{where}: {int((~believed).sum())} rows have a time out of line with the rows about them, the first in "
+            f"row {row}; they are left out"
+        )
+    rows, known = rows[believed], known[believed]
+    steps = np.diff(known)
+    cuts = np.flatnonzero(steps < -policy.late * usual) + 1
+    late = int((steps < 0).sum()) - len(cuts)
+    if (back := np.flatnonzero(steps < 0)).size and (
+        late > max(policy.late_share * len(rows), 1) or (len(cuts) > 1 and len(rows) < policy.shortest * len(cuts))
+    ):
+        raise _alternating(rows, known, back, where)
+    if late:
+        notes.append(f"{where}: {late} rows came late by less than {policy.late:g} intervals and are put in order")
+    ordered = np.array(time_ns)
+    ordered[rows] = known
+    edges = [0, *cuts.tolist(), len(rows)]
+    stretches = tuple(rows[a:b][np.argsort(known[a:b], kind="stable")] for a, b in pairwise(edges))
+    back_words = tuple(_step_back(rows, known, cut) for cut in cuts.tolist())
+    if back_words:
+        shown = "; ".join(back_words[:3]) + f" and {len(back_words) - 3} times more" * (len(back_words) > 3)
+        notes.append(
+            f"{where}: time goes back {shown}: a clock that was set back or began again. What follows is a recording "
+            "of its own"
+        )
+    return TimeOrder(stretches, ordered, tuple(notes), back_words)
+
+
+def _step_back(rows: np.ndarray, time_ns: np.ndarray, cut: int) -> str:
+    size = (time_ns[cut - 1] - time_ns[cut]) / 1e9
+    return f"by {size:.6g} s in row {int(rows[cut]) + 1}"
+
+
+def _alternating(rows: np.ndarray, time_ns: np.ndarray, back: np.ndarray, where: str) -> FormatError:
+    return FormatError(
+        f"{where}: time goes back {len(back)} times in {len(rows)} rows, first "
+        f"{_step_back(rows, time_ns, int(back[0]) + 1)}",
+        "times that grow inside a recording",
+        "if rows of several machines or recordings alternate, name the column that numbers them: trials: "
+        "{column: NAME}; else give another time column",
+    )
+
+
+def _unwrapped(time_ns: np.ndarray, usual: float, tick_ns: float, policy: OrderPolicy) -> tuple[np.ndarray, str]:
+    """Return times [ns] with the wraps of a counter undone, and the wrap in words; "" without one.
+
+    A wrap leads from the counter's upper limit to its lower one. A restart hardly ever begins there.
+    """
+    steps = np.diff(time_ns)
+    back = np.flatnonzero(steps < -policy.late * usual)
+    if not len(back):
+        return time_ns, ""
+    near = policy.wrap * usual
+    for span, name in _spans(tick_ns).items():
+        for low in (0.0, -span / 2):
+            inside = time_ns.min() >= low and time_ns.max() < low + span
+            ends = (time_ns[back] >= low + span - near) & (time_ns[back + 1] <= low + near)
+            if not inside or not ends.any() or not (-steps[back] > span / 2).all() or 2 * ends.sum() < len(ends):
+                continue
+            turns = np.zeros(len(time_ns))
+            turns[back + 1] = 1
+            lifted = time_ns + (np.cumsum(turns) * span).round().astype(np.int64)
+            return lifted, f"its counter wraps at {name} in row {back[0] + 2}" + (
+                f" and {len(back) - 1} times more" if len(back) > 1 else ""
+            ) + "; the times are continued"
+    return time_ns, ""
+
+
+def _spans(tick_ns: float) -> dict[float, str]:
+    """Return the spans after which counters wrap [ns], each with its name."""
+    ticks = {tick_ns: "steps"} | {float(tick): name for tick, name in TICKS.items()}
+    return {tick * 2.0**bits: f"2^{bits} {name}" for tick, name in ticks.items() for bits in BITS} | {
+        float(DAY_NS): "midnight"
+    }
+
+
+def _believed(time_ns: np.ndarray, usual: float, policy: OrderPolicy) -> np.ndarray:
+    """Return which rows have a time in line with the rows before and behind them, shape (rows,), bool."""
+    believed = np.ones(len(time_ns), dtype=bool)
+    for cut in (np.flatnonzero(np.diff(time_ns) < -policy.late * usual) + 1).tolist():
+        if not believed[cut - 1] or not believed[cut]:
+            continue
+        ahead = cut - 1
+        while ahead > 0 and cut - ahead < policy.wrong and time_ns[ahead - 1] > time_ns[cut]:
+            ahead -= 1
+        before = time_ns[ahead - 1] if ahead else None
+        if before is not None and 0 <= time_ns[cut] - before <= (cut - ahead + 1 + policy.late) * usual:
+            believed[ahead:cut] = False
+            continue
+        behind = cut
+        while behind < len(time_ns) and time_ns[behind] < time_ns[cut - 1]:
+            if behind - cut >= policy.wrong and time_ns[behind] != time_ns[cut]:
+                break
+            behind += 1
+        else:
+            constant = (time_ns[cut:behind] == time_ns[cut]).all()
+            if constant or behind < len(time_ns):
+                believed[cut:behind] = False
+    return believed
