@@ -46,7 +46,7 @@ class TimeOrder:
     """Times that never go back inside a stretch."""
 
     stretches: tuple[np.ndarray, ...]
-    """Rows of each stretch in the order of time, shape (n,) each."""
+    """Row numbers of each stretch in the order of time [count], shape (n,) each."""
     time_ns: np.ndarray
     """Time of each row [ns], shape (rows,), int64; wraps undone."""
     notes: tuple[str, ...]
