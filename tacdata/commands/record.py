@@ -34,6 +34,9 @@ def run(
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the next press not yet done.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,
+    confirm_position: Annotated[
+        str, typer.Option(metavar="CODE", help="Answer yes to one question about a lost position, by its code.")
+    ] = "",
     sync_tap: Annotated[
         bool, typer.Option("--sync-tap", help="First touch a taxel a few times to measure the streams' delays.")
     ] = False,
@@ -67,6 +70,7 @@ def run(
         from tacdata.recording.motion.preflight import Preflight
         from tacdata.recording.recorder import Recorder
         from tacdata.registration.chosen import chosen_registration
+        from tacdata.registration.evidence import prove_zero
         from tacdata.rig import read_rig
         from tacdata.sensor import default_sensor, read_sensor
         from tacdata.tags import look
@@ -102,6 +106,8 @@ def run(
             watch=watch,
             interruption=interruption,
             ask=lambda question: _answer(question).lower() in ("y", "yes"),
+            confirmed=confirm_position,
+            prove=prove_zero,
         )
         try:
             session = recorder.run(confirm)

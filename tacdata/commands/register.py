@@ -15,6 +15,7 @@ from tacdata.progress import say, suggest
 if TYPE_CHECKING:
     from tacdata.recording.live.guarded_motion import GuardedMotion
     from tacdata.recording.live.interruption import Interruption
+    from tacdata.recording.live.lost_position import PositionGuard
     from tacdata.recording.live.rig_devices import RigDevices
     from tacdata.registration import RegistrationSettings
     from tacdata.rig import Rig
@@ -41,6 +42,9 @@ def run(
     repeats: Annotated[int, typer.Option(min=1, max=10, help="Slow approaches at each place.")] = 2,
     taxel: Annotated[list[int] | None, typer.Option(help="Taxel of the cross scan; repeat for two or more.")] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,
+    confirm_position: Annotated[
+        str, typer.Option(metavar="CODE", help="Answer yes to one question about a lost position, by its code.")
+    ] = "",
 ) -> Result:
     """Touch the sensor and find its origin, yaw and tilt in the guide's frame, with uncertainties, into a file."""
     with before_it_moves():
@@ -54,7 +58,7 @@ def run(
         specimen = _specimen(indenter)
         _check(settings, skin, target)
     try:
-        document, text = _measure(bench, skin, settings, specimen, yes)
+        document, text = _measure(bench, skin, settings, specimen, yes, confirm_position)
     except KeyboardInterrupt as error:
         print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise typer.Exit(Exit.INTERRUPTED) from None
@@ -104,23 +108,27 @@ def _check(settings: RegistrationSettings, sensor: Sensor, target: Path) -> None
 
 
 def _measure(
-    rig: Rig, sensor: Sensor, settings: RegistrationSettings, specimen: dict[str, Any], yes: bool
+    rig: Rig, sensor: Sensor, settings: RegistrationSettings, specimen: dict[str, Any], yes: bool, confirmed: str
 ) -> tuple[dict[str, Any], str]:
     """Open the devices, ask, and carry the procedure out; return the file's document and the result in words."""
     from tacdata.recording.live.ending import ending
     from tacdata.recording.live.guarded_motion import GuardedMotion
     from tacdata.recording.live.interruption import Interruption
+    from tacdata.recording.live.lost_position import PositionGuard
+    from tacdata.recording.live.machine_state import MachineState
     from tacdata.recording.live.rig_devices import RigDevices
 
     with Interruption() as interruption:
         devices = RigDevices.of(rig)
-        motion = GuardedMotion(devices.cnc, rig.clock, interruption)
+        state = MachineState(rig, devices.cnc)
+        guard = PositionGuard(state, devices.cnc, _agreed, confirmed)
+        motion = GuardedMotion(devices.cnc, rig.clock, interruption, state)
         try:
-            return _touch(rig, sensor, settings, specimen, yes, devices, motion, interruption)
+            return _touch(rig, sensor, settings, specimen, yes, devices, guard, motion, interruption)
         except BaseException as error:
             interruption.last_words()
             data = ("nothing was written",)
-            error.add_note(ending(motion, devices.cnc.position_lost, data, "the same command", error))
+            error.add_note(ending(motion, guard.loss(), data, "the same command", error))
             raise
 
 
@@ -131,19 +139,19 @@ def _touch(
     specimen: dict[str, Any],
     yes: bool,
     devices: RigDevices,
+    guard: PositionGuard,
     motion: GuardedMotion,
     interruption: Interruption,
 ) -> tuple[dict[str, Any], str]:
     from tacdata.errors import UsageError
-    from tacdata.recording.live.lost_position import guard_homing, require_found, why_lost
     from tacdata.registration.guarded_probe import guarded_probe
     from tacdata.registration.procedure import described, register
     from tacdata.registration.result import document_of
     from tacdata.registration.touch_off import LIFT_SPEED
 
     safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
-    guard_homing(devices.cnc, _agreed)
-    with devices.opened():
+    guard.before_homing(resumed=False)
+    with guard.opened(devices):
         controller = devices.cnc.settings()
         print(described(sensor, rig.registration, settings))
         for caution in devices.cnc.cautions:
@@ -154,7 +162,7 @@ def _touch(
             )
         if not yes and not _agreed("Move now? [y/N] "):
             raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
-        require_found(why_lost(devices.cnc), safe, _agreed)
+        guard.require_known(safe)
         _mount(rig, specimen)
         told = lambda text: say(f"  {text}")  # noqa: E731
         with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption, motion, told) as probe:

@@ -178,6 +178,14 @@ class MotionController(Device):
     def lose_position(self, why: str) -> None:
         """Take that its position is unknown from now on, and why, in words; a controller without memory forgets it."""
 
+    def trust_position(self) -> None:
+        """Take that its position is known again; a controller without memory forgets it."""
+
+    @property
+    def reported(self) -> tuple[float, float, float] | None:
+        """Machine position of its latest report [mm]; None if it does not report any."""
+        return None
+
     @property
     def moved(self) -> bool:
         """Whether any motion was commanded since this was created, homing at opening included."""

@@ -71,6 +71,7 @@ class Grbl(MotionController):
         self._found: dict[str, str] = {}
         self._cautions: tuple[str, ...] = ()
         self._lost, self._moved = "", False
+        self._reported: tuple[float, float, float] | None = None
         self._target: np.ndarray | None = None  # where the queued motion ends [mm]
         self._held_ns = clock.now_ns()
         self._ends_ns = 0  # when it has ended at the latest
@@ -130,6 +131,9 @@ class Grbl(MotionController):
                 link.realtime(b"!")
         link.stop()
         self._lost = link.lost or self._lost
+        if link.last is not None:
+            x, y, z = link.last.position.tolist()
+            self._reported = (x, y, z)
 
     def settings(self) -> dict[str, str]:
         """Return ``banner``, the ``$n`` settings, ``$G``, ``$#``, ``$I`` by their tags, and how lines are checked."""
@@ -173,6 +177,18 @@ class Grbl(MotionController):
     def lose_position(self, why: str) -> None:
         """Take that the position is unknown, and why, in words."""
         self._lost = self._lost or why
+
+    def trust_position(self) -> None:
+        """Take that a position that was lost before or at opening is known again."""
+        self._lost = ""
+
+    @property
+    def reported(self) -> tuple[float, float, float] | None:
+        """Machine position of the latest report [mm]; kept after `close`."""
+        if self._link is not None and self._link.last is not None:
+            x, y, z = self._link.last.position.tolist()
+            self._reported = (x, y, z)
+        return self._reported
 
     @property
     def moved(self) -> bool:

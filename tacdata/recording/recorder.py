@@ -20,7 +20,8 @@ from tacdata.recording.live.ending import ending, on_disk
 from tacdata.recording.live.guarded_motion import WATCH, GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
-from tacdata.recording.live.lost_position import Ask, guard_homing, require_found, why_lost
+from tacdata.recording.live.lost_position import Ask, PositionGuard
+from tacdata.recording.live.machine_state import MachineState
 from tacdata.recording.live.reading_health import BadReadings
 from tacdata.recording.live.rig_devices import RigDevices, require_channels
 from tacdata.recording.live.rig_streams import RigStreams
@@ -28,20 +29,14 @@ from tacdata.recording.motion import sync_tap as tap_motion
 from tacdata.recording.motion.preflight import Preflight, preflight, safe_height
 from tacdata.recording.motion.press_steps import Position, Step, steps
 from tacdata.recording.motion.trapezoid import AxisLimits
-from tacdata.recording.session import (
-    Session,
-    create_session,
-    find_position,
-    lose_position,
-    read_session,
-    refresh,
-    resume_session,
-)
+from tacdata.recording.session import Session, create_session, refresh, resume_session
 from tacdata.recording.sync_tap import delays
 from tacdata.recording.sync_tap.session_delays import add_sync, changes, latencies
 from tacdata.rig import Rig
 from tacdata.sensor import Sensor
 
+Prove = Callable[..., Position]
+"""Touches the skin before the first press (`tacdata.registration.evidence.prove_zero`)."""
 FIRST_FRAME = 5.0
 """Time allowed for the streams to begin [s of real time]."""
 FIRST_SEARCH = 20.0
@@ -71,6 +66,8 @@ class Recorder:
         watch: Watch | None = None,
         interruption: Interruption | None = None,
         ask: Ask = lambda question: False,
+        confirmed: str = "",
+        prove: Prove | None = None,
     ) -> None:
         """Prepare; nothing is opened, created or moved.
 
@@ -88,6 +85,9 @@ class Recorder:
             say: Called with messages for a person.
             watch: Called with a sample of the data (`live_feed`); must return at once.
             ask: Puts a question to a person that no --yes answers; by default nobody says yes.
+            confirmed: Code of the question about a lost position that a person answered in advance with yes.
+            prove: Touches the skin before the first press, unless the machine has just homed for a new session; raises
+                where the skin begins elsewhere than the registration states.
             interruption: Holds Ctrl-C back while the guide moves; without it, Python raises it anywhere.
         """
         self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
@@ -96,9 +96,12 @@ class Recorder:
         self._mounted: tuple[str, float, float, float] | None = None
         self._height = safe_height(plan, rig)
         self._interruption = interruption or Interruption()
-        self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption)
+        self._state = MachineState(rig, self.devices.cnc)
+        self._guard = PositionGuard(self._state, self.devices.cnc, ask, confirmed)
+        self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption, self._state)
         self._tap = tap_motion.touch(plan, sensor) if sync_tap else None
         self._say, self._watch, self._ask = say or (lambda words: None), watch, ask
+        self._prove = prove
         self._latencies: dict[str, StreamLatency] = {}
 
     def run(self, confirm: Callable[[Preflight], bool]) -> Session:
@@ -130,11 +133,7 @@ class Recorder:
             if isinstance(error, BadReadings) and self._paused(error):
                 return self.run(lambda summary: True)
             self._interruption.last_words()
-            lost = self.devices.cnc.position_lost
-            with suppress(TacdataError):  # the fault itself must be reported first
-                if lost and self.out.exists():
-                    lose_position(read_session(self.out), lost)
-            error.add_note(self._ending(lost or self._remembered_loss(), error))
+            error.add_note(self._ending(self._guard.loss(), error))
             raise
 
     def _paused(self, error: BadReadings) -> bool:
@@ -145,7 +144,8 @@ class Recorder:
         question = f"Put the board right: {error.remedy.split(', then')[0]}. Go on with this press? [y/N] "
         if not self._ask(question):
             return False
-        self.resume, self._motion = True, GuardedMotion(self.devices.cnc, self.rig.clock, self._interruption)
+        self.resume = True
+        self._motion = GuardedMotion(self.devices.cnc, self.rig.clock, self._interruption, self._state)
         return True
 
     def _say_bad(self, words: str) -> None:
@@ -154,18 +154,16 @@ class Recorder:
     def _open_and_record(
         self, session: Session | None, wanted: tuple[int, ...], confirm: Callable[[Preflight], bool]
     ) -> Session:
-        remembered = session.position_lost if session else ""
-        guard_homing(self.devices.cnc, self._ask, remembered, session is not None)
-        with self.devices.opened() as devices:
+        self._guard.before_homing(session is not None)
+        with self._guard.opened(self.devices) as devices:
             cnc = devices.cnc
             limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
             bounds = cnc.travel, cnc.cautions
             summary = preflight(self.plan, self.sensor, self.rig, limits, wanted, *bounds, self._tap)
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
-            require_found(why_lost(cnc, remembered, session is not None), self._height, self._ask)
+            self._guard.require_known(self._height, session is not None)
             session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
-            session = find_position(session)
             with RigStreams(
                 devices,
                 self.rig.cameras,
@@ -186,12 +184,6 @@ class Recorder:
             session = refresh(session)
         return session
 
-    def _remembered_loss(self) -> str:
-        """Return why an earlier run lost the position, which was not found since; empty if none did."""
-        with suppress(TacdataError):
-            return read_session(self.out).position_lost if self.out.exists() else ""
-        return ""
-
     def _ending(self, lost: str, error: BaseException) -> str:
         again = "the same command" + (" with --resume" if self.out.exists() else "")
         return ending(self._motion, lost, on_disk(self.out, len(self.plan.presses)), again, error)
@@ -211,6 +203,9 @@ class Recorder:
         self._wait_for_streams(streams)
         streams.set_latencies(self._latencies)
         position = self._rise(streams)
+        homed = self.devices.cnc.settings().get("homed_at_opening") == "yes"
+        if self._prove and (self.resume or not homed):
+            position = self._touch_first(self._prove, self._tap or self.plan.presses[wanted[0]], position, streams)
         if self._tap is not None:
             session, position = self._touch(session, self._tap, position, streams, limits)
         left = summary.seconds[-len(wanted) :]  # everything before this belongs to the sync tap
@@ -250,10 +245,11 @@ class Recorder:
         if here[2] < self._height:
             speed = self.plan.motion.approach_speed
             try:
-                return self._motion.drive((Step("", above, speed),), here, streams, None)
+                here = self._motion.drive((Step("", above, speed),), here, streams, None)
             except BaseException:
                 self._motion.lift(self._height, speed)
                 raise
+            self._motion.settle()
         return here
 
     def _change_indenter(self, press: Press, position: Position, streams: RigStreams) -> Position:
@@ -263,10 +259,27 @@ class Recorder:
             if position[2] < self._height:
                 up = Step("", (*position[:2], self._height), self.plan.motion.approach_speed)
                 position = self._motion.drive((up,), position, streams, None)
+                self._motion.settle()
             with self._interruption.at_once():
                 self._mount(press)
         self._mounted = wanted
         return position
+
+    def _touch_first(self, prove: Prove, press: Press, position: Position, streams: RigStreams) -> Position:
+        """Prove the height by a touch with a press's indenter; return the position afterwards [mm]."""
+        position = self._change_indenter(press, position, streams)
+        return prove(
+            self.rig,
+            self.sensor,
+            press,
+            self.devices,
+            streams,
+            self._motion,
+            self._interruption,
+            self._height,
+            self._say,
+            position,
+        )
 
     def _touch(
         self, session: Session, tap: Press, position: Position, streams: RigStreams, limits: AxisLimits
@@ -319,6 +332,7 @@ class Recorder:
                 with suppress(DeviceError):  # the fault itself must be reported first
                     self._close(writer, streams, reason)
             raise
+        self._motion.settle()
         self._close(writer, streams)
         return position
 

@@ -91,11 +91,6 @@ class Session(Displayed):
         return label_files.folder(self.folder)
 
     @property
-    def position_lost(self) -> str:
-        """Why the machine's position was lost and not found again since, in words; empty if it was not."""
-        return self.document.get("position_lost", {}).get("why", "")
-
-    @property
     def done(self) -> frozenset[int]:
         """Numbers of the presses that are recorded."""
         return frozenset(file_names.finished(self.folder))
@@ -233,20 +228,4 @@ def refresh(session: Session) -> Session:
         for number, path in file_names.finished(session.folder).items()
     ]
     documents.write(session.folder / FILE, {**document, "episodes": episodes}, "session")
-    return read_session(session.folder)
-
-
-def lose_position(session: Session, why: str) -> None:
-    """Write into the session's document that the machine's position was lost, and why."""
-    lost = {"since": datetime.now(UTC).isoformat(timespec="seconds"), "why": why}
-    document = {**read_session(session.folder).document, "version": schemas.version("session"), "position_lost": lost}
-    documents.write(session.folder / FILE, document, "session")
-
-
-def find_position(session: Session) -> Session:
-    """Take that a lost position was found again: by homing, or by a touch-off."""
-    if not session.position_lost:
-        return session
-    document = {key: value for key, value in session.document.items() if key != "position_lost"}
-    documents.write(session.folder / FILE, document, "session")
     return read_session(session.folder)

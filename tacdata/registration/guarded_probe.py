@@ -45,6 +45,15 @@ class _Sink:
     def status(self, status: CncStatus) -> None:
         """Ignore a status report."""
 
+    def image(self, *image: Any) -> None:
+        """Ignore an image."""
+
+    def cube(self, *pose: Any) -> None:
+        """Ignore a pose."""
+
+    def note(self, words: str, level: str) -> None:
+        """Ignore a remark."""
+
 
 class GuardedProbe(Probe):
     """Drives the devices of a rig; made by `guarded_probe`."""
@@ -58,13 +67,18 @@ class GuardedProbe(Probe):
         height: float,
         interruption: Interruption,
         say: Callable[[str], None] = lambda words: None,
+        position: Position | None = None,
     ) -> None:
-        """Use open devices and running streams; ``height`` [mm, machine] is a safe height."""
+        """Use open devices and running streams; ``height`` [mm, machine] is a safe height.
+
+        ``position`` is where the guide stands [mm, machine]; by default where it reports to be.
+        """
         self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
         self._height, self._sink, self._interruption = height, _Sink(), interruption
         self._say, self._retried = say, False
         streams.record_into(cast(Any, self._sink))
-        self._position = self._begin()
+        reported = self._begin()
+        self._position = position or reported
         self._rested_ns = rig.clock.now_ns()
         self.lowest = self._position[2]
         """Lowest machine height so far [mm]."""
@@ -187,18 +201,39 @@ def guarded_probe(
     interruption = interruption or Interruption()
     motion = motion or GuardedMotion(devices.cnc, rig.clock, interruption)
     without_cameras = replace(devices, cameras={})
-    off_path = motion.off_path
-    with RigStreams(without_cameras, {}, motion.stop, off_path=off_path) as streams, interruption.kept():
-        probe = GuardedProbe(rig, devices, streams, motion, height, interruption, say)
-        try:
-            probe.rise(speed)
-            yield probe
-            probe.rise(speed)
-        except BaseException:
-            _free(probe, motion, streams, height, speed)
-            raise
-        finally:
-            streams.record_into(None)
+    streams = RigStreams(without_cameras, {}, motion.stop, off_path=motion.off_path)
+    with (
+        streams,
+        interruption.kept(),
+        probing(rig, devices, streams, motion, height, speed, interruption, say) as probe,
+    ):
+        yield probe
+
+
+@contextmanager
+def probing(
+    rig: Rig,
+    devices: RigDevices,
+    streams: RigStreams,
+    motion: GuardedMotion,
+    height: float,
+    speed: float,
+    interruption: Interruption,
+    say: Callable[[str], None] = lambda words: None,
+    position: Position | None = None,
+) -> Iterator[GuardedProbe]:
+    """Yield a probe on running streams, lifted to ``height`` [mm, machine] before and after; see `guarded_probe`."""
+    probe = GuardedProbe(rig, devices, streams, motion, height, interruption, say, position)
+    try:
+        probe.rise(speed)
+        yield probe
+        probe.rise(speed)
+        motion.settle()
+    except BaseException:
+        _free(probe, motion, streams, height, speed)
+        raise
+    finally:
+        streams.record_into(None)
 
 
 def _free(probe: GuardedProbe, motion: GuardedMotion, streams: RigStreams, height: float, speed: float) -> None:
@@ -206,6 +241,7 @@ def _free(probe: GuardedProbe, motion: GuardedMotion, streams: RigStreams, heigh
     if streams.fault is None and not probe.stopped:
         with suppress(TacdataError):
             probe.rise(speed)
+            motion.settle()
         return
     if not probe.stopped:  # a fault while the guide stood still: the hold must be released first
         with suppress(TacdataError):

@@ -64,16 +64,26 @@ def touch_off(
             answer shows no clear onset.
     """
     found = search(probe, site, place, top, lowest, noise)
-    touches = [_approach(probe, site, place, found, lowest, noise) for _ in range(repeats)]
+    touches = [approach(probe, site, place, found, lowest, noise) for _ in range(repeats)]
     probe.go((*place, found + HIGHER), LIFT_SPEED)
     return touches
 
 
-def _approach(
+def approach(
     probe: Probe, site: str, place: tuple[float, float], found: float, lowest: float, noise: np.ndarray
 ) -> Touch:
-    """Approach slowly around the height at which the search was answered; if that began in contact, once more from
-    higher.
+    """Approach slowly around the height at which the search was answered; from higher where that began in contact.
+
+    Args:
+        probe: The indenter.
+        site: Name of the place, for errors.
+        place: x and y [mm, machine].
+        found: Height of the search's first answer [mm, machine].
+        lowest: Height below which the approach never goes [mm, machine].
+        noise: Standard deviation of a reading [counts], shape (channels,).
+
+    Raises:
+        DeviceError: If the answer shows no clear onset.
     """
     for above in ABOVE:
         probe.go((*place, found + max(above, HIGHER)), LIFT_SPEED)

@@ -154,6 +154,8 @@ def from_document(document: dict[str, Any], origin: str) -> Rig:
         document = {**document, "fingers": documents.read(Path(origin).parent / document["fingers"], "fingers")}
     elif "fingers" in document:
         documents.check(document["fingers"], "fingers", f"{origin}: fingers")
+    if "state_directory" in document:
+        document = {**document, "state_directory": str(Path(origin).parent.absolute() / document["state_directory"])}
     envelope = Envelope(tuple(document["envelope"]["min"]), tuple(document["envelope"]["max"]))
     if any(a >= b for a, b in zip(envelope.min, envelope.max, strict=True)):
         raise FormatError(

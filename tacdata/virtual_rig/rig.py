@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -34,6 +35,8 @@ NOMINAL = Registration((-96.0, -61.5, -38.0), 1.2)
 """Position of the sensor as the lab's touch-off measured it."""
 PARKED = 25.0
 """Height above the skin at which the machine waits [mm]."""
+STATE = "machine_state"
+"""Folder of the file that states where the machine was left."""
 IMAGES = 30.0
 """Largest number of images rendered per real second."""
 BAUDS = (115200, 230400, 460800, 921600, 2000000, 4000000)
@@ -50,7 +53,7 @@ class VirtualRig:
     """Emulated devices and their world; the pipeline sees only the rig file and the wires.
 
     Files in its directory: ``rig.yaml`` while it runs, ``mounted.json`` (written by whoever mounts an indenter),
-    ``truth.yaml`` (the true parameters; for tests only).
+    ``truth.yaml`` (the true parameters; for tests only), ``machine_state/`` (where its machine was left).
     """
 
     def __init__(
@@ -113,6 +116,7 @@ class VirtualRig:
                 "baud": self.board.baud,
                 "format": self.layout.document,
             },
+            "state_directory": str((self.directory / STATE).absolute()),
             "mounting": {"file": str(self.mounted.path.absolute())},
             "registration": {"origin": [x, y, z], "yaw": NOMINAL.yaw, **self._registered},
             "envelope": {
@@ -169,6 +173,7 @@ class VirtualRig:
         }
         documents.write(self.directory / "truth.yaml", truth, "virtual_truth")
         self.mounted.start()
+        shutil.rmtree(self.directory / STATE, ignore_errors=True)  # its machine is made at a known place
         for device in (self.controller, self.board, self.camera):
             if device:
                 device.start()

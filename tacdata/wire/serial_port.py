@@ -27,6 +27,14 @@ def ports() -> str:
     return ", ".join(found) or "this machine shows none"
 
 
+def usb_identity(port: str) -> str:
+    """Return vendor, product and serial number of the USB device behind a port; empty without a serial number."""
+    device = next((p for p in list_ports.comports() if os.path.realpath(p.device) == port), None)
+    if device is None or not device.serial_number:
+        return ""
+    return f"{device.vid:04x}:{device.pid:04x} {device.serial_number}"
+
+
 def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | None = None) -> serial.SerialBase:
     """Open a port exclusively.
 

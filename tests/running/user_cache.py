@@ -6,6 +6,7 @@ of Hugging Face lies there too: lerobot reads where it is once, when the first t
 """
 
 import shutil
+import uuid
 from pathlib import Path
 
 import pytest
@@ -29,3 +30,10 @@ def user_cache(tmp_path_factory):
         patch.setenv("HF_HOME", str(folder / "huggingface"))
         patch.setenv("HF_HUB_OFFLINE", "1")
         yield folder
+
+
+@pytest.fixture(autouse=True)
+def machine_states(tmp_path_factory, monkeypatch):
+    """Keep where machines were left for each test alone."""
+    base = tmp_path_factory.getbasetemp()
+    monkeypatch.setenv("TACDATA_STATE", str(base / f"machines-{uuid.uuid4().hex}"))

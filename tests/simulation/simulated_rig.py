@@ -108,7 +108,7 @@ class World:
             line.attach(self.computer)
         self.schedule.extend(seconds)
 
-    def record(self, resume=False, sync_tap=False, **controller):
+    def record(self, resume=False, sync_tap=False, confirmed="", prove=None, **controller):
         """Run the recorder, with settings of the controller; return the session, or raise what it raises."""
         rig = self.rig(**controller)
         devices = RigDevices.of(rig)
@@ -128,6 +128,8 @@ class World:
                     ask=self._asked,
                     say=self.said.append,
                     sync_tap=sync_tap,
+                    confirmed=confirmed,
+                    prove=prove,
                 )
                 return recorder.run(lambda summary: True)
 
@@ -142,6 +144,7 @@ class World:
             "board": {"driver": "capacitive_board", "port": self.board_line.path},
             "registration": {"origin": [*ORIGIN], "yaw": 5.0, "method": "by hand", "date": "2026-01-01"},
             "envelope": ENVELOPE,
+            "state_directory": str(self.folder.parent / "machines"),
         }
         clock = Clock(EPOCH + START, START, 1.0, self.computer)
         return replace(from_document(document, "simulated"), clock=clock)

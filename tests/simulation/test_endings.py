@@ -25,6 +25,7 @@ PRESSING, TRAVELLING = 5.2, 0.6
 HERE = r"\(-\d+\.\d\d, -\d+\.\d\d, -38\.80\) mm"
 LIFTED = r"the indenter was lifted off the skin, straight up from -38\.80\d to -35\.000 mm"
 LEFT = "the indenter was not lifted; leave it, the next start lifts it straight up"
+UNSEEN = "the indenter was not lifted; leave it, the next start asks, then lifts it straight up"
 LOST = "LOST: do not trust the position that the machine reports"
 BY_HAND = "the indenter was not lifted; free it by hand"
 AGAIN = "the same command with --resume"
@@ -153,7 +154,7 @@ ENDINGS = {
         "",
         rf"NOT KNOWN to have stopped \(interrupted while it was being stopped\); it last reported {HERE}; "
         "if it moves, press the emergency stop",
-        LEFT,
+        UNSEEN,
         None,
         AGAIN,
     ),

@@ -44,7 +44,9 @@ def camera_figures(recording: Recording, name: str) -> dict[str, Any]:
             }
             for stream in fingers
         },
-        "clock": clock_figures(recording.clocks.get(f"camera {name}"), 1e9 / rate if rate else 0.0, within),
+        "clock": clock_figures(
+            recording.clocks.get(f"camera {name}"), 1e9 / rate if rate else 0.0, times.arrival_ns, times.sample_ns
+        ),
     }
 
 

@@ -13,20 +13,29 @@ DRIFT_PPM = 250.0
 """Warning threshold: drift against the nominal rate [ppm]; three times that of a poor crystal."""
 STEP_MS = 15.0
 """Warning threshold: step of a device's clock [ms]; smaller steps are a host that was late for long."""
+DELAY_MS = 100.0
+"""Warning threshold: mean delay of the frames, or its standard deviation [ms of real time]."""
 UNCERTAIN_MS = 5.0
 """Warning threshold: uncertainty of sample times [ms of real time]."""
 
 
-def clock_figures(clock: ClockModel | None, nominal_period_ns: float, within: tuple[int, int]) -> dict[str, Any] | None:
+def clock_figures(
+    clock: ClockModel | None, nominal_period_ns: float, arrival_ns: np.ndarray, sample_ns: np.ndarray
+) -> dict[str, Any] | None:
     """Return a clock as an entry of `schemas/check.schema.json`; None without one.
+
+    Delay and jitter are those of the recording itself: the clock's own are of minutes before it, too.
 
     Args:
         clock: The stream's clock.
         nominal_period_ns: Nominal time between frames [ns]; 0 if none is known.
-        within: Beginning and end of the recording [ns]: earlier steps are of no concern.
+        arrival_ns: Arrivals in the recording [ns], shape (n,); steps of the clock before them are of no concern.
+        sample_ns: Sample times by the clock [ns], shape (n,).
     """
     if clock is None:
         return None
+    within = (int(arrival_ns[0]), int(arrival_ns[-1])) if len(arrival_ns) else (0, 0)
+    beyond = arrival_ns - sample_ns - (clock.latency.latency_ns if clock.latency else 0)
     lines = (*clock.earlier, clock)[1:]
     steps = [s for s, line in zip(clock.steps_ns, lines, strict=True) if within[0] < line.first_arrival_ns <= within[1]]
     known = nominal_period_ns > 0 or clock.axis == "device_ns"
@@ -34,8 +43,8 @@ def clock_figures(clock: ClockModel | None, nominal_period_ns: float, within: tu
         "steady": clock.steady,
         "drift": _rounded(clock.drift(nominal_period_ns), 1) if known else None,
         "drift_uncertainty": _rounded(clock.drift_uncertainty * 1e6, 1),
-        "delay": _rounded(clock.delay_ns / 1e6),
-        "jitter": _rounded(clock.jitter_ns / 1e6),
+        "delay": _rounded(float(np.mean(beyond)) / 1e6) if len(beyond) else 0.0,
+        "jitter": _rounded(float(np.std(beyond)) / 1e6) if len(beyond) else 0.0,
         "uncertainty": _rounded(clock.uncertainty_ns / 1e6),
         "latency": _rounded(clock.latency.latency_ns / 1e6) if clock.latency else None,
         "latency_uncertainty": _rounded(clock.latency.uncertainty_ns / 1e6) if clock.latency else None,
@@ -64,6 +73,11 @@ def clock_warnings(clock: dict[str, Any] | None, rate_of_clock: float) -> list[s
     if steps:
         found.append(
             f"its clock stepped by {', '.join(f'{s:+.0f}' for s in steps)} ms: it restarted, or lost its count"
+        )
+    if max(clock["delay"], clock["jitter"]) / rate_of_clock > DELAY_MS:
+        found.append(
+            f"its frames were read {clock['delay']:.0f} ms late on average, with a jitter of {clock['jitter']:.0f} ms: "
+            "this computer was too busy"
         )
     if clock["uncertainty"] / rate_of_clock > UNCERTAIN_MS:
         found.append(f"its sample times are uncertain by {clock['uncertainty']:.1f} ms")

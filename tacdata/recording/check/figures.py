@@ -96,13 +96,9 @@ def _taxels(recording: Recording, lag: np.ndarray) -> dict[str, Any]:
             {"channel": j.channel, "size": _rounded(j.size), "at": _rounded((j.time_ns - stream.sample_ns[0]) / 1e9)}
             for j in jumps(episode, noise, response)
         ],
-        "clock": clock_figures(recording.clocks.get("taxels"), 1e9 / nominal, _span(stream.arrival_ns)),
+        "clock": clock_figures(recording.clocks.get("taxels"), 1e9 / nominal, stream.arrival_ns, stream.sample_ns),
         "driver_counts": recording.counts.get("taxels", {}),
     }
-
-
-def _span(time_ns: np.ndarray) -> tuple[int, int]:
-    return (int(time_ns[0]), int(time_ns[-1])) if len(time_ns) else (0, 0)
 
 
 def idle_reading(episode: Episode) -> np.ndarray:

@@ -40,6 +40,8 @@ TYPICAL = 1.2
 """Root mean square over median of a latency that is uniform from 0 [1]."""
 HIDDEN = 0.1
 """Share of the typical latency that may stay hidden in every block [1]: 1.6 ms of a 16 ms timer."""
+STALLED = 3.0
+"""Mean latency of a block over the median of all blocks, beside `LATE_NS`, that shows a stalled host [1]."""
 CRYSTAL = 250e-6
 """Largest deviation of a crystal from its nominal rate [1]: three times that of a poor one."""
 KEPT = 32
@@ -184,7 +186,7 @@ class _Stretch:
     def _spread(self, line: tuple[int, int, float]) -> tuple[float, float, float]:
         """Return mean and standard deviation of the latencies above a line, and its uncertainty [ns]."""
         x0, y0, slope = line
-        n, sx, sy, sxx, sxy, syy = (sum(parts) for parts in zip(*(b.sums for b in self.blocks), strict=True))
+        n, sx, sy, sxx, sxy, syy = (sum(parts) for parts in zip(*self._usual_sums(line), strict=True))
         variance = ((n * syy - sy * sy) - 2 * slope * (n * sxy - sx * sy) + slope**2 * (n * sxx - sx * sx)) / n**2
         jitter = math.sqrt(max(variance, 0.0))
         delay = sy / n + self.origin[1] - y0 - slope * (sx / n + self.origin[0] - x0)
@@ -196,6 +198,14 @@ class _Stretch:
         if len(whole) < 3:  # too short to compare blocks: the scatter of the mean is the bound
             uncertainty = max(uncertainty, jitter / math.sqrt(n))
         return delay, jitter, uncertainty
+
+    def _usual_sums(self, line: tuple[int, int, float]) -> list[list[int]]:
+        """Return the sums of the blocks whose mean latency is usual: a stall of minutes ago is none of the link's."""
+        x0, y0, slope = line
+        rows = [block.sums for block in self.blocks]
+        mean = [s[2] / s[0] + self.origin[1] - y0 - slope * (s[1] / s[0] + self.origin[0] - x0) for s in rows]
+        most = STALLED * float(np.median(mean)) + LATE_NS
+        return [s for s, latency in zip(rows, mean, strict=True) if latency <= most]
 
 
 class EnvelopeFit:

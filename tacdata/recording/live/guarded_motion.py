@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from tacdata.devices.device import CncStatus, MotionController, StandsStill
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.interruption import Interruption
+from tacdata.recording.live.machine_state import MachineState
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion.allowed_path import AllowedPath
 from tacdata.recording.motion.move_times import Command, report_resolution
@@ -29,6 +31,8 @@ REASON = 1.0
 BY_HAND = "; free it by hand"
 LATER = "; leave it, the next start lifts it straight up"
 """Where a machine at rest keeps its position: a tip that is freed by hand loses it."""
+ASKS = "; leave it, the next start asks, then lifts it straight up"
+"""Where nobody saw the machine come to rest."""
 STALL = 3.0
 """Time that this computer may stand still while the guide moves [s of real time]: suspended, or a closed lid."""
 
@@ -36,8 +40,18 @@ STALL = 3.0
 class GuardedMotion:
     """Carries out steps in a thread of its own, so that the calling thread can stop them at any moment."""
 
-    def __init__(self, cnc: MotionController, clock: Clock, interruption: Interruption | None = None) -> None:
-        """Drive ``cnc``; nothing moves before `drive`, which looks for signals that the interruption holds back."""
+    def __init__(
+        self,
+        cnc: MotionController,
+        clock: Clock,
+        interruption: Interruption | None = None,
+        state: MachineState | None = None,
+    ) -> None:
+        """Drive ``cnc``; nothing moves before `drive`, which looks for signals that the interruption holds back.
+
+        ``state`` receives a mark before each motion; `settle` ends it.
+        """
+        self._state = state
         self._cnc, self._clock, self._interruption = cnc, clock, interruption or Interruption()
         self._halted = clock.host.event()
         self._rest: Position | None = None  # where it stands after a stop; None: it runs, or does not obey
@@ -76,6 +90,8 @@ class GuardedMotion:
             DeviceError: On a fault, after a feed hold and dropping the queue.
             KeyboardInterrupt: On Ctrl-C, after the same.
         """
+        if self._state:
+            self._state.moving()
         failure, host = list[BaseException](), self._clock.host
         work = self._clock.host.thread(self._carry_out, "motion", (path, start, writer, failure))
         self._allowed.stand(start, self._clock.now_ns())
@@ -103,6 +119,11 @@ class GuardedMotion:
             raise
         self._at = next((step.target for step in reversed(path) if step.target), start)
         return self._at
+
+    def settle(self) -> None:
+        """Record where the machine is at rest."""
+        if self._state and not self._cnc.position_lost:
+            self._state.rest()
 
     @property
     def _allowed(self) -> AllowedPath:
@@ -165,6 +186,9 @@ class GuardedMotion:
         """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; return the result as a sentence."""
         self._lifted = f"the indenter was not lifted (interrupted){self._advice}"
         self._lifted = self._lift(height, speed)
+        if self.lifted or self._still:
+            with suppress(TacdataError):  # the fault itself must be reported first; the mark of a motion stays
+                self.settle()
         return self._lifted
 
     def _lift(self, height: float, speed: float) -> str:
@@ -190,7 +214,9 @@ class GuardedMotion:
 
     @property
     def _advice(self) -> str:
-        return BY_HAND if self._cnc.position_lost else LATER
+        if self._cnc.position_lost:
+            return BY_HAND
+        return LATER if self._still or self._rest is not None else ASKS
 
     def go_on(self) -> Position:
         """After a stop and a lift: accept steps again, and return where the guide stands [mm].
@@ -219,7 +245,8 @@ class GuardedMotion:
             return (f"motion: the machine moved while homing{f', and {lost}: its position is lost' if lost else ''}",)
         if self._lifted or self._halted.is_set():
             tip = (self._lifted or f"the indenter was not lifted{self._advice}").replace(f" ({self._why})", "")
-            tip = tip.replace(LATER, self._advice)  # the position may have been lost since
+            for advice in (LATER, ASKS):
+                tip = tip.replace(advice, self._advice)  # the position may have been lost since
             if self._still:
                 stands = "" if "stands at" in self._why else self._last_seen
                 return f"motion: stopped ({self._why}){stands}", f"tip:    {tip}"

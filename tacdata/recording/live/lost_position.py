@@ -1,91 +1,119 @@
-"""A position that was lost stays lost until a person says that it was found again; --yes does not say so."""
+"""Questions about a position that may be lost; a person's yes to the question ends them, --yes does not."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 from tacdata.devices.device import MotionController
-from tacdata.errors import DeviceError
+from tacdata.errors import DeviceError, TacdataError
+from tacdata.recording.live.machine_state import UNKNOWN, MachineState
+from tacdata.recording.live.rig_devices import RigDevices
 
 Ask = Callable[[str], bool]
 """Puts a question to a person; True only for a yes that was given to this very question."""
+OPTION = "--confirm-position"
+"""Option of a verb that answers one question in advance, by the code that its refusal states."""
 
 
-def why_lost(cnc: MotionController, remembered: str = "", resumed: bool = False) -> str:
-    """Return why the position of an opened controller is not known, in words; empty if it is.
+class PositionGuard:
+    """Compares where a machine was left with what its controller reports, and asks where they differ.
 
-    Args:
-        cnc: The controller.
-        remembered: Why a session lost it, if it did.
-        resumed: Whether earlier recordings rest on the same machine zero.
-    """
-    said = cnc.settings()
-    if said.get("homed_at_opening") == "yes":
-        return ""
-    at_zero = said.get("position_at_opening") == "0.000,0.000,0.000" and said.get("$22") == "0"
-    if at_zero and resumed and not (remembered or cnc.position_lost):
-        return "the controller says (0, 0, 0) mm, as one does that has just been switched on"
-    return remembered or cnc.position_lost
-
-
-def guard_homing(cnc: MotionController, ask: Ask, remembered: str = "", resumed: bool = False) -> None:
-    """Ask whether the tip is free before a controller homes at opening.
-
-    Nobody asks if it was merely switched on.
+    Example:
+        ``guard = PositionGuard(state, cnc, ask); guard.before_homing(False); ...open...; guard.require_known(-35.0)``
     """
 
-    def before_homing() -> None:
-        why = remembered or cnc.alarm
-        if why or resumed:
-            require_free(why, ask)
+    def __init__(self, state: MachineState, cnc: MotionController, ask: Ask, confirmed: str = "") -> None:
+        """Ask by ``ask``, unless ``confirmed`` is the code of the question."""
+        self._state, self._cnc, self._ask, self._confirmed = state, cnc, ask, confirmed.strip().lower()
 
-    cnc.before_homing = before_homing
+    def before_homing(self, resumed: bool) -> None:
+        """Ask whether the tip is free before the controller homes at opening, unless it was merely switched on.
 
+        Args:
+            resumed: Whether earlier recordings rest on the same machine zero.
+        """
 
-def require_free(why: str, ask: Ask) -> None:
-    """Ask whether the tip is free, before a locked controller homes: a tip in the skin would be dragged.
+        def require_free() -> None:
+            if why := self._state.why_lost or self._cnc.alarm or ("the controller is locked" if resumed else ""):
+                self._require_free(why)
 
-    Args:
-        why: Why the position was lost, in words; empty if only the controller says so.
-        ask: Puts the question.
+        self._cnc.before_homing = require_free
 
-    Raises:
-        DeviceError: If nobody says yes.
-    """
-    why = why or "the controller is locked"
-    question = (
-        f"THE POSITION WAS LOST: {why}.\n"
-        f"The machine is about to home: every axis moves. Is the tip out of the skin, and the way straight up free? "
-        f"[y/N] "
-    )
-    if not ask(question):
-        raise DeviceError(
-            f"the machine was not homed: {why}, and nobody said that the tip is free",
-            "a tip that is out of the skin, with a free way straight up",
-            "free the tip by hand, then start again and say so when asked (--yes does not)",
+    @contextmanager
+    def opened(self, devices: RigDevices) -> Iterator[RigDevices]:
+        """A context that opens the devices, and records at its end where the machine is, or why that is unknown."""
+        with devices.opened():
+            try:
+                yield devices
+            finally:
+                with suppress(TacdataError):  # a fault that ends the context must be reported first
+                    self._state.close()
+
+    def loss(self) -> str:
+        """After the devices were closed: record a loss; return why the position is unknown, empty if it is known."""
+        if why := self._cnc.position_lost:
+            with suppress(TacdataError):  # a fault that ended the session must be reported first
+                self._state.lose(why)
+        return why or self._state.loss
+
+    def doubt(self, resumed: bool) -> str:
+        """Return why the position of the opened controller is not known, in words; empty if it is."""
+        if self._cnc.settings().get("homed_at_opening") == "yes":
+            return ""
+        unmet = UNKNOWN if resumed and not self._state.is_known else ""
+        return self._state.why_lost or self._cnc.position_lost or self._state.difference or unmet
+
+    def require_known(self, height: float, resumed: bool = False) -> bool:
+        """Ask whether a position that was lost was found again; return whether there was a doubt.
+
+        Args:
+            height: Where the first move ends, straight up [mm, machine].
+            resumed: Whether earlier recordings rest on the same machine zero.
+
+        Raises:
+            DeviceError: If nobody says yes. Nothing has moved.
+        """
+        why = self.doubt(resumed)
+        code = self._code("known", why) if why else ""
+        question = (
+            f"THE POSITION IS NOT KNOWN: {why}.\n"
+            f"Has the machine been homed, or its zero found again by a touch-off, since then? And is the way straight "
+            f"up free, to machine height {height:.2f} mm? [y/N] "
         )
+        if why and not self._agreed(question, code):
+            raise DeviceError(
+                f"the position is not known: {why}",
+                "a machine that was homed or touched off since, and a free way straight up",
+                "free the tip by hand, home the machine or set its zero again, then start again and say so when asked "
+                f"(--yes does not; without a terminal: {OPTION} {code})",
+            )
+        self._cnc.trust_position()
+        self._state.find()
+        return bool(why)
 
-
-def require_found(why: str, height: float, ask: Ask) -> None:
-    """Ask whether a position that was lost was found again.
-
-    Args:
-        why: Why it was lost, in words; with an empty one nothing is asked.
-        height: Where the first move ends, straight up [mm, machine].
-        ask: Puts the question.
-
-    Raises:
-        DeviceError: If nobody says yes.
-    """
-    question = (
-        f"THE POSITION WAS LOST: {why}.\n"
-        f"Has the machine been homed, or its zero found again by a touch-off, since then? And is the way straight up "
-        f"free, to machine height {height:.2f} mm? [y/N] "
-    )
-    if why and not ask(question):
-        raise DeviceError(
-            f"the position is not known: {why}",
-            "a machine that was homed or touched off since, and a free way straight up",
-            "free the tip by hand, home the machine or set its zero again, then start again and say so when asked "
-            "(--yes does not)",
+    def _require_free(self, why: str) -> None:
+        code = self._code("free", why)
+        question = (
+            f"THE POSITION WAS LOST: {why}.\n"
+            f"The machine is about to home: every axis moves. Is the tip out of the skin, and the way straight up "
+            f"free? [y/N] "
         )
+        if not self._agreed(question, code):
+            raise DeviceError(
+                f"the machine was not homed: {why}, and nobody said that the tip is free",
+                "a tip that is out of the skin, with a free way straight up",
+                "free the tip by hand, then start again and say so when asked "
+                f"(--yes does not; without a terminal: {OPTION} {code})",
+            )
+
+    def _agreed(self, question: str, code: str) -> bool:
+        return self._confirmed == code or self._ask(question)
+
+    def _code(self, question: str, why: str) -> str:
+        """Record the loss; return the code of this question about it, which answers no question about a later one."""
+        if not self._state.why_lost:
+            self._state.lose(why)
+        text = f"{question} {self._state.lost_since} {why}"
+        return hashlib.sha256(text.encode()).hexdigest()[:6]

@@ -324,3 +324,16 @@ def test_a_board_without_a_clock_and_a_camera_stand_in_the_pairs_too(tmp_path):
     metadata = read_records(press.write(tmp_path / "episode-000000.mcap")).metadata
     names = ["camera side - taxels", "camera side - motion", "taxels - motion"]
     assert metadata["sync"] == dict.fromkeys(names, "not measured")
+
+
+def test_a_stall_of_minutes_ago_does_not_count_as_the_links_delay():
+    rng = np.random.default_rng(8)
+    true, arrival = arrivals(rng, 9000, 30.0, 50e-6, 0.002 + rng.exponential(0.003, 9000))
+    stalled = (arrival > START + 20_000_000_000) & (arrival < START + 140_000_000_000)
+    arrival[stalled] = START + 140_000_000_000  # two minutes, read at once
+    model = fit(arrival, np.arange(9000), nominal_ns=1e9 / 30)
+    assert (arrival[stalled] - true[stalled]).mean() > 5e10
+    assert model.delay_ns < 6e6
+    assert model.jitter_ns < 6e6
+    error = (model.sample_ns(np.arange(9000)) - true) / 1e6
+    assert np.abs(error[6000:]).max() < 4.0

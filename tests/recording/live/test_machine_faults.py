@@ -1,5 +1,6 @@
 """What a controller, its line or another hand does wrong in mid-press: hold, lift, file closed, words; or no move."""
 
+import json
 import re
 import threading
 import time
@@ -10,7 +11,6 @@ import pytest
 from recording_examples import SENSOR, plan, recorder
 
 from tacdata.errors import DeviceError, UsageError
-from tacdata.recording import read_session
 from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.recorder import Recorder
@@ -23,6 +23,11 @@ def place(virtual):
     """Where the indenter is: x, y, and its height above the skin's nominal face [mm]."""
     at = virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000)
     return at - [0.0, 0.0, read_rig(virtual.path).registration.origin[2]]
+
+
+def left_state(virtual):
+    """What is on disk of where the machine was left."""
+    return json.loads(next((virtual.directory / "machine_state").glob("*.json")).read_text())
 
 
 def on_the_skin(virtual, act):
@@ -155,7 +160,7 @@ def test_a_lost_position_is_remembered_until_a_person_says_that_it_was_found(vir
     on_the_skin(virtual, virtual.controller.inject_alarm)
     with pytest.raises(DeviceError, match="hard limit") as raised:
         recorder(virtual, out).run(lambda summary: True)
-    assert "hard limit" in read_session(out).position_lost
+    assert "hard limit" in left_state(virtual)["lost"]["why"]
     last = "\n".join(raised.value.__notes__)
     assert "the indenter was not lifted" in last
     assert "zero:   LOST" in last
@@ -170,7 +175,7 @@ def test_a_lost_position_is_remembered_until_a_person_says_that_it_was_found(vir
     assert "straight up free" in asked[0]
     session = recorder(virtual, out, resume=True, ask=lambda question: True).run(lambda summary: True)
     assert session.remaining == ()
-    assert session.position_lost == ""
+    assert "lost" not in left_state(virtual)
 
 
 def test_a_power_cycle_in_mid_press_is_no_ground_to_stand_on(virtual, tmp_path):
@@ -201,7 +206,7 @@ def test_a_machine_at_its_power_on_zero_is_not_believed_on_resuming(virtual, tmp
     # Its welcome goes out while nobody listens: one that is still under way would tell of the reset.
     while virtual.controller._out:
         time.sleep(0.01)
-    with pytest.raises(DeviceError, match=r"says \(0, 0, 0\) mm, as one does that has just been switched on"):
+    with pytest.raises(DeviceError, match=r"reports \(0.000, 0.000, 0.000\) mm, and the machine was left at"):
         recorder(virtual, out, resume=True).run(lambda summary: True)
 
 

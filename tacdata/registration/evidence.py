@@ -1,0 +1,184 @@
+"""One slow touch before anything goes deep: does the skin begin where the registration states?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.errors import DeviceError
+from tacdata.plans import Press
+from tacdata.recording.live.guarded_motion import GuardedMotion
+from tacdata.recording.live.interruption import Interruption
+from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.recording.live.rig_streams import RigStreams
+from tacdata.registration.guarded_probe import probing
+from tacdata.registration.probe import Position, Probe
+from tacdata.registration.touch_off import ANSWER, COARSE, FRAMES, LIFT_SPEED, SPEED, approach
+from tacdata.rig import Registration, Rig
+from tacdata.sensor import Sensor
+
+PROVED = 0.02
+"""Agreement of touch and registration that proves the height [mm], beside the registration's own uncertainty."""
+UNSTATED = 0.05
+"""Standard uncertainty of a registration that states none [mm]."""
+HALF_WIDTH = 4.0
+"""Half width of a flat tip, whose edge touches a tilted skin first [mm]."""
+FAR = 1.0
+"""Step from the present height down to `NEAR` [mm]; no plan that is worth a touch presses less deep."""
+NEAR = 1.0
+"""Height above the expected skin from which steps are fine [mm]."""
+BELOW = 0.3
+"""How far below the lowest height that would agree the touch goes on [mm]: a weak answer shows late."""
+IDLE_FRAMES = 30
+"""Readings from which the noise is estimated [count]."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Height of the skin by a touch, beside the registration's."""
+
+    expected: float
+    """Depth zero at the touched place by the registration [mm, machine]."""
+    height: float
+    """First contact by the touch [mm, machine]."""
+    uncertainty: float
+    """Standard uncertainty of `height` [mm]."""
+    limit: float
+    """Largest difference that does not contradict the registration [mm]."""
+
+    @property
+    def difference(self) -> float:
+        """First contact minus depth zero [mm]; positive where the skin begins higher than stated."""
+        return self.height - self.expected
+
+    @property
+    def text(self) -> str:
+        """The evidence as text."""
+        return (
+            f"zero proved by a touch: first contact {1000 * self.difference:+.0f} +- {1000 * self.uncertainty:.0f} um "
+            f"from depth zero (at most {1000 * self.limit:.0f})"
+        )
+
+
+def difference_limit(registration: Registration, document: dict[str, object]) -> float:
+    """Return the largest difference between touch and registration that is no contradiction [mm].
+
+    Args:
+        registration: Where the sensor lies.
+        document: The rig file's entry, with its stated ``uncertainty`` or ``residual``.
+    """
+    stated = document.get("uncertainty")
+    claim = stated["origin"][2] if isinstance(stated, dict) and "origin" in stated else document.get("residual")
+    sigma = float(claim) if isinstance(claim, int | float) else UNSTATED
+    return PROVED + 3.0 * sigma + HALF_WIDTH * float(np.hypot(*registration.tilt))
+
+
+def touch_site(press: Press, sensor: Sensor, rig: Rig) -> tuple[float, float]:
+    """Return the rig file's reference place, or the taxel nearest to a press [mm, sensor frame]."""
+    if reference := rig.document.get("reference"):
+        return reference["x"], reference["y"]
+    centers = sensor.taxels.centers
+    x, y = centers[int(np.argmin(np.linalg.norm(centers - [press.x, press.y], axis=1)))].tolist()
+    return x, y
+
+
+def touch_evidence(
+    probe: Probe, start: Position, place: tuple[float, float], expected: float, limit: float
+) -> Evidence:
+    """Touch the skin at one place, slowly, and compare its height with the expected one.
+
+    The way down is in steps, each ended by a reading at rest, so that nothing goes deeper into a skin that begins
+    higher than expected than one step.
+
+    Args:
+        probe: The indenter.
+        start: Where it stands [mm, machine].
+        place: x and y of the touch [mm, machine].
+        expected: Height of the skin there [mm, machine].
+        limit: Largest difference that is no contradiction [mm].
+
+    Raises:
+        DeviceError: If the skin answers elsewhere than expected, or not at all.
+    """
+    height = start[2]
+    probe.go((*place, height), LIFT_SPEED)
+    probe.wait(1.0)
+    idle = probe.read(IDLE_FRAMES)
+    noise = np.maximum(idle.spread, 0.3)
+    near = min(height, expected + NEAR)
+    far, fine = np.arange(height - FAR, near, -FAR), np.arange(near, expected - limit - BELOW, -COARSE)
+    heights = [*far.tolist(), *fine.tolist()]
+    contact = _first_answer(probe, place, heights, idle.mean, noise)
+    if contact is None:
+        raise _contradiction(f"no channel answers down to machine height {heights[-1]:.2f} mm", expected, limit)
+    if contact > expected + limit + COARSE:
+        raise _contradiction(f"the skin answers already at machine height {contact:.2f} mm", expected, limit)
+    touch = approach(probe, "the touch before the first press", place, contact, contact - BELOW, noise)
+    sigma = float(np.hypot(touch.onset.uncertainty, touch.onset.model))
+    evidence = Evidence(expected, touch.onset.height, sigma, limit)
+    if abs(evidence.difference) > limit + 2.0 * sigma:
+        given = f"the skin is first touched at machine height {evidence.height:.3f} +- {sigma:.3f} mm"
+        raise _contradiction(given, expected, limit)
+    return evidence
+
+
+def prove_zero(
+    rig: Rig,
+    sensor: Sensor,
+    press: Press,
+    devices: RigDevices,
+    streams: RigStreams,
+    motion: GuardedMotion,
+    interruption: Interruption,
+    height: float,
+    say: Callable[[str], None],
+    position: Position,
+) -> Position:
+    """Touch the skin with the mounted indenter before the first press; return where the guide stands then [mm].
+
+    Args:
+        rig: The rig.
+        sensor: The skin.
+        press: The first press; its indenter is mounted.
+        devices: The open devices.
+        streams: Their running streams.
+        motion: What moves.
+        interruption: Holds Ctrl-C back.
+        height: Safe machine height [mm].
+        say: Called with the result in words.
+        position: Where the guide stands [mm, machine].
+
+    Raises:
+        DeviceError: If the touch contradicts the registration; the indenter was lifted.
+    """
+    registration = rig.registration_for(press.indenter_name)
+    x, y, expected = registration.to_machine(*touch_site(press, sensor, rig), 0.0)
+    limit = difference_limit(registration, rig.document["registration"])
+    with probing(rig, devices, streams, motion, height, LIFT_SPEED, interruption, say, position) as probe:
+        evidence = touch_evidence(probe, probe.position, (x, y), expected, limit)
+    say(evidence.text)
+    return probe.position
+
+
+def _first_answer(
+    probe: Probe, place: tuple[float, float], heights: list[float], rest: np.ndarray, noise: np.ndarray
+) -> float | None:
+    """Go down to each height in turn; return the first at which a channel answers twice, or None."""
+    frames = FRAMES // 2 + 1
+    threshold = ANSWER * noise / np.sqrt(frames)
+    for height in heights:
+        probe.go((*place, height), SPEED)
+        if all(bool((np.abs(probe.read(frames).mean - rest) > threshold).any()) for _ in range(2)):
+            return height
+    return None
+
+
+def _contradiction(given: str, expected: float, limit: float) -> DeviceError:
+    return DeviceError(
+        f"{given}, and depth zero is at {expected:.3f} mm by the registration: nothing goes deeper",
+        f"a first contact within {limit:.3f} mm of depth zero",
+        "see that the indenter sits as at the registration and the board answers; find the machine's zero again (home "
+        "it, or touch off), or register again",
+    )
