@@ -82,8 +82,6 @@ class Session(Displayed):
         yield f"{len(labels)} labelled"
         if self.unfinished:
             yield f"{len(self.unfinished)} recordings interrupted"
-        if self.position_lost:
-            yield f"the machine's position is lost: {self.position_lost}"
 
     @property
     def labels(self) -> Path:
