@@ -13,6 +13,7 @@ from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
 from training.inference.prediction import PredictedMaps
 from viewers.parts.label import ShownLabel
+from viewers.parts.prediction_error import press_error
 from viewers.scene.scene import CameraView, DepthMaps
 
 LINE_LENGTH = 170
@@ -99,21 +100,13 @@ def of_dataset_episode(
 
 
 def of_prediction(prediction: PredictedMaps | None, maps: tuple[DepthMaps, ...]) -> list[str]:
-    """Return whose prediction it is and how it does; nothing without one."""
+    """Return the network of a prediction and its errors; nothing without one."""
     if prediction is None:
         return []
-    known = "of another dataset" if prediction.part == "other dataset" else f"in its {prediction.part} part"
-    return [
-        f"- **Prediction** {prediction.network}, checkpoint {prediction.checkpoint[:12]}, episode {known}" + rmse(maps)
-    ]
-
-
-def rmse(maps: tuple[DepthMaps, ...]) -> str:
-    """Return the pixel root mean square error over all frames in words; nothing without a label."""
-    error = next((m for m in maps if m.name == "error"), None)
-    if error is None:
-        return ""
-    return f", pixel RMSE {np.sqrt(np.mean(error.values.astype(float) ** 2)):.3f} mm"
+    part = "of another dataset" if prediction.part == "other dataset" else f"in its {prediction.part} part"
+    lines = [f"- **Prediction** {prediction.network}, checkpoint {prediction.checkpoint[:12]}, episode {part}"]
+    error = press_error(maps)
+    return [*lines, f"- **Error** {error}"] if error else lines
 
 
 def missing(

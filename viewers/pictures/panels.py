@@ -11,6 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import SubFigure
 from matplotlib.patches import Circle, Rectangle
 
+from viewers.parts.prediction_error import frame_error, pitch
 from viewers.scene.color_scale import HUES, ColorScale, taxel_colors
 from viewers.scene.moments import nearest, picture_at
 from viewers.scene.scene import Scene
@@ -115,10 +116,8 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
             image(axes, picture_at(shown, moment).T, (shown.x, shown.y), shown.scale)
             tip_mark(axes, scene, moment)
             if shown.scale.signed:
-                rmse = np.sqrt(np.mean(picture_at(shown, moment).astype(float) ** 2))
-                axes.text(
-                    0.98, 0.03, f"RMSE {rmse:.3f} mm", transform=axes.transAxes, ha="right", fontsize=8, color=INK
-                )
+                error = _frame_error(scene, moment)
+                axes.text(0.98, 0.03, error, transform=axes.transAxes, ha="right", fontsize=8, color=INK)
     first = scene.maps[0]
     for axis, centers in (("x", first.x), ("y", first.y)):
         # All share axes, and the protrusions' own map is smaller.
@@ -134,6 +133,13 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
         part = 0.9 if len(scene.maps) > 1 else 0.3
         bar = figure.colorbar(mappable(scale), ax=grid[:, own], location="bottom", shrink=part, aspect=20 * len(own))
         bar.set_label(_bar_label(scale, [scene.maps[k].name for k in own]))
+
+
+def _frame_error(scene: Scene, moment: int) -> str:
+    label, prediction = scene.map_named("label"), scene.map_named("prediction")
+    if label is None or prediction is None:
+        return ""
+    return str(frame_error(picture_at(label, moment), picture_at(prediction, moment), pitch(label)))
 
 
 def _bar_label(scale: ColorScale, names: list[str]) -> str:

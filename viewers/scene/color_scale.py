@@ -49,7 +49,7 @@ def _table(colormap: str) -> np.ndarray:
 
 
 def scale_of(values: np.ndarray, unit: str, signed: bool = False, floor: float = 0.0) -> ColorScale:
-    """Return the scale that spans finite values, from 0 (or symmetrically around it) to a round number.
+    """Return the scale that spans finite values, from 0 (or symmetrically around it) to two significant digits.
 
     Args:
         values: What is to be coloured [unit].
@@ -63,10 +63,9 @@ def scale_of(values: np.ndarray, unit: str, signed: bool = False, floor: float =
 
 
 def round_up(value: float) -> float:
-    """Return the next of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(value))
-    step = next(s for s in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if value <= s * power * (1 + 1e-9))
-    return float(f"{step * power:.12g}")
+    """Return a positive value rounded up to two significant digits, so that a scale ends where its data end."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(f"{np.ceil(value / unit * (1 - 1e-9)) * unit:.12g}")
 
 
 def taxel_colors(columns: int, rows: int) -> np.ndarray:

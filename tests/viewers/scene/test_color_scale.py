@@ -12,16 +12,17 @@ def lightness(rgb):
 
 
 @pytest.mark.parametrize(
-    ("value", "rounded"), [(1.2, 1.5), (1.0, 1.0), (0.31, 0.4), (987.0, 1000.0), (7.2, 8.0), (0.05, 0.05)]
+    ("value", "rounded"),
+    [(1.157, 1.2), (1.0, 1.0), (0.311, 0.32), (987.0, 990.0), (996.0, 1000.0), (7.2, 7.2), (0.05, 0.05)],
 )
-def test_a_scale_ends_at_a_round_number(value, rounded):
+def test_a_scale_ends_within_a_tenth_of_the_data(value, rounded):
     assert round_up(value) == rounded
 
 
 def test_a_scale_spans_the_values_and_no_less_than_its_floor():
     values = np.array([0.2, np.nan, 2.7])
-    assert scale_of(values, "mm") == ColorScale(0.0, 3.0, "mm")
-    assert scale_of(-values, "mm", signed=True) == ColorScale(-3.0, 3.0, "mm", True)
+    assert scale_of(values, "mm") == ColorScale(0.0, 2.7, "mm")
+    assert scale_of(-values, "mm", signed=True) == ColorScale(-2.7, 2.7, "mm", True)
     assert scale_of(np.full(3, 1e-4), "mm", floor=0.1).high == 0.1
     assert scale_of(np.full(3, np.nan), "mm", floor=0.1).high == 0.1
 

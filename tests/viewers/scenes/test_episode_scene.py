@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -153,8 +154,27 @@ def test_what_is_missing_is_said_and_the_rest_is_shown(episode):
 
 
 def test_the_summary_names_press_and_checkpoint(scene):
-    for words in ("sphere (radius 4", "depth 1.2 mm", "abababababab", "test part", "pixel RMSE", "a made-up press"):
+    for words in ("sphere (radius 4", "depth 1.2 mm", "abababababab", "test part", "a made-up press"):
         assert words in scene.summary
+
+
+def test_the_summary_states_peak_and_centroid_of_the_deepest_frame_and_of_the_press(scene):
+    # The made prediction is 0.9 of the label, moved by (0.4, 0.2) mm.
+    [line] = [line for line in scene.summary.splitlines() if "**Error**" in line]
+    numbers = [float(number) for number in re.findall(r"[-+]?\d+\.\d+", line)]
+    predicted, labelled, peak, centroid, median_peak, contact_rmse = numbers
+    assert (predicted, labelled) == pytest.approx((1.08, 1.2), abs=0.02)
+    assert peak == pytest.approx(predicted - labelled, abs=0.011)
+    assert centroid == pytest.approx(np.hypot(0.4, 0.2), abs=0.12)
+    assert 0.02 < median_peak <= abs(peak) + 0.01 and contact_rmse > median_peak / 2
+    page_texts = [text.get_text() for axes in page(scene).axes for text in axes.texts]
+    assert any(text.startswith("peak -0.1") and "centroid" in text for text in page_texts)
+
+
+def test_a_missed_contact_has_a_peak_error_and_no_centroid(episode, label, prediction):
+    flat = replace(prediction, depth=np.zeros_like(prediction.depth))
+    summary, deepest = episode_scene(episode, label, flat).summary, label.depth.max()
+    assert f"0.00 mm predicted, {deepest:.2f} mm labelled (peak {-deepest:.2f} mm)" in summary
 
 
 def test_lost_frames_are_counted(episode):
