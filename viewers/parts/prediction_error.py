@@ -63,7 +63,8 @@ def press_error(maps: tuple[DepthMaps, ...]) -> str:
 
 def pitch(maps: DepthMaps) -> tuple[float, float]:
     """Return the distance of neighbouring pixels along x and y [mm]."""
-    return tuple(float(np.ptp(axis) / max(len(axis) - 1, 1)) for axis in (maps.x, maps.y))
+    x, y = (float(np.ptp(axis) / max(len(axis) - 1, 1)) for axis in (maps.x, maps.y))
+    return x, y
 
 
 def _at_common_times(named: dict[str, DepthMaps]) -> tuple[np.ndarray, np.ndarray]:
