@@ -381,11 +381,8 @@ def _validate(
     prediction = predict(network, windows, chosen, top)
     label = frames.depth[chosen]
     loss = settings.loss(torch.from_numpy(prediction) / top, normalized(torch.from_numpy(label), top))
-    scores = depth_maps.score_frames(prediction, label)
-    return {
-        "validation_loss": float(loss),
-        "validation_contact_rmse_mm": depth_maps.summarize(scores.contact_rmse).median,
-    }
+    rmse = depth_maps.summarize(depth_maps.score_frames(prediction, label).contact_rmse).median
+    return {"validation_loss": float(loss), "validation_contact_rmse_mm": rmse}
 
 
 def _keep(run: _Run, line: dict[str, Any], out: Path) -> None:

@@ -18,16 +18,8 @@ from tacdata.skin.adhesions import load_adhesion_law
 from tacdata.skin.contact.contact_forces import ContactForces, ContactTangent
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.contact.history import ContactHistory
-from tacdata.skin.contact.kernels import (
-    MemberData,
-    SurfaceData,
-    deformed_point,
-    member_data,
-    normal_function,
-    of_member,
-    parameters_of,
-    rotation_of,
-)
+from tacdata.skin.contact.kernel_data import MemberData, SurfaceData, member_data
+from tacdata.skin.contact.kernels import deformed_point, normal_function, of_member, parameters_of, rotation_of
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.member.warp_arrays import REAL, argument, filled

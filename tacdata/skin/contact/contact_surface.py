@@ -21,7 +21,7 @@ import numpy as np
 import torch
 import warp as wp
 
-from tacdata.skin.contact import kernels
+from tacdata.skin.contact import kernel_data, kernels
 from tacdata.skin.contact.contact_forces import ContactForces, ContactTangent
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.contact.mortar import Mortar
@@ -95,7 +95,7 @@ class ContactSurface:
         slots = torch.as_tensor(self.mortar.slots.astype(np.int32), device=nodes.device)
         self._slots = slots
         self.data = filled(
-            kernels.SurfaceData,
+            kernel_data.SurfaceData,
             nodes=nodes,
             faces=faces,
             slots=slots,
@@ -164,7 +164,7 @@ class ContactSurface:
             Gaps, tractions, their linearization, and the resultant.
         """
         count, b = self.count, u.shape[2]
-        members = kernels.member_data(conditions, pose)
+        members = kernel_data.member_data(conditions, pose)
         pressed, place = list(self.by_shape(conditions)), self._mean_place(u, conditions)
         gap = self._gaps(u, place, pose, members, pressed)
         c = self.activation * conditions.modulus
@@ -190,7 +190,7 @@ class ContactSurface:
                 argument(place),
                 self.data,
                 members,
-                kernels.history_data(history),
+                kernel_data.history_data(history),
                 argument(pressure),
                 argument(active),
                 argument(normal),
@@ -253,7 +253,7 @@ class ContactSurface:
     def passed_through(self, u: torch.Tensor, pose: Pose, conditions: Conditions) -> torch.Tensor:
         """Return in which members a point of the face lies above the shape, shape (b,), bool; ``u``: (n, 3, b)."""
         above = torch.zeros(u.shape[2], dtype=torch.int32, device=u.device)
-        members = kernels.member_data(conditions, pose)
+        members = kernel_data.member_data(conditions, pose)
         for distance, chosen in self.by_shape(conditions):
             wp.launch(
                 passage_kernel(distance),

@@ -14,7 +14,8 @@ from functools import cache
 
 import warp as wp
 
-from tacdata.skin.contact.kernels import MemberData, SurfaceData, deformed_point, of_member, parameters_of, rotation_of
+from tacdata.skin.contact.kernel_data import MemberData, SurfaceData
+from tacdata.skin.contact.kernels import deformed_point, of_member, parameters_of, rotation_of
 
 _SAMPLES = wp.constant(16)
 """Points of a ray where the distance is asked for [count]."""

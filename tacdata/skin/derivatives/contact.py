@@ -16,7 +16,7 @@ import warp as wp
 from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.contact.history import ContactHistory
-from tacdata.skin.contact.kernels import history_data, member_data
+from tacdata.skin.contact.kernel_data import history_data, member_data
 from tacdata.skin.derivatives.contact_kernel import friction_change, normal_change_kernel
 from tacdata.skin.member.columns import Columns
 from tacdata.skin.member.conditions import Conditions

@@ -1,19 +1,14 @@
 """Warp kernels of `tacdata.skin.derivatives.contact`: how gaps, normal forces and friction change along a direction.
 
-Indices as in `tacdata.skin.contact.kernels`, whose structs hold the changes too.
+Indices as in `tacdata.skin.contact.kernels`; the structs of `kernel_data` hold the changes too.
 """
 
 from functools import cache
 
 import warp as wp
 
+from tacdata.skin.contact.kernel_data import HistoryData, MemberData, Nodal, Parameters, Six, SurfaceData
 from tacdata.skin.contact.kernels import (
-    HistoryData,
-    MemberData,
-    Nodal,
-    Parameters,
-    Six,
-    SurfaceData,
     at_node,
     deformed_point,
     normal_function,
