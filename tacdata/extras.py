@@ -7,6 +7,8 @@ import re
 from importlib.metadata import PackageNotFoundError, distribution, requires
 from types import TracebackType
 
+from packaging.requirements import Requirement
+
 from tacdata.errors import PackageError
 
 IMPORTED_AS = {"markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "warp": "warp-lang"}
@@ -41,6 +43,48 @@ def missing_package(error: ImportError, asked: str, instead: str = "") -> Packag
         f"an install with the extra {extra}",
         f"{line}, or {instead}" if instead else line,
     )
+
+
+def require(extras: tuple[str, ...], asker: str) -> None:
+    """Check that every package of some extras is installed, without importing any.
+
+    Args:
+        extras: Names of extras.
+        asker: Verb that needs them, for example ``"tacdata demo"``.
+
+    Raises:
+        PackageError: If a package is missing.
+    """
+    for extra in extras:
+        if absent := [package for package in packages_of(extra) if not _installed(package)]:
+            raise PackageError(
+                f"{asker} needs {', '.join(absent)}, which {'is' if len(absent) == 1 else 'are'} not installed",
+                f"an install with the extras {', '.join(extras)}",
+                install_line(",".join(extras)),
+            )
+
+
+def packages_of(extra: str) -> tuple[str, ...]:
+    """Return the packages that an extra brings on this platform."""
+    try:
+        lines = requires("tacdata") or ()
+    except PackageNotFoundError:
+        return ()
+    requirements = map(Requirement, lines)
+    return tuple(r.name for r in requirements if r.marker and not _plain(r) and r.marker.evaluate({"extra": extra}))
+
+
+def _plain(requirement: Requirement) -> bool:
+    """Return whether the plain install brings a requirement too."""
+    return requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+
+
+def _installed(package: str) -> bool:
+    try:
+        distribution(package)
+    except PackageNotFoundError:
+        return False
+    return True
 
 
 def install_line(extra: str) -> str:

@@ -77,6 +77,11 @@ class Line:
         started = self._announce(purpose)
         self._end(background.arguments, background.follow(), tolerated, started)
 
+    def skip(self, count: int, reason: str) -> None:
+        """Pass over ``count`` finished stages and print the reason."""
+        self.number += count
+        print(f"\n[{self.number}/{self.total}] {reason}", flush=True)
+
     def _announce(self, purpose: str) -> float:
         self.number += 1
         started = time.monotonic()

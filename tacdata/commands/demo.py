@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from contextlib import ExitStack
@@ -13,15 +14,21 @@ import typer
 from tacdata import stages
 from tacdata.commands.command import TOOLS, Result
 from tacdata.errors import SolveError, UsageError
+from tacdata.extras import require
+from tacdata.progress import say
 
 ORDER = 100
 PANEL = TOOLS
+EXTRAS = ("fem", "learn", "view")
 START_LIMIT = 60.0
 """Time that the virtual rig may take to open its ports [s]."""
 
 
 def run(
-    out: Annotated[Path, typer.Option(help="Folder to make; if it exists, a numbered one beside it.")] = Path("demo"),
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder to make. A recorded demo in it goes on; beside any other, a numbered one is made."),
+    ] = Path("demo"),
     presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 96,
     epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 10,
     speed: Annotated[
@@ -29,37 +36,73 @@ def run(
     ] = 4.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the plan, the virtual world and the training.")] = 1,
 ) -> Result:
-    """Run the main job once against a virtual rig, in some eight minutes, and say where everything lies."""
-    place = _Place(_new_folder(out))
+    """Run the main job once against a virtual rig, in some eight minutes, and name every file that it leaves."""
+    require(EXTRAS, "tacdata demo")
+    recorded = _is_recorded(_Place(out))
+    place = _Place(out if recorded else _new_folder(out))
     recording, learning = place.recording(presses, seed), place.learning(epochs, seed)
-    kept = f"what was finished is in {place.folder}; on a busy machine run again with a lower --speed"
+    kept = f"finished stages are in {place.folder}; `tacdata demo --out {place.folder}` goes on once all is recorded"
     line = stages.Line(len(recording) + len(learning) + 3, kept)
     begin = time.monotonic()
     try:
-        with ExitStack() as stack:
-            with stages.Background(place.virtual_rig(speed, seed), place.folder / "virtual-rig.log") as background:
-                background.wait_until(place.rig.is_file, "a virtual rig that writes its rig file", START_LIMIT)
-                for purpose, arguments in recording[:-1]:
-                    line.run(purpose, arguments)
-                # Recording is mostly waiting: labels are computed beside it, and it has the processor first.
-                log = place.folder / "label.log"
-                labelling = stack.enter_context(stages.Background(place.labelling(), log, yielding=True))
-                line.run(*recording[-1])
-            line.run("check what was recorded", ["check", str(place.session)])
-            # A press that could not be solved has no label and is left out of the dataset; the others go on.
-            line.join("label every frame by finite elements", labelling, tolerated=SolveError.exit_code)
-        for purpose, arguments in learning:
-            line.run(purpose, arguments)
+        if recorded:
+            line.skip(len(recording) + 1, f"{place.session} is recorded: the demo goes on with its labels")
+            line.run("label every frame by finite elements", place.labelling(), tolerated=SolveError.exit_code)
+        else:
+            _record(place, recording, line, speed, seed)
+        for purpose, arguments, product in learning:
+            if product.exists():
+                line.skip(1, f"{product} exists")
+            else:
+                line.run(purpose, arguments)
         line.run(*place.viewing())
     except KeyboardInterrupt:
-        print(f"\nstopped at stage {line.number}: what was finished is in {place.folder}", file=sys.stderr)
+        print(f"\nstopped at stage {line.number}: {kept}", file=sys.stderr)
         raise
-    took = time.monotonic() - begin
-    print(f"\nthe whole job took {stages.clock_face(took)}; it left")
-    for what, path in place.products.items():
-        print(f"  {what:<14} {path}" + ("" if path.exists() else "   MISSING"))
-    left = {what: path for what, path in place.products.items() if path.exists()}
-    return Result({"folder": place.folder, "seconds": took, "left": left})
+    duration = time.monotonic() - begin
+    print(f"\nthe whole job took {stages.clock_face(duration)}; its products:")
+    for product, path in place.products.items():
+        print(f"  {product:<14} {path}" + ("" if path.exists() else "   MISSING"))
+    print(_accuracy(place.scores))
+    say(f"next: open {place.picture}, or `tacdata browse {place.session}`")
+    products = {product: path for product, path in place.products.items() if path.exists()}
+    return Result({"folder": place.folder, "seconds": duration, "left": products})
+
+
+def _record(place: _Place, recording: list[tuple[str, list[str]]], line: stages.Line, speed: float, seed: int) -> None:
+    """Record, check and label a session on a virtual rig."""
+    with ExitStack() as stack:
+        with stages.Background(place.virtual_rig(speed, seed), place.folder / "virtual-rig.log") as background:
+            background.wait_until(place.rig.is_file, "a virtual rig that writes its rig file", START_LIMIT)
+            for purpose, arguments in recording[:-1]:
+                line.run(purpose, arguments)
+            # Recording is mostly waiting, so labels are computed meanwhile; the recorder has priority.
+            log = place.folder / "label.log"
+            labelling = stack.enter_context(stages.Background(place.labelling(), log, yielding=True))
+            line.run(*recording[-1])
+        line.run("check what was recorded", ["check", str(place.session)])
+        # A press that could not be solved has no label and is left out of the dataset; the others go on.
+        line.join("label every frame by finite elements", labelling, tolerated=SolveError.exit_code)
+
+
+def _is_recorded(place: _Place) -> bool:
+    """Return whether the folder holds a session with every press of its plan, and no finished demo."""
+    from tacdata.recording.session import FILE, read_session
+
+    return (place.session / FILE).is_file() and not place.picture.exists() and not read_session(place.session).remaining
+
+
+def _accuracy(scores: Path) -> str:
+    """Return the median errors on held-out presses as a sentence in millimetres."""
+    document = json.loads(scores.read_text())
+    table, pitch = document["contact_frames"], document["sensor"]["pixel_pitch_mm"]
+    peak, region, place = (table[name]["median"] for name in ("peak_error", "contact_rmse", "centroid_error"))
+    if None in (peak, region, place):
+        return "no held-out frame is in contact: the network has no score"
+    return (
+        f"on {len(document['split']['episodes'])} presses that the network had not seen, the median frame is right to "
+        f"{peak:.2f} mm in peak depth, {region:.2f} mm over the contact and {place * pitch:.2f} mm in place"
+    )
 
 
 class _Place:
@@ -69,6 +112,7 @@ class _Place:
         self.folder = folder
         self.rig, self.plan = folder / "rig" / "rig.yaml", folder / "plan.yaml"
         self.session, self.dataset, self.network = (folder / n for n in ("session", "dataset", "network"))
+        self.scores = self.network / "scores" / "scores.json"
         self.scene, self.picture = folder / "episode.rrd", folder / "episode.png"
 
     def virtual_rig(self, speed: float, seed: int) -> list[str]:
@@ -88,13 +132,17 @@ class _Place:
     def labelling(self) -> list[str]:
         return ["label", str(self.session), "--follow", "--no-uncertainty"]
 
-    def learning(self, epochs: int, seed: int) -> list[tuple[str, list[str]]]:
+    def learning(self, epochs: int, seed: int) -> list[tuple[str, list[str], Path]]:
+        """Return purpose, arguments and product of each stage after the labels."""
         session, dataset, network = str(self.session), str(self.dataset), str(self.network)
         train = ["train", dataset, "--from", "shipped", "--out", network, "--epochs", str(epochs), "--seed", str(seed)]
+        if (self.network / "last.safetensors").exists():
+            train.append("--resume")
+        packed = self.dataset / "meta" / "info.json"
         return [
-            ("pack recordings and labels as a LeRobot dataset", ["pack", session, "--out", dataset]),
-            ("fit the network that ships to this sensor", train),
-            ("score it on presses that it has not seen", ["evaluate", network]),
+            ("pack recordings and labels as a LeRobot dataset", ["pack", session, "--out", dataset], packed),
+            ("fit the network that ships to this sensor", train, self.scores),
+            ("score it on presses that it has not seen", ["evaluate", network], self.scores),
         ]
 
     def viewing(self) -> tuple[str, list[str]]:

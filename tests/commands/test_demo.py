@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,8 +11,9 @@ import time
 import pytest
 
 import schemas
+from tacdata import extras
 from tacdata.commands import demo
-from tacdata.errors import UsageError
+from tacdata.errors import PackageError, UsageError
 
 DEMO = [sys.executable, "-m", "tacdata.cli", "demo"]
 
@@ -81,6 +83,41 @@ def test_the_whole_job(tmp_path):
     )
     assert done.returncode == 0, done.stdout
     left_behind(tmp_path / "out", done.stdout)
+    accuracy = re.search(
+        r"right to (\S+) mm in peak depth, (\S+) mm over the contact and (\S+) mm in place", done.stdout
+    )
+    scores = json.loads((tmp_path / "out" / "network" / "scores" / "scores.json").read_text())
+    assert float(accuracy[1]) == pytest.approx(scores["contact_frames"]["peak_error"]["median"], abs=0.005)
+    assert "next: open" in done.stdout
+
+    # Stopped before its scores, it goes on there and records nothing again.
+    shutil.rmtree(tmp_path / "out" / "network" / "scores")
+    (tmp_path / "out" / "episode.png").unlink()
+    again = subprocess.run(
+        [*DEMO, "--out", str(tmp_path / "out"), "--presses", "8", "--epochs", "1"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert again.returncode == 0, again.stdout
+    assert re.findall(r"^\$ tacdata ([a-z-]+)", again.stdout, re.M) == ["label", "train", "evaluate", "view"]
+    assert (tmp_path / "out" / "episode.png").exists()
+
+
+def test_a_missing_extra_is_named_before_the_first_move(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        extras, "packages_of", lambda extra: {"fem": ("warp-lang", "numpy"), "learn": ()}.get(extra, ())
+    )
+    monkeypatch.setattr(extras, "_installed", lambda package: package != "warp-lang")
+    with pytest.raises(PackageError, match="warp-lang, which is not installed") as caught:
+        demo.run(tmp_path / "demo")
+    assert "fem,learn,view" in caught.value.remedy
+    assert not (tmp_path / "demo").exists()
+
+
+def test_the_packages_of_an_extra_leave_out_those_of_the_plain_install():
+    packages = extras.packages_of("fem")
+    assert {"warp-lang", "torch", "pytetwild"} <= set(packages) and "numpy" not in packages
 
 
 def left_behind(out, said):
