@@ -173,8 +173,11 @@ def _labels(records: list[EpisodeRecord]) -> list[str]:
 
 
 def _gaps(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
-    invalid = int((~np.asarray(dataset[features.VALID])).sum())
-    lines = [f"- {invalid} of {len(dataset)} frames are invalid (frames lost before them, or off the commanded path)"]
+    losses, outside = _invalid(dataset)
+    lines = [
+        f"- {losses} of {len(dataset)} frames follow a lost frame",
+        f"- {outside} of {len(dataset)} frames are outside the commanded path (before its start or after its end)",
+    ]
     broken = [r.recording_file for r in records if not r.complete]
     if broken:
         lines.append(f"- {len(broken)} recordings were broken off, the first is {broken[0]}")
@@ -187,6 +190,20 @@ def _gaps(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
     notes = Counter(note for r in records for note in r.notes)
     lines += [f"- {count} episodes: {note}" for note, count in notes.most_common(10)]
     return ["## Known gaps", "", *lines, ""]
+
+
+def _invalid(dataset: Dataset) -> tuple[int, int]:
+    """Return the number of frames after a loss and of frames outside the commanded path.
+
+    The path of a press is one interval of time, so invalid frames outside of it are the first or last of their episode.
+    """
+    valid, losses, outside = np.asarray(dataset[features.VALID]), 0, 0
+    for episode in dataset.episodes:
+        rows = np.flatnonzero(valid[episode.start : episode.stop])
+        length = episode.stop - episode.start
+        inside = int(rows[-1] - rows[0] + 1) if len(rows) else 0
+        losses, outside = losses + inside - len(rows), outside + length - inside
+    return losses, outside
 
 
 def _columns(dataset: Dataset) -> list[str]:

@@ -62,6 +62,18 @@ def test_lost_records_and_broken_recordings_are_gaps(tmp_path: Path) -> None:
     assert "1 episodes lost their record" in card.card(dataset)
 
 
+def test_lost_frames_and_frames_outside_the_path_are_counted_apart(tmp_path: Path) -> None:
+    """Three counts are missing before frame 9; the path begins at frame 2 and ends at frame 16."""
+    whole = example.episode(0)
+    counter = whole.taxels.counter + np.where(np.arange(20) >= 9, 3, 0)
+    times = whole.taxels.sample_ns
+    path_ns = times[[2, 6, 9, 12, 16]]
+    lossy = replace(whole, taxels=replace(whole.taxels, counter=counter), tip_ns=path_ns)
+    text = card.card(read_dataset(packed(tmp_path / "d", [lossy, example.episode(1)])))
+    assert "- 1 of 40 frames follow a lost frame" in text
+    assert "- 5 of 40 frames are outside the commanded path" in text
+
+
 def test_the_picture_is_a_picture(tmp_path: Path) -> None:
     stream = io.BytesIO()
     coverage_picture.draw(stream, read_dataset(packed(tmp_path / "d", [example.episode(n) for n in range(2)])))
