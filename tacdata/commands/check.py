@@ -33,11 +33,11 @@ def run(
 
 def checked(path: Path, folder: Path) -> Report:
     """Check a recording or session, say what was found, and leave it in a folder, with a picture."""
+    import tacdata as td
     from tacdata import documents
-    from tacdata.recording.check.report import check
     from viewers.pictures.check import draw
 
-    report = check(path)
+    report = td.check(path)
     stem = "check" if path.is_dir() else f"{path.stem}.check"
     print(report.text, flush=True)  # whatever becomes of the files beside it
     documents.write(folder / f"{stem}.json", report.document, "check")

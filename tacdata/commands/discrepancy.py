@@ -32,27 +32,25 @@ def run(
     ] = False,
 ) -> Result:
     """Find where recordings and a model disagree, and name the missing effect, or say why not."""
-    import tacdata.warp_runtime  # noqa: F401 - missing, it is said now, not when all is read
-    from tacdata.discrepancy.model.spec import read_spec
-    from tacdata.discrepancy.run import run as judge
+    import tacdata as td
+    import tacdata.warp_runtime
 
     console = progress.console()
     if fem:
         spec = _solved(recordings, spec, out)
-    model = read_spec(spec)
     begun = time.monotonic()
     with console.status("reading") as status:
 
-        def told(words: str) -> None:
+        def show(words: str) -> None:
             status.update(words)
             line = f"{time.monotonic() - begun:5.0f} s  {words}"
             console.print(line, markup=False, highlight=False, soft_wrap=True)
 
-        written = judge(recordings, model, out, told, stop_after)
+        verdict = td.judge(recordings, out, spec=spec, stop_after=stop_after, progress=show)
     print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
-    print(written.text, end="")
-    console.print(f"written: {written.folder}", markup=False, highlight=False, soft_wrap=True)
-    return Result(written.verdict)
+    print(verdict.text, end="")
+    console.print(f"written: {verdict.folder}", markup=False, highlight=False, soft_wrap=True)
+    return Result(verdict.document)
 
 
 def _solved(recordings: list[Path], spec: Path | None, out: Path) -> Path:

@@ -29,28 +29,25 @@ def run(
 
     On the dataset that it was trained on only the test episodes count; another dataset counts as a whole.
     """
-    from tacdata.dataset.reader import read_dataset
-    from tacdata.errors import UsageError
+    import tacdata as td
     from training.frames.data import frames_of
-    from training.inference import checkpoint
     from training.reports import report
     from training.reports.score_sheet import markdown
-    from training.scoring.evaluate import evaluate
 
     place = report.places(network, out)
     place.check()
-    trained = checkpoint.load(network)
-    recorded = Path(trained.document["dataset"]["path"])
-    if dataset is None and not recorded.is_dir():
-        raise UsageError(f"the dataset {recorded} of {network} is not there", "a dataset folder", "give --dataset")
-    scored = read_dataset(dataset or recorded)
-    frames = frames_of(scored)
+    trained = td.read_network(network)
+    scored = td.read_dataset(dataset or trained.training_folder)
     with progress.bars(transient=True) as bar:
         task = bar.add_task("predict", total=None)
-        evaluation = evaluate(
-            trained, frames, device, threads, lambda done, total: bar.update(task, completed=done, total=total)
+        evaluation = td.evaluate(
+            trained,
+            scored,
+            device=device,
+            threads=threads,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
-        report.write(place, evaluation, frames)
+        report.write(place, evaluation, frames_of(scored))
     print(markdown(evaluation.document))
     if scored.simulated:
         print("simulated: the scores say how well the network knows the skin model; of a sensor they say nothing")

@@ -20,12 +20,13 @@ def run(
     out: Annotated[Path, typer.Argument(help="New folder for the recording and its pictures.")] = Path("example"),
 ) -> Result:
     """Copy a small recording that ships with tacdata, check it and draw one press of it."""
-    from tacdata.example import DEEPEST, copy_session
+    import tacdata as td
+    from tacdata.example import DEEPEST
     from tacdata.extras import install_line
     from viewers.pictures.backend import PictureBackend
     from viewers.source import scene_at
 
-    report = check.checked(copy_session(out), out)
+    report = check.checked(td.example_session(out).folder, out)
     scene = scene_at(out, episode=DEEPEST)
     print(f"press {DEEPEST}: {scene.found[0]}")
     for line in scene.found[1:]:

@@ -28,18 +28,17 @@ def run(
     ] = None,
 ) -> Result:
     """Turn measured data of another rig into recordings that every other verb reads, by a mapping file."""
-    from tacdata.errors import UsageError
-    from tacdata.importing.imported_session import import_session
+    import tacdata as td
 
     if mapping is None:
         return _inspect(source, propose)
     if out is None or propose is not None:
-        raise UsageError(
+        raise td.UsageError(
             "--mapping without --out" if out is None else "--mapping with --propose",
             "--mapping FILE --out SESSION, or --propose FILE alone",
             "add --out, or leave --propose out",
         )
-    made = import_session(source, mapping, out, progress=say)
+    made = td.import_files(source, mapping, out, progress=say)
     for note in _together(made.notes):
         print(f"note: {note}")
     for text in made.refused:

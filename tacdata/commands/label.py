@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import PIPELINE, Result
-from tacdata.errors import SolveError, UsageError
+from tacdata.errors import SolveError
 from tacdata.progress import bars, say, suggest
 
 if TYPE_CHECKING:
@@ -55,68 +55,33 @@ def run(
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> Result:
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
-    from functools import partial
-
-    from label_farm.environment import cores, devices, idle_gpus
-    from label_farm.growing_session import GrowingSession
-    from label_farm.labelling import Labelling
-    from label_farm.labels.dataset_flow import DatasetFlow
-    from label_farm.presses.ladder import Ladder
-    from label_farm.presses.model import FACTORY
-    from label_farm.presses.tolerance import Tolerance
-    from label_farm.settings import FarmSettings
-    from label_farm.store.store import Store
-    from label_farm.workers.dask_pool import dask_engine
-    from label_farm.workers.pool import Pool
+    import tacdata as td
+    from label_farm.environment import idle_gpus
     from tacdata.labels import file_names
-    from tacdata.recording.files.reader import read_episode
-    from tacdata.recording.session import read_session
-    from tacdata.sensor import read_sensor
 
-    if follow:
-        _wait_for(session)
-    recorded = read_session(session)
-    if not recorded.episodes and not follow:
-        raise UsageError(f"{session} holds no finished recording", "at least one", "record: `tacdata record`")
-    settings = FarmSettings(
-        factory=factory or FACTORY,
-        ladder=Ladder(
-            load_step=load_step, unload_step=unload_step, tolerance=Tolerance(least=tolerance) if tolerance else None
-        ),
-        uncertainty=uncertainty,
-        workers=workers or (cores() if devices(device or ()) == ("cpu",) else len(devices(device or ()))),
-        devices=devices(device or ()),
-        redo=redo,
-        engine=dask_engine(dask) if dask else Pool,
-    )
     if hint := "" if dask else idle_gpus(device or ()):
         say(hint)
-    skin = read_sensor(sensor) if sensor else None
-    labels = file_names.folder(session)
-    paths = {int(path.stem[-6:]): path for path in recorded.episodes}
-    recordings = {number: partial(read_episode, path) for number, path in paths.items()}
-    flow = DatasetFlow(into, session, recorded.episodes, skin) if into else None
-    deliver = flow.deliver if flow else lambda *_: None
     with _Bars() as bars:
-        labelling = Labelling(labels, Store(store or file_names.store(labels)), settings, bars.show, deliver)
-        try:
-            later = GrowingSession(session, paths) if follow else None
-            summary = labelling.run(recordings, skin, paths, later)
-        finally:
-            if flow:
-                flow.say()
-    if later and later.remaining:
-        say(f"{later.remaining} presses of the plan were not recorded: label again when they are")
-    return _report(summary, labels, session)
-
-
-def _wait_for(session: Path) -> None:
-    """Wait until a recorder has made a folder with its first recording, or for long."""
-    from label_farm.growing_session import GrowingSession
-
-    coming = GrowingSession(session)
-    while not coming.new() and not coming.ended:
-        time.sleep(0.2)
+        summary = td.label(
+            session,
+            sensor=sensor,
+            store=store,
+            workers=workers,
+            devices=device or (),
+            redo=redo,
+            follow=follow,
+            load_step=load_step,
+            unload_step=unload_step,
+            tolerance=tolerance,
+            uncertainty=uncertainty,
+            into=into,
+            dask=dask,
+            factory=factory,
+            progress=bars.show,
+        )
+    if follow and (remaining := len(td.read_session(session).remaining)):
+        say(f"{remaining} presses of the plan were not recorded: label again when they are")
+    return _report(summary, file_names.folder(session), session)
 
 
 class _Bars:

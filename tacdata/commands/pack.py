@@ -27,37 +27,22 @@ def run(
     model: Annotated[str | None, typer.Option(help="Content hash of the skin model to insist on.")] = None,
 ) -> Result:
     """Write the recordings and their labels as a LeRobot v3 dataset."""
-    from tacdata.dataset.flags import carry_flags
-    from tacdata.dataset.format.features import asked_for
-    from tacdata.dataset.notes import carry_notes
-    from tacdata.dataset.pack import LabelFiles, pack, refuse_existing
-    from tacdata.labels import file_names
-    from tacdata.recording.files.reader import read_episode
-    from tacdata.recording.session import read_session
-    from tacdata.sensor import read_sensor
+    import tacdata as td
 
-    extra = asked_for(column or [])
-    refuse_existing(out, append)
-    found = read_session(session)
-    files = LabelFiles(labels or file_names.folder(session))
-    skin = read_sensor(sensor) if sensor else None
-    files.check(found.episodes, skin, model)
-    episodes = (read_episode(path) for path in found.episodes)
-
-    def done(episode, reason: str) -> None:
+    def show(episode: td.Episode, reason: str) -> None:
         say(f"  {episode.path.name}  " + (f"left out: {reason}" if reason else "packed"))
 
-    packed = pack(episodes, files, out, append=append, sensor=skin, model=model, extra=extra, done=done)
-    for name, _ in packed.left_out:
-        why = files.failure(session / name)
-        if why:
-            print(f"  {name} has no label because: {why}")
-    for path in found.unfinished:
-        print(f"  {path.name}  left out: the recording was broken off")
-    for flag in carry_flags(session, out):
+    packed = td.pack(
+        session, out, labels=labels, append=append, sensor=sensor, columns=column or (), model=model, progress=show
+    )
+    for name, reason in packed.failures.items():
+        print(f"  {name} has no label because: {reason}")
+    for name in packed.unfinished:
+        print(f"  {name}  left out: the recording was interrupted")
+    for flag in packed.flags:
         print(f"  {flag.file}  set aside, training leaves it out: {flag.reason}")
-    if carried := carry_notes(session, out):
-        print(f"  {carried} notes on stretches carried along")
+    if packed.notes:
+        print(f"  {packed.notes} notes on stretches copied")
     print(f"{packed.episodes} episodes, {packed.frames} frames in {out}")
     suggest("train", out)
     return Result(packed)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import sys
 import time
-from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tacdata.commands.command import PIPELINE, Result
 from tacdata.progress import bars, say, suggest
+
+if TYPE_CHECKING:
+    from tacdata.pipeline.simulate import SimulatedPresses
 
 ORDER = 45
 PANEL = PIPELINE
@@ -49,101 +51,73 @@ def run(
 
     The dataset is marked as simulated. Solved presses stay in their folder: more presses or other noise reuse them.
     """
-    from label_farm.environment import cores
-    from label_farm.simulated.crew import chosen_devices, solve_all
-    from label_farm.simulated.plan import DEFAULT, read_simulation_plan
-    from label_farm.simulated.press_effects import effects_of, with_effects
-    from label_farm.simulated.simulation import Simulation
-    from tacdata.errors import SolveError, UsageError
-    from tacdata.sensor import default_sensor, read_sensor
+    import tacdata as td
 
-    if out is None and solved is None:
-        raise UsageError("neither --out nor --solved", "a folder to write to", "add --out DATASET")
-    extra = _asked_for(column) if column else ()
-    folder = solved or Path(f"{out}.solved")
-    skin = read_sensor(sensor) if sensor else default_sensor()
-    drawn = read_simulation_plan(plan or DEFAULT)
-    for path in effects or ():
-        drawn = with_effects(drawn, effects_of(path))
-    simulation = Simulation(folder, drawn, skin, seed, mesh_error)
-    devices = chosen_devices(device)
-    simulation.check()
-    simulation.open()
-    missing = presses - len({n for n in simulation.settled if n < presses})
-    count = max(1, min(workers or (cores() if devices == ("cpu",) else len(devices)), missing))
-    solving = _Solving(missing)
-    if missing:
-        with solving:
-            solve_all(simulation, presses, devices, count, solving.settled)
-        solving.report()
-    given_up = solving.failed.total()
-    if given_up == presses:
-        raise SolveError("none of the presses has an equilibrium", "presses that the skin can take", "narrow the plan")
-    figures = {"solved": folder, "presses": presses, "new": missing, "given_up": given_up}
+    with _Bars() as bars:
+        done = td.simulate(
+            out,
+            presses,
+            plan=plan,
+            seed=seed,
+            sensor=sensor,
+            solved=solved,
+            device=device,
+            workers=workers,
+            mesh_error=mesh_error,
+            effects=effects or (),
+            columns=column or (),
+            progress=bars.show,
+        )
+    if done.new:
+        _report(done, bars.solving_seconds)
+    figures = {"solved": done.solved, "presses": presses, "new": done.new, "given_up": done.given_up.total()}
     if out is None:
         return Result(figures)
-    from label_farm.simulated.packing import write_dataset  # here: a computer that only solves needs no recorder
-
-    left_out = Counter[str]()
-    with bars() as bar:
-        task = bar.add_task("writing episodes", total=presses)
-
-        def done(number: int, reason: str) -> None:
-            left_out.update([reason] if reason else [])
-            bar.update(task, advance=1)
-
-        episodes, total = write_dataset(simulation, presses, out, extra, done)
-    if not total:
-        raise SolveError(
-            f"none of {presses} presses is left: {left_out.most_common(1)[0][0]}",
-            "presses that the skin can take",
-            "solve anew into another --solved folder, or narrow the plan",
-        )
-    if left_out:
-        say(f"left out: {left_out.total()} solved presses; {left_out.most_common(1)[0][0]}")
+    if done.left_out:
+        say(f"left out: {done.left_out.total()} solved presses; {done.left_out.most_common(1)[0][0]}")
         say("an older release may have solved them: to have them too, solve anew into another --solved folder")
-    print(f"simulated dataset: {episodes} episodes, {total} frames, {len(simulation.specimens)} specimens in {out}")
-    say(f"solved presses stay in {folder}")
+    print(f"simulated dataset: {done.episodes} episodes, {done.frames} frames, {done.specimens} specimens in {out}")
+    say(f"solved presses stay in {done.solved}")
     suggest("train", out, "--out NETWORK")
-    return Result({**figures, "dataset": out, "episodes": episodes, "frames": total, "left_out": left_out.total()})
+    left_out = done.left_out.total()
+    return Result({**figures, "dataset": out, "episodes": done.episodes, "frames": done.frames, "left_out": left_out})
 
 
-class _Solving:
-    """A bar with the time that remains; a line now and then where there is no terminal."""
+class _Bars:
+    """A bar a stage, with the time that remains; a line now and then where there is no terminal."""
 
-    def __init__(self, presses: int) -> None:
-        self.failed: Counter[str] = Counter()
-        self._presses, self._done = presses, 0
+    def __init__(self) -> None:
         self._bar = bars(speed_estimate_period=24 * 3600.0)
+        self._tasks: dict = {}
+        self.solving_seconds = 0.0
 
-    def __enter__(self) -> None:
-        self._began = self._said = time.monotonic()
-        self._task = self._bar.add_task("solving presses", total=self._presses)
+    def __enter__(self) -> _Bars:
+        self._began = self._spoke = time.monotonic()
         if sys.stdout.isatty():
             self._bar.start()
+        return self
 
     def __exit__(self, *exception: object) -> None:
         self._bar.stop()
 
-    def settled(self, number: int, reason: str) -> None:
-        """Count a press that is solved or given up."""
-        self._done += 1
-        self.failed.update([reason] if reason else [])
-        self._bar.update(self._task, completed=self._done)
-        if not sys.stdout.isatty() and time.monotonic() - self._said > SAY_SECONDS:
-            self._said = time.monotonic()
-            left = (self._said - self._began) * (self._presses - self._done) / self._done
-            say(f"  press {self._done} of {self._presses} solved, about {left / 60:.0f} min left")
-
-    def report(self) -> None:
-        """Say how many were solved, how fast, and why others were given up."""
-        hours, lost = (time.monotonic() - self._began) / 3600, self.failed.total()
-        print(f"presses solved: {self._presses - lost}, given up: {lost}; {self._presses / hours:.0f} an hour")
-        for reason, times in self.failed.most_common(3):
-            print(f"  given up {times} times: {reason.splitlines()[0]}")
+    def show(self, stage: str, done: int, total: int) -> None:
+        """Move the bar of a stage."""
+        if stage not in self._tasks:
+            names = {"solve": "solving presses", "write": "writing episodes"}
+            self._tasks[stage] = self._bar.add_task(names[stage], total=total)
+        self._bar.update(self._tasks[stage], completed=done)
+        if stage != "solve":
+            return
+        self.solving_seconds = time.monotonic() - self._began
+        if not sys.stdout.isatty() and time.monotonic() - self._spoke > SAY_SECONDS:
+            self._spoke = time.monotonic()
+            minutes = self.solving_seconds * (total - done) / done / 60
+            say(f"  press {done} of {total} solved, about {minutes:.0f} min left")
 
 
-def _asked_for(names: list[str]) -> tuple[str, ...]:
-    from tacdata.dataset.format import features
-
-    return features.asked_for(names)
+def _report(done: SimulatedPresses, seconds: float) -> None:
+    """Print how many presses were solved, how fast, and why others were given up."""
+    lost = done.given_up.total()
+    print(f"presses solved: {done.new - lost}, given up: {lost}; {done.new / seconds * 3600:.0f} an hour")
+    for reason, times in done.given_up.most_common(3):
+        print(f"  given up {times} times: {reason.splitlines()[0]}")

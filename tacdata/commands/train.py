@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress as Bar
 
-    from training.frames.frames import Frames
     from training.inference.checkpoint import Checkpoint
     from training.train import Progress
 
@@ -71,61 +70,56 @@ def run(
     """
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-    from training.frames.data import read_frames
-    from training.pretraining.recipe import recipe
-    from training.pretraining.shipped import pretrained
-    from training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
-    from training.tensorboard import event_log
-    from training.train import METRICS, train
+    import tacdata as td
+    from training.train import METRICS
 
-    begun = pretrained(start) if start else None
-    asked = {
-        "network": network,
-        "split": split,
-        "seed": seed,
-        "epochs": epochs,
-        "batch_size": batch_size,
-        "learning_rate": learning_rate,
-        "schedule": schedule,
-        "mirror": mirror,
-        "calibrate": calibrate,
-        "gain_jitter": gain_jitter,
-        "scale_jitter": scale_jitter,
-        "exponent_jitter": exponent_jitter,
-        "spread_jitter": spread_jitter,
-        "idle_share": idle_share,
-        "precision": precision,
-    }
-    settings = recipe(asked, begun, simulated is not None)
-    frames = read_frames(dataset)
-    mixed = read_frames(simulated) if simulated else None
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    log = event_log(out) if tensorboard else lambda progress: None
     with bars(*columns) as bar:
-        show = _listener(bar)
-
-        def listen(progress: Progress) -> None:
-            show(progress)
-            log(progress)
-
-        best = train(frames, settings, out, device, resume, threads, listen, compiled, begun, mixed)
-        if leave_out is not None:
-            calibrate_on_unseen_shapes(best, frames, leave_out, device, threads, begun, mixed, lambda group: show)
+        trained = td.train(
+            dataset,
+            out,
+            start=start,
+            simulated=simulated,
+            device=device,
+            threads=threads,
+            compiled=compiled,
+            leave_out=leave_out,
+            tensorboard=tensorboard,
+            resume=resume,
+            progress=_listener(bar),
+            network=network,
+            split=split,
+            seed=seed,
+            epochs=epochs,
+            batch_size=batch_size,
+            learning_rate=learning_rate,
+            schedule=schedule,
+            mirror=mirror,
+            calibrate=calibrate,
+            gain_jitter=gain_jitter,
+            scale_jitter=scale_jitter,
+            exponent_jitter=exponent_jitter,
+            spread_jitter=spread_jitter,
+            idle_share=idle_share,
+            precision=precision,
+        )
+    best = trained.checkpoint
     document = best.document
     parts = ", ".join(f"{len(document['split'][part])} {part}" for part in ("train", "validation", "test"))
     print(f"episodes: {parts} (split {document['split']['name']!r})")
-    _say_calibration(best, frames)
+    _say_calibration(best, dataset)
     print(f"best epoch {document['epoch']}: validation loss {document['best']['validation_loss']:.5f}")
     print(f"checkpoint {best.path}\nmetrics    {out / METRICS}")
     suggest("evaluate", out)
     return Result({**document, "checkpoint": best.path})
 
 
-def _say_calibration(best: Checkpoint, frames: Frames) -> None:
+def _say_calibration(best: Checkpoint, dataset: Path) -> None:
     """Say how readings become forces, and what the presses cannot tell."""
     import numpy as np
 
     from training.frames.channel_calibration import doubts
+    from training.frames.data import read_frames
 
     known = best.calibration
     if not known:
@@ -141,7 +135,7 @@ def _say_calibration(best: Checkpoint, frames: Frames) -> None:
             f"the model spreads a load {wider} than this skin, and its forces are spread alike: variance "
             f"{known.spread:+.2f} ± {known.spread_error:.2f} mm²"
         )
-    for words in doubts(known, frames, best.split.train):
+    for words in doubts(known, read_frames(dataset), best.split.train):
         print(f"note: {words}")
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 from tacdata.dataset.reader import Dataset, read_dataset
-from tacdata.errors import UsageError
 from tacdata.paths import StrPath
 from tacdata.pipeline.trained_network import TrainedNetwork, read_network
 from training.frames.data import frames_of
@@ -39,17 +37,5 @@ def evaluate(
         FormatError: If the dataset is of another sensor, or lacks episodes of the split.
     """
     trained = network if isinstance(network, TrainedNetwork) else read_network(network)
-    scored = dataset if isinstance(dataset, Dataset) else read_dataset(dataset or training_dataset(trained))
+    scored = dataset if isinstance(dataset, Dataset) else read_dataset(dataset or trained.training_folder)
     return score_network(trained.checkpoint, frames_of(scored), device, threads, progress)
-
-
-def training_dataset(trained: TrainedNetwork) -> Path:
-    """Return the folder of the dataset that a network was trained on.
-
-    Raises:
-        UsageError: If it is not there.
-    """
-    recorded = Path(trained.checkpoint.document["dataset"]["path"])
-    if not recorded.is_dir():
-        raise UsageError(f"the dataset {recorded} of {trained.path} is not there", "a dataset folder", "give --dataset")
-    return recorded

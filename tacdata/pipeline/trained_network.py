@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata import provenance
 from tacdata.display import Displayed
+from tacdata.errors import UsageError
 from tacdata.paths import StrPath
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
@@ -40,6 +41,20 @@ class TrainedNetwork(Displayed):
     def path(self) -> Path:
         """The checkpoint file."""
         return self.checkpoint.path
+
+    @property
+    def training_folder(self) -> Path:
+        """The folder of the dataset that it was trained on.
+
+        Raises:
+            UsageError: If it is not there.
+        """
+        recorded = Path(self.checkpoint.document["dataset"]["path"])
+        if not recorded.is_dir():
+            raise UsageError(
+                f"the dataset {recorded} of {self.path} is not there", "a dataset folder", "give --dataset"
+            )
+        return recorded
 
     def predict(self, episode: Episode) -> PredictedMaps:
         """Return the depth map of each reading of an episode.
