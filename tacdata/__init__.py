@@ -13,6 +13,7 @@ lines, draw themselves by ``plot()``, and show both in a notebook.
 
 **Steps of the pipeline.** `check`, `label`, `pack`, `train`, `evaluate`, `import_files`, `simulate`, `judge`: the verbs
 of the command line call the same functions. ``indenter("sphere", radius=4.0)`` gives a shape to press with.
+`add_plugins` adds a folder of your own drivers, indenters, materials, effects, networks or viewers.
 
 **Errors.** Bad input raises a `TacdataError`: `UsageError`, `FormatError`, `SolveError`, `DeviceError`, `PackageError`.
 
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from tacdata.recording.episode import Episode
     from tacdata.recording.files.reader import read_episode
     from tacdata.recording.session import Session, read_session
+    from tacdata.registry import add_folder as add_plugins
     from tacdata.sensor.sensor import Sensor, read_sensor
 
     __version__: str
@@ -84,6 +86,7 @@ _HOMES = {
     "tacdata.recording.episode": ("Episode",),
     "tacdata.recording.files.reader": ("read_episode",),
     "tacdata.recording.session": ("Session", "read_session"),
+    "tacdata.registry": ("add_plugins=add_folder",),
     "tacdata.sensor.sensor": ("Sensor", "read_sensor"),
 }
 """Module -> the public names that it holds; ``Public=Name`` where the public name is another one."""

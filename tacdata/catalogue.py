@@ -69,12 +69,11 @@ def members(name: str) -> list[RegistryMember]:
             f"did you mean {close[0]!r}?" if close else "tacdata list shows them all",
         )
     room, base = known[name].room, known[name].base
-    return [_member(_folder(room), member) for member in registry.names(room, base)]
+    return [_member(room, member) for member in registry.names(room, base)]
 
 
-def _member(folder: Path, name: str) -> RegistryMember:
-    path = folder / f"{name}.py" if (folder / f"{name}.py").exists() else folder / name / "__init__.py"
-    tree = _parse(path)
+def _member(room: str, name: str) -> RegistryMember:
+    tree = _parse(registry.source(room, name))
     classes = [n for n in tree.body if isinstance(n, ast.ClassDef) and not n.name.startswith("_")]
     return RegistryMember(name, _first_line(tree), tuple(field for kind in classes for field in _fields(kind)))
 

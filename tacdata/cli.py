@@ -10,6 +10,7 @@ import re
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext, redirect_stdout
+from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
 
@@ -218,6 +219,7 @@ def main() -> None:
     """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
     stages.follow()
     try:
+        registry.add_project(Path.cwd())
         ended = _command(_verbs())(prog_name="tacdata", standalone_mode=False)
         # A verb that ends with a code returns it, a member of Exit.
         raise SystemExit(int(ended) if isinstance(ended, int) else 0)

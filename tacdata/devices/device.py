@@ -259,17 +259,29 @@ def create(settings: dict[str, Any], kind: type[Device], clock: Clock) -> Any:
     """Build the device that a rig file's entry describes (``{"driver": name, ...}``).
 
     Raises:
-        UsageError: If no such driver exists or it has no such setting.
+        UsageError: If no such driver exists, it has no such setting, or a setting is missing.
     """
     values = dict(settings)
     driver = values.pop("driver")
     maker = registry.load(ROOM, BASE, driver, kind)
-    allowed = [name for name in inspect.signature(maker).parameters if name != "clock"]
+    parameters = {name: setting for name, setting in inspect.signature(maker).parameters.items() if name != "clock"}
+    allowed = list(parameters)
     unknown = sorted(set(values) - set(allowed))
     if unknown:
         raise UsageError(
             f"driver {driver}: setting {', '.join(unknown)} in the rig file",
             ", ".join(allowed),
             "correct the name in the rig file",
+        )
+    missing = [
+        name
+        for name, setting in parameters.items()
+        if setting.default is setting.empty and setting.kind is not setting.VAR_KEYWORD and name not in values
+    ]
+    if missing:
+        raise UsageError(
+            f"driver {driver} without {', '.join(missing)} in the rig file",
+            ", ".join(allowed),
+            f"add {missing[0]} below driver: {driver}",
         )
     return maker(clock=clock, **values)

@@ -227,7 +227,7 @@ def from_document(document: dict[str, Any], origin: str = "indenter", folder: Pa
             ...
         tacdata.errors.UsageError: 'cube' is not among the indenters
           allowed: cone, cylinder, ellipsoid, flat_punch, mesh, pair, prism, ring, sphere, square_punch
-          next:    choose one, or add tacdata/indenters/cube.py
+          next:    choose one, or add indenters/cube.py as a plug-in (docs/how_to/plug_ins.md)
     """
     values = dict(document)
     shape = values.pop("shape", None)

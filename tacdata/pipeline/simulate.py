@@ -6,18 +6,21 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from label_farm.environment import cores
 from label_farm.simulated.crew import chosen_devices, solve_all
 from label_farm.simulated.plan import DEFAULT, read_simulation_plan
 from label_farm.simulated.press_effects import effects_of, with_effects
 from label_farm.simulated.simulation import Simulation
-from tacdata.dataset.format.features import asked_for
-from tacdata.dataset.reader import Dataset, read_dataset
 from tacdata.errors import SolveError, UsageError
 from tacdata.paths import StrPath
 from tacdata.sensor import Sensor, default_sensor, read_sensor
 
+if TYPE_CHECKING:
+    from tacdata.dataset.reader import Dataset
+
+# A computer that only solves needs no recorder: what packs a dataset is imported when one is asked for.
 SOLVE, WRITE = "solve", "write"
 """Stages."""
 
@@ -57,6 +60,8 @@ class SimulatedPresses:
         """
         if self.root is None:
             raise UsageError("presses were only solved", "a dataset", "simulate again with a dataset folder")
+        from tacdata.dataset.reader import read_dataset
+
         return read_dataset(self.root)
 
 
@@ -98,7 +103,7 @@ def simulate(
     """
     if out is None and solved is None:
         raise UsageError("neither --out nor --solved", "a folder to write to", "add --out DATASET")
-    extra = asked_for(list(columns)) if columns else ()
+    extra = _optional(columns) if columns else ()
     folder = Path(solved or f"{out}.solved")
     given = default_sensor() if sensor is None else sensor
     ranges = read_simulation_plan(Path(plan) if plan else DEFAULT)
@@ -115,7 +120,7 @@ def simulate(
         raise SolveError("none of the presses has an equilibrium", "presses that the skin can take", "narrow the plan")
     if out is None:
         return SimulatedPresses(folder, presses, missing, given_up)
-    from label_farm.simulated.packing import write_dataset  # here: a computer that only solves needs no recorder
+    from label_farm.simulated.packing import write_dataset
 
     left_out, done = Counter[str](), 0
 
@@ -134,6 +139,12 @@ def simulate(
         )
     specimens = len(simulation.specimens)
     return SimulatedPresses(folder, presses, missing, given_up, Path(out), episodes, frames, specimens, left_out)
+
+
+def _optional(columns: Sequence[str]) -> tuple[str, ...]:
+    from tacdata.dataset.format.features import asked_for
+
+    return asked_for(list(columns))
 
 
 def _solve(

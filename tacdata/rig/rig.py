@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata import documents, provenance
+from tacdata import documents, provenance, registry
 from tacdata.clock import Clock
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
@@ -178,11 +178,14 @@ def from_document(document: dict[str, Any], origin: str) -> Rig:
 
 
 def read_rig(path: StrPath) -> Rig:
-    """Read a rig file.
+    """Read a rig file; the plug-ins that it names are available from then on.
 
     Raises:
-        UsageError: If it does not exist.
+        UsageError: If it does not exist, or its folder of plug-ins.
         FormatError: If it is damaged or contradicts itself.
     """
     path = Path(path)
-    return from_document(documents.read(path, "rig"), str(path))
+    document = documents.read(path, "rig")
+    if "plugins" in document:
+        registry.add_folder(path.parent / document["plugins"])
+    return from_document(document, str(path))

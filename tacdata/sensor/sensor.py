@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, registry
 from tacdata.errors import FormatError
 from tacdata.paths import StrPath
 from tacdata.sensor.adhesion import Adhesion
@@ -248,10 +248,10 @@ def _check_contact(sensor: Sensor, origin: str) -> None:
 
 
 def read_sensor(path: StrPath) -> Sensor:
-    """Read a sensor file.
+    """Read a sensor file; the plug-ins that it names are available from then on.
 
     Raises:
-        UsageError: If it does not exist.
+        UsageError: If it does not exist, or its folder of plug-ins.
         FormatError: If it is damaged or contradicts itself.
 
     Example:
@@ -264,7 +264,10 @@ def read_sensor(path: StrPath) -> Sensor:
         array([-7.5, -7.5])
     """
     path = Path(path)
-    return Sensor.from_document(documents.read(path, "sensor"), str(path), path.parent)
+    document = documents.read(path, "sensor")
+    if "plugins" in document:
+        registry.add_folder(path.parent / document["plugins"])
+    return Sensor.from_document(document, str(path), path.parent)
 
 
 def default_sensor() -> Sensor:
