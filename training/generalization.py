@@ -46,7 +46,7 @@ def generalize(
     threads: int | None = None,
     begun: Callable[[TrainingSettings], Callable[[Progress], None]] = lambda settings: lambda progress: None,
 ) -> list[SplitOutcome]:
-    """Train and score ``recipe`` on every split and seed; what is finished in ``out`` is kept, what is begun goes on.
+    """Train and score ``recipe`` on every split and seed; finished runs in ``out`` are kept, others continue.
 
     Args:
         frames: The dataset.

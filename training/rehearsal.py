@@ -1,4 +1,4 @@
-"""Rehearsal: simulated frames mixed into training on recorded ones, so that what they taught is not forgotten.
+"""Rehearsal: simulated frames mixed into training on recorded ones, to prevent forgetting.
 
 A few recorded presses show a small part of the skin. Trained on them alone, a network forgets the rest (R. French,
 Trends in Cognitive Sciences 3 (1999) 128). Each step therefore takes as many simulated frames as recorded ones.

@@ -38,11 +38,11 @@ class TrainingSettings:
     schedule: str = "constant"
     """Course of the learning rate over the epochs: "constant", or "cosine" down to a fiftieth."""
     mirror: bool = False
-    """Mirror half of the frames about x and half about y, signals and labels alike: taxels and map are symmetric."""
+    """Mirror half of the frames about x and half about y, signals and labels: taxels and map are symmetric."""
     gain_jitter: float = 0.0
     """Standard deviation of a factor drawn for each channel of each frame [1]: other specimens' gains."""
     scale_jitter: float = 0.0
-    """Standard deviation of a factor drawn for each frame, all channels alike [1]: a unit's gain is uncertain."""
+    """Standard deviation of a factor drawn for each frame, common to all channels [1]: a unit's gain is uncertain."""
     exponent_jitter: float = 0.0
     """Standard deviation of a change of the exponent drawn for each frame [1]: a unit's law is uncertain."""
     spread_jitter: float = 0.0
@@ -51,10 +51,10 @@ class TrainingSettings:
     calibrate: bool = False
     """Turn readings into forces first, by a calibration fitted on the training presses."""
     pull: float = 0.0
-    """Weight of the squared distance from the pretrained weights [1], of 10 presses to train on or fewer; beside more
+    """Weight of the squared distance from the pretrained weights [1], for 10 training presses or fewer; with more
     it falls as one over their number (L2-SP; X. Li et al., ICML 2018)."""
     idle_share: float = 1.0
-    """Share of the frames without contact in their label that an epoch takes, drawn anew [1]; the others all count."""
+    """Share of the frames without contact that an epoch takes, drawn each epoch [1]; the others all count."""
     precision: str = "float32"
     """Arithmetic of the forward pass while training: "float32" or "bfloat16"; weights are float32 in both."""
 
@@ -98,7 +98,7 @@ class TrainingSettings:
 
     @property
     def title(self) -> str:
-        """The network, and what the recipe changes of the paper's, in words."""
+        """The network, and the changes of the recipe from the paper's."""
         paper = TrainingSettings()
         changed = [f"{k} {v}" for k, v in self.arguments.items()]
         names = (

@@ -1,4 +1,4 @@
-"""The metrics of a run as an event file that TensorBoard shows, beside metrics.jsonl."""
+"""The metrics of a run as an event file for TensorBoard, in addition to metrics.jsonl."""
 
 from __future__ import annotations
 

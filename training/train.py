@@ -56,7 +56,7 @@ class Progress:
 
 @dataclass
 class _Run:
-    """What the loop changes from step to step."""
+    """State of the loop."""
 
     network: Network
     optimizer: torch.optim.Optimizer
@@ -65,7 +65,7 @@ class _Run:
     epoch: int = 0
     """Epochs done."""
     forward: Callable[[torch.Tensor], torch.Tensor] = field(init=False)
-    """The network, or what the compiler made of it."""
+    """The network, compiled or not."""
 
     rehearsal: Rehearsal | None = None
     """Simulated frames that are mixed in."""
@@ -81,7 +81,7 @@ class _Run:
     def start(
         self, pretrained: checkpoint.Checkpoint | None, simulated: Frames | None, settings: TrainingSettings
     ) -> None:
-        """Take along what a pretrained network brings.
+        """Copy the state of a pretrained network.
 
         Raises:
             UsageError: If the run was started from another one, or with other simulated frames.
@@ -102,7 +102,7 @@ class _Run:
         if settings.pull and pretrained:
             weights = checkpoint.load(pretrained.path, place).network.parameters()
             self.origin = tuple(weight.detach() for weight in weights)
-            # The loss is a mean over frames, the pull a prior: beside more data it weighs less.
+            # The loss is a mean over frames, the pull a prior: with more data it weighs less.
             self.pull = settings.pull * min(1.0, _PULLED / len(self.document["split"]["train"]))
         if simulated:
             self.rehearsal = Rehearsal(simulated, pretrained, self.network, place)
@@ -142,7 +142,7 @@ def train(
         threads: CPU threads; by default one a core, at most `compute.THREADS`; others may change last bits.
         listener: Called after every step and every epoch.
         compiled: Let torch compile the network first; pays off on GPUs, and changes last bits.
-        pretrained: Start from its weights; it is calibrated anew to these frames.
+        pretrained: Start from its weights; it is calibrated again to these frames.
         simulated: Frames of a simulated dataset, of which each step takes as many (`training.rehearsal`).
         split: Division of the dataset; by default the settings' own.
 
@@ -307,7 +307,7 @@ def _optimizer(network: Network, settings: TrainingSettings) -> torch.optim.Opti
 
 
 def _circumstances(place: torch.device) -> dict[str, Any]:
-    """What besides the settings decides the last bits."""
+    """Environment that affects the last bits."""
     name = torch.cuda.get_device_name(place) if place.type == "cuda" else "cpu"
     return {"torch": torch.__version__, "device": name, "threads": torch.get_num_threads()}
 
@@ -324,7 +324,7 @@ def _epoch(
 ) -> float:
     """Run one pass over the training frames ``chosen`` (m,) and return the mean loss over them.
 
-    Those of which ``taken`` (m,) says no take part by chance.
+    Frames with ``taken`` (m,) false take part at random.
     """
     run.network.train()
     for group in run.optimizer.param_groups:
@@ -386,7 +386,7 @@ def _validate(
 
 
 def _keep(run: _Run, line: dict[str, Any], out: Path) -> None:
-    """Write the epoch down: best first, then last, so that a run cut between them repeats the epoch alike."""
+    """Write the epoch down: best first, then last, so that a run interrupted between them repeats the epoch."""
     document = run.document
     document["history"] = [*document["history"], line]
     document["epoch"] = run.epoch

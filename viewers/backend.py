@@ -1,4 +1,4 @@
-"""What a backend's file holds: one class that draws a scene."""
+"""The content of a backend's file: one class that draws a scene."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from viewers.scene.scene import Scene
 
 
 class Backend(ABC):
-    """Draws scenes. A backend decides how things look, never what they are."""
+    """Draws scenes. A backend decides the look, never the content."""
 
     @abstractmethod
     def draw(self, scene: Scene) -> None:

@@ -45,7 +45,7 @@ class Output:
         return [file for file in (self.save, self.picture, self.video) if file]
 
     def prepare(self) -> None:
-        """Import what is going to draw, which takes as long as reading a large file."""
+        """Import the drawing packages, which takes as long as reading a large file."""
         import viewers.scenes.episode
 
         import_module("trimesh.creation")  # of which indenters are made
@@ -55,7 +55,7 @@ class Output:
             import viewers.pictures.backend  # noqa: F401
 
     def check(self) -> None:
-        """Refuse what cannot be done, before anything is read.
+        """Refuse impossible requests, before anything is read.
 
         Raises:
             UsageError: If a file exists or has a wrong ending, or there is no display for a window.
@@ -72,7 +72,7 @@ class Output:
 
 
 def show(scene: Scene, output: Output) -> None:
-    """Write the files that were asked for, then open what is to be opened.
+    """Write the requested files, then open the windows.
 
     Raises:
         UsageError: If a file exists, or the viewer breaks down.

@@ -21,10 +21,10 @@ def scene_at(
 
     Args:
         path: A recording, session, dataset, demonstration, folder of targets, verdict or revision (`viewers.kinds`).
-        labels: Folder of labels; without it ``labels`` beside the recording, if it is there.
+        labels: Folder of labels; without it ``labels`` in the folder of the recording, if there is one.
         predictions: Folder of predictions, or a training run.
         episode: Its number in the folder; without it the first.
-        meanwhile: What can be done while a large file is read.
+        meanwhile: Work to do while a large file is read.
 
     Raises:
         UsageError: If there is nothing to view, or a named folder holds nothing.

@@ -1,1 +1,1 @@
-"""The verbs, one file each; see `command.py` for what a file must hold."""
+"""The verbs, one file each; see `command.py` for the required content of a file."""

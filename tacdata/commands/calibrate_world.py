@@ -1,4 +1,4 @@
-"""Find where a camera stands in the world."""
+"""Estimate the pose of a camera in the world."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def run(
     camera: Annotated[str, typer.Option(help="With --board: name of the camera in the demo rig.")] = "camera",
     frame: Annotated[str, typer.Option(help="With --board: name of the world.")] = "board",
 ) -> Result:
-    """Find where a camera stands: by a robot that carries a tag cube (hand-eye), or by a board on the table."""
+    """Estimate the pose of a camera: by a robot that carries a tag cube (hand-eye), or by a board on the table."""
     import numpy as np
 
     from tacdata import documents

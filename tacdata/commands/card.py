@@ -19,7 +19,7 @@ def run(
         Path | None, typer.Option(help="New folder for card.md and coverage.png; else only printed.")
     ] = None,
 ) -> Result:
-    """Say what is inside a dataset: sensor, indenters, coverage, model version, origin of the labels, known gaps."""
+    """Summarize a dataset: sensor, indenters, coverage, model version, origin of the labels, known gaps."""
     from tacdata import documents
     from tacdata.dataset import card, coverage_picture
     from tacdata.dataset.reader import read_dataset

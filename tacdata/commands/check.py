@@ -32,14 +32,14 @@ def run(
 
 
 def checked(path: Path, folder: Path) -> Report:
-    """Check a recording or session, say what was found, and leave it in a folder, with a picture."""
+    """Check a recording or session, print the findings, and write them to a folder, with a picture."""
     import tacdata as td
     from tacdata import documents
     from viewers.pictures.check import draw
 
     report = td.check(path)
     stem = "check" if path.is_dir() else f"{path.stem}.check"
-    print(report.text, flush=True)  # whatever becomes of the files beside it
+    print(report.text, flush=True)  # even if other files fail
     documents.write(folder / f"{stem}.json", report.document, "check")
     if report.episodes:
         draw(report, folder / f"{stem}.png")

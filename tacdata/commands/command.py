@@ -1,11 +1,11 @@
-"""What a verb's file holds. Copy this shape; no other file needs to change.
+"""The content of a verb's file. Copy this shape; no other file needs to change.
 
 A module in this folder named ``my_verb.py`` becomes ``tacdata my-verb``. It holds
 
 - ``ORDER``: its place in ``tacdata --help`` (record 10, check 20, label 30, pack 40, train 50, evaluate 60, view 70;
   tools around the pipeline from 100 on);
-- ``PANEL``: ``PIPELINE`` or ``TOOLS``, the heading it stands under;
-- ``run(...)``: a Typer command. Its docstring's first line is what ``--help`` shows. Heavy imports stay inside it.
+- ``PANEL``: ``PIPELINE`` or ``TOOLS``, its heading;
+- ``run(...)``: a Typer command. ``--help`` shows the first line of its docstring. Heavy imports stay inside it.
   Bad input raises a `tacdata.errors.TacdataError`; the command line prints it and exits with its code.
 
 A verb that finds something out prints it and returns it as a `Result`. The command line then gives it ``--json``. Every
@@ -32,7 +32,7 @@ TOOLS = "Around it"
 
 @dataclass(frozen=True)
 class Result:
-    """What a verb found, for ``--json``, and how it ends."""
+    """Result of a verb, for ``--json``, and how it ends."""
 
     document: Any
     """Dictionaries, lists, numbers, texts, paths, arrays and dataclasses."""
@@ -56,7 +56,7 @@ def before_it_moves() -> Iterator[None]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value in JSON's types: arrays as lists, what is not finite as null."""
+    """Return a value in JSON's types: arrays as lists, values that are not finite as null."""
     if is_dataclass(value) and not isinstance(value, type):
         return plain(asdict(value))
     if isinstance(value, dict):

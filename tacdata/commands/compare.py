@@ -1,4 +1,4 @@
-"""Compare two label versions, two networks, or a model with what was measured."""
+"""Compare two label versions, two networks, or a model with measurements."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def run(
     video: Annotated[Path | None, typer.Option(help="Write a film (.mp4 or .gif) instead of opening a window.")] = None,
     web: Annotated[bool, typer.Option("--web", help="Serve Rerun's web viewer on this machine.")] = False,
 ) -> Result:
-    """Show two label versions, two networks, or models and measurement beside each other and as difference."""
+    """Show two label versions, two networks, or models and measurement side by side and as difference."""
     from viewers import comparison, showing
 
     output = showing.Output(save, picture, video, web)
@@ -76,13 +76,13 @@ def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:
     if len(models) == 1:
         name, own = next(iter(models.items()))
         effects = " and ".join(entry["effect"] for entry in own.document["effects"])
-        if effects:  # what the effects do is seen beside the same model without them
+        if effects:  # effects show in a comparison with the same model without them
             bare = replace(own, document={**own.document, "effects": []})
             models = {f"without {effects}": bare, f"with {effects}": own}
     for name, spec in models.items():
         held = Comparison(course, spec)
         own = held.predicted(held.before.response, [])[rows]
-        said[name] = own + (measured - own).mean(axis=0)  # the offset of a press says nothing of a model
+        said[name] = own + (measured - own).mean(axis=0)  # the offset of a press is no property of a model
     time = np.round(1e9 * (course.time[rows] - course.time[rows[0]])).astype(np.int64)
     title = f"{path.resolve().name}/{chosen}: model and measurement"
     shape, unit = array_of(path, course.channels)

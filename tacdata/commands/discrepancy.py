@@ -54,7 +54,7 @@ def run(
 
 
 def _solved(recordings: list[Path], spec: Path | None, out: Path) -> Path:
-    """Solve what the recordings pressed; return the spec that starts from it."""
+    """Solve the presses of the recordings; return the spec that starts from it."""
     from tacdata.commands import surrogate
     from tacdata.errors import UsageError
 

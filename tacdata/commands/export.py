@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 ORDER = 121
 PANEL = TOOLS
 SESSION = "session.json"
-"""What a folder of recorded presses holds."""
+"""Content of a folder of recorded presses."""
 
 
 def run(
@@ -87,7 +87,7 @@ def _presses(session: Path) -> Iterator[Demonstration]:
 
 
 def _notes(targets: FingertipTargets) -> list[str]:
-    """Return what a person should know of compensated targets: what was not felt, and what was not known."""
+    """Return remarks on compensated targets: missing readings, and unknown quantities."""
     made = targets.source
     if made is None or targets.kind == "direct":
         return []

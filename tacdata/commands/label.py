@@ -132,7 +132,7 @@ def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:
     if summary.found:
         print(f"presses taken from the store: {summary.found}")
     if summary.seconds:
-        # Presses go in fours, and the first of a model waits for it: only the mean says what one costs.
+        # Presses go in fours, and the first of a model waits for it: so only the mean is the cost of one.
         mean = statistics.fmean(summary.seconds)
         print(f"presses solved: {len(summary.seconds)}, {mean:.0f} s of a worker each, on average")
     _report_margins(summary)

@@ -1,4 +1,4 @@
-"""List what can be chosen by name, and its parameters."""
+"""List members of registries by name, with their parameters."""
 
 from __future__ import annotations
 

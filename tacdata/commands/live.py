@@ -90,13 +90,13 @@ def run(
 
 
 def _tare_at_enter(loop: LiveLoop) -> None:
-    """Tare anew at every line that a person types."""
+    """Tare again at every typed line."""
     for _ in sys.stdin:
         loop.tare()
 
 
 def _mode(name: str, ahead: int, causal: bool, rate: float) -> str:
-    """Say what the network's look-ahead costs."""
+    """Print the delay by the network's look-ahead."""
     wait = f"{ahead} frames, {1000 * ahead / rate:.0f} ms at {rate:g} Hz"
     if ahead <= 0:
         return f"network {name} needs no later frames: each estimate is of the newest one"
@@ -110,7 +110,7 @@ def _mode(name: str, ahead: int, causal: bool, rate: float) -> str:
 
 @contextmanager
 def _stopping(loop: LiveLoop) -> Iterator[None]:
-    """Ctrl-C ends the loop and lets it say what it measured."""
+    """Ctrl-C ends the loop and prints the measured figures."""
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, lambda *_: loop.stop()) for number in numbers]
     try:

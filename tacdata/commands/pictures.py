@@ -1,4 +1,4 @@
-"""Draw the pictures of README and tutorial anew."""
+"""Draw the pictures of README and tutorial."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def run(
     verdict: Annotated[Path | None, typer.Option(help="A verdict folder, for its page too.")] = None,
     demonstration: Annotated[Path | None, typer.Option(help="A tracked demonstration, for its page too.")] = None,
 ) -> Result:
-    """Draw the pictures of README and tutorial from what the demo made: small enough for the repository."""
+    """Draw the pictures of README and tutorial from the files of the demo: small enough for the repository."""
     from tacdata.errors import UsageError
     from viewers.browse.list_sources import episodes_at
     from viewers.pictures.small_pictures import small_film, small_page

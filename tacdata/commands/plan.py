@@ -69,7 +69,7 @@ def run(
 def _document(
     what: str, skin: Sensor, presses: int | None, seed: int, indenter: list[str] | None
 ) -> tuple[dict[str, Any], bool]:
-    """Return the plan's document, and whether it was read from a plan's file as it stands."""
+    """Return the plan's document, and whether it was read unchanged from a plan's file."""
     from tacdata.errors import UsageError
     from tacdata.plans.recipe import write_out
     from tacdata.plans.shipped.shipped_plan import PlanOptions, shipped_plan

@@ -21,7 +21,7 @@ def run(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="New folder for protocols.json and protocols.md.")] = None,
 ) -> Result:
-    """Evaluate labels and predictions against the prescribed contact, with the paper's rows beside.
+    """Evaluate labels and predictions against the prescribed contact, with the paper's rows for comparison.
 
     The plan that `tacdata plan evaluation` writes holds 78 depth and 40 position trials; presses whose purpose is
     "wearing trial" are scored by participant. Where no press of the dataset has a purpose, each counts as both.

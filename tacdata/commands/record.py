@@ -1,4 +1,4 @@
-"""Press a sensor as a plan says and record every press."""
+"""Press a sensor by a plan and record every press."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def run(
     ] = None,
     demonstrations: Annotated[int, typer.Option(min=1, help="With --demo: how many.")] = 1,
 ) -> Result:
-    """Press the sensor as the plan says and record every press to its own MCAP file; or --demo, by hand."""
+    """Press the sensor by the plan and record every press to its own MCAP file; or --demo, by hand."""
     if demo:
         unwanted = {"--plan": plan, "--sensor": sensor, "--registration": registration, "--live": live}
         named = [k for k, v in unwanted.items() if v is not None]

@@ -1,4 +1,4 @@
-"""Find where the sensor lies in the guide's frame."""
+"""Estimate the pose of the sensor in the guide's frame."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def run(
     weight = {} if mass is None else {"mass": mass}
     scene = scene_of(name, thing, None if radius is None else radius / 1000, stiffness=stiffness, **weight)
     known, chosen = {"compensated": read_gains(gains).of(name)}, None
-    # Before the search: it may fail by what is said here.
+    # Before the search: these remarks may explain its failure.
     for one in {one.recording_hash: one for one in (source, *made)}.values():
         seen = Trials(one, {}, scene).seen
         if not with_guesses:

@@ -1,4 +1,4 @@
-"""Do what follows a verdict: add, relabel, show, next."""
+"""Revise a model by a verdict: add the effect, relabel, show the gap, plan presses."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def run(
     ] = None,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> Result:
-    """Add what a verdict named to the model, show the gap before and after, and plan the next presses."""
+    """Add the named effects of a verdict to the model, show the gap before and after, and plan the next presses."""
     from label_farm.labelling import FarmSettings
     from label_farm.presses.model import FACTORY
     from tacdata.discrepancy.model.spec import read_spec

@@ -30,7 +30,7 @@ def run(
     capacity: Annotated[int, typer.Option(min=1, help="Presses in work at a time; about 100 on a card.")] = 1,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what it takes and stop.")] = False,
 ) -> Result:
-    """Solve what a session pressed by finite elements: the base that tacdata discrepancy --spec starts from."""
+    """Solve the presses of a session by finite elements: the base of tacdata discrepancy --spec."""
     from tacdata.skin.mesh.build import MeshSettings
     from tacdata.stages import clock_face
     from tacdata.surrogate import TableSettings, work, written_spec

@@ -115,7 +115,7 @@ def run(
 
 
 def _say_calibration(best: Checkpoint, dataset: Path) -> None:
-    """Say how readings become forces, and what the presses cannot tell."""
+    """Print the calibration of readings to forces, and its undetermined quantities."""
     import numpy as np
 
     from training.frames.channel_calibration import doubts
@@ -140,7 +140,7 @@ def _say_calibration(best: Checkpoint, dataset: Path) -> None:
 
 
 def _listener(bar: Bar) -> Callable[[Progress], None]:
-    """Return what shows the progress of a run: a bar for the epochs, one for the steps, a line an epoch."""
+    """Return the progress display of a run: a bar for the epochs, one for the steps, a line an epoch."""
     epochs, steps = bar.add_task("epochs", total=None), bar.add_task("steps ", total=None)
 
     def show(progress: Progress) -> None:

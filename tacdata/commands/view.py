@@ -35,7 +35,7 @@ def run(
         Path | None, typer.Option(help="Write a layout (.json) with which Foxglove shows the recording itself.")
     ] = None,
 ) -> Result:
-    """Look at an episode, a demonstration, targets or a verdict, in a window or browser, or save what is to be seen."""
+    """Look at an episode, a demonstration, targets or a verdict, in a window or browser, or save the view."""
     from viewers import output_file, showing
     from viewers.live import following
     from viewers.source import scene_at

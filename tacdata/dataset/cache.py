@@ -22,7 +22,7 @@ from tacdata.dataset.format import folder, tiff
 from tacdata.errors import FormatError
 
 LAYOUT = 1
-"""Raised when the files change their meaning, so that old ones are made anew."""
+"""Raised when the files change their meaning, so that old ones are rebuilt."""
 
 
 def cache_root() -> Path:

@@ -1,4 +1,4 @@
-"""The data card: what is inside a dataset, where it comes from, and what it lacks, as Markdown."""
+"""The data card: content, origin and gaps of a dataset, as Markdown."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def card(dataset: Dataset) -> str:
 
 
 def _simulated(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
-    """Say first of all that nobody recorded it, and what it was drawn from."""
+    """Begin with the note that it is simulated, and from which ranges."""
     drawn = Counter(f"plan {r.simulated['plan']}, seed {r.simulated['seed']}" for r in records if r.simulated)
     if not drawn:
         return []

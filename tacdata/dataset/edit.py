@@ -1,6 +1,6 @@
-"""Deletes from, splits and merges datasets by lerobot's edit tools, and restores what these drop.
+"""Deletes from, splits and merges datasets by lerobot's edit tools, and restores fields that these drop.
 
-A new dataset is written beside its place and renamed when it is whole. Sources stay as they are.
+A new dataset is written to a temporary folder and renamed when complete. Sources stay as they are.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tacdata.errors import FormatError, UsageError
 
 
 def delete(root: Path, episodes: Sequence[int], out: Path) -> list[int]:
-    """Write a dataset without some of its episodes; the others are numbered anew.
+    """Write a dataset without some of its episodes; the others are renumbered.
 
     Args:
         root: The dataset.
@@ -137,7 +137,7 @@ def _check_numbers(root: Path, episodes: Sequence[int]) -> int:
 def _write(
     out: Path, sources: Sequence[Path], edit: Callable[[Any, Path], None], parts: Sequence[str] = ("",)
 ) -> dict[str, list[int]]:
-    """Let lerobot write into a hidden folder, restore what it drops, carry the flags along, and rename the folder."""
+    """Let lerobot write into a hidden folder, restore dropped fields, carry the flags along, and rename the folder."""
     refuse_existing(out, append=False)
     for source in sources:
         folder.read_info(source)
@@ -169,7 +169,7 @@ def _write(
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep back what lerobot logs: above all a page on a video decoder, which our datasets have no use for."""
+    """Suppress the log of lerobot: above all a page on a video decoder, which our datasets have no use for."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:
@@ -185,5 +185,5 @@ def _open(root: Path) -> Any:
 
 
 def _name(root: Path) -> str:
-    """Return what lerobot calls a dataset that is on no hub."""
+    """Return lerobot's name of a dataset that is on no hub."""
     return f"local/{root.resolve().name}"

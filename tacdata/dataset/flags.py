@@ -1,6 +1,6 @@
-"""Episodes that a person has set aside, with a reason, in a file beside the data.
+"""Episodes that a person has set aside, with a reason, in a file of the same folder.
 
-A flag names the recording by its hash, so that it stays true when a dataset is edited or a session packed anew.
+A flag names the recording by its hash, so that it stays true when a dataset is edited or a session packed again.
 `tacdata browse` sets flags; whatever learns from a dataset leaves out `flagged_episodes`.
 """
 
@@ -120,7 +120,7 @@ def read_history(folder: StrPath) -> list[FlagChange]:
 
 
 def carry_flags(session: Path, dataset: Path) -> list[Flag]:
-    """Give a dataset the flags of the session that it was packed from; what it says of an episode itself stays.
+    """Give a dataset the flags of the session that it was packed from; its own flags stay.
 
     Args:
         session: Folder of recordings.

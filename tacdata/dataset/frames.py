@@ -39,10 +39,10 @@ def check_pair(episode: Episode, label: Label, wanted: dict[str, str | None]) ->
     Args:
         episode: The recording.
         label: Its label.
-        wanted: What it must be made from: recording, sensor, model -> content hash, None if any will do.
+        wanted: Required parents: recording, sensor, model -> content hash, None if any will do.
 
     Raises:
-        FormatError: Naming what differs.
+        FormatError: Naming the difference.
     """
     where = f"label of {episode.path.name}"
     parents = label.provenance.get("parents", {})
@@ -71,7 +71,7 @@ LOST = 1.8
 def valid(episode: Episode) -> np.ndarray:
     """Return which frames follow their neighbour without loss and lie on the commanded path, (n,), bool.
 
-    Imported readings may have no counter (-1): then a loss is told by their times.
+    Imported readings may have no counter (-1): then a loss is detected by their times.
     """
     times, counter = episode.taxels.sample_ns, episode.taxels.counter
     follows = np.diff(counter, prepend=counter[:1] - 1) == 1
@@ -90,7 +90,7 @@ def episode_columns(episode: Episode, label: Label, extra: Iterable[str] = ()) -
         extra: Which of `features.EXTRA` too.
 
     Raises:
-        FormatError: If the readings cannot be tared, or the label lacks what is asked for.
+        FormatError: If the readings cannot be tared, or the label lacks a requested column.
     """
     counts = episode.taxels.counts
     return {

@@ -45,7 +45,7 @@ def update(root: Path, session: LabelledSession, models: dict[str, str]) -> None
 
     Args:
         root: Folder of the dataset.
-        session: The session as it stands.
+        session: The session at present.
         models: Content hash of a sensor -> content hash of the current model.
     """
     document = read(root)

@@ -1,4 +1,4 @@
-"""What people noted of stretches of recordings, in a file beside the data.
+"""Notes of people on intervals of recordings, in a file of the same folder.
 
 Like a flag, a note names the recording by its hash. Unlike a flag it takes nothing out of training.
 """
@@ -21,7 +21,7 @@ IN_SESSION, IN_DATASET = Path("notes.json"), Path("meta/tacdata_notes.json")
 
 @dataclass(frozen=True)
 class Note:
-    """What a person said of a stretch of one recording."""
+    """A person's note on an interval of one recording."""
 
     recording: str
     """SHA-256 of the recording's file (hex)."""
@@ -32,7 +32,7 @@ class Note:
     end: float
     """Where it ends [s]."""
     text: str
-    """What is said."""
+    """The note."""
     by: str
     """Who wrote it: user@computer."""
     at: str
@@ -66,7 +66,7 @@ def add_note(folder: Path, recording: str, file: str, begin: float, end: float, 
         file: Its name.
         begin: Where the stretch begins, after the first reading [s].
         end: Where it ends [s].
-        text: What is to be said.
+        text: The note.
 
     Raises:
         UsageError: If the stretch is none, or there is no text, or a whole story.

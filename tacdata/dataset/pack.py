@@ -41,7 +41,7 @@ def pack(
     extra: Sequence[str] = (),
     done: Callable[[Episode, str], None] = lambda episode, reason: None,
 ) -> Packed:
-    """Write the labelled episodes as a dataset, one by one; an interruption keeps what is finished.
+    """Write the labelled episodes as a dataset, one by one; an interruption keeps finished ones.
 
     An episode without a label, without a frame to tare with, or with readings that are no numbers is left
     out and named; so is, when appending, one that the dataset holds already.
@@ -154,7 +154,7 @@ class LabelFiles:
         self.folder = folder
 
     def path(self, recording: Path) -> Path:
-        """Return where the label of a recording lies, or would lie."""
+        """Return the path of a recording's label, existing or not."""
         return file_names.label(self.folder, recording)
 
     def __call__(self, episode: Episode) -> Label | None:
@@ -163,7 +163,7 @@ class LabelFiles:
         return read_label(path) if path.is_file() else None
 
     def failure(self, recording: Path) -> str:
-        """Return why the recording has no label, in words; "" if nothing says so."""
+        """Return the reason why the recording has no label; "" if unknown."""
         path = file_names.failure(self.folder, recording)
         return documents.read(path, "label_failure")["reason"] if path.is_file() else ""
 

@@ -41,7 +41,7 @@ class DatasetEpisode:
     stop: int
     """One past the last frame."""
     task: str
-    """What is done in it, in words."""
+    """Description of its task."""
     sensor: str
     """Content hash of its sensor."""
     record: EpisodeRecord | None
@@ -122,7 +122,7 @@ class Dataset(Displayed):
         """Refuse a dataset with simulated episodes where measured ones are meant.
 
         Args:
-            purpose: What they are wanted for, in words.
+            purpose: Purpose, for the message.
 
         Raises:
             UsageError: If it has one.
@@ -164,7 +164,7 @@ def read_dataset(root: StrPath, cache_folder: StrPath | None = None) -> Dataset:
         FormatError: If it is damaged, foreign, or does not say which sensor recorded it.
 
     Warns:
-        LostProvenanceWarning: If an edit dropped what can be missed or found again.
+        LostProvenanceWarning: If an edit dropped metadata that is dispensable or recoverable.
 
     Example:
         >>> from tacdata.dataset import read_dataset

@@ -16,7 +16,7 @@ from tacdata.errors import FormatError, UsageError
 def restore(root: Path | str, sources: Path | str | Iterable[Path | str]) -> list[int]:
     """Write meta/tacdata.json and the records of a dataset that lerobot deleted from, split or merged.
 
-    Frames carry the hashes of their sensor and record, so only what belongs to them is taken from the
+    Frames carry the hashes of their sensor and record, so only their own metadata is taken from the
     sources.
 
     Args:

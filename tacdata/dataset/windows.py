@@ -38,7 +38,7 @@ class EpisodeBounds(Protocol):
 
     @property
     def task(self) -> str:
-        """What is done in it, in words."""
+        """Description of its task."""
         ...
 
 
@@ -67,7 +67,7 @@ class FrameColumns(Protocol):
 class WindowDataset(torch.utils.data.Dataset):
     """Frames with windows around them, as ``LeRobotDataset(delta_timestamps=...)`` gives them.
 
-    Beyond an episode's ends its first or last frame is repeated, and ``KEY_is_pad`` says so. ``dataset[i]``
+    Beyond an episode's ends its first or last frame is repeated, and ``KEY_is_pad`` is true. ``dataset[i]``
     is one frame; ``dataset[[i, j, ...]]`` and `batch` are a batch, so that a DataLoader with
     ``batch_size=None`` and a BatchSampler reads whole batches at once.
 

@@ -1,7 +1,7 @@
 """A LeRobot v3.0 folder, written one finished episode at a time.
 
-Order of an append: data file, record, episode row, tasks, statistics, info.json; each is written beside,
-brought to the disk and renamed. info.json counts the episodes, so what a crash left behind it is no part of
+Order of an append: data file, record, episode row, tasks, statistics, info.json; each is written aside,
+brought to the disk and renamed. info.json counts the episodes, so remains of a crash are no part of
 the dataset and is replaced by the next append.
 """
 
@@ -77,7 +77,7 @@ class DatasetWriter:
         Args:
             root: The folder.
             sensor: Whose episodes.
-            extra: Which of `features.EXTRA` it must have; None takes what it has.
+            extra: Optional columns of `features.EXTRA` it must have; None takes what it has.
             simulated: Whether a dataset that has no finished episode yet is to hold simulated ones.
 
         Raises:
@@ -117,7 +117,7 @@ class DatasetWriter:
             columns: Every column of `features.DTYPES` but the two hashes, and those of `features.EXTRA` that the
                 dataset has, frames first, in the units of `features.unit`; shapes as `features.shapes`.
             record: Where the episode comes from.
-            task: What is done in it, in words.
+            task: Description of the task.
 
         Returns:
             The episode's index.

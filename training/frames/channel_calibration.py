@@ -3,7 +3,7 @@
     force = spread(gain_k sign(c) (|c| / 1000 counts)^exponent)
 
 The gain is the channel's own, the exponent common. The labels know the force on each protrusion from the skin model.
-So a few presses that touch every taxel are enough. Gains are shrunk towards their mean by what the presses tell: a
+So a few presses that touch every taxel are enough. Gains are shrunk towards their mean by their uncertainty: a
 channel that was hardly touched takes the mean, one that was touched often its own value. A unit's skin may spread a
 load less far than the model's. So its forces are spread over neighbours, by one variance (`training.frames.spreading`).
 The errors of exponent and variance come from the jackknife over presses.
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 SPREAD = 0.1
 """Standard deviation of a unit's gains about their mean that a stated error allows at least [1]."""
 EXPONENTS = np.linspace(0.4, 3.0, 53)
-"""Exponents that are tried [1], shape (53,); the answer lies between two of them."""
+"""Exponents that are tried [1], shape (53,); the result is between two of them."""
 FEWEST = 3
-"""Presses below which gains are said to be unknown [count]."""
+"""Presses below which gains are reported as unknown [count]."""
 UNSURE = 0.15
-"""Standard error of the exponent above which it is said [1]: pretraining varies the exponent by as much."""
+"""Standard error of the exponent above which it is reported [1]: pretraining varies the exponent by as much."""
 _TOUCHED = 0.1
 """Least force on a channel that some press touched, over the largest force on the median channel [1]."""
 _GROUPS = 20
@@ -72,7 +72,7 @@ class ChannelCalibration:
     spread_error: float = 0.0
     """Its standard error [mm^2]."""
     mixing: np.ndarray | None = None
-    """What spreads the unit's forces as the model does [1], shape (taxels, taxels); None without."""
+    """Spreads the unit's forces to match the model [1], shape (taxels, taxels); None without."""
 
     def force(self, counts: np.ndarray) -> np.ndarray:
         """Return forces [N] of tared readings [counts], shapes (n, taxels)."""
@@ -164,10 +164,10 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
 
 
 def doubts(calibration: ChannelCalibration, frames: Frames, episodes: tuple[int, ...]) -> list[str]:
-    """Return what the presses of a calibration cannot tell, and what to record, one sentence each.
+    """Return undetermined quantities of a calibration and the presses to record, one sentence each.
 
     Args:
-        calibration: What `calibrate` found.
+        calibration: Result of `calibrate` found.
         frames: The dataset.
         episodes: Numbers of the presses.
     """
@@ -206,8 +206,8 @@ def _gathered(
 def _spread(presses: list[tuple[np.ndarray, np.ndarray]], taxels: Taxels, exponent: float) -> tuple[float, float]:
     """Return the variance of the spreading and its standard error [mm^2].
 
-    Gains are fitted to forces that are gathered again, the variance to what the spread forces then miss. The exponent
-    stays what it is without spreading: together they would trade a steeper law for a wider skin.
+    Gains are fitted to forces without spreading, the variance to the residual of the spread forces. The exponent
+    stays that without spreading: a joint fit would trade a steeper law for a wider skin.
     """
     change, variance, before = laplacian(taxels) / 2, 0.0, 0.0
     product, square = np.zeros(len(presses)), np.zeros(len(presses))

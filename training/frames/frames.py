@@ -1,4 +1,4 @@
-"""What the trainer reads: every labelled frame in flat arrays, and which episode it belongs to."""
+"""Input of the trainer: every labelled frame in flat arrays, and which episode it belongs to."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class EpisodeSpan:
     specimen: str = ""
     """Which of several sensors of one design: the name in its sensor file, else the rig's; empty if not known."""
     purpose: str = ""
-    """What the press is for, in the plan's words."""
+    """Purpose of the press in the plan."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,13 @@ class Frames:
     dataset_hash: str
     """Identity of the dataset's content."""
     origin: str
-    """Where the dataset lies, as given; for messages and for finding it again."""
+    """Path of the dataset, as given; for messages."""
     virtual: bool | None = None
     """True if a virtual rig recorded it, False if a real one did, None if the dataset does not say."""
     simulated: bool = False
     """Whether nobody recorded them: `tacdata simulate` made some or all of the episodes."""
     taxel_force: np.ndarray | None = None
-    """Normal force on each protrusion as the skin model says it [N], shape (n, taxels); None if not known."""
+    """Normal force on each protrusion by the skin model [N], shape (n, taxels); None if not known."""
 
     def __post_init__(self) -> None:
         """Refuse arrays that no network may see.

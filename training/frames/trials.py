@@ -1,4 +1,4 @@
-"""The presses of a dataset as trials of the paper's evaluations: which count as what, and one map for each."""
+"""The presses of a dataset as trials of the paper's evaluations: their roles, and one map for each."""
 
 from __future__ import annotations
 

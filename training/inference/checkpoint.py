@@ -1,4 +1,4 @@
-"""A trained network on disk: a safetensors file whose metadata says what it is.
+"""A trained network on disk: a safetensors file with metadata.
 
 The metadata is the document of `schemas/checkpoint.schema.json`. It shares one file with the weights so that
 neither can be lost or swapped alone, and nothing in that file can run code.

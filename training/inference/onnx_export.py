@@ -38,7 +38,7 @@ class DepthNetwork(nn.Module):
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written."""
+    """The written file."""
 
     path: Path
     difference: float
@@ -50,7 +50,7 @@ class Exported:
 def export(trained: Checkpoint, path: Path, windows: np.ndarray | None = None) -> Exported:
     """Write a network as ONNX (opset 17, one input "windows", one output "depth") and compare both.
 
-    The file's metadata says sensor, frames of the window, units and checkpoint under the key "tacdata".
+    The file's metadata has sensor, frames of the window, units and checkpoint under the key "tacdata".
 
     Args:
         trained: The network.

@@ -35,7 +35,7 @@ class PredictedMaps(Displayed):
     depth: np.ndarray
     """Predicted depth [mm], shape (n, pixels_x, pixels_y), float32, 0 to D_max."""
     part: str
-    """What the network knew of the episode: "train", "validation", "test", or "other dataset"."""
+    """Role of the episode in training: "train", "validation", "test", or "other dataset"."""
     checkpoint: str
     """SHA-256 of the checkpoint file."""
     network: str
@@ -45,7 +45,7 @@ class PredictedMaps(Displayed):
     sensor: str
     """Content hash of the sensor."""
     provenance: dict[str, Any]
-    """What made it."""
+    """Its origin."""
 
     def description(self) -> Iterator[str]:
         """Yield what it is: maps, network, deepest pixel."""

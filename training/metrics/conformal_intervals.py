@@ -7,10 +7,10 @@ predicted depth and by the depth's slope there. Conformal prediction (Angelopoul
    takes that of all cells of its depth.
 2. The errors of each episode are divided by deviations that the other episodes give (cross-conformal prediction;
    V. Vovk, Annals of Mathematics and Artificial Intelligence 74 (2015) 9). The factor of a level is the quotient below
-   which such a share of them lies.
+   which such a share of them is.
 
 Whole episodes are left out, because frames of one press have correlated errors. The intervals hold for presses like
-those of validation. `reliability` measures what share of the errors lies inside on the scored episodes; on unseen
+those of validation. `reliability` measures the share of errors inside on the scored episodes; on unseen
 shapes it is less. `training.pretraining.unseen_shapes` calibrates on shapes left out of training instead.
 """
 
@@ -29,7 +29,7 @@ from training.metrics.depth_maps import CONTACT_THRESHOLD
 
 FILE = "spread.json"
 VALIDATION = "validation episodes"
-"""What intervals are calibrated on by default."""
+"""Default calibration data of intervals."""
 LEVELS = (0.5, 0.68, 0.8, 0.9, 0.95, 0.99)
 """Shares of errors for which intervals are calibrated [1]."""
 DEPTHS = (0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
@@ -53,15 +53,15 @@ class ConformalIntervals:
     deviation: np.ndarray
     """Root mean square error [mm], shape (len(DEPTHS) + 1, len(SLOPES) + 1)."""
     factors: tuple[float, ...]
-    """Deviations within which each share of `LEVELS` lies [1]."""
+    """Deviations that contain each share of `LEVELS` [1]."""
     checkpoint: str
     """SHA-256 of the checkpoint that it belongs to."""
     source: str = VALIDATION
-    """What it was calibrated on, in words."""
+    """Calibration data, as a phrase."""
 
     @property
     def definition(self) -> str:
-        """What `reliability` counts, in words."""
+        """Unit of `reliability`, as a phrase."""
         return (
             f"share of errors inside intervals calibrated on {self.source}, over pixels deeper than 0.1 mm in label or "
             "prediction"
@@ -118,7 +118,7 @@ def calibrate(
         labels: Their labels [mm], same shapes.
         pitch: Distance of pixels [mm].
         checkpoint: SHA-256 of the checkpoint.
-        source: What the episodes are, in words.
+        source: Description of the episodes.
 
     Raises:
         UsageError: If there are fewer than two episodes.

@@ -1,12 +1,12 @@
 """Several contacts in one depth map: where each is, which are missed and which are invented.
 
 Two indenters near each other make one region above any threshold, but two hills of depth. A contact is therefore a
-hill: a local maximum that stands out from the pass to the next deeper one (its prominence, as of mountains), with the
+hill: a local maximum that rises above the pass to the next deeper one (its prominence, as of mountains), with the
 pixels whose way uphill ends there. Hills are found by flooding from the deepest pixel down, as in a watershed
 (L. Vincent, P. Soille, IEEE Trans. Pattern Anal. 13 (1991) 583). Predicted and labelled contacts are matched one to
 one with the least sum of distances (H. W. Kuhn, Naval Research Logistics 2 (1955) 83).
 
-A prediction is smoother than what was pressed. The pass between near contacts is filled in, and the top of a wide one
+A prediction is smoother than the pressed shape. The pass between near contacts is filled in, and the top of a wide one
 has dents. The region's outline tells these apart: two contacts make it long. So in a long region a low hill counts
 already, in a round one only a high one.
 """
@@ -88,7 +88,7 @@ def match(prediction: np.ndarray, label: np.ndarray, pitch: float) -> ContactMat
     error = np.full(len(theirs), np.nan)
     if len(ours) and len(theirs):
         distance = cdist(theirs, ours)
-        # What lies too far apart costs more than all that does not, so that it is matched last.
+        # A pair that is too far apart costs more than all others, so that it is matched last.
         far = distance > REACH / pitch
         rows, columns = linear_sum_assignment(np.where(far, 1e6, distance))
         near = ~far[rows, columns]
@@ -171,7 +171,7 @@ def hills(
     width = columns + 2
     around = (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)
     tops: list[float] = []
-    joined: list[int] = []  # hill -> hill that it turned out to be a shoulder of; itself while it stands alone
+    joined: list[int] = []  # hill -> hill that it is a shoulder of; itself if separate
 
     def standing(hill: int) -> int:
         while joined[hill] != hill:

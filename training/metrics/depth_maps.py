@@ -1,6 +1,6 @@
 """Agreement of predicted and labelled depth maps, frame by frame (paper, Exp. 1).
 
-Empty masks. The paper does not say what its formulas mean where a mask is empty. Here:
+Empty masks. The paper does not define its formulas for empty masks. Here:
 
 - pixel RMSE and peak error are defined for every frame;
 - contact-region RMSE needs contact in the label;

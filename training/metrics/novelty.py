@@ -29,7 +29,7 @@ LOOKED_AT = 20_000
 SHARE = 0.99
 """Share of the validation frames in contact that count as near [1]."""
 FEWEST = 20
-"""Validation frames in contact without which nothing is said [count]."""
+"""Validation frames in contact needed for a result [count]."""
 BLOCK = 4096
 
 

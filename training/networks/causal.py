@@ -1,6 +1,6 @@
 """The paper's network over the newest nine frames: no look-ahead, so no delay beyond link and computing.
 
-Everything but the window is as in `paper`. What the four frames to come tell the paper's network (whether a press is
+All but the window is as in `paper`. Information of the four future frames for the paper's network (whether a press is
 still deepening) this one must guess from the past.
 """
 

@@ -1,6 +1,6 @@
 """No look-ahead: the newest frames and some of the past, ever further apart, through a residual perceptron.
 
-The window reaches 2 s back at 30 Hz, so that the network can tell loading from holding and unloading, which look alike
+The window reaches 2 s back at 30 Hz, so the network can distinguish loading, holding and unloading, which are equal
 in the newest frames of a skin that relaxes; it costs nine frames like the paper's. The encoder has no recurrence: one
 frame is a few matrix products. Decoder as in `paper`.
 """

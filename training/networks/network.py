@@ -1,4 +1,4 @@
-"""What a network's file holds.
+"""The content of a network's file.
 
 A file ``training/networks/my_network.py`` defines one class derived from `Network`. It sets ``offsets``,
 takes the sensor's sizes and its own arguments (plain JSON values) in ``__init__``, hands both to the base,
@@ -60,7 +60,7 @@ class Network(nn.Module, ABC):
         Args:
             gain: Force at 1000 counts [N], shape (taxels,).
             exponent: Exponent of the reading [1].
-            mixing: What spreads forces over neighbours [1], shape (taxels, taxels); none if left out.
+            mixing: Weights that spread forces over neighbours [1], shape (taxels, taxels); none if left out.
         """
         mixing = np.eye(self.taxels) if mixing is None else mixing
         self.get_buffer("mixing").copy_(torch.as_tensor(mixing, dtype=torch.float32))
@@ -81,7 +81,7 @@ class Network(nn.Module, ABC):
         return own @ self.get_buffer("mixing").T
 
     def respond(self, signals: torch.Tensor) -> torch.Tensor:
-        """Return maps over D_max from what `calibrated` returned; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
+        """Return maps over D_max from the output of `calibrated`; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
         return self.estimate((signals - self.get_buffer("mean")) / self.get_buffer("sd"))
 
     @abstractmethod
@@ -90,7 +90,7 @@ class Network(nn.Module, ABC):
 
 
 class ResidualLayers(nn.ModuleList):
-    """Perceptrons one after the other, each added to what it takes."""
+    """Perceptrons one after the other, each added to its input."""
 
     def __init__(self, width: int, count: int) -> None:
         """Build ``count`` layers of a width."""

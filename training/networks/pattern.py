@@ -1,8 +1,8 @@
 """No look-ahead: the pattern of a window apart from its scale, through a residual perceptron to all pixels at once.
 
-Where an indenter touches is said by the pattern of readings, how deep by their size. A unit's gain is uncertain, its
+The pattern of readings determines the place of contact, their size its depth. A unit's gain is uncertain, its
 pattern is not. So the window over its own root mean square and the logarithms of that scale are separate inputs.
-Frames as in `history`. It is meant to be trained on forces (`training.frames.channel_calibration`), so that what it
+Frames as in `history`. It is meant to be trained on forces (`training.frames.channel_calibration`), so that its
 learned from simulated presses holds for any unit.
 """
 
@@ -64,7 +64,7 @@ class Pattern(Network):
     def respond(self, signals: torch.Tensor) -> torch.Tensor:
         """Return maps over D_max; (b, T, taxels) -> (b, pixels_x, pixels_y).
 
-        All channels are divided by one number, so that nothing stays nothing and the pattern stays what it is.
+        All channels are divided by one number, which keeps zeros and the pattern.
         """
         return self.estimate(signals / self.get_buffer("sd").square().mean().sqrt())
 

@@ -72,7 +72,7 @@ def learning_curve(
     told: Callable[[CurvePoint], None] = lambda point: None,
     begun: Callable[[str, int, int], Callable[[Progress], None]] = lambda *_: lambda progress: None,
 ) -> dict[str, Any]:
-    """Train and score every point of the curve; what ``out`` already holds is kept.
+    """Train and score every point of the curve; finished points in ``out`` are kept.
 
     Args:
         frames: The recorded dataset.

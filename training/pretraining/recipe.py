@@ -1,4 +1,4 @@
-"""The recipe of a run from what a person asked for, the network and the pretrained network."""
+"""The recipe of a run from options, the network and the pretrained network."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from training.inference.checkpoint import Checkpoint
 
 FITTING: dict[str, Any] = {"epochs": 20, "learning_rate": 5e-4, "batch_size": 64}
-"""What differs where a pretrained network is fitted to a few recorded presses: small steps, and soon done."""
+"""Settings for fitting a pretrained network to a few recorded presses: small steps, few epochs."""
 PULL = 1e-3
 """Weight of the pull towards the pretrained weights where no simulated frames are mixed in [1]."""
 
@@ -22,11 +22,11 @@ PULL = 1e-3
 def recipe(asked: Mapping[str, Any], pretrained: Checkpoint | None = None, simulated: bool = False) -> TrainingSettings:
     """Return the settings of a run.
 
-    A person's wishes come first, then what suits a pretrained start, then what suits the network, then the paper.
+    Order of precedence: options, settings of a pretrained start, those of the network, the paper's.
 
     Args:
-        asked: Settings by name; None where a person said nothing.
-        pretrained: What the run starts from.
+        asked: Settings by name; None where not given.
+        pretrained: Start of the run.
         simulated: Whether simulated frames are mixed in.
 
     Raises:

@@ -1,8 +1,8 @@
 """Intervals that hold on shapes that a network never saw: each shape's errors come from a network without it.
 
 By default the errors are those of validation episodes. These have the shapes of the training episodes, so
-a shape unlike all others lies outside too often. Here the shapes are dealt into groups. For each group a network is
-trained on the others by the same recipe, and predicts what it did not learn (cross-conformal prediction; V. Vovk,
+errors on a shape unlike all others are outside too often. Here shapes are dealt into groups. For each a network is
+trained on the others by the same recipe, and predicts the left-out group (cross-conformal prediction; V. Vovk,
 Annals of Mathematics and Artificial Intelligence 74 (2015) 9). The errors of all groups together make the intervals.
 """
 
@@ -38,15 +38,15 @@ def calibrate_on_unseen_shapes(
     simulated: Frames | None = None,
     begun: Callable[[int], Callable[[Progress], None]] = lambda group: lambda progress: None,
 ) -> ConformalIntervals:
-    """Replace the intervals of a trained network by ones that hold on unseen shapes; write them beside it.
+    """Replace the intervals of a trained network by ones valid for unseen shapes; write them to its folder.
 
     Args:
         trained: The network, in its run's folder. The other networks are trained there too.
-        frames: What it was trained on.
+        frames: Its training frames.
         groups: Into how many groups the shapes are dealt; as many networks are trained.
         device: As of `train`.
         threads: As of `train`.
-        pretrained: What it was started from.
+        pretrained: Its start.
         simulated: The simulated frames that were mixed in.
         begun: Called with each group's number; returns the listener of that training's progress.
 

@@ -19,7 +19,7 @@ class Group:
     """Runs of one network, recipe and split that differ in their seed."""
 
     name: str
-    """Network, and what its recipe changes of the paper's."""
+    """Network, and changes of its recipe from the paper's."""
     split: str
     seeds: tuple[int, ...]
     frames: int

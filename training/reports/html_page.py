@@ -1,4 +1,4 @@
-"""An HTML file with everything inside: text, tables, and pictures as data (`page.html.j2` says how it looks)."""
+"""An HTML file with everything inside: text, tables, and pictures as data (`page.html.j2` has its style)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class HtmlPage:
         Args:
             heads: Titles of the columns.
             rows: Rows of as many cells.
-            bold: Called with row and column; says which cells are set bold.
+            bold: Called with row and column; true for bold cells.
             words: Cells are words, set to the left; else numbers, set to the right.
         """
         marked = [[(cell, bold(number, k)) for k, cell in enumerate(row)] for number, row in enumerate(rows)]
@@ -64,7 +64,7 @@ class HtmlPage:
         self._add("html", html=converter.renderer.render(tokens, converter.options, {}))
 
     def picture(self, draw: Callable[[BinaryIO], object], words: str) -> None:
-        """Add a PNG that ``draw`` writes to a stream; ``words`` say what it shows."""
+        """Add a PNG that ``draw`` writes to a stream; ``words`` are its caption."""
         stream = BytesIO()
         draw(stream)
         if stream.getvalue():

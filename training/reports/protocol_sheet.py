@@ -1,4 +1,4 @@
-"""The paper's evaluations as a page of Markdown tables, ours beside the paper's."""
+"""The paper's evaluations as a page of Markdown tables, our figures and the paper's."""
 
 from __future__ import annotations
 

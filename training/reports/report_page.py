@@ -22,10 +22,10 @@ class Scored:
     """One run with its scores."""
 
     name: str
-    """Network, and what its recipe changes of the paper's."""
+    """Network, and changes of its recipe from the paper's."""
     evaluation: Evaluation
     frames: Frames
-    """What it was scored on."""
+    """Data of the score."""
 
 
 def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None = None) -> str:
@@ -58,7 +58,7 @@ def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None
         document = run.evaluation.document
         key = run.name, document["split"]["name"]
         if key in seen:
-            continue  # of several seeds the first stands for all; their figures are in the first table
+            continue  # of several seeds the first is shown; their figures are in the first table
         seen.add(key)
         _run(result, run, document)
     return result.text

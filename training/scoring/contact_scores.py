@@ -24,7 +24,7 @@ from training.metrics.contacts import (
 from training.metrics.depth_maps import summarize
 
 DISTANCES = (3.0, 4.0, 5.0)
-"""Borders of the distance of the two nearest contacts, by which presses are told apart [mm]."""
+"""Borders of the distance of the two nearest contacts, between groups of presses [mm]."""
 
 
 def scored(presses: Iterable[tuple[np.ndarray, np.ndarray]], pitch: float) -> dict[str, Any]:

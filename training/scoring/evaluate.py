@@ -24,7 +24,7 @@ from training.metrics.physical import PressScore
 from training.scoring import baselines, contact_scores, published
 
 DEPTHS = (0.2, 0.3, 0.5, 0.8)
-"""Borders of the largest labelled depth by which frames are told apart [mm]."""
+"""Borders of the largest labelled depth between groups of frames [mm]."""
 METRICS = {
     "pixel_rmse": ("Depth", "Pixel-wise RMSE", "mm"),
     "peak_error": ("Depth", "Peak Depth Error", "mm"),
@@ -55,14 +55,14 @@ class EpisodeResult:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores with what they were computed from."""
+    """Scores with their origin."""
 
     document: dict[str, Any]
     """`schemas/scores.schema.json`."""
     episodes: tuple[EpisodeResult, ...]
     """One entry a scored episode."""
     part: str
-    """What the network knew of them: "test", or "other dataset"."""
+    """Role of the episodes in training: "test", or "other dataset"."""
     checkpoint_hash: str
     """Identity of the checkpoint."""
 
@@ -257,7 +257,7 @@ def _at_full_depth(episodes: tuple[EpisodeResult, ...]) -> list[tuple[np.ndarray
 def _uncertainty(
     trained: Checkpoint, identity: str, episodes: tuple[EpisodeResult, ...], frames: Frames
 ) -> dict[str, Any]:
-    """Return what share of errors each interval holds; nothing if the run was not calibrated."""
+    """Return the share of errors in each interval; empty if the run was not calibrated."""
     known = conformal_intervals.read(trained.path.parent, identity)
     if known is None:
         return {}

@@ -1,4 +1,4 @@
-"""Figures of the paper, shown beside our own; nothing is computed from them."""
+"""Figures of the paper, shown with our own; nothing is computed from them."""
 
 from __future__ import annotations
 

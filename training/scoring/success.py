@@ -22,7 +22,7 @@ class Attempt:
     """One trial."""
 
     condition: str
-    """What was compared, for example the control method."""
+    """Compared variant, for example the control method."""
     success: bool
     position: str = ""
     """Where it began; empty if that was not varied."""

@@ -1,9 +1,9 @@
-"""What a split's file holds.
+"""The content of a split's file.
 
 A file ``training/splits/my_split.py`` defines one function,
 ``held_out(episodes, sensor, generator) -> set[int]``, that returns the numbers of the test episodes. Whole
-episodes only: frames of one press are so alike that dividing them would score memory. The file's docstring
-says what the split asks of the network; `divide` draws the validation episodes.
+episodes only: frames of one press are so similar that dividing them would score memory. The file's docstring
+states the question of the split; `divide` draws the validation episodes.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Split:
 
 
 def describe(name: str) -> str:
-    """Return what a split asks of a network: the first line of its file.
+    """Return the question of a split: the first line of its file.
 
     Raises:
         UsageError: If no such split exists.

@@ -35,7 +35,7 @@ class Catalogue:
     """A catalogue that is served."""
 
     page: str
-    """Address of Rerun's web viewer, which opens whatever stands behind `url=`."""
+    """Address of Rerun's web viewer, which opens the address behind `url=`."""
     address: str
     """Of the catalogue itself, for Rerun and its Python client."""
     dataset: str
@@ -67,13 +67,13 @@ def catalogue_server(
     """Draw every episode of a list, and serve them as one dataset while the context lasts, on the loopback only.
 
     Args:
-        listed: What is drawn.
+        listed: Episodes of the page.
         labels: Folder of labels, as for `viewers.source.scene_at`.
         predictions: Folder of predictions, likewise.
         drawn: Called with how many are drawn, of how many.
 
     Yields:
-        What is served.
+        Served content.
 
     Raises:
         UsageError: If the list is empty, or the server does not begin.

@@ -1,4 +1,4 @@
-"""The episodes of a session or dataset as a list to choose from, without reading what they recorded."""
+"""The episodes of a session or dataset as a list to choose from, without reading recorded data."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Entry:
     label: str = ""
     """State of the label: complete, stale, failed, waiting or none."""
     part: str = ""
-    """What a network knew of it: train, validation, test."""
+    """Role in a network's training: train, validation, test."""
     error: float | None = None
     """Pixel root mean square error of a network over all frames [mm]."""
     centroid: float | None = None
@@ -58,7 +58,7 @@ class Entry:
 
 UNITS = {"x": "mm", "y": "mm", "depth": "mm", "rate": "mm/s", "error": "mm", "centroid": "px"}
 SHOWN = tuple(f.name for f in fields(Entry) if f.name != "recording")
-"""What can be listed, filtered and sorted by."""
+"""Columns for listing, filtering and sorting."""
 OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
     "!=": lambda a, b: a != b,
     "<=": lambda a, b: a <= b,
@@ -72,14 +72,14 @@ WORDS = frozenset(("file", "indenter", "shape", "label", "part", "flag"))
 
 @dataclass(frozen=True)
 class EpisodeList:
-    """What a session or dataset holds."""
+    """Content of a session or dataset."""
 
     root: Path
     kind: str
     """"session" or "dataset"."""
     entries: tuple[Entry, ...]
     remarks: tuple[str, ...] = ()
-    """What should be said of the list, in words."""
+    """Remarks on the list."""
 
     def where(self, condition: str) -> EpisodeList:
         """Return those that fulfil a condition such as ``depth>0.8``, ``indenter=ball`` or ``flag=``.
@@ -93,7 +93,7 @@ class EpisodeList:
         return replace(self, entries=kept)
 
     def by(self, key: str) -> EpisodeList:
-        """Return them sorted by a column; ``-key`` or an error sorts the greatest first, what is unknown last.
+        """Return them sorted by a column; ``-key`` or an error sorts the greatest first, unknown values last.
 
         Raises:
             UsageError: If there is no such column.

@@ -30,7 +30,7 @@ def episodes_at(path: Path, labels: Path | None = None, predictions: Path | None
     Args:
         path: The folder.
         labels: A session's labels, else those inside it.
-        predictions: Folder of predictions, or a training run: then each episode has an error where it can be said.
+        predictions: Folder of predictions, or a training run: then each episode has an error if known.
 
     Raises:
         UsageError: If it is neither.

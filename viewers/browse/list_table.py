@@ -31,7 +31,7 @@ def list_table(listed: EpisodeList, most: int, scored: bool) -> str:
 
 
 def said(entry: Entry, column: str) -> str:
-    """Return a value as it is printed; what is not known as a dash."""
+    """Return a value as it is printed; a dash if unknown."""
     value = getattr(entry, column)
     if value is None:
         return "–"

@@ -9,7 +9,7 @@ from viewers.browse.flagging import recording_of
 
 
 def notes_of(listed: EpisodeList, number: int) -> list[Note]:
-    """Return what was noted of an episode, in the order of time.
+    """Return the notes on an episode, in the order of time.
 
     Raises:
         UsageError: If there is no such episode.
@@ -34,7 +34,7 @@ def note_stretch(listed: EpisodeList, number: int, begin: float, end: float, tex
 
 
 def unnote_stretch(listed: EpisodeList, number: int, place: int) -> str:
-    """Take a note away by its place among the episode's; return what it said.
+    """Delete a note by its place among the episode's; return its text.
 
     Raises:
         UsageError: If there is none.

@@ -43,7 +43,7 @@ def browse_server(listed: EpisodeList, labels: Path | None, predictions: Path | 
     It listens on the loopback only, and only whoever knows its address may read or flag.
 
     Args:
-        listed: What is listed, in this order.
+        listed: Episodes of the list, in this order.
         labels: Folder of labels, as for `viewers.source.scene_at`.
         predictions: Folder of predictions, likewise.
 
@@ -71,12 +71,12 @@ class Times:
 
 
 class Pages:
-    """What is served: the page, the list, an episode's Rerun file, and setting flags."""
+    """Served content: the page, the list, an episode's Rerun file, and setting flags."""
 
     def __init__(
         self, listed: EpisodeList, labels: Path | None, predictions: Path | None, folder: Path, viewer: str
     ) -> None:
-        """Keep what is to be served.
+        """Keep the served content.
 
         Args:
             listed: The episodes.
@@ -130,24 +130,24 @@ class Pages:
             return file, self._times.get(number)
 
     def flag(self, number: int, reason: str) -> str:
-        """Set an episode aside for a reason, or take it back where there is none; return what was done."""
+        """Set an episode aside for a reason, or take it back where there is none; return a confirmation."""
         if reason.strip():
             return f"set aside: {flag_episode(self.listed, number, reason)}"
         return f"taken back: {unflag_episode(self.listed, number)}"
 
     def notes(self, number: int) -> list[Note]:
-        """Return what was noted of an episode, in the order of time."""
+        """Return the notes on an episode, in the order of time."""
         return notes_of(self.listed, number)
 
     def note(self, asked: NoteRequest) -> str:
-        """Note something of a stretch of an episode; return what was done."""
+        """Add a note on an interval of an episode; return a confirmation."""
         with self._drawing:
             said = note_stretch(self.listed, asked.number, asked.begin, asked.end, asked.text)
             (self._folder / f"{asked.number}.rrd").unlink(missing_ok=True)
         return f"noted: {said}"
 
     def unnote(self, number: int, place: int) -> str:
-        """Take an episode's note away by its place among them; return what was done."""
+        """Delete an episode's note by its place among them; return a confirmation."""
         with self._drawing:
             said = unnote_stretch(self.listed, number, place)
             (self._folder / f"{number}.rrd").unlink(missing_ok=True)
@@ -155,7 +155,7 @@ class Pages:
 
 
 class NoteRequest(BaseModel):
-    """What the page asks for when a person notes something of a stretch of an episode."""
+    """Request of the page for a note on an interval of an episode."""
 
     number: int
     begin: float
@@ -164,7 +164,7 @@ class NoteRequest(BaseModel):
 
 
 class FlagRequest(BaseModel):
-    """What the page asks for when a person sets an episode aside or takes it back."""
+    """Request of the page to set an episode aside or take it back."""
 
     number: int
     reason: str = Field(max_length=LONGEST)
@@ -237,7 +237,7 @@ def application(pages: Pages) -> FastAPI:
 @contextmanager
 def serving(pages: Pages, port: int) -> Iterator[None]:
     """Answer requests on a port of the loopback while the context lasts; 0 takes any that is free."""
-    with socket.create_server((LOOPBACK, port)) as listener:  # before the address is said: whoever comes early waits
+    with socket.create_server((LOOPBACK, port)) as listener:  # before the address is printed: early requests wait
         pages.address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/{pages.token}"
         config = uvicorn.Config(application(pages), log_config=None, lifespan="off", timeout_graceful_shutdown=1)
         server = uvicorn.Server(config)

@@ -1,1 +1,1 @@
-"""What can be viewed, one kind a file."""
+"""Kinds of viewable files, one a file."""

@@ -1,4 +1,4 @@
-"""What a kind's file holds: how to tell that a path is of this kind, and how to make a scene of it.
+"""The content of a kind's file: a test whether a path is of this kind, and its scene.
 
 ``viewers/kinds/my_kind.py`` defines one class derived from `Kind`; `viewers.source` asks every kind in the order of
 `ORDER`, the narrowest first.
@@ -24,18 +24,18 @@ class Kind(ABC):
     ORDER: ClassVar[int]
     """Its place among the kinds: those that ask for less of a path come later."""
     NOUN: ClassVar[str]
-    """What it is called in messages."""
+    """Its name in messages."""
 
     @abstractmethod
     def claims(self, path: Path) -> bool:
-        """Say whether a path is of this kind, by its name and what lies in it; nothing large is read."""
+        """Return whether a path is of this kind, by its name and the files in it; nothing large is read."""
 
     @abstractmethod
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return the scene.
 
         Raises:
-            UsageError: If what is asked for is not there, or means nothing for this kind.
+            UsageError: If the requested part is missing, or not applicable to this kind.
             FormatError: If a file is damaged.
         """
 

@@ -1,4 +1,4 @@
-"""What a network predicted, without the data that it predicted from."""
+"""Predictions of a network, without its input data."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PredictionsKind(Kind):
             return False
         try:
             return HEADER in (pq.read_schema(file).metadata or {})
-        except Exception:  # a damaged file is of no kind; whoever asks for it says more
+        except Exception:  # a damaged file is of no kind; its reader raises the error
             return False
 
     def scene(self, path: Path, asked: Asked) -> Scene:
@@ -57,7 +57,7 @@ class PredictionsKind(Kind):
 
 
 def _sensor(path: Path, wanted: str) -> Sensor | None:
-    """Return the sensor that the network was trained for, if its checkpoint lies beside its predictions."""
+    """Return the sensor that the network was trained for, if its checkpoint is in the folder of its predictions."""
     for folder in (path, *path.resolve().parents[:2]):
         if (folder / CHECKPOINT).is_file():
             from training.inference.checkpoint import load

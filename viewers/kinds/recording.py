@@ -10,7 +10,7 @@ from viewers.scene.scene import Scene
 
 
 class RecordingKind(Kind):
-    """One recording with what lies beside it."""
+    """One recording with the files of its folder."""
 
     ORDER, NOUN = 60, "a recording (.mcap)"
 
@@ -19,7 +19,7 @@ class RecordingKind(Kind):
         return path.is_file() and path.suffix == ".mcap"
 
     def scene(self, path: Path, asked: Asked) -> Scene:
-        """Return the press; of a file that is still being written what has reached the disk."""
+        """Return the press; of a file that is still being written, its part on the disk."""
         from viewers.scenes.recording import recording_scene
 
         refuse(asked, "one recording", "labels", "predictions")

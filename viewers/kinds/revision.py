@@ -1,4 +1,4 @@
-"""What `tacdata revise` made of a verdict."""
+"""Result of `tacdata revise` on a verdict."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class SessionKind(Kind):
     ORDER, NOUN = 90, "a session folder"
 
     def claims(self, path: Path) -> bool:
-        """Any folder: what is missing in it is said when it is opened."""
+        """Any folder: missing files are reported when it is opened."""
         return path.is_dir()
 
     def scene(self, path: Path, asked: Asked) -> Scene:
@@ -38,7 +38,7 @@ class SessionKind(Kind):
 
 
 def spans(folder: Path) -> Iterator[tuple[int, int, int]]:
-    """Yield number, first and last time [ns] of each finished recording, as its summary says."""
+    """Yield number, first and last time [ns] of each finished recording, from its summary."""
     from mcap.exceptions import McapError
     from mcap.reader import SeekingReader
 

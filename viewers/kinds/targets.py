@@ -15,9 +15,9 @@ MARKS = {
     "csv": "episode-*.csv",
     "parquet": "episode-*.parquet",
 }
-"""Format -> what lies in its folder; the first that fits is read."""
+"""Format -> files of its folder; the first that fits is read."""
 OURS = ("*.mcap", "*.tracks.parquet")
-"""What a folder of targets never holds."""
+"""Files that no folder of targets contains."""
 
 
 class TargetsKind(Kind):

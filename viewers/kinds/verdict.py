@@ -21,7 +21,7 @@ class VerdictKind(Kind):
         return (path / FILE).is_file() or (path.is_file() and path.name == FILE)
 
     def scene(self, path: Path, asked: Asked) -> Scene:
-        """Return it in words and bars, with the readings beside the model before and after."""
+        """Return it as text and bars, with readings and model before and after."""
         from tacdata import documents
         from tacdata.discrepancy.verdict.residual_table import read
         from viewers.parts.residual_curves import residual_curves

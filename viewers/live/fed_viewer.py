@@ -1,4 +1,4 @@
-"""A running Rerun viewer that shows what is logged: a window, or the web viewer on the loopback."""
+"""A running Rerun viewer that shows logged data: a window, or the web viewer on the loopback."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class FedViewer:
 
     process: subprocess.Popen
     address: str
-    """What a browser has to open; empty for a window."""
+    """Address for a browser; empty for a window."""
     feed: str
     """Where it listens."""
 
@@ -34,7 +34,7 @@ class FedViewer:
 
 @contextmanager
 def fed_viewer(web: bool) -> Iterator[FedViewer]:
-    """Start a viewer that takes what is logged, for as long as the context lasts.
+    """Start a viewer that takes logged data, for as long as the context lasts.
 
     Raises:
         TimeoutError: If it does not listen.
@@ -52,7 +52,7 @@ def fed_viewer(web: bool) -> Iterator[FedViewer]:
 
 
 def _wait_for(port: int) -> None:
-    """Return once the viewer listens; what is sent before is lost."""
+    """Return once the viewer listens; earlier data is lost."""
     end = time.monotonic() + START / 2
     while time.monotonic() < end:
         with socket.socket() as probe:

@@ -1,4 +1,4 @@
-"""Shows a recording while it is being written: what is there first, then what is added, until it ends."""
+"""Shows a recording while it is being written: the present content, then additions, until it ends."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Follower:
         return self._file.finished
 
     def step(self) -> bool:
-        """Draw what was added since; return whether there was anything to draw."""
+        """Draw additions; return whether there was anything to draw."""
         if not self._file.update():
             return False
         scene = self._scene()
@@ -59,7 +59,7 @@ class Follower:
         return True
 
     def _scene(self) -> Scene | None:
-        """Return what there is so far, or None if that is too little to be drawn."""
+        """Return the content so far, or None if that is too little to be drawn."""
         from dataclasses import replace
 
         from tacdata.recording.files.reader import recording_of
@@ -99,9 +99,9 @@ def is_growing(path: Path) -> bool:
 
 
 def meant(path: Path) -> Path:
-    """Return the recording that a path stands for: one that has ended since, or a session's first that has not.
+    """Return the recording of a path: one that has ended since, or a session's first that has not.
 
-    Any other path stands for itself.
+    Any other path is itself.
     """
     if path.is_dir() and not file_names.finished(path):
         return next((own for own in file_names.unfinished(path) if is_growing(own)), path)
@@ -133,7 +133,7 @@ def follow(path: Path, web: bool) -> None:
                 if has_display():
                     webbrowser.open(viewer.address)
             print(f"following {path.name}; Ctrl-C ends the viewer, never the recording", flush=True)
-            left = set(file_names.unfinished(path.parent))  # what crashes left is not waited for
+            left = set(file_names.unfinished(path.parent))  # remains of crashes are not waited for
             shown, following = left, path
             while viewer.process.poll() is None:
                 if following is None:

@@ -1,4 +1,4 @@
-"""A live view of a recording in progress, in a process of its own. It drops what it cannot show in time."""
+"""A live view of a recording in progress, in a process of its own. It drops frames that it cannot show in time."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
         yield watch
     finally:
         with suppress(Full):
-            values.put(None, timeout=PATIENCE)  # stands behind everything that was given
+            values.put(None, timeout=PATIENCE)  # after everything in the queue
         ending.set()
         for end in (lambda: None, process.terminate, process.kill):
             if process.is_alive():
@@ -95,7 +95,7 @@ def _show(where: str, columns: int, rows: int, values: Any, started: Any, ending
     with ExitStack() as stack:
         try:
             recording, words = _open(where, stack)
-        except Exception as error:  # whatever Rerun says is for the person who asked for it
+        except Exception as error:  # Rerun's messages are for the person who asked for it
             started.put(f"error: the live view cannot be opened ({type(error).__name__}: {error})")
             return
         started.put(words)
@@ -129,7 +129,7 @@ def _open(where: str, stack: ExitStack) -> tuple[Any, str]:
 
 
 class _Drawing:
-    """Writes what arrives into a Rerun recording: the array as a picture, signals, the guide, images."""
+    """Writes arriving data into a Rerun recording: the array as a picture, signals, the guide, images."""
 
     def __init__(self, recording: Any, columns: int, rows: int) -> None:
         self._recording, self._shape = recording, (rows, columns)
@@ -153,7 +153,7 @@ class _Drawing:
     def _depth(self, name: str, depth: np.ndarray, largest: float, centre: tuple[float, float] | None) -> None:
         import rerun as rr
 
-        # Row 0 of a map lies at the lowest x; shown with x to the right and y upwards, as the array is.
+        # Row 0 of a map is at the lowest x; shown with x to the right and y upwards, as the array is.
         self._recording.log(f"depth/{name}", rr.Tensor(np.round(depth.T[::-1], 4), dim_names=("y", "x")))
         self._recording.log(f"depth_mm/{name}", rr.Scalars([largest]))
         for axis, number in zip("xy", centre or (np.nan, np.nan), strict=True):
@@ -167,5 +167,5 @@ class _Drawing:
         change = counts - self._first
         self._recording.log("taxels/change_counts", rr.Scalars(change))
         if change.size == self._shape[0] * self._shape[1]:
-            # Row 0 of the array lies at the lowest y, row 0 of a picture on top.
+            # Row 0 of the array is at the lowest y, row 0 of a picture on top.
             self._recording.log("array", rr.Tensor(change.reshape(self._shape)[::-1], dim_names=("y", "x")))

@@ -1,4 +1,4 @@
-"""What a person reads first about a demonstration or about targets, as Markdown."""
+"""Summary of a demonstration or of targets, as Markdown."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tacdata.replay.targets import FingertipTargets
 def of_demonstration(
     title: str, made: Demonstration | None, recorded: DemoRecording | None, remarks: tuple[str, ...] = ()
 ) -> str:
-    """Return what the demonstration is, finger by finger, and what is missing."""
+    """Return a summary of the demonstration, finger by finger, and its missing parts."""
     lines = [f"# {title}", ""]
     if recorded is not None:
         begin, end = recorded.span_ns
@@ -67,7 +67,7 @@ def _bridged(track: FingerTrack, rate: float) -> str:
 
 
 def of_targets(title: str, targets: FingertipTargets, others: int, joints: dict[str, np.ndarray] | None) -> str:
-    """Return what a robot is asked to do."""
+    """Return a summary of a robot's targets."""
     seconds = (targets.time_ns[-1] - targets.time_ns[0]) / 1e9
     moved = 1000 * np.linalg.norm(targets.position - targets.seen, axis=-1)
     lines = [

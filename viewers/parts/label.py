@@ -50,7 +50,7 @@ class ShownLabel:
 
 
 def shown_label(path: Path, most: int | None = None) -> ShownLabel:
-    """Read what is drawn from a label file.
+    """Read the drawn parts of a label file.
 
     Args:
         path: The file.

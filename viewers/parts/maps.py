@@ -64,7 +64,7 @@ def contact_maps(sensor: Sensor, time_ns: np.ndarray, traction: np.ndarray) -> t
 
 
 def board_map(sensor: Sensor, time_ns: np.ndarray, pressure: np.ndarray) -> DepthMaps:
-    """Return the map called "board" [kPa]: each protrusion's pressure where it stands, to half of a pixel.
+    """Return the map called "board" [kPa]: each protrusion's pressure at its place, to half of a pixel.
 
     Args:
         sensor: Gives the protrusions' places.

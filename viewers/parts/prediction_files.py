@@ -18,7 +18,7 @@ PATTERN = "episode-*.parquet"
 def find_prediction(folder: Path, time_ns: np.ndarray) -> PredictedMaps | None:
     """Return the prediction whose frames are those of an episode, or None if the folder holds none.
 
-    A prediction is numbered by its dataset, a recording by its session; the frames' times tell what belongs.
+    A prediction is numbered by its dataset, a recording by its session; the frames' times show the match.
 
     Args:
         folder: Folder that `tacdata evaluate` wrote, or the training run that holds it as ``predictions``.

@@ -55,7 +55,7 @@ class ImageSampler:
 def recorded_images(path: Path, cameras: tuple[str, ...], most: int = IMAGES) -> Iterator[tuple[str, int, bytes]]:
     """Yield camera name, time of exposure [ns] and JPEG image of a recording's images.
 
-    A finished file says where its images lie, and only those that are wanted are read; one that breaks off is
+    A finished file has an index of its images, and only requested ones are read; one that breaks off is
     read from its beginning to its end.
 
     Args:
@@ -71,7 +71,7 @@ def recorded_images(path: Path, cameras: tuple[str, ...], most: int = IMAGES) ->
         return
     try:
         found = _indexed(path, cameras, most)
-    except Exception:  # a damaged index raises whatever the parser stumbles over; the records tell what is there
+    except Exception:  # a damaged index raises any error of the parser; the records show the content
         found = None
     if found is None:
         found = _all(path, cameras, most)

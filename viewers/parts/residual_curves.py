@@ -16,7 +16,7 @@ READINGS, RESIDUALS = "readings", "residuals"
 
 
 def residual_curves(told: Residuals) -> tuple[Curves, ...]:
-    """Return for each stream its readings measured, before and after, and what is left over the noise; then the depth.
+    """Return for each stream its readings measured, before and after, and the residual over the noise; then the depth.
 
     Args:
         told: What `tacdata discrepancy` wrote.

@@ -104,7 +104,7 @@ def episode_curves(episode: Episode, unit: str = "counts") -> tuple[Curves, ...]
 
 
 def delays(stream: str, sample_ns: np.ndarray, arrival_ns: np.ndarray) -> Curves:
-    """Return by how much later than it was sampled each value came [ms]: what a stream's clock model leaves."""
+    """Return by how much later than it was sampled each value came [ms]: the residual of a stream's clock model."""
     return Curves(f"clock/{stream}", "ms", (stream,), sample_ns, (arrival_ns - sample_ns)[:, None] / 1e6)
 
 

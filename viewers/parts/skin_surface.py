@@ -82,7 +82,7 @@ def indenter_body(sensor: Sensor, press: Press, time_ns: np.ndarray, tip: np.nda
     """
     mesh = press.indenter.surface()
     turn = Rotation.from_euler("XYZ", [press.tilt_x, press.tilt_y, press.yaw], degrees=True)
-    # The depth is that of the lowest point; a body is placed by its origin, which lies above it if it leans.
+    # The depth is that of the lowest point; a body is placed by its origin, which is above it if it leans.
     leans = press.tilt_x or press.tilt_y
     rise = -float(turn.apply(np.asarray(mesh.vertices))[:, 2].min()) if leans else 0.0
     position = np.column_stack([tip[:, :2], sensor.skin.thickness - tip[:, 2] + rise])

@@ -1,4 +1,4 @@
-"""What people noted of stretches of a recording, as stretches of its scene."""
+"""Notes of people on intervals of a recording, as intervals of its scene."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def with_stretch_notes(scene: Scene, root: Path, recording: Callable[[], str]) -
     """Return a scene with the notes of its recording.
 
     Args:
-        scene: What is shown; its first reading is the notes' zero.
+        scene: The scene; its first reading is the notes' zero.
         root: The session or dataset.
         recording: Returns the hash of the recording's file; asked only where there are notes.
 

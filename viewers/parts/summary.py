@@ -1,4 +1,4 @@
-"""What a person reads first about an episode, as Markdown."""
+"""Summary of an episode, as Markdown."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def of_episode(
     cameras: tuple[CameraView, ...],
     remarks: tuple[str, ...] = (),
 ) -> str:
-    """Return what the episode is, how the prediction does, and what is missing."""
+    """Return a summary of the episode, the prediction's errors, and missing parts."""
     time = episode.taxels.sample_ns
     seconds = (time[-1] - time[0]) / 1e9
     rate = f", {(len(time) - 1) / seconds:.1f} Hz" if seconds > 0 else ""
@@ -79,7 +79,7 @@ def of_dataset_episode(
     remarks: tuple[str, ...],
     count: int,
 ) -> str:
-    """Return what the dataset's episode is, where it comes from, and how the prediction does."""
+    """Return a summary of the dataset's episode, its origin, and the prediction's errors."""
     sensor, record = dataset.sensors[entry.sensor], entry.record
     frames = entry.stop - entry.start
     lines = [f"# Episode {entry.index} of {count}", ""]
@@ -116,7 +116,7 @@ def missing(
     maps: tuple[DepthMaps, ...],
     cameras: tuple[CameraView, ...],
 ) -> list[str]:
-    """Return what could not be shown, each in words."""
+    """Return the parts that could not be shown, one phrase each."""
     words = []
     if label is None:
         words.append("no label, so the skin is undeformed" if prediction is None else "no label")

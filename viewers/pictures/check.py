@@ -1,4 +1,4 @@
-"""The picture of `tacdata check`: what the channels did, how the stream ran, where the presses were."""
+"""The picture of `tacdata check`: channels, timing of the stream, places of the presses."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def _noise(axes, report: Report, unit: str) -> None:
 
 def _lag(axes, report: Report) -> None:
     lag = np.concatenate([entry.lag for entry in report.episodes])
-    if is_imported(report.episodes[0].recording.episode):  # a source has one time: when it says it read
+    if is_imported(report.episodes[0].recording.episode):  # a source has one time: that of its reading
         every = [np.diff(entry.recording.episode.taxels.sample_ns) / 1e6 for entry in report.episodes]
         spans = np.concatenate(every)
         axes.hist(spans, bins=60, color="tab:blue")

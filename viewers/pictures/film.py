@@ -26,7 +26,7 @@ from viewers.scene.scene import Scene
 RATE = {".mp4": 20.0, ".gif": 10.0}
 """Frames a second [Hz]."""
 MOST = {".mp4": 240, ".gif": 60}
-"""Frames of a film; what lasts longer is shown faster."""
+"""Frames of a film; longer recordings are shown faster."""
 SIZE = (10.0, 5.6)
 """Of a frame [inch]."""
 

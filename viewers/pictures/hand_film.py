@@ -1,4 +1,4 @@
-"""A tracked hand as a film: what the cameras saw, fingertips in space, what each of them felt."""
+"""A tracked hand as a film: images of the cameras, fingertips in space, maps of each fingertip."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def hand_times(scene: Scene, rate: float, most: int) -> np.ndarray:
     Args:
         scene: A demonstration that was tracked.
         rate: Frames a second [Hz].
-        most: Frames at most; what lasts longer is shown faster.
+        most: Frames at most; longer recordings are shown faster.
     """
     begin, end = _begin(scene), max(int(body.time_ns[-1]) for body in scene.bodies)
     return np.linspace(begin, end, int(np.clip((end - begin) / 1e9 * rate, 2, most))).astype(np.int64)
@@ -42,7 +42,7 @@ class HandPage:
     """A tracked hand at one time: cameras above, fingertips from the side and from above, maps, predicted depth."""
 
     def __init__(self, scene: Scene) -> None:
-        """Draw what does not move."""
+        """Draw the static parts."""
         self._scene = scene
         self._fingers = [body.name for body in scene.bodies]
         self._bridged = {c.name.split("/", 1)[1]: c for c in scene.curves if c.name.startswith("fingertip/")}
@@ -113,7 +113,7 @@ class HandPage:
 
 
 class _CameraPicture:
-    """What one camera saw. The paths are drawn into it: a dot beside its fingertip shows a wrong path."""
+    """Images of one camera, with the paths: a dot away from its fingertip shows a wrong path."""
 
     def __init__(self, axes: Axes, view: CameraView, bodies: tuple[Body, ...]) -> None:
         self._view, self._bodies = view, bodies

@@ -1,4 +1,4 @@
-"""A page drawn anew for every frame of a film."""
+"""A page drawn again for every frame of a film."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def page_frames(page: MovingPage, times: np.ndarray) -> Iterator[np.ndarray]:
     """Yield a page at given times, in its own unit, uint8, shape (height, width, 3) each."""
     canvas = FigureCanvasAgg(page.figure)
     canvas.draw()
-    page.figure.set_layout_engine("none")  # laid out once; every frame is alike
+    page.figure.set_layout_engine("none")  # laid out once; every frame is the same
     for time in times.tolist():
         page.show(time)
         canvas.draw()

@@ -22,7 +22,7 @@ BAR, MOST_BARS = 0.24, 26
 """Height of a bar [inch], and bars that are drawn at most, the first of them."""
 COLORS = [tuple(channel / 255 for channel in hue) for hue in HUES]
 TITLE_LETTERS = 40
-"""Letters of a line of a title above bars, of which three sets lie beside each other."""
+"""Letters of a line of a title above bars, of three sets side by side."""
 FULL = 6
 """Sets of curves that a page holds, unless it shows a hand."""
 
@@ -67,7 +67,7 @@ def other_page(scene: Scene) -> Figure:
 
 
 def one_scale(grid: Iterable[Axes], curves: list[Curves]) -> None:
-    """Give curves of one group, such as what two models leave, the same axis, so that their heights compare."""
+    """Give curves of one group, such as residuals of two models, the same axis, so that their heights compare."""
     groups: dict[str, list[Axes]] = {}
     for axes, own in zip(grid, curves, strict=False):
         groups.setdefault(own.name.split("/")[0], []).append(axes)

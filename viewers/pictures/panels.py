@@ -34,7 +34,7 @@ def seconds(scene: Scene, time_ns: np.ndarray) -> np.ndarray:
 
 
 def mappable(scale: ColorScale) -> ScalarMappable:
-    """Return what a colour bar needs."""
+    """Return the arguments of a colour bar."""
     return ScalarMappable(Normalize(scale.low, scale.high), scale.colormap)
 
 
@@ -126,7 +126,7 @@ def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
         axes.set_title(TITLES.get(shown.name, shown.name))
     for axes in grid[-1]:
         axes.set_xlabel("x [mm]")
-    # Neighbours on one scale share a bar; maps apart from each other would share it across what lies between.
+    # Neighbours on one scale share a bar; separate maps would share it across the panels between.
     for scale, group in groupby(range(len(scene.maps)), key=lambda k: scene.maps[k].scale):
         own = list(group)
         # One map alone keeps its proportions, and is narrower than its column.

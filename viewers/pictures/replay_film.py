@@ -1,4 +1,4 @@
-"""Replays of a grasp or wipe as a film: one replay beside the other, with what was felt, forces and slip."""
+"""Replays of a grasp or wipe as a film: replays side by side, with the felt maps, forces and slip."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ NAME = 0.46, 0.14
 LETTERS = 62
 """Letters of a line of the verdict."""
 NAMES = {"direct": "direct", "compensated": "compensated, gains as given", "chosen": "compensated, gain found"}
-"""Kind of replay -> what stands above it."""
+"""Kind of replay -> its heading."""
 
 
 def film_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
@@ -59,7 +59,7 @@ def film_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: Fingert
 
 
 class ReplayPage:
-    """All replays at one time: a column each, from the side and from above, forces and slip; the maps beside."""
+    """All replays at one time: a column each, from the side and from above, forces and slip; the maps next to them."""
 
     def __init__(self, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
         """Draw the beginning; arguments as in `film_replays`."""
@@ -132,7 +132,7 @@ def _pad(axes: Axes, finger: str, number: int) -> tuple[Circle, Any]:
     color = tuple(channel / 255 for channel in HUES[number % len(HUES)])
     circle = Circle((0, 0), PAD, facecolor=color, edgecolor=color, alpha=0.8)
     axes.add_patch(circle)
-    # A white rim keeps a name readable where it lies on the object or on another pad.
+    # A white rim keeps a name readable on top of the object or of another pad.
     rim = [withStroke(linewidth=2.0, foreground="white")]
     name = axes.text(0, 0, finger, fontsize=7, ha="center", va="bottom", color=color, path_effects=rim)
     return circle, name
@@ -147,7 +147,7 @@ def _moved(replay: ReplayOutcome, row: int) -> str:
 
 
 class ReplayCurves:
-    """A quantity of every pad over time, drawn up to now: what is to come must not tell the end."""
+    """A quantity of every pad over time, drawn up to now: the future must not show the end."""
 
     def __init__(
         self, axes: Axes, replay: ReplayOutcome, name: str, values: np.ndarray, most: float, gap: np.ndarray

@@ -1,4 +1,4 @@
-"""The object of a replay, and what it lies on, from the side or from above."""
+"""The object of a replay, and its support, from the side or from above."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.patches import Circle, Rectangle
 from tacdata.replay.outcome import ReplayOutcome
 
 COLOR, SUPPORT = (0.70, 0.63, 0.56), "0.88"
-"""Colours of the object, unlike those of fingers, and of what it lies on."""
+"""Colours of the object, unlike those of fingers, and of its support."""
 
 
 class ReplayObjectShape:

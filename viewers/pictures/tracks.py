@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 COLORS = ("#0072B2", "#D55E00", "#009E73")
-"""For x, y and z; told apart without red-green vision."""
+"""For x, y and z; distinct without red-green vision."""
 
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """What is drawn of one finger."""
+    """Drawn parts of one finger."""
 
     name: str
     position: np.ndarray
@@ -34,7 +34,7 @@ def draw_tracks(path: Path, seconds: np.ndarray, strips: Sequence[Strip], title:
         path: The picture.
         seconds: Times [s], shape (n,).
         strips: The fingers.
-        title: What stands on top.
+        title: Heading.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

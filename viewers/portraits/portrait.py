@@ -1,4 +1,4 @@
-"""What a portrait's file holds: one function, ``portrait(noun) -> Figure``; and the parts that portraits share.
+"""The content of a portrait's file: one function, ``portrait(noun) -> Figure``; and the parts that portraits share.
 
 A file ``viewers/portraits/my_noun.py`` draws the class ``MyNoun``, which derives from `tacdata.display.Displayed`.
 """

@@ -22,14 +22,14 @@ LAYOUTS = {
     "verdict": verdict_blueprint,
     "comparison": comparison_blueprint,
 }
-"""Kind of a scene -> what lays it out."""
+"""Kind of a scene -> its layout."""
 
 
 class RerunBackend(Backend):
     """Writes each scene into a file (.rrd) that the stock Rerun viewer opens."""
 
     def __init__(self, path: Path, recording: str | None = None) -> None:
-        """Take the file to write, and a name for what is in it, by which Rerun tells recordings apart.
+        """Take the file to write, and a name of its content, by which Rerun distinguishes recordings.
 
         Raises:
             UsageError: If it exists or does not end in .rrd.

@@ -26,12 +26,12 @@ EYE = (-10.0, -16.5, 14.0)
 
 
 def episode_blueprint(scene: Scene, follows: bool = False, stands: bool = False) -> rrb.Blueprint:
-    """Return the layout for one episode: skin, maps and curves in rows, text and cameras beside them.
+    """Return the layout for one episode: skin, maps and curves in rows, text and cameras next to them.
 
     Args:
-        scene: What is laid out.
-        follows: Whether time runs along with what arrives, for a recording in progress.
-        stands: Whether time stands where an address says.
+        scene: The scene.
+        follows: Whether time follows arriving data, for a recording in progress.
+        stands: Whether time is fixed by an address.
     """
     skins = [skin_view(s.name, SKIN_TITLES[s.name], scene) for s in scene.surfaces]
     rows: list[rrb.ContainerLike] = [rrb.Horizontal(*skins)]
@@ -107,7 +107,7 @@ def _heat_map(scene: Scene) -> rrb.Spatial2DView:
 
 
 def _curves(scene: Scene) -> rrb.Container:
-    """Return the taxels' change beside tabs with everything else that has a course in time."""
+    """Return the taxels' change next to tabs with all other curves over time."""
     hidden = rrb.PlotLegend(visible=False)
     origin = "curves/taxels/change"
     first = rrb.TimeSeriesView(origin=origin, name=f"Change since rest [{scene.taxels.scale.unit}]", plot_legend=hidden)

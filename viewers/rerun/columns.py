@@ -218,7 +218,7 @@ class RerunParts:
         self._columns(path, cloud.time_ns, columns)
 
     def _bars(self, bars: Bars) -> None:
-        # Rerun's own bars carry no names; a table with bars of letters says both.
+        # Rerun's own bars carry no names; a table with bars of letters has both.
         self._static(f"bars/{bars.name}", rr.TextDocument(bar_table(bars), media_type=rr.MediaType.MARKDOWN))
 
     def _camera(self, camera: CameraView) -> None:

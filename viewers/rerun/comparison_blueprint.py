@@ -1,4 +1,4 @@
-"""How a comparison is laid out in Rerun: sides beside each other, their difference behind them, one timeline."""
+"""How a comparison is laid out in Rerun: both sides, then their difference, one timeline."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewers.scene.scene import Scene
 
 
 def comparison_blueprint(scene: Scene) -> rrb.Blueprint:
-    """Return skins, maps or arrays in rows, curves below, and the words beside them."""
+    """Return skins, maps or arrays in rows, curves below, and the text next to them."""
     rows: list[rrb.ContainerLike] = []
     shares: list[float] = []
     if scene.surfaces:

@@ -28,7 +28,7 @@ def read_gap_curves(path: Path) -> tuple[Curves, ...]:
             time = batch[TIMELINE].cast("int64").to_numpy()
             values = batch["Scalars:scalars"].flatten().to_numpy()
             found.setdefault(parts[0], {})[parts[2]] = (time, values)
-    except Exception as error:  # whatever Rerun's reader says of a damaged file
+    except Exception as error:  # any error of Rerun's reader for a damaged file
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FormatError(f"{path} cannot be read: {reason}", "a file of tacdata revise", "revise again") from None
     curves = []

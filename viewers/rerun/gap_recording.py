@@ -65,7 +65,7 @@ def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
     """Write episodes, one view each of its telling channel and of its depth.
 
     Args:
-        episodes: What to show.
+        episodes: Episodes to show.
         path: File to write (.rrd).
         title: Its name.
 

@@ -11,7 +11,7 @@ from viewers.scene.scene import Scene
 
 
 def hand_blueprint(scene: Scene) -> rrb.Blueprint:
-    """Return fingers in space beside what they felt, curves below, text and cameras at the side."""
+    """Return fingers in space next to their maps, curves below, text and cameras at the side."""
     rows: list[rrb.ContainerLike] = [rrb.Horizontal(_space(scene), *_felt(scene), column_shares=[3, 1])]
     shares = [6.0]
     if scene.curves:

@@ -1,4 +1,4 @@
-"""Replays of a grasp or wipe as a Rerun file: object and fingertips in time, one replay beside the other."""
+"""Replays of a grasp or wipe as a Rerun file: object and fingertips in time, replays side by side."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BOARD = (0.12, 0.12, 0.002)
 
 
 def save_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
-    """Write replays, by kind, beside each other.
+    """Write replays, by kind, side by side.
 
     Args:
         path: A new Rerun file.

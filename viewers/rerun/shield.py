@@ -25,7 +25,7 @@ POLICY = (
     f"script-src {HERE} blob: 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval'; style-src {HERE} 'unsafe-inline'; "
     "form-action 'none'"
 )
-"""What the browser lets the viewer load and call; its own code needs inline scripts and WebAssembly."""
+"""Policy of the browser for the viewer's loads and calls; its own code needs inline scripts and WebAssembly."""
 PASSED_ON = ("Content-Type", "rerun-final-length")
 PATIENCE = 20.0
 """Longest wait for the viewer's own server to listen [s]."""
@@ -33,7 +33,7 @@ PATIENCE = 20.0
 
 @contextmanager
 def shielded(inner: int, port: int) -> Iterator[str]:
-    """Serve what a viewer serves, with the policy, while the context lasts.
+    """Serve a viewer's content, with the policy, while the context lasts.
 
     Args:
         inner: Port of Rerun's web server on the loopback.

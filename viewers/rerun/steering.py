@@ -37,7 +37,7 @@ class Moment:
 
     @property
     def query(self) -> str:
-        """What is added to a viewer's address."""
+        """Addition to a viewer's address."""
         return f"&at={quote(str(self))}"
 
 
@@ -50,7 +50,7 @@ def deepest_moment(scene: Scene) -> Moment | None:
 
 
 def script() -> str:
-    """Return what is added to the page of Rerun's web viewer."""
+    """Return the addition to the page of Rerun's web viewer."""
     return f"<script>{files('viewers.rerun').joinpath('steering.js').read_text()}</script>"
 
 

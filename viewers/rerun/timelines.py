@@ -1,4 +1,4 @@
-"""Names of the clocks that a recording in Rerun has; apart from what needs Rerun, which the plain install lacks."""
+"""Names of a recording's clocks in Rerun; separate from modules that need Rerun, which the plain install lacks."""
 
 HOST, DEVICE, DEVICE_TIME = "host_time", "device_frame", "device_time"
 ELAPSED = "time"

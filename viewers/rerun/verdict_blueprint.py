@@ -11,7 +11,7 @@ from viewers.scene.scene import Bars, Curves, Scene
 
 
 def verdict_blueprint(scene: Scene) -> rrb.Blueprint:
-    """Return the words beside bars, and curves where there are some."""
+    """Return the text next to bars, and curves where there are some."""
     parts: list[rrb.ContainerLike] = [_bars(bars) for bars in scene.bars]
     streams = [c.name.partition("/")[2] for c in scene.curves if c.name.startswith(f"{READINGS}/")]
     parts += [_series(c) for c in scene.curves if not streams]
@@ -35,7 +35,7 @@ def _series(curves: Curves) -> rrb.TimeSeriesView:
 
 
 def _streams(scene: Scene, streams: list[str]) -> rrb.Tabs:
-    """Return a tab for each stream: readings, what is left of them, the depth; the stream with most to see first."""
+    """Return a tab for each stream: readings, their residual, the depth; the stream with the largest first."""
     by_name = {c.name: c for c in scene.curves}
     tabs = []
     for name in streams:

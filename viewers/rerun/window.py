@@ -34,10 +34,10 @@ def require_display(remedy: str = "add --save FILE.rrd, --picture FILE.png, or -
     """Refuse to open a window where there is none.
 
     Args:
-        remedy: What a person can do instead.
+        remedy: The alternative for the user.
 
     Raises:
-        UsageError: Naming what can be done instead.
+        UsageError: Naming the alternative.
     """
     if not has_display():
         raise UsageError(
@@ -99,7 +99,7 @@ def window(file: Path, moment: Moment | None = None) -> None:
 
     Args:
         file: The file.
-        moment: Where its time stands when it opens; else at the beginning.
+        moment: Its time when it opens; else the beginning.
 
     Raises:
         UsageError: If there is no display.
@@ -130,7 +130,7 @@ def wait_for(viewer: subprocess.Popen) -> None:
 
 @contextmanager
 def web_server(file: Path, moment: Moment | None = None) -> Iterator[tuple[subprocess.Popen, str]]:
-    """Serve a file with Rerun's web viewer on the loopback; its time stands at a moment, else at the beginning.
+    """Serve a file with Rerun's web viewer on the loopback; its time is at a moment, else at the beginning.
 
     Yields:
         The serving process and the address to open.

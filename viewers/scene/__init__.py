@@ -1,1 +1,1 @@
-"""What is shown, as plain arrays."""
+"""Content of a picture, as plain arrays."""

@@ -52,7 +52,7 @@ def scale_of(values: np.ndarray, unit: str, signed: bool = False, floor: float =
     """Return the scale that spans finite values, from 0 (or symmetrically around it) to two significant digits.
 
     Args:
-        values: What is to be coloured [unit].
+        values: Values to colour [unit].
         unit: Unit to print.
         signed: Whether values of both signs matter.
         floor: Smallest end of the scale [unit], so that noise is not blown up to full colour.

@@ -10,7 +10,7 @@ from viewers.scene.scene import DepthMaps, Scene
 def moments(scene: Scene) -> tuple[tuple[str, int], ...]:
     """Return the name and time [ns] of up to three frames: half way in, deepest, half way out.
 
-    They are found in the label's maps, else in the prediction's, else in the taxels' signal; what never
+    They are found in the label's maps, else in the prediction's, else in the taxels' signal; a scene that never
     happens (in a recording that breaks off, say) is left out.
     """
     shown = scene.map_named("label") or scene.map_named("prediction") or next(iter(scene.maps), None)

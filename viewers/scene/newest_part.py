@@ -14,13 +14,13 @@ TIMED = ("time_ns", "values", "height", "depth", "position")
 
 
 class ScenePart:
-    """Remembers up to what time each stream was shown: some reach the disk later than others."""
+    """Remembers the last shown time of each stream: some reach the disk later than others."""
 
     def __init__(self) -> None:
         self._shown: dict[str, int] = {}
 
     def newer(self, scene: Scene) -> Scene:
-        """Return a scene with only what was not in those before; what has no time stays, and so do the phases."""
+        """Return a scene with only what was not in those before; parts without time stay, and so do the phases."""
         return replace(
             scene,
             curves=self._known("curves", scene.curves),

@@ -13,7 +13,7 @@ def nothing() -> None:
 
 @dataclass(frozen=True)
 class Asked:
-    """Options beside the path: labels, predictions, episode."""
+    """Options in addition to the path: labels, predictions, episode."""
 
     labels: Path | None = None
     """Folder of labels."""
@@ -22,4 +22,4 @@ class Asked:
     episode: int | None = None
     """Number of the episode in a folder."""
     meanwhile: Callable[[], None] = nothing
-    """What can be done while a large file is read: imports, mostly."""
+    """Work to do while a large file is read: imports, mostly."""

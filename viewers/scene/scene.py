@@ -81,7 +81,7 @@ class DepthMaps:
     """Maps on the label's pixel grid."""
 
     name: str
-    """"label", "prediction", "error", "pressure", "shear", "board", or what a comparison calls it."""
+    """"label", "prediction", "error", "pressure", "shear", "board", or a comparison's name for it."""
     x: np.ndarray
     """Pixel centres along x [mm], shape (pixels_x,)."""
     y: np.ndarray
@@ -92,7 +92,7 @@ class DepthMaps:
     """Depth, or predicted minus labelled depth [mm], or a traction [kPa], shape (n, pixels_x, pixels_y), float32."""
     scale: ColorScale
     title: str = ""
-    """What stands above it; without one its name says it."""
+    """Its heading; without one its name."""
 
     @property
     def pictures(self) -> np.ndarray:
@@ -115,10 +115,10 @@ class Bars:
 
     name: str
     title: str
-    """What is compared, with the unit."""
+    """Compared quantity, with the unit."""
     labels: tuple[str, ...]
     values: np.ndarray
-    """In the unit that the title says [1], shape (n,); NaN where there is none."""
+    """In the unit of the title [1], shape (n,); NaN where there is none."""
     mark: float | None = None
     """A value worth a line: a threshold or a floor."""
     logarithmic: bool = False
@@ -126,7 +126,7 @@ class Bars:
 
 @dataclass(frozen=True)
 class Page:
-    """A picture that was drawn by somebody else and lies beside the data."""
+    """A picture from another program in the folder of the data."""
 
     name: str
     title: str
@@ -135,7 +135,7 @@ class Page:
 
 @dataclass(frozen=True)
 class CameraView:
-    """What one camera saw, and where it saw the cube."""
+    """Images of one camera, and the cube's places in them."""
 
     name: str
     width: int
@@ -162,9 +162,9 @@ class CameraView:
     """The camera in the scene, homogeneous, shape (4, 4) [mm]; None if unknown."""
 
     def pixel(self, place: np.ndarray) -> np.ndarray | None:
-        """Return where a place in the scene [mm], shape (3,), lies in the image [px], shape (2,).
+        """Return the image coordinates [px], shape (2,), of a place in the scene [mm], shape (3,).
 
-        Without the lens's distortion. None if it lies behind the camera, or the camera's pose is not known.
+        Without the lens's distortion. None if it is behind the camera, or the camera's pose is not known.
         """
         if self.pose is None:
             return None
@@ -189,7 +189,7 @@ class Scene:
 
     title: str
     summary: str
-    """What a person reads first, as Markdown; includes what is missing."""
+    """The summary, as Markdown; includes missing parts."""
     frame_ns: np.ndarray
     """Sample time of every taxel frame [ns], shape (n,), int64."""
     frame: np.ndarray
@@ -207,7 +207,7 @@ class Scene:
     cameras: tuple[CameraView, ...] = ()
     phases: tuple[Span, ...] = ()
     notes: tuple[Span, ...] = ()
-    """Stretches of which a person said something."""
+    """Intervals with a person's note."""
     trails: tuple[MotionTrail, ...] = ()
     clouds: tuple[Cloud, ...] = ()
     bars: tuple[Bars, ...] = ()

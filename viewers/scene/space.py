@@ -1,4 +1,4 @@
-"""What a scene holds in space, as plain arrays: skins, bodies, paths, clouds of points."""
+"""Objects of a scene in space, as plain arrays: skins, bodies, paths, clouds of points."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class SkinSurface:
     height: np.ndarray
     """z of the face [mm], shape (n, pixels_x, pixels_y), float32."""
     depth: np.ndarray
-    """What colours it [mm], shape (n, pixels_x, pixels_y), float32."""
+    """Values of its colours [mm], shape (n, pixels_x, pixels_y), float32."""
     scale: ColorScale
 
     @property
@@ -83,7 +83,7 @@ class MotionTrail:
     hue: int = 0
     """Which of `color_scale.HUES`."""
     faint: bool = False
-    """Whether it is drawn pale, beside another path of the same hue."""
+    """Whether it is drawn pale, next to another path of the same hue."""
 
     def strips(self, doubtful: bool) -> list[np.ndarray]:
         """Return the stretches that are doubtful, or those that are not [mm], each of shape (m, 3), m >= 2."""
@@ -107,7 +107,7 @@ class Cloud:
     position: np.ndarray
     """Points of all times, one after another [mm], shape (count.sum(), 3)."""
     values: np.ndarray
-    """What colours them [the scale's unit], shape (count.sum(),)."""
+    """Values of their colours [the scale's unit], shape (count.sum(),)."""
     scale: ColorScale
     radius: float = 0.2
     """At which a point is drawn [mm]."""

@@ -21,7 +21,7 @@ class Side:
     """Maps of one label version or network."""
 
     name: str
-    """What it is called, in a word or two."""
+    """Its name, in a word or two."""
     time_ns: np.ndarray
     """Times [ns], shape (n,), int64, ascending."""
     depth: np.ndarray
@@ -34,10 +34,10 @@ def maps_comparison(
     """Return two sides and their difference, second minus first, at the frames that both hold.
 
     Args:
-        title: What stands on top.
+        title: Heading.
         sensor: Gives the pixel grid.
         sides: The first and the second.
-        truth: What both are held against, if there is such a thing: then each side's error is shown too.
+        truth: Reference of both, if there is one: then each side's error is shown too.
         phases: Marked phases.
     """
     first, second = sides
@@ -83,14 +83,14 @@ def readings_comparison(
     said: Mapping[str, np.ndarray],
     unit: str,
 ) -> Scene:
-    """Return what was measured beside what models say, and what is left.
+    """Return measurements, predictions of models, and residuals.
 
     Args:
-        title: What stands on top.
+        title: Heading.
         shape: Columns and rows of the array; (channels, 1) where they are not on a grid.
         time_ns: Times [ns], shape (n,).
         measured: Readings [unit], shape (n, channels).
-        said: Model -> what it says [unit], shape (n, channels).
+        said: Model -> its prediction [unit], shape (n, channels).
         unit: Of the readings.
     """
     columns, rows = shape
@@ -108,7 +108,7 @@ def readings_comparison(
         arrays.append(_heat(f"measured − {name}", shape, time_ns, values, signed))
     off = {name: np.sqrt(np.mean(np.square(values), axis=1)) for name, values in left.items()}
     curves.insert(0, Curves("root mean square left", unit, tuple(off), time_ns, np.column_stack(list(off.values()))))
-    lines = [f"# {title}", "", "Readings since the first frame, measured and as a model says them.", ""]
+    lines = [f"# {title}", "", "Readings since the first frame, measured and predicted by a model.", ""]
     for name, values in left.items():
         worst = int(np.argmax(np.square(values).mean(axis=0)))
         lines.append(

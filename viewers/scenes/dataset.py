@@ -21,13 +21,13 @@ def dataset_scene(
     remarks: tuple[str, ...] = (),
     total: int | None = None,
 ) -> Scene:
-    """Return what a dataset holds of one episode: signals, label and tip, without recording and cameras.
+    """Return a dataset's content of one episode: signals, label and tip, without recording and cameras.
 
     Args:
         dataset: The dataset.
         number: Number of the episode in it.
         prediction: A network's maps for it, if there are any.
-        remarks: What else a person should read, each in words.
+        remarks: Further remarks, one phrase each.
         total: Episodes of the whole dataset, where it was not read whole.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The scene of a recording, its label and a prediction. What is missing stands in the summary."""
+"""The scene of a recording, its label and a prediction. The summary lists missing parts."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def episode_scene(
     image_times: Mapping[str, tuple[np.ndarray, np.ndarray]] | None = None,
     unit: str = "counts",
 ) -> Scene:
-    """Return what there is to see of a recording.
+    """Return the scene of a recording.
 
     Args:
         episode: The recording.
         label: Its label, if there is one.
         prediction: A network's maps for it, if there are any.
         images: Camera name, time of exposure [ns] and JPEG image.
-        remarks: What else a person should read, each in words.
+        remarks: Further remarks, one phrase each.
         image_times: Camera name -> times of exposure and of arrival [ns], shape (n,) each.
         unit: Of the board's readings.
 
@@ -87,7 +87,7 @@ def episode_scene(
 
 
 def _without_taxels(episode: Episode) -> Episode:
-    """Return an episode whose board said nothing, with missing readings at the times of its other streams.
+    """Return an episode whose board sent nothing, with missing readings at the times of its other streams.
 
     Raises:
         FormatError: If there is no other stream.

@@ -33,14 +33,14 @@ def demonstration_scene(
     images: Iterable[tuple[str, int, bytes]] = (),
     remarks: tuple[str, ...] = (),
 ) -> Scene:
-    """Return what there is to see of a demonstration.
+    """Return the scene of a demonstration.
 
     Args:
-        title: What stands on top.
+        title: Heading.
         made: Its tracks, if it was worked up.
         recorded: The recording, if it is there.
         images: Camera name, time of exposure [ns] and JPEG image.
-        remarks: What else a person should read.
+        remarks: Further remarks.
     """
     scene = Scene(title, "", np.zeros(0, np.int64), np.zeros(0, np.int64), kind="hand")
     if recorded is not None:
@@ -53,12 +53,12 @@ def demonstration_scene(
 def targets_scene(
     title: str, targets: FingertipTargets, others: int = 0, joints: dict[str, np.ndarray] | None = None
 ) -> Scene:
-    """Return what a robot is asked to do: where the fingers were seen, and where they are to be.
+    """Return a robot's targets: observed and wanted places of the fingers.
 
     Args:
-        title: What stands on top.
+        title: Heading.
         targets: The targets of one demonstration.
-        others: How many further demonstrations lie beside it.
+        others: Number of further demonstrations in its folder.
         joints: Joint values by name [rad or m], shape (n,), NaN where a target cannot be reached.
     """
     time, trails, bodies, curves = targets.time_ns, [], [], []
@@ -186,7 +186,7 @@ def contact(maps: DepthMaps, track: FingerTrack, time_ns: np.ndarray) -> Cloud:
 
 
 def pad(name: str, time_ns: np.ndarray, place: np.ndarray, quaternion: np.ndarray, sensor: Sensor | None) -> Body:
-    """Return a fingertip as a plate whose outer face lies at its origin.
+    """Return a fingertip as a plate whose outer face is at its origin.
 
     Args:
         name: The finger.

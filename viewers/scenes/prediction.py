@@ -17,7 +17,7 @@ def prediction_scene(title: str, prediction: PredictedMaps, sensor: Sensor | Non
     """Return predicted maps, without label and signals.
 
     Args:
-        title: What stands on top.
+        title: Heading.
         prediction: The maps.
         sensor: The sensor that the network was trained for; without it maps are drawn in pixels.
         files: How many predictions lie there.

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def recording_scene(path: Path, asked: Asked) -> Scene:
-    """Return the scene of a recording with what lies beside it. Raises as `viewers.source.scene_at`."""
+    """Return the scene of a recording with the files of its folder. Raises as `viewers.source.scene_at`."""
     from tacdata.recording.files.reader import read_recording
     from viewers.parts.recorded_images import ImageSampler
 
@@ -104,7 +104,7 @@ def find_label(recording: Path, labels: Path | None, most: int | None = None) ->
 
 
 def prediction_for(folder: Path, time_ns: np.ndarray, sensor: str) -> tuple[PredictedMaps | None, list[str]]:
-    """Return the prediction of an episode's frames, and what should be said of it.
+    """Return the prediction of an episode's frames, and remarks on it.
 
     Args:
         folder: Folder of predictions, or a training run.

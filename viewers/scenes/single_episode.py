@@ -19,7 +19,7 @@ SHOWN = (features.TIME, features.STATE, features.RAW, features.DEPTH, features.T
 def read_single(root: Path, number: int) -> tuple[Dataset, int]:
     """Return a dataset that holds one episode, and how many the whole has.
 
-    Where an edit lost what tells sensor and record, the whole dataset is read (`tacdata.dataset.reader`), which knows
+    If an edit lost the keys of sensor and record, the whole dataset is read (`tacdata.dataset.reader`), which knows
     where to look for them.
 
     Args:

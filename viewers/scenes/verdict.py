@@ -24,10 +24,10 @@ def verdict_scene(
     """Return a verdict in words and bars.
 
     Args:
-        title: What stands on top.
+        title: Heading.
         verdict: The document (`schemas/verdict.schema.json`).
-        picture: The page with residuals that lies beside it, if one does.
-        curves: Readings beside the model before and after, if they are there.
+        picture: The page with residuals in its folder, if there is one.
+        curves: Readings and model before and after, if they exist.
     """
     words = verdict_words(title, verdict, picture.name if picture else None)
     bars = (*_left(verdict), *_slices(verdict), *_margins(verdict), *_limits(verdict))
@@ -38,10 +38,10 @@ def verdict_scene(
 
 
 def revision_scene(title: str, revision: dict[str, Any], table: str, curves: tuple[Curves, ...]) -> Scene:
-    """Return what a revision did: the gap before and after, and readings of telling episodes.
+    """Return the outcome of a revision: the gap before and after, and readings of selected episodes.
 
     Args:
-        title: What stands on top.
+        title: Heading.
         revision: The document (`schemas/revision.schema.json`).
         table: The gap as a Markdown table.
         curves: Readings measured, before and after, one entry an episode.
@@ -74,7 +74,7 @@ def _scene(title: str, words: str, bars: tuple[Bars, ...], curves: tuple[Curves,
 
 
 def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> str:
-    """Return the verdict as Markdown: the answer first, what it rests on, what to do next."""
+    """Return the verdict as Markdown: the conclusion, the evidence, the next step."""
     lines = [f"# {title}: {verdict['status']}", "", verdict["why"] + ".", ""]
     for effect in verdict["effects"]:
         lines += [f"## {effect['title']} ({effect['effect']}, {effect['stage']}): {effect['status']}", ""]

@@ -1,4 +1,4 @@
-"""What the verbs below ``tacdata dataset`` share: numbers of episodes as they are typed, and what they print."""
+"""Shared by the verbs of ``tacdata dataset``: numbers of episodes as typed, and printed lines."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def numbers(text: str) -> list[int]:
 
 
 def counted(episodes: Collection[int]) -> str:
-    """Return how many episodes there are, as a person says it."""
+    """Return the number of episodes as a phrase."""
     return f"{len(episodes)} episode" + ("s" if len(episodes) != 1 else "")
 
 

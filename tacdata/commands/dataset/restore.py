@@ -1,4 +1,4 @@
-"""Put back what lerobot's edit tools dropped."""
+"""Restore fields that lerobot's edit tools dropped."""
 
 from __future__ import annotations
 

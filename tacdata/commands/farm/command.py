@@ -1,4 +1,4 @@
-"""What the verbs that talk to a service share: its address and its token."""
+"""Shared by the verbs of a service: its address and its token."""
 
 from typing import Annotated
 

@@ -22,7 +22,7 @@ def run(
     wait: Annotated[bool, typer.Option("--wait", help="Go on until the submission is finished.")] = False,
     redo: Annotated[bool, typer.Option("--redo", help="Replace labels that were made from something else.")] = False,
 ) -> Result:
-    """Bring the labels that are finished into SESSION/labels; run again, it brings what is new."""
+    """Copy finished labels to SESSION/labels; run again, it copies new ones."""
     from time import sleep
 
     from label_farm.remote.client import Client
@@ -35,7 +35,7 @@ def run(
     fetch.bring()
     while wait and entry["state"] in ("waiting", "planning", "running"):
         sleep(1.0)
-        # Its state is asked for first: what is finished by then is brought below.
+        # Its state is requested first: labels finished by then are copied below.
         entry = client.get(client.submission(number))
         fetch.bring()
     found = fetch.fetched

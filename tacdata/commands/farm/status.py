@@ -19,7 +19,7 @@ def run(
     token: service.Token = "",
     wait: Annotated[bool, typer.Option("--wait", help="Until the submission is finished; needs its number.")] = False,
 ) -> Result:
-    """Say what was submitted, how far it is, who works, and why presses failed."""
+    """Print submissions, their progress, the workers, and reasons of failed presses."""
     from time import sleep
 
     from label_farm.remote.client import Client

@@ -34,7 +34,7 @@ def run(
         float, typer.Option(min=0.0, help="Longest wait for the service to look at the recordings [s].")
     ] = 10.0,
 ) -> Result:
-    """Ask for the labels of a session and walk away; `tacdata farm status` says how far they are."""
+    """Ask for the labels of a session and walk away; `tacdata farm status` shows the progress."""
     from label_farm.remote.client import Client, refusal
 
     wish = {

@@ -23,7 +23,7 @@ def run(
     ] = None,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> None:
-    """Solve presses for a service, or a Dask scheduler, elsewhere; Ctrl-C gives back what is in work."""
+    """Solve presses for a service, or a Dask scheduler, elsewhere; Ctrl-C gives back unfinished presses."""
     if url.startswith(("tcp://", "tls://")):
         from label_farm.workers.dask_pool import join
 

@@ -24,7 +24,7 @@ INFO, STATS, TASKS = Path("meta/info.json"), Path("meta/stats.json"), Path("meta
 
 @dataclass(frozen=True)
 class EpisodeRow:
-    """What LeRobot must know of one episode: a row of meta/episodes."""
+    """LeRobot's metadata of one episode: a row of meta/episodes."""
 
     index: int
     """Episode number, from 0."""
@@ -33,7 +33,7 @@ class EpisodeRow:
     stop: int
     """One past its last frame."""
     tasks: tuple[str, ...]
-    """What is done in it, in words."""
+    """Description of its task."""
     data_file: int
     """Number of its data file, counted through all chunks."""
     row_file: int
@@ -128,7 +128,7 @@ def _converted(root: Path, version: str) -> str:
 
 
 def write_parquet(path: Path, table: pa.Table) -> None:
-    """Write a Parquet file beside, bring it to the disk, rename it."""
+    """Write a Parquet file under a temporary name, sync it, rename it."""
     with replacement(path) as stream:
         pq.write_table(table, stream, compression="snappy", write_page_checksum=True)
 
@@ -191,7 +191,7 @@ def rows_in(path: Path) -> dict[int, EpisodeRow]:
 
 
 def read_rows(root: Path, info: dict[str, Any]) -> list[EpisodeRow]:
-    """Return the rows of the episodes that info.json counts, in order; what a crash left is passed over.
+    """Return the rows of the episodes that info.json counts, in order; remains of a crash are ignored.
 
     Raises:
         FormatError: If rows are missing, damaged, or do not follow each other.
@@ -278,7 +278,7 @@ def read_row_stats(root: Path, info: dict[str, Any]) -> dict[str, Statistics]:
 
 
 def huggingface_metadata(features: dict[str, Any]) -> bytes:
-    """Return what the ``datasets`` library keeps in a Parquet schema, to know images without LeRobot."""
+    """Return the Parquet schema metadata by which the ``datasets`` library recognizes images."""
     described: dict[str, Any] = {}
     for key, feature in features.items():
         value = {"dtype": feature["dtype"], "_type": "Value"}

@@ -1,4 +1,4 @@
-"""Metadata beside LeRobot's own: sensors, units and where each episode comes from.
+"""Metadata in addition to LeRobot's own: sensors, units and where each episode comes from.
 
 LeRobot's edit tools drop files and columns that they do not know, so nothing here is trusted by its place:
 the frame columns `tacdata.sensor` and `tacdata.record`, which every edit keeps, say which sensor and record
@@ -41,7 +41,7 @@ class EpisodeRecord:
     label: str
     """SHA-256 of the label's values."""
     label_provenance: dict[str, Any]
-    """What made the label."""
+    """Origin of the label."""
     press: dict[str, Any]
     """The nominal configuration as a document."""
     rig: str
@@ -55,11 +55,11 @@ class EpisodeRecord:
     complete: bool
     """False if the recording was interrupted or salvaged."""
     notes: tuple[str, ...] = ()
-    """What a person should know of it."""
+    """Remarks for the reader."""
     specimen: str = ""
     """Name of the sensor: of sensors of one design, whose descriptions are the same, each has its own."""
     simulated: dict[str, Any] | None = None
-    """What drew the press and its specimen, where nothing was recorded (`tacdata simulate`); None of a recording."""
+    """Simulation that drew the press and its specimen (`tacdata simulate`); None of a recording."""
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -72,7 +72,7 @@ class EpisodeRecord:
 
     @cached_property
     def key(self) -> int:
-        """What the column `tacdata.record` holds: decided by what was measured and labelled, not by when."""
+        """What the column `tacdata.record` holds: decided by the content of measurement and label, not by time."""
         return short_hash(provenance.content_hash([self.sensor, self.recording, self.label]))
 
     @property
@@ -131,7 +131,7 @@ def read_main(root: Path) -> dict[str, Any] | None:
 
 
 def lost(root: Path) -> FormatError:
-    """Return the error that says that an edit lost the sensor, and how to get it back."""
+    """Return the error for a sensor that an edit lost, with the way to restore it."""
     return FormatError(
         f"{root} has no {MAIN}: the tool that last edited it dropped the sensor description and the units",
         f"a dataset with {MAIN} and {RECORDS}",
@@ -182,7 +182,7 @@ def read_record(root: Path, key: int) -> EpisodeRecord | None:
 
 
 def shard_metadata(sensor: Sensor, record: EpisodeRecord) -> bytes:
-    """Return what stands under the key ``tacdata`` in a data file's Parquet metadata."""
+    """Return the value of the key ``tacdata`` in a data file's Parquet metadata."""
     content = {
         "version": schemas.version("dataset"),
         "units": UNITS,

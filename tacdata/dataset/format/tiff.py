@@ -13,7 +13,7 @@ MM_PER_METRE = np.float32(1000.0)
 
 def _header(height: int, width: int) -> bytes:
     size = height * width * 4
-    # (tag, type, value); type 3 is a 16-bit, 4 a 32-bit unsigned integer. 339 = 3 says floating point.
+    # (tag, type, value); type 3 is a 16-bit, 4 a 32-bit unsigned integer. 339 = 3: floating point.
     fields = [
         (256, 4, width),
         (257, 4, height),
