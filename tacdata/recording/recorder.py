@@ -22,6 +22,7 @@ from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.live_feed import Watch
 from tacdata.recording.live.lost_position import Ask, PositionGuard
 from tacdata.recording.live.machine_state import MachineState
+from tacdata.recording.live.pressed_depth import require_contact
 from tacdata.recording.live.reading_health import BadReadings
 from tacdata.recording.live.rig_devices import RigDevices, require_channels
 from tacdata.recording.live.rig_streams import RigStreams
@@ -37,6 +38,8 @@ from tacdata.sensor import Sensor
 
 Prove = Callable[..., Position]
 """Touches the skin before the first press (`tacdata.registration.evidence.prove_zero`)."""
+JUDGED = 3
+"""Presses after a start whose first contact is compared with depth zero at once; so is the first of each mounting."""
 FIRST_FRAME = 5.0
 """Time allowed for the streams to begin [s of real time]."""
 FIRST_SEARCH = 20.0
@@ -101,7 +104,7 @@ class Recorder:
         self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption, self._state)
         self._tap = tap_motion.touch(plan, sensor) if sync_tap else None
         self._say, self._watch, self._ask = say or (lambda words: None), watch, ask
-        self._prove = prove
+        self._prove, self._doubtful = prove, False
         self._latencies: dict[str, StreamLatency] = {}
 
     def run(self, confirm: Callable[[Preflight], bool]) -> Session:
@@ -123,9 +126,9 @@ class Recorder:
         require_channels(self.devices.board, self.sensor)  # before the plan: its sites are off another skin too
         self.plan.check_against(self.sensor)
         session = self._existing_session()
-        self._latencies = latencies(session) if session else {}
-        wanted = session.remaining if session else tuple(press.index for press in self.plan.presses)
-        if session and not wanted:
+        self._latencies = {} if session is None else latencies(session)
+        wanted = tuple(press.index for press in self.plan.presses) if session is None else session.remaining
+        if session is not None and not wanted:
             return session
         try:
             return self._open_and_record(session, wanted, confirm)
@@ -162,8 +165,9 @@ class Recorder:
             summary = preflight(self.plan, self.sensor, self.rig, limits, wanted, *bounds, self._tap)
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
-            self._guard.require_known(self._height, session is not None)
-            session = session or create_session(self.out, self.plan, self.sensor, self.rig.document)
+            self._doubtful = self._guard.require_known(self._height, session is not None)
+            if session is None:  # one without recordings counts as empty
+                session = create_session(self.out, self.plan, self.sensor, self.rig.document)
             with RigStreams(
                 devices,
                 self.rig.cameras,
@@ -209,11 +213,16 @@ class Recorder:
         if self._tap is not None:
             session, position = self._touch(session, self._tap, position, streams, limits)
         left = summary.seconds[-len(wanted) :]  # everything before this belongs to the sync tap
+        judged = None
         for done, number in enumerate(wanted, start=1):
             press = self.plan.presses[number]
             position = self._change_indenter(press, position, streams)
+            changed = press.mounting != judged
             position = self._record(press, position, streams, limits)
-            refresh(session)
+            session = refresh(session)
+            if changed or done <= JUDGED:
+                require_contact(file_names.finished(self.out)[press.index])
+            judged = press.mounting
             if self._progress:
                 self._progress(done, len(wanted), sum(left[done:]) / self.rig.clock.rate)
 
@@ -279,6 +288,7 @@ class Recorder:
             self._height,
             self._say,
             position,
+            self._doubtful,
         )
 
     def _touch(

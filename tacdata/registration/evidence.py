@@ -85,12 +85,12 @@ def touch_site(press: Press, sensor: Sensor, rig: Rig) -> tuple[float, float]:
 
 
 def touch_evidence(
-    probe: Probe, start: Position, place: tuple[float, float], expected: float, limit: float
+    probe: Probe, start: Position, place: tuple[float, float], expected: float, limit: float, doubtful: bool
 ) -> Evidence:
     """Touch the skin at one place, slowly, and compare its height with the expected one.
 
-    The way down is in steps, each ended by a reading at rest, so that nothing goes deeper into a skin that begins
-    higher than expected than one step.
+    The last millimetre is in steps, each ended by a reading at rest. Where the height is doubtful, so is the whole way
+    down: into a skin that begins higher than expected nothing goes deeper than one step.
 
     Args:
         probe: The indenter.
@@ -98,6 +98,7 @@ def touch_evidence(
         place: x and y of the touch [mm, machine].
         expected: Height of the skin there [mm, machine].
         limit: Largest difference that is no contradiction [mm].
+        doubtful: Whether the machine's position had been lost.
 
     Raises:
         DeviceError: If the skin answers elsewhere than expected, or not at all.
@@ -109,7 +110,7 @@ def touch_evidence(
     noise = np.maximum(idle.spread, 0.3)
     near = min(height, expected + NEAR)
     far, fine = np.arange(height - FAR, near, -FAR), np.arange(near, expected - limit - BELOW, -COARSE)
-    heights = [*far.tolist(), *fine.tolist()]
+    heights = [*(far.tolist() if doubtful else ()), *fine.tolist()]
     contact = _first_answer(probe, place, heights, idle.mean, noise)
     if contact is None:
         raise _contradiction(f"no channel answers down to machine height {heights[-1]:.2f} mm", expected, limit)
@@ -135,6 +136,7 @@ def prove_zero(
     height: float,
     say: Callable[[str], None],
     position: Position,
+    doubtful: bool,
 ) -> Position:
     """Touch the skin with the mounted indenter before the first press; return where the guide stands then [mm].
 
@@ -149,6 +151,7 @@ def prove_zero(
         height: Safe machine height [mm].
         say: Called with the result in words.
         position: Where the guide stands [mm, machine].
+        doubtful: Whether the machine's position had been lost.
 
     Raises:
         DeviceError: If the touch contradicts the registration; the indenter was lifted.
@@ -157,7 +160,7 @@ def prove_zero(
     x, y, expected = registration.to_machine(*touch_site(press, sensor, rig), 0.0)
     limit = difference_limit(registration, rig.document["registration"])
     with probing(rig, devices, streams, motion, height, LIFT_SPEED, interruption, say, position) as probe:
-        evidence = touch_evidence(probe, probe.position, (x, y), expected, limit)
+        evidence = touch_evidence(probe, probe.position, (x, y), expected, limit, doubtful)
     say(evidence.text)
     return probe.position
 
@@ -169,7 +172,7 @@ def _first_answer(
     frames = FRAMES // 2 + 1
     threshold = ANSWER * noise / np.sqrt(frames)
     for height in heights:
-        probe.go((*place, height), SPEED)
+        probe.go((*place, height), SPEED if height < heights[0] else LIFT_SPEED)
         if all(bool((np.abs(probe.read(frames).mean - rest) > threshold).any()) for _ in range(2)):
             return height
     return None

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.errors import DeviceError
+from tacdata.recording.onset import POWERS, onset, shared_power
 from tacdata.registration.cross_scan import Cross, cross_scan
-from tacdata.registration.onset import POWERS, onset, shared_power
 from tacdata.registration.probe import Probe
 from tacdata.registration.result import Found
 from tacdata.registration.settings import RegistrationSettings

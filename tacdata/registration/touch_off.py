@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.errors import DeviceError
-from tacdata.registration.onset import Onset, combined, onset
+from tacdata.recording.onset import Onset, combined, onset
 from tacdata.registration.probe import Probe
 
 COARSE = 0.1

@@ -77,13 +77,19 @@ def test_where_the_touch_contradicts_nothing_goes_deep(shifted, shift):
     assert not list(world.folder.glob("*.mcap"))
 
 
-def test_a_machine_that_lost_its_zero_is_found_out_after_a_mistaken_yes(shifted):
+@pytest.mark.parametrize("lost", [1.5, -1.5])
+def test_a_machine_that_lost_its_zero_is_found_out_after_a_mistaken_yes(shifted, lost):
     world = shifted(0.0)
-    world.controller.machine.error = np.array([0.0, 0.0, 1.5])  # it reports 1.5 mm less than it stands at
+    world.record()
+    world.reboot()
+    world.folder = world.folder.with_name("session2")
+    world.path.clear()
+    world.controller.machine.error = np.array([0.0, 0.0, lost])  # it reports so much less than it stands at
     world.answer = lambda question: True
     with pytest.raises(DeviceError, match="nothing goes deeper"):
         world.record(prove=prove_zero)
-    assert depth(world) < DEEPEST
+    assert len(world.asked) == 1
+    assert depth(world) < 1.1, "one step"
 
 
 def test_a_board_that_does_not_answer_stops_the_way_down(shifted):

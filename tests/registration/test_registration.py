@@ -5,8 +5,8 @@ import pytest
 from fake_sensor import GUESS, SENSOR, FakeSensor, put_down
 
 from tacdata.errors import DeviceError
+from tacdata.recording.onset import onset
 from tacdata.registration import RegistrationSettings, register
-from tacdata.registration.onset import onset
 from tacdata.registration.procedure import reference_taxels
 from tacdata.registration.solution import fit_rigid_motion
 from tacdata.registration.symmetric_center import symmetric_center

@@ -60,7 +60,10 @@ def plan(presses, **entries):
 class Calm:
     """No fault, as the judge of a run sees it."""
 
-    deaf, names, moved_otherwise = False, (), False
+    deaf, names, stalls, moved_otherwise = False, (), (), False
+
+    def due(self):
+        """Return that nothing has to end the run."""
 
     def seen(self):
         """Return that there is nothing to see."""
@@ -69,8 +72,11 @@ class Calm:
 class World:
     """One computer, one controller, one board and their lines, driven by one seed."""
 
-    def __init__(self, seed, folder, presses=2, firmware="Grbl", settings=None, echo=False, camera=False, **entries):
-        """Switch everything on."""
+    def __init__(
+        self, seed, folder, presses=2, firmware="Grbl", settings=None, echo=False, camera=False, zero=False, **entries
+    ):
+        """Switch everything on; with ``zero`` the place where a controller counts from lies in the envelope."""
+        self.envelope = {**ENVELOPE, "max": [1.0, 1.0, 1.0]} if zero else ENVELOPE
         self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
         self.schedule = Schedule(seed, LIMIT)
         self.bench = SimulatedHost(self.schedule)
@@ -143,7 +149,7 @@ class World:
             "cnc": {"driver": "grbl", "port": self.cnc_line.path, **controller},
             "board": {"driver": "capacitive_board", "port": self.board_line.path},
             "registration": {"origin": [*ORIGIN], "yaw": 5.0, "method": "by hand", "date": "2026-01-01"},
-            "envelope": ENVELOPE,
+            "envelope": self.envelope,
             "state_directory": str(self.folder.parent / "machines"),
         }
         clock = Clock(EPOCH + START, START, 1.0, self.computer)

@@ -21,6 +21,7 @@ from tacdata.recording.check.channel_order import (
 from tacdata.recording.check.clocks import DRIFT_PPM
 from tacdata.recording.check.figures import RecordingFigures
 from tacdata.recording.check.findings import DEPTH_MM, UNUSABLE, WARNING, Finding
+from tacdata.recording.check.first_contact import LIMITS, drift_words, first_contact, height_words
 from tacdata.recording.check.possible import ANSWER, CONTACT, answer
 from tacdata.recording.check.session_steps import TELLING, height_step, slip, strength_step
 
@@ -53,7 +54,7 @@ LOUDER = 3.0
 
 def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
     """Return findings on the channels, from their answers to the session's presses."""
-    apart = [*_delays(entries), *_louder(entries), *_drifts(entries), *_not_felt(entries)]
+    apart = [*_delays(entries), *_louder(entries), *_drifts(entries), *_not_felt(entries), *_heights(entries)]
     found = answers(entries)
     if found is None:
         return apart
@@ -157,11 +158,27 @@ def _not_felt(entries: list[RecordingFigures]) -> list[Finding]:
     return [
         Finding(UNUSABLE, "taxels", entry.recording.episode.path.name, f"no channel answers to this press: {NOT_FELT}")
         for entry, press, felt in known
-        if felt < ANSWER and press.depth >= felt_from and _over_taxels(entry)
+        if felt < ANSWER and press.depth >= felt_from and over_taxels(entry)
     ]
 
 
-def _over_taxels(entry: RecordingFigures) -> bool:
+def _heights(entries: list[RecordingFigures]) -> list[Finding]:
+    """Judge where the skin begins: at depth zero, and at the same depth in each press."""
+    contacts = [
+        (entry.recording.episode.number, contact)
+        for entry in entries
+        if entry.recording.episode.complete and (contact := first_contact(entry)) is not None
+    ]
+    found = []
+    if judged := height_words([contact for _, contact in contacts]):
+        found.append(Finding(UNUSABLE if abs(judged[0]) > LIMITS[1] else WARNING, "taxels", "", judged[1]))
+    if words := drift_words(contacts):
+        found.append(Finding(WARNING, "taxels", "", words))
+    return found
+
+
+def over_taxels(entry: RecordingFigures) -> bool:
+    """Whether a press lies over a taxel, so that it must be felt."""
     press, taxels = entry.recording.episode.press, entry.recording.episode.sensor.taxels
     apart = np.linalg.norm(taxels.centers - np.array([press.x, press.y]), axis=1)
     return bool(apart.min() < 0.75 * max(taxels.pitch_x, taxels.pitch_y))

@@ -23,6 +23,10 @@ WATCH = 0.02
 """Interval at which the motion is watched for faults and Ctrl-C [s of real time]."""
 MARGIN = 15.0
 """Time allowed for coming to rest at the end of a path before it counts as hung [s of the host's clock]."""
+LIFTS = 3
+"""Attempts to lift the tip after a stop [count]."""
+FIRST_RISE, FIRST_SPEED = 1.0, 1.0
+"""Length [mm] and speed [mm/s] of the first part of a lift."""
 LETTING_GO = 10.0
 """Time allowed for a stopped motion's thread to end [s of real time]."""
 
@@ -143,6 +147,11 @@ class GuardedMotion:
             self._why = "the motion's thread does not end"
             return
         self._allowed.forget()
+        self._find_rest()
+
+    def _find_rest(self) -> None:
+        """Empty the controller's queue, and take where it stands, or why that is unknown."""
+        self._rest = None
         try:
             self._rest = self._cnc.abandon()
         except TacdataError as error:
@@ -196,21 +205,41 @@ class GuardedMotion:
             return f"the indenter stands clear of the skin, at machine height {self._stands[2]:.3f} mm"
         if self._rest is None:
             return f"the indenter was not lifted ({self._why}){self._advice}"
+        begun = self._rest[2]
+        for attempt in range(1, LIFTS + 1):
+            try:
+                self._rise_to(height, speed)
+                break
+            except TacdataError as error:
+                if not self._came_to_rest() or attempt == LIFTS:
+                    return f"the indenter was not lifted all the way: {error.given}{self._advice}"
         x, y, z = self._rest
-        try:
-            if z < height:
-                self._rising = height
-                self._lifted = f"the indenter was not lifted all the way (interrupted){self._advice}"
-                self._allowed.move((x, y, height), speed, self._clock.now_ns())
-                self._cnc.rise((x, y, height), speed)
-                self._cnc.wait_idle(MARGIN + (height - z) / speed)
-                self._rising = None
-        except TacdataError as error:
-            return f"the indenter was not lifted all the way: {error.given}{self._advice}"
         self._at, self._clear = (x, y, max(z, height)), True
-        if z >= height:
-            return f"the indenter stands clear of the skin, at machine height {z:.3f} mm"
-        return f"the indenter was lifted off the skin, straight up from {z:.3f} to {height:.3f} mm"
+        if begun >= height:
+            return f"the indenter stands clear of the skin, at machine height {begun:.3f} mm"
+        again = "" if attempt == 1 else f", at the attempt number {attempt}"
+        return f"the indenter was lifted off the skin, straight up from {z:.3f} to {height:.3f} mm{again}"
+
+    def _rise_to(self, height: float, speed: float) -> None:
+        """Rise from rest to ``height`` [mm], slowly at first: a damaged line is then noticed near the place of rest."""
+        x, y, z = self._rest or (np.nan, np.nan, np.inf)
+        targets = [(z + FIRST_RISE, min(speed, FIRST_SPEED))] if z + FIRST_RISE < height else []
+        for target, fast in [*targets, (height, speed)] if z < height else []:
+            self._rising = height
+            self._lifted = f"the indenter was not lifted all the way (interrupted){self._advice}"
+            self._allowed.move((x, y, target), fast, self._clock.now_ns())
+            self._cnc.rise((x, y, target), fast)
+            self._cnc.wait_idle(MARGIN + (target - z) / fast)
+            self._allowed.rested(self._clock.now_ns())
+        self._rising = None
+
+    def _came_to_rest(self) -> bool:
+        """After a lift that failed: stop again; return whether the controller obeys and its place is known."""
+        self._cnc.feed_hold()
+        self._allowed.forget()
+        self._rising = None
+        self._find_rest()
+        return self._rest is not None
 
     @property
     def _advice(self) -> str:

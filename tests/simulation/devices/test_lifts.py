@@ -1,0 +1,80 @@
+"""A lift is watched as any path is, tried again where the controller obeys, and reported as it ended."""
+
+import re
+
+import pytest
+from simulated_rig import ORIGIN, World
+
+from tacdata.errors import DeviceError
+
+PRESSING = 7_000_000_000
+"""Time at which the tip is in the skin [ns]."""
+DEEP = 0.8
+"""Depth of the press [mm]."""
+RISE = re.compile(r"G1Z-(\d)(\d)")
+"""A line of a lift: it names no x and y."""
+
+
+@pytest.fixture
+def lifted(tmp_path):
+    """Breaks a press off; the lifts' lines of the given numbers are damaged. Returns world and words."""
+    made = []
+
+    def play(damaged):
+        world = World(1, tmp_path / "session")
+        made.append(world)
+        count = []
+
+        def wire(line):
+            if not RISE.search(line):
+                return line
+            count.append(line)
+            if len(count) in damaged:
+                return RISE.sub(lambda match: f"G1Z-{int(match[1]) + 1}{match[2]}", line)
+            return line
+
+        world.controller.inject_wire(to_controller=wire)
+        world.schedule.at(PRESSING, lambda: world.board_line.close())
+        with pytest.raises(DeviceError, match="taxel board") as raised:
+            world.record()
+        return world, "\n".join(raised.value.__notes__)
+
+    yield play
+    for world in made:
+        world.end()
+
+
+def deepest(world):
+    return ORIGIN[2] - min(row[3] for row in world.path)
+
+
+def test_a_damaged_lift_is_stopped_near_its_place_and_tried_again(lifted):
+    world, words = lifted({1})
+    assert deepest(world) < DEEP + 0.5
+    assert world.position()[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
+    assert re.search(r"tip:    the indenter was lifted off the skin, .* at the attempt number 2", words), words
+    assert "on its way" not in words
+
+
+def test_a_lift_whose_second_part_is_damaged_is_tried_again(lifted):
+    world, words = lifted({2})
+    assert world.position()[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
+    assert "lifted off the skin" in words
+    assert "attempt number 2" in words
+
+
+def test_a_lift_that_never_goes_up_is_reported_where_it_stands(lifted):
+    world, words = lifted(set(range(1, 20)))
+    place = world.position()
+    assert place[2] < ORIGIN[2]
+    assert deepest(world) < DEEP + 3 * 0.5
+    assert "the indenter was not lifted all the way" in words
+    stands = re.search(r"motion: stopped at \((\S+), (\S+), (\S+)\) mm", words)
+    assert [float(value) for value in stands.groups()] == pytest.approx(place.tolist(), abs=0.02), words
+    assert "on its way" not in words.split("motion:")[1].splitlines()[0]
+
+
+def test_an_undamaged_lift_is_one_attempt(lifted):
+    world, words = lifted(set())
+    assert world.position()[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
+    assert "attempt" not in words
