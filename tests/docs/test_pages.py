@@ -5,6 +5,7 @@ import re
 import shlex
 from pathlib import Path
 
+import example_folder
 import pytest
 import typer.main
 
@@ -30,6 +31,7 @@ def blocks(page, language):
 
 GUIDES = [page for page in PAGES if page.parent == ROOT or page.is_relative_to(ROOT / "docs")]
 PYTHON = [page for page in GUIDES if blocks(page, "python")]
+OF_ROOMS = [page for page in PAGES if page not in GUIDES and blocks(page, "python")]
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +47,22 @@ def test_python_blocks_run_as_they_stand(page, tmp_path, monkeypatch, capsys):
     for body in blocks(page, "python"):
         exec(compile(body, name(page), "exec"), shared)
     assert capsys.readouterr().out.strip()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A session with labels, its dataset and the shipped examples."""
+    made = tmp_path_factory.mktemp("rooms")
+    example_folder.fill(made)
+    return made
+
+
+@pytest.mark.parametrize("page", OF_ROOMS, ids=name)
+def test_python_blocks_of_rooms_run_as_they_stand(page, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    shared = {}
+    for body in blocks(page, "python"):
+        exec(compile(body, name(page), "exec"), shared)
 
 
 def commands(page):
