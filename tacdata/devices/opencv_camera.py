@@ -16,6 +16,7 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import Camera, ImageFrame, StreamCounts
 from tacdata.errors import DeviceError, UsageError
+from tacdata.wire.image_stream import ImageStream
 
 FIRST_IMAGE = 5.0
 """Timeout for the first image [s, real time]."""
@@ -246,6 +247,8 @@ class OpencvCamera(Camera):
             self._check_index(self.source)
         elif not self._live and not Path(self.source).is_file():
             raise self._error("does not exist", "correct source in the rig file")
+        if stamped := self._open_stamped():
+            return stamped
         quiet = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
         try:
             capture = self._capture()
@@ -259,7 +262,7 @@ class OpencvCamera(Camera):
         elif not self._live and self.rate is None:
             self.rate = capture.get(cv2.CAP_PROP_FPS) or 30.0
         raw = self._ask_for_jpeg(capture)
-        # A stream over HTTP has no clock: its back-end invents times at 25 Hz. A looped file begins again and again.
+        # A stream over HTTP without stamps has no clock: OpenCV invents times. A looped file begins again and again.
         timed = not str(self.source).startswith("http") and not self.loop
 
         def grab() -> _Grabbed | None:
@@ -274,6 +277,24 @@ class OpencvCamera(Camera):
             return _decoded(image.tobytes(), device_ns) if raw else _Grabbed(image, device_ns=device_ns)
 
         return grab, capture.release
+
+    def _open_stamped(self) -> tuple[Grab, Callable[[], None]] | None:
+        """Open a stream over HTTP whose images carry the time of their exposure; None for any other source."""
+        if not str(self.source).startswith("http"):
+            return None
+        try:
+            stream = ImageStream(str(self.source), FIRST_IMAGE)
+        except OSError:
+            return None
+        if not stream.stamped:
+            stream.close()
+            return None
+
+        def grab() -> _Grabbed | None:
+            part = stream.read()
+            return _decoded(part.data, part.device_ns) if part else None
+
+        return grab, stream.close
 
     def _capture(self) -> Any:
         import cv2

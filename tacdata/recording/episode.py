@@ -76,6 +76,8 @@ class TagStream:
     """Tags read on the cube in each image, ascending."""
     finger: str = ""
     """Name of the finger; empty for the cube that the camera's entry in the rig file names."""
+    timing: np.ndarray | None = None
+    """Standard uncertainty of each time of exposure [s], shape (p,); None where a stream has one for all."""
 
 
 @dataclass(frozen=True)

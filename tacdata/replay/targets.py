@@ -17,6 +17,8 @@ from tacdata.errors import UsageError
 
 FAR = 0.05
 """Shift by compensation that is said [m]; the paper's gains move a target by at most 36 mm."""
+VAGUE = 0.01
+"""Share of the targets that may be known worse than `GUESS` though the finger was seen [1]."""
 UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m", "depth": "mm", "gap": "1"}
 
 
@@ -159,7 +161,7 @@ def doubts(targets: FingertipTargets) -> list[str]:
     for name, bridged, spread in _bridged(targets):
         if (vague := ~bridged & (spread > GUESS)).any():
             words.append(
-                f"{name}: {vague.mean():.0%} of the targets were seen and are still uncertain, with standard "
+                f"{name}: {vague.sum()} of {len(vague)} targets were seen and are still uncertain, with standard "
                 f"deviations of up to {1000 * spread[vague].max():.0f} mm"
             )
         if not bridged.any():
@@ -183,6 +185,7 @@ def check_guesses(targets: FingertipTargets) -> None:
     """
     for name, bridged, spread in _bridged(targets):
         guess = bridged & (spread > GUESS)
+        vague = ~bridged & (spread > GUESS)
         if guess.any():
             raise UsageError(
                 f"{targets.recording}: {name} was not seen for {guess.sum() / targets.rate:.1f} s by a camera in its "
@@ -191,6 +194,14 @@ def check_guesses(targets: FingertipTargets) -> None:
                 f"targets known to {1000 * GUESS:g} mm, or a stretch without gaps",
                 "record again with the cubes in view, export fingers that were seen (--finger), or let them pass with "
                 "--with-guesses",
+            )
+        if vague.mean() > VAGUE:
+            raise UsageError(
+                f"{targets.recording}: {name} was seen, and {vague.mean():.0%} of its targets are uncertain, with a "
+                f"standard deviation of up to {1000 * spread[vague].max():.0f} mm",
+                f"targets known to {1000 * GUESS:g} mm at {1 - VAGUE:.0%} of the times",
+                "record again: on a host that keeps up, with cubes nearer to the cameras, or with a camera that stamps "
+                "its images; or let them pass with --with-guesses",
             )
 
 

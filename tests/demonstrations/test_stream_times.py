@@ -7,7 +7,8 @@ import pytest
 from demo_examples import recording, taxels, truth_at, view
 
 from tacdata.demonstrations.paths.tracking import track
-from tacdata.errors import FormatError
+from tacdata.errors import FormatError, UsageError
+from tacdata.replay.targets import check_guesses, targets_of
 
 NAMES = ("thumb", "index", "middle")
 TWO = {"cameras": ("eye", "other")}
@@ -70,12 +71,29 @@ def test_times_that_go_back_are_refused(tmp_path):
         track(recording(tmp_path, streams=felt))
 
 
+@pytest.mark.parametrize("lag", [0.15, 0.3])
+def test_images_that_are_late_all_the_time_are_betrayed_by_touch(tmp_path, lag):
+    """No clock shows it: the paths are as uncertain as the lag, and not fit for a robot.
+
+    One camera with a noise of 0.4 mm tells the lag to some 0.03 s.
+    """
+    tracked = track(recording(tmp_path, views=tuple(later(view(name), lag) for name in NAMES)))
+    (words,) = [words for words in tracked.remarks if "later than the readings" in words]
+    assert float(words.split()[3]) == pytest.approx(lag, abs=0.04)
+    off = np.concatenate([t.position - truth_at(n, tracked.time_ns)[:, :3, 3] for n, t in tracked.tracks.items()])
+    spread = np.concatenate([np.sqrt(t.covariance[:, range(3, 6), range(3, 6)]) for t in tracked.tracks.values()])
+    assert 1000 * np.nanmax(np.abs(off)) > 10.0 and (np.abs(off) > 3 * spread).any(axis=1).mean() < 0.01
+    with pytest.raises(UsageError, match="of its targets are uncertain"):
+        check_guesses(targets_of(tracked, None))
+
+
 def test_late_images_do_not_average_out(tmp_path):
     """All images are 60 ms late, as their clock allows: the truth lies within what is stated, and it is said."""
     made = recording(tmp_path, views=tuple(later(view(name), 0.06) for name in NAMES))
     tracked = track(replace(made, timing={"eye": 0.06}))
-    (words,) = tracked.remarks
-    assert words.startswith("the times of camera eye's images are known to 0.06 s only")
+    stated, felt = tracked.remarks
+    assert stated.startswith("the times of camera eye's images are known to 0.06 s only")
+    assert "later than the readings" in felt
     off = np.concatenate([t.position - truth_at(n, tracked.time_ns)[:, :3, 3] for n, t in tracked.tracks.items()])
     spread = np.concatenate([np.sqrt(t.covariance[:, range(3, 6), range(3, 6)]) for t in tracked.tracks.values()])
     assert 1000 * np.nanmax(np.abs(off)) > 5.0

@@ -17,6 +17,7 @@ import numpy as np
 from tacdata.demonstrations.paths.camera_bumps import Bump, jumps, split
 from tacdata.demonstrations.paths.second_look import sampled
 from tacdata.demonstrations.paths.sightings import Sightings
+from tacdata.demonstrations.paths.stream_times import timely
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.errors import FormatError, UsageError
 
@@ -70,7 +71,8 @@ def without_bumps(
         recording: The demonstration.
         delays: Camera -> by how much its images were moved back in time [s]; missing for 0.
     """
-    behind, between = shifts(recording, delays), jumps(seen, recording.span_ns[0])
+    behind = shifts(recording, delays)
+    between = jumps({name: timely(found) for name, found in seen.items()}, recording.span_ns[0])
     if behind:
         shown = {bump.camera for bump in behind}
         rivals = {bump.begin_ns: {b.camera for b in between if b.begin_ns == bump.begin_ns} for bump in between}

@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata.demonstrations.paths.motion_filter import GAP, Smoothed, logarithm
 from tacdata.demonstrations.paths.sightings import Sightings
+from tacdata.demonstrations.recording.reader import TIMELY
 from tacdata.tags.cube.pose import CubePose
 from tacdata.tags.fingers import Finger
 from tacdata.tags.mixups import handedness
@@ -118,7 +119,7 @@ def exchanges(seen: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: 
 
 def _on_the_others_path(seen: Sightings, own: Smoothed, other: Smoothed, times_ns: np.ndarray) -> np.ndarray:
     """Return the times [ns] of outliers that lie much nearer to another finger's path than to their own."""
-    refused = ~own.accepted & (seen.time_ns >= times_ns[0]) & (seen.time_ns <= times_ns[-1])
+    refused = ~own.accepted & (seen.time_ns >= times_ns[0]) & (seen.time_ns <= times_ns[-1]) & (seen.timing <= TIMELY)
     times = seen.time_ns[refused]
     here, there = (
         np.stack([np.interp(times, times_ns, path.position[:, k]) for k in range(3)], -1) for path in (own, other)
@@ -159,7 +160,8 @@ def _stands(fingers: dict[str, Finger], paths: dict[str, Smoothed], k: int) -> s
 
 def contradictions(seen: Sightings, path: Smoothed, begin_ns: int) -> list[str]:
     """Say how many sightings contradict the path, and of which camera, where they are more than `CONTRADICTING`."""
-    left_out = ~path.accepted
+    # An image at a wrong time contradicts the others, whatever camera and tags do.
+    left_out = ~path.accepted & (seen.timing <= TIMELY)
     if left_out.mean() <= CONTRADICTING:
         return []
     each = {name: np.array([camera == name for camera in seen.camera]) for name in dict.fromkeys(seen.camera)}

@@ -11,10 +11,10 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording.clocks.clock_model import ClockModel
+from tacdata.recording.clocks.image_clock import ImageClock
 from tacdata.recording.episode import TagStream
 from tacdata.recording.files import topics
-from tacdata.recording.files.camera_arrays import image_times
+from tacdata.recording.files.camera_arrays import clock_of, image_times
 from tacdata.recording.files.mcap_records import read_records
 from tacdata.tags.detection.unread import Unread, why_unread
 from tacdata.tags.tips import TipPose
@@ -56,9 +56,12 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
     records = read_records(recording.path, images=False, digests=False, seen=search)
     views: list[TagStream] = []
     for name, found in seen.items():
-        stored = records.metadata.get(f"clock_model/camera {name}")
-        times = image_times(records, name, ClockModel.from_document(stored) if stored else None).sample_ns
-        views += [_stream(name, finger, times, found) for finger in recording.rig.fingers]
+        clock = clock_of(records, name, recording.rig.cameras[name].get("rate"))
+        stamps = image_times(records, name, clock)
+        own = None
+        if isinstance(clock, ImageClock):
+            own = clock.uncertainties(stamps.device_ns if clock.axis == "device_ns" else stamps.sequence)
+        views += [_stream(name, finger, stamps.sample_ns, found, own) for finger in recording.rig.fingers]
     notes = tuple(note for note in recording.notes if not note.startswith("camera ") or "failed" in note)
     searched = f"all {sum(map(len, seen.values()))} images"
     return replace(recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched)
@@ -100,8 +103,7 @@ def sampled(recording: DemoRecording, count: int) -> dict[str, list[tuple[int, n
     records = read_records(recording.path, images=False, digests=False, seen=keep)
     made: dict[str, list[tuple[int, np.ndarray]]] = {}
     for name, messages in kept.items():
-        stored = records.metadata.get(f"clock_model/camera {name}")
-        times = image_times(records, name, ClockModel.from_document(stored) if stored else None).sample_ns
+        times = image_times(records, name, clock_of(records, name, recording.rig.cameras[name].get("rate"))).sample_ns
         chosen = [k for k in list(messages)[:: -(-len(messages) // count) or 1] if k < len(times)]
         opened = ((int(times[k]), _image(messages[k])) for k in chosen)
         made[name] = [(time, image) for time, image in opened if image is not None]
@@ -116,7 +118,9 @@ def _image(message: bytes) -> np.ndarray | None:
     return cv2.imdecode(data, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION) if len(data) else None
 
 
-def _stream(camera: str, finger: str, times_ns: np.ndarray, found: list[dict[str, TipPose]]) -> TagStream:
+def _stream(
+    camera: str, finger: str, times_ns: np.ndarray, found: list[dict[str, TipPose]], timing: np.ndarray | None
+) -> TagStream:
     count = min(len(times_ns), len(found))
     position, quaternion = np.full((count, 3), np.nan), np.full((count, 4), np.nan)
     covariance, reprojection = np.full((count, 6, 6), np.nan), np.full(count, np.nan)
@@ -131,5 +135,15 @@ def _stream(camera: str, finger: str, times_ns: np.ndarray, found: list[dict[str
         reprojection[row], faces[row] = tip.cube.reprojection, tip.cube.faces
         ambiguous[row], ids[row] = tip.cube.ambiguous, tip.cube.ids
     return TagStream(
-        camera, times_ns[:count], position, quaternion, reprojection, faces, covariance, ambiguous, tuple(ids), finger
+        camera,
+        times_ns[:count],
+        position,
+        quaternion,
+        reprojection,
+        faces,
+        covariance,
+        ambiguous,
+        tuple(ids),
+        finger,
+        None if timing is None else timing[:count],
     )

@@ -14,6 +14,8 @@ FLOOR = 0.0002, float(np.radians(0.2))
 """Standard deviation [m], [rad] of every sighting beyond its image noise: print, mounting, calibration."""
 UNKNOWN = 0.002, float(np.radians(3.0))
 """Standard deviation [m], [rad] of a sighting without a stored covariance, or with an impossible one."""
+LONGEST = 1.0
+"""Largest uncertainty of a time that is multiplied by a speed [s]."""
 UNIT = 0.01
 """Largest deviation of a quaternion's length from 1 [1]."""
 ROUNDING = 1e-12
@@ -49,6 +51,8 @@ class Sightings:
     """Camera of each sighting."""
     ids: tuple[tuple[int, ...], ...]
     """Tags of each sighting, ascending."""
+    timing: np.ndarray
+    """Standard uncertainty of each time [s], shape (p,)."""
     cameras: dict[str, CameraError] = field(default_factory=dict)
     """Camera -> the error common to all of its sightings; cameras without an entry have none stated."""
 
@@ -68,6 +72,7 @@ class Sightings:
             self.ambiguous[kept],
             tuple(self.camera[k] for k in chosen),
             tuple(self.ids[k] for k in chosen),
+            self.timing[kept],
             self.cameras,
         )
 
@@ -84,14 +89,22 @@ def sightings_of(
         finger: Name of the finger.
         views: Streams of the cameras.
         rig: The rig, with the cameras' poses.
-        timing: Camera -> standard uncertainty of its images' times [s].
+        timing: Camera -> standard uncertainty of its images' times [s], beyond each image's own.
     """
     parts = [_of_camera(view, rig, (timing or {}).get(view.camera, 0.0)) for view in views if view.finger == finger]
     parts = [part for part in parts if len(part)]
     if not parts:
         empty = np.zeros((0, 3))
         return Sightings(
-            finger, np.zeros(0, np.int64), empty, np.zeros((0, 3, 3)), np.zeros((0, 6, 6)), np.zeros(0, bool), (), ()
+            finger,
+            np.zeros(0, np.int64),
+            empty,
+            np.zeros((0, 3, 3)),
+            np.zeros((0, 6, 6)),
+            np.zeros(0, bool),
+            (),
+            (),
+            np.zeros(0),
         )
     time_ns = np.concatenate([part.time_ns for part in parts])
     order = np.argsort(time_ns, kind="stable")
@@ -110,6 +123,7 @@ def sightings_of(
         joined("ambiguous"),
         tuple(cameras[k] for k in order),
         tuple(ids[k] for k in order),
+        joined("timing"),
         {name: error for name in rig.worlds if (error := _error_of(name, rig)) is not None},
     )
 
@@ -138,7 +152,10 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     lost = ~np.isfinite(covariance).all(axis=(1, 2))
     covariance[lost] = _diagonal(*UNKNOWN)
     covariance[np.linalg.eigvalsh(covariance)[:, 0] < -ROUNDING] = _diagonal(*UNKNOWN)
-    covariance = covariance + timing**2 * _motion(view.sample_ns[seen], view.position[seen] @ turn.T)
+    sigma = np.hypot(timing, np.zeros(count) if view.timing is None else view.timing[seen])
+    # Beyond a second a finger has moved as far as it ever does.
+    per_second = motion(view.sample_ns[seen], view.position[seen] @ turn.T)
+    covariance = covariance + np.minimum(sigma, LONGEST)[:, None, None] ** 2 * per_second
     ambiguous = np.zeros(len(seen), bool) if view.ambiguous is None else view.ambiguous
     ids: list[tuple[int, ...]] = list(view.ids) if view.ids else [()] * len(seen)
     matrices = Rotation.from_quat(view.quaternion[seen]).as_matrix() if count else np.zeros((0, 3, 3))
@@ -151,10 +168,11 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
         ambiguous[seen],
         (view.camera,) * count,
         tuple(ids[k] for k in chosen),
+        sigma,
     )
 
 
-def _motion(time_ns: np.ndarray, position: np.ndarray) -> np.ndarray:
+def motion(time_ns: np.ndarray, position: np.ndarray) -> np.ndarray:
     """Return v v^T of a path [m^2/s^2] in the lower right of (p, 6, 6): the covariance per squared second of timing
     error.
 

@@ -13,8 +13,8 @@ from itertools import combinations
 import numpy as np
 
 from tacdata.demonstrations.paths.motion_filter import Smoothed, logarithm
-from tacdata.demonstrations.paths.sightings import Sightings
-from tacdata.demonstrations.recording.reader import DemoRecording
+from tacdata.demonstrations.paths.sightings import LONGEST, Sightings, motion
+from tacdata.demonstrations.recording.reader import TIMELY, DemoRecording
 from tacdata.errors import FormatError
 
 ASTRAY = 2.0
@@ -37,8 +37,16 @@ OVERLAP = 0.4
 """The same, as a share of all of its sightings [1]."""
 KEPT = 0.9
 """Share of the differences that count; the largest are outliers [1]."""
-LATE = 0.05
-"""Standard uncertainty of image times from which it is said [s]."""
+LATE = 0.03
+"""Standard uncertainty of image times from which a remark is made [s]."""
+WINDOW, FEW = 3.0, 20
+"""Stretch in which the lag of two cameras is looked for [s], and sightings of each that it must hold [count]."""
+NEAR_LAGS = np.arange(-1.0, 1.0001, 0.02)
+"""Lags that are tried in a stretch [s], shape (m,)."""
+CLEARLY = 3.0
+"""Smallest lag in a stretch, over the stated uncertainty of times [1]."""
+STILL = 0.005
+"""Smallest interval of images of which a speed is taken [s]."""
 RESIDUAL = 0.01
 """Standard uncertainty of image times that were moved by a lag [s]."""
 
@@ -110,57 +118,192 @@ def in_step(
     return replace(recording, views=views, timing=timing) if moved else recording, moved, words
 
 
-def carried_through(path: Smoothed, times_ns: np.ndarray, timing: float) -> Smoothed:
+def late_stretches(seen: Mapping[str, Sightings], begin_ns: int) -> tuple[dict[str, Sightings], list[str]]:
+    """Return sightings with the uncertainty of times that two cameras' motion shows, and words about it.
+
+    In a stretch in which the images of one camera are later than those of another, that lag is the uncertainty of its
+    times. Two cameras that are late alike do not show it.
+
+    Args:
+        seen: Finger -> its sightings.
+        begin_ns: Beginning of the demonstration [ns], for words.
+    """
+    cameras = sorted({camera for found in seen.values() for camera in found.camera})
+    spans: dict[str, list[tuple[float, float, float]]] = {}
+    times = np.concatenate([np.zeros(0, np.int64), *(found.time_ns for found in seen.values())])
+    if len(cameras) < 2 or not len(times):
+        return dict(seen), []
+    moments = np.arange(times.min(), times.max(), round(WINDOW / 2 * 1e9), dtype=np.int64)
+    for one, other in combinations(cameras, 2):
+        for first in moments:
+            last = first + round(WINDOW * 1e9)
+            part = {n: f.where((f.time_ns >= first) & (f.time_ns < last)) for n, f in seen.items()}
+            lag = _lag(part, one, other, NEAR_LAGS, FEW)
+            late = other if (lag or 0.0) > 0 else one
+            known = [sigma for f in part.values() for sigma in f.timing[_by(f, late)]]
+            if lag is not None and known and abs(lag) > CLEARLY * float(np.median(known)):
+                spans.setdefault(late, []).append((float(first), float(last), abs(lag)))
+    made, words = dict(seen), []
+    for camera, late in spans.items():
+        for name, found in made.items():
+            timing = found.timing.copy()
+            for first, last, lag in late:
+                rows = _by(found, camera) & (found.time_ns >= first) & (found.time_ns < last)
+                timing[rows] = np.maximum(timing[rows], lag)
+            made[name] = replace(found, timing=timing, covariance=found.covariance + _more(found, timing))
+        ends = (min(span[0] for span in late) - begin_ns) * 1e-9, (max(span[1] for span in late) - begin_ns) * 1e-9
+        words.append(
+            f"the images of camera {camera} are up to {max(span[2] for span in late):.2f} s later than those of "
+            f"another between {ends[0]:.1f} and {ends[1]:.1f} s: the host did not keep up, and they hardly count there"
+        )
+    return made, words
+
+
+def timely(seen: Sightings) -> Sightings:
+    """Return the sightings whose times are known well enough to judge cameras and tags by them."""
+    return seen.where(seen.timing <= TIMELY)
+
+
+def carried_through(path: Smoothed, seen: Sightings, times_ns: np.ndarray) -> Smoothed:
     """Return a path whose covariance holds the error of the images' times.
 
-    Neighbouring images are late alike. So this error does not average out, as the noise of single images does.
+    Neighbouring images are late alike. So this error does not average out, as the noise of single images does. It is
+    the distance that the finger goes in that time by its sightings: a smoothed path may have cut a stroke short.
 
     Args:
         path: A smoothed path.
-        times_ns: Its times [ns], shape (n,), ascending.
-        timing: Standard uncertainty of the times [s].
+        seen: Its sightings.
+        times_ns: The path's times [ns], shape (n,), ascending.
     """
-    covariance, seconds = path.covariance.copy(), times_ns * 1e-9 - times_ns[0] * 1e-9
-    last = len(times_ns) - 1
+    sigma, covariance = known_to(seen, times_ns), path.covariance.copy()
+    seconds, last = (times_ns - times_ns[0]) * 1e-9, len(times_ns) - 1
+    moved = _displacements(seen, times_ns, sigma)
     for k in np.flatnonzero(np.isfinite(path.position).all(axis=1)):
         a, b = max(k - 1, 0), min(k + 1, last)
         turn = path.rotation[b] @ path.rotation[a].T
         turning = logarithm(turn) / (seconds[b] - seconds[a]) if np.isfinite(turn).all() and b > a else np.zeros(3)
-        rate = np.concatenate([turning, path.velocity[k]])
-        covariance[k] += timing**2 * np.outer(rate, rate)
+        smoothed = np.outer(path.velocity[k], path.velocity[k]) * sigma[k] ** 2
+        covariance[k, :3, :3] += np.outer(turning, turning) * sigma[k] ** 2
+        covariance[k, 3:, 3:] += max(smoothed, moved[k], key=lambda matrix: float(np.trace(matrix)))
     return replace(path, covariance=covariance)
 
 
-def late_words(timing: Mapping[str, float], paths: Mapping[str, Smoothed]) -> list[str]:
-    """Say which cameras' image times are known badly, and what that means for moving fingers."""
-    fastest = max(float(np.nanmax(np.linalg.norm(path.velocity, axis=1), initial=0.0)) for path in paths.values())
-    return [
-        f"the times of camera {name}'s images are known to {sigma:.2f} s only: a finger that moves is known to up to "
-        f"{1000 * sigma * fastest:.0f} mm; a host that keeps up, or a camera with times of its own, knows them better"
-        for name, sigma in timing.items()
-        if sigma > LATE
-    ]
+def known_to(seen: Sightings, times_ns: np.ndarray) -> np.ndarray:
+    """Return the standard uncertainty of time by the surest camera that sees the finger [s], shape (n,).
+
+    Args:
+        seen: A finger's sightings.
+        times_ns: Times [ns], shape (n,), ascending.
+    """
+    best = np.full(len(times_ns), np.inf)
+    for camera in dict.fromkeys(seen.camera):
+        rows = _by(seen, camera)
+        times, sigma = seen.time_ns[rows], np.minimum(seen.timing[rows], LONGEST)
+        after = np.clip(np.searchsorted(times, times_ns), 1, max(len(times) - 1, 1))
+        ends = [np.clip(after - 1, 0, len(times) - 1), np.clip(after, 0, len(times) - 1)]
+        away = np.min([np.abs(times[k] - times_ns) for k in ends], axis=0)
+        near = away <= SPACED * 1e9
+        best[near] = np.minimum(best, np.max([sigma[k] for k in ends], axis=0))[near]
+    if len(seen):
+        nearest = np.clip(np.searchsorted(seen.time_ns, times_ns), 1, max(len(seen) - 1, 1))
+        ends = np.maximum(seen.timing[nearest - 1], seen.timing[np.minimum(nearest, len(seen) - 1)])
+        best = np.where(np.isfinite(best), best, np.minimum(ends, LONGEST))
+    return best
 
 
-def _lag(seen: Mapping[str, Sightings], one: str, other: str) -> float | None:
-    """Return how much later the images of another camera are than those of one [s]; None if they are not."""
+def late_words(seen: Mapping[str, Sightings], begin_ns: int) -> list[str]:
+    """Describe which cameras' image times are known badly, when, and what that means for moving fingers."""
+    words = []
+    for camera in sorted({camera.partition(" (")[0] for found in seen.values() for camera in found.camera}):
+        times, sigma, fastest = [], [], 0.0
+        for found in seen.values():
+            rows = np.array([name.partition(" (")[0] == camera for name in found.camera], bool)
+            if rows.sum() > 1:
+                times, sigma = [*times, *found.time_ns[rows]], [*sigma, *found.timing[rows]]
+                step = np.diff(found.time_ns[rows]) * 1e-9
+                speed = np.linalg.norm(np.diff(found.position[rows], axis=0), axis=1) / np.maximum(step, STILL)
+                fastest = max(fastest, float(np.quantile(speed, 0.99)))
+        vague = np.array(sigma) > LATE
+        if not vague.any():
+            continue
+        when, most = np.array(times)[vague], min(float(np.max(sigma)), LONGEST)
+        span = f" from {(when.min() - begin_ns) * 1e-9:.1f} to {(when.max() - begin_ns) * 1e-9:.1f} s"
+        words.append(
+            f"the times of camera {camera}'s images are known to {most:.2f} s only{'' if vague.all() else span}: a "
+            f"finger that moves is known to up to {1000 * most * fastest:.0f} mm; record again on a host that keeps up,"
+            " or with a camera that stamps its images"
+        )
+    return words
+
+
+def _by(seen: Sightings, camera: str) -> np.ndarray:
+    """Return which sightings are of a camera, shape (p,), bool."""
+    return np.array([name == camera for name in seen.camera], bool)
+
+
+def _more(seen: Sightings, timing: np.ndarray) -> np.ndarray:
+    """Return the covariance that larger uncertainties of times add to sightings [m^2], shape (p, 6, 6)."""
+    added = np.zeros((len(seen), 6, 6))
+    grown = np.minimum(timing, LONGEST) ** 2 - np.minimum(seen.timing, LONGEST) ** 2
+    for camera in dict.fromkeys(seen.camera):
+        rows = _by(seen, camera)
+        added[rows] = grown[rows, None, None] * motion(seen.time_ns[rows], seen.position[rows])
+    return added
+
+
+def _displacements(seen: Sightings, times_ns: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Return the covariance [m^2] of a finger's place that its sightings' times cause, shape (n, 3, 3)."""
+    made = np.zeros((len(times_ns), 3, 3))
+    for camera in dict.fromkeys(seen.camera):
+        rows = _by(seen, camera)
+        if rows.sum() < 2:
+            continue
+        seconds = (seen.time_ns[rows] - times_ns[0]) * 1e-9
+        at = (times_ns - times_ns[0]) * 1e-9
+
+        def place(moments: np.ndarray, seconds: np.ndarray = seconds, rows: np.ndarray = rows) -> np.ndarray:
+            return np.stack([np.interp(moments, seconds, seen.position[rows, k]) for k in range(3)], axis=1)
+
+        middle = place(at)
+        away = np.stack([(place(at + s * sigma) - middle) / abs(s) for s in (-2.0, -1.0, 1.0, 2.0)])
+        squares = (away**2).sum(axis=2)
+        outer = np.einsum("sni,snj->nij", away, away)
+        total = np.maximum(squares.sum(axis=0), 1e-30)
+        scaled = outer * (squares.max(axis=0) / total)[:, None, None]
+        larger = np.trace(scaled, axis1=1, axis2=2) > np.trace(made, axis1=1, axis2=2)
+        made[larger] = scaled[larger]
+    return made
+
+
+def _lag(
+    seen: Mapping[str, Sightings], one: str, other: str, lags: np.ndarray = LAGS, fewest: int = FEWEST
+) -> float | None:
+    """Return how much later the images of another camera are than those of one [s]; None if they are not.
+
+    Args:
+        seen: Finger -> its sightings.
+        one: A camera.
+        other: Another.
+        lags: Lags that are tried [s], shape (m,).
+        fewest: Smallest number of sightings of one that must fall on the other's path.
+    """
     pairs = []
     for found in seen.values():
         of = [np.array([camera == name for camera in found.camera]) for name in (one, other)]
-        if all(rows.sum() >= FEWEST for rows in of):
+        if all(rows.sum() >= fewest for rows in of):
             pairs.append([((found.time_ns[rows] - found.time_ns[0]) * 1e-9, found.position[rows]) for rows in of])
     if not pairs:
         return None
-    coarse = np.array([_difference(pairs, float(lag)) for lag in LAGS])
-    fine = LAGS[int(coarse.argmin())] + FINE
-    scores = np.array([_difference(pairs, float(lag)) for lag in fine])
-    best, without = float(fine[int(scores.argmin())]), _difference(pairs, 0.0)
+    coarse = np.array([_difference(pairs, float(lag), fewest) for lag in lags])
+    fine = lags[int(coarse.argmin())] + FINE
+    scores = np.array([_difference(pairs, float(lag), fewest) for lag in fine])
+    best, without = float(fine[int(scores.argmin())]), _difference(pairs, 0.0, fewest)
     if not np.isfinite(scores.min()) or abs(best) < SHORTEST or without < BETTER * scores.min():
         return None
     return best
 
 
-def _difference(pairs: list[list[tuple[np.ndarray, np.ndarray]]], lag: float) -> float:
+def _difference(pairs: list[list[tuple[np.ndarray, np.ndarray]]], lag: float, fewest: int) -> float:
     """Return the trimmed mean square of the distance between two cameras' paths at a lag [m^2]."""
     squares, count, whole = [], 0, 0
     for (times, path), (other_times, other_path) in pairs:
@@ -173,7 +316,7 @@ def _difference(pairs: list[list[tuple[np.ndarray, np.ndarray]]], lag: float) ->
         there = np.stack([np.interp(at[inside], times, path[:, k]) for k in range(3)], axis=1)
         off = other_path[inside] - there
         squares.append(((off - np.median(off, axis=0)) ** 2).sum(axis=1))
-    if count < max(FEWEST, OVERLAP * whole):
+    if count < max(fewest, OVERLAP * whole):
         return np.inf
     every = np.sort(np.concatenate(squares))
     return float(every[: max(int(KEPT * len(every)), 1)].mean())

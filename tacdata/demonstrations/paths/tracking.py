@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,14 @@ from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.motion_filter import GATE, Smoothed
 from tacdata.demonstrations.paths.second_look import why_nothing_is_seen
 from tacdata.demonstrations.paths.sightings import FLOOR, Sightings, sightings_of
-from tacdata.demonstrations.paths.stream_times import carried_through, check_together, in_step, late_words
+from tacdata.demonstrations.paths.stream_times import (
+    carried_through,
+    check_together,
+    in_step,
+    late_stretches,
+    late_words,
+)
+from tacdata.demonstrations.paths.touch_times import touch_lag
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.errors import FormatError, UsageError
 
@@ -59,10 +67,12 @@ def track(
     if moved:
         seen = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
     begin, end = recording.span_ns
+    # A fault of time looks like a fault of cameras or tags, so it comes first.
+    seen, late = late_stretches(seen, begin)
     whole = seen
     seen, bumps = without_bumps(seen, recording, delays)
     times = begin + np.rint(np.arange(int((end - begin) * 1e-9 * rate) + 1) * (1e9 / rate)).astype(np.int64)
-    remarks = [*moved, *bumps, *(f"while recording: {note}" for note in recording.notes)]
+    remarks = [*moved, *late, *bumps, *(f"while recording: {note}" for note in recording.notes)]
     remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in seen.items() if len(s) < FEWEST]
     seen = {name: found for name, found in seen.items() if len(found) >= FEWEST}
     if not seen or len(times) < 2:
@@ -75,14 +85,13 @@ def track(
         seen[name], paths[name], settings[name], words = _path(found, times)
         remarks += words
         remarks += path_faults.contradictions(seen[name], paths[name], begin)
-        known = min((recording.timing.get(camera.partition(" (")[0], 0.0) for camera in set(found.camera)), default=0.0)
-        paths[name] = carried_through(paths[name], times, known)
+        paths[name] = carried_through(paths[name], seen[name], times)
         # The sentence about a bump says why its moment is left out.
         doubted = np.setdiff1d(whole[name].time_ns, found.time_ns)
         words, passed_over = _gaps(seen[name], paths[name], times, looked, doubted)
         remarks += words
         unsearched |= passed_over
-    remarks += late_words(recording.timing, paths)
+    remarks += late_words(seen, begin)
     remarks += _unsearched_words(sorted(unsearched))
     if not recording.searched.startswith("all") and unsearched:
         remarks.append("all images are stored: tacdata track --every-image searches those that were passed over")
@@ -95,6 +104,8 @@ def track(
     for name, path in paths.items():
         tracks[name], words = _track(name, path, seen[name], recording, times, estimators.get(name))
         remarks += words
+    tracks, words = _against_touch(tracks, paths, seen, times)
+    remarks += words
     parents = {"recording": provenance.file_hash(recording.path)}
     network = identity_of(estimators)
     if network:
@@ -121,6 +132,29 @@ def track(
         tuple(dict.fromkeys(remarks)),
         provenance.stamp("tacdata track", parents, {"rate": rate}),
     )
+
+
+def _against_touch(
+    tracks: dict[str, FingerTrack], paths: dict[str, Smoothed], seen: dict[str, Sightings], times: np.ndarray
+) -> tuple[dict[str, FingerTrack], list[str]]:
+    """Return tracks as uncertain as touch shows their times to be, and words about it."""
+    lag = touch_lag(tracks, (times - times[0]) * 1e-9)
+    if lag is None:
+        return tracks, []
+    if lag < 0:
+        return tracks, [
+            f"the readings are {-lag:.2f} s later than the images, by when the fingers close: depth belongs to earlier "
+            "places than it stands at; record again on a host that keeps up, or correct the boards' latency"
+        ]
+    late = {name: replace(found, timing=np.maximum(found.timing, lag)) for name, found in seen.items()}
+    made = {
+        name: replace(track, covariance=carried_through(paths[name], late[name], times).covariance)
+        for name, track in tracks.items()
+    }
+    return made, [
+        f"the images are {lag:.2f} s later than the readings, by when the fingers close: the paths are known no better "
+        "than that; record again on a host that keeps up, or correct the cameras' latency in the demo rig"
+    ]
 
 
 def _nothing_seen(recording: DemoRecording) -> FormatError:

@@ -7,6 +7,7 @@ import signal
 import sys
 from pathlib import Path
 
+from tacdata.demonstrations.recording.reader import TIMELY, read_demo
 from tacdata.demonstrations.recording.recorder import DemoRecorder
 from tacdata.demonstrations.recording.rig import read_demo_rig
 from tacdata.demonstrations.recording.session import DemoSession, open_demo_session
@@ -47,7 +48,7 @@ def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count
                         length = f"{seconds:g} s" if seconds is not None else "until Ctrl-C"
                         print(f"demonstration {number + 1} of {count}: recording {length}", flush=True)
                     path = recorder.record(stop.asked if not asks else lambda: stop.asked() or _enter(), seconds)
-                    print(f"  {path.name}", flush=True)
+                    print(f"  {path.name}: {_times_known(path)}", flush=True)
                     if stop.asked():
                         break
                 return recorder.session
@@ -55,6 +56,15 @@ def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count
             _forget_if_empty(out, resume)
             error.add_note(_ending(out))
             raise
+
+
+def _times_known(path: Path) -> str:
+    """Return how well the times of a recording's images are known, in words, and what to do where that is badly."""
+    known = read_demo(path).times_known
+    if not known:
+        return "no image was searched for tags while recording"
+    best = min(known.values())
+    return f"times known to {best:.3f} s" if best <= TIMELY else f"times known to {best:.2f} s: record again"
 
 
 def _ending(out: Path) -> str:

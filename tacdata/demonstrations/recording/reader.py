@@ -16,14 +16,21 @@ from tacdata.errors import FormatError
 from tacdata.paths import StrPath
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.clocks.envelope_fit import fit
+from tacdata.recording.clocks.image_clock import ImageClock
 from tacdata.recording.clocks.running_clock import nominal_period_ns
 from tacdata.recording.episode import TagStream, TaxelStream
 from tacdata.recording.files import topics
-from tacdata.recording.files.camera_arrays import finger_streams
+from tacdata.recording.files.camera_arrays import clock_of, finger_streams
 from tacdata.recording.files.mcap_records import Records, read_records
 
 UNTIMED = 0.02
 """Standard uncertainty of an image's time without a clock model, in a damaged file [s]."""
+
+
+TIMELY = 0.02
+"""Largest standard uncertainty of an image's time with which it tells of motion, cameras and tags [s]."""
+NEARLY_ALL = 0.99
+"""Share of a camera's images that must be that well timed [1]."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +49,22 @@ class DemoRecording:
     notes: tuple[str, ...]
     """Remarks of the recorder and of the reader, as sentences."""
     timing: dict[str, float] = field(default_factory=dict)
-    """Camera -> standard uncertainty of its image times [s]."""
+    """Camera -> standard uncertainty of its image times [s], beyond that of each image."""
     searched: str = "images that the recorder had time for"
     """Which images were searched for tags, in words."""
+
+    @property
+    def times_known(self) -> dict[str, float]:
+        """Camera -> standard uncertainty of nearly all of its images' times [s]; those without an image are missing."""
+        found: dict[str, list[np.ndarray]] = {}
+        for view in self.views:
+            own = np.zeros(len(view.sample_ns)) if view.timing is None else view.timing
+            found.setdefault(view.camera, []).append(np.hypot(own, self.timing.get(view.camera, 0.0)))
+        return {
+            name: float(np.quantile(np.concatenate(parts), NEARLY_ALL))
+            for name, parts in found.items()
+            if len(parts[0])
+        }
 
     @property
     def span_ns(self) -> tuple[int, int]:
@@ -81,8 +101,7 @@ def _recording(records: Records) -> DemoRecording:
     notes += [entry.message for entry in logged if entry.level > Log.Level.INFO]
     views, timing = [], {}
     for camera in rig.cameras:
-        stored = records.metadata.get(f"clock_model/camera {camera}")
-        clock = ClockModel.from_document(stored) if stored else None
+        clock = clock_of(records, camera, rig.cameras[camera].get("rate"))
         views += finger_streams(records, camera, clock)
         timing[camera] = _timing(clock)
     return DemoRecording(
@@ -97,10 +116,12 @@ def _recording(records: Records) -> DemoRecording:
     )
 
 
-def _timing(clock: ClockModel | None) -> float:
-    """Return the uncertainty of a camera's image times [s]: by its clock, or by arrivals where that is not steady."""
+def _timing(clock: ImageClock | ClockModel | None) -> float:
+    """Return the uncertainty common to a camera's image times [s]; 0 where each image has its own."""
     if clock is None:
         return UNTIMED
+    if isinstance(clock, ImageClock):
+        return 0.0
     latency = clock.latency.uncertainty_ns if clock.latency else 0
     return float(np.hypot(clock.uncertainty_ns if clock.steady else clock.jitter_ns, latency)) * 1e-9
 

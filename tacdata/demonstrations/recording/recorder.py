@@ -104,7 +104,7 @@ class DemoRecorder:
         """Record one demonstration until ``ended()``, or for ``seconds`` [s of the rig's clock].
 
         Raises:
-            DeviceError: If writing fails, or every stream is silent; what was written is kept.
+            DeviceError: If writing fails, a camera is lost, or every stream is silent; what was written is kept.
             KeyboardInterrupt: On Ctrl-C; what was recorded so far is kept as an interrupted recording.
         """
         if self._streams is None:
@@ -119,6 +119,14 @@ class DemoRecorder:
             while not ended() and (seconds is None or self.rig.clock.now_ns() - begun < seconds * 1e9):
                 if writer.failure is not None:
                     break  # closing reports what the disk refused
+                if lost := self._streams.lost_cameras:
+                    reason = "; ".join(lost.values())
+                    seconds_kept = (self.rig.clock.now_ns() - begun) * 1e-9
+                    raise DeviceError(
+                        f"{reason}, {seconds_kept:.1f} s after the beginning of {writer.path.name}",
+                        "every camera of the demo rig until the end",
+                        "check its cable and its supply, then record again",
+                    )
                 if len(self._streams.silent) == len(self._boards) + len(self._cameras):
                     reason = "; ".join(f"{k}: {v}" for k, v in self._streams.silent.items())
                     given = f"every stream fell silent ({reason})"

@@ -47,6 +47,7 @@ class DemoStreams(DeviceStreams):
         super().__init__(boards, cameras, entries, fingers, detect)
         self._say = say
         self._why: dict[str, str] = {}
+        self._lost: dict[str, str] = {}
         self._heard: set[str] = set()
         self._health = {name: _health_of(board) for name, board in self._boards.items()}
         self._quiet_until_ns = dict.fromkeys(self._boards, 0)
@@ -61,6 +62,11 @@ class DemoStreams(DeviceStreams):
     def silent(self) -> dict[str, str]:
         """Stream -> why it delivers nothing at the moment, as a sentence."""
         return dict(self._why)
+
+    @property
+    def lost_cameras(self) -> dict[str, str]:
+        """Camera that delivers nothing any more -> why, as a sentence."""
+        return dict(self._lost)
 
     @property
     def heard(self) -> frozenset[str]:
@@ -94,6 +100,8 @@ class DemoStreams(DeviceStreams):
             self._fall_silent(name, f"nothing received for {self.silence:g} s; check cable and power")
 
     def _broken(self, name: str, error: TacdataError) -> None:
+        if name in self._cameras:
+            self._lost[name] = error.given
         self._fall_silent(name, f"{error.given}; {error.remedy}")
 
     def _fall_silent(self, name: str, why: str) -> None:

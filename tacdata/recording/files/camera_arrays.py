@@ -10,6 +10,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from schemas import tacdata_pb2 as pb
 from tacdata.recording.clocks.clock_model import ClockModel
+from tacdata.recording.clocks.image_clock import ImageClock, image_clock
 from tacdata.recording.episode import TagStream
 from tacdata.recording.files import topics
 from tacdata.recording.files.mcap_records import Records
@@ -44,11 +45,24 @@ def device_times(records: Records, camera: str) -> dict[int, int]:
     return {time.sequence & 0xFFFFFFFF: time.device_ns for time in times}
 
 
-def image_times(records: Records, camera: str, clock: ClockModel | None) -> ImageTimes:
+def image_times(records: Records, camera: str, clock: ClockModel | ImageClock | None) -> ImageTimes:
     """Return the times of a camera's images by its clock."""
     arrival, sequence, device = image_stamps(records, camera)
     digest = _array([int.from_bytes(own, "little") for own in records.columns_of(topics.image(camera)).data])
     return ImageTimes(arrival, _sample(clock, arrival, sequence, device), digest, sequence, device)
+
+
+def clock_of(records: Records, camera: str, rate: float | None) -> ImageClock | ClockModel | None:
+    """Return the clock of a camera's images: one with a time for each, or the recorder's where it stored too few.
+
+    Args:
+        records: The recording.
+        camera: Its name in the rig file.
+        rate: Its nominal rate [Hz]; None if unknown.
+    """
+    stored = records.metadata.get(f"clock_model/camera {camera}")
+    model = ClockModel.from_document(stored) if stored else None
+    return image_clock(*image_stamps(records, camera), model, rate) or model
 
 
 def cube_stream(records: Records, camera: str, clock: ClockModel | None) -> TagStream:
@@ -56,14 +70,16 @@ def cube_stream(records: Records, camera: str, clock: ClockModel | None) -> TagS
     return _stream(records, camera, clock, (topics.cube(camera), topics.pose(camera)), "")
 
 
-def finger_streams(records: Records, camera: str, clock: ClockModel | None) -> tuple[TagStream, ...]:
+def finger_streams(records: Records, camera: str, clock: ClockModel | ImageClock | None) -> tuple[TagStream, ...]:
     """Return the poses of each fingertip that a camera looked for."""
     names = topics.fingers((c.topic for c in records.channels.values()), camera)
     found = (_stream(records, camera, clock, topics.finger(camera, name), name) for name in names)
     return tuple(stream for stream in found if len(stream.faces))
 
 
-def _stream(records: Records, camera: str, clock: ClockModel | None, pair: tuple[str, str], finger: str) -> TagStream:
+def _stream(
+    records: Records, camera: str, clock: ClockModel | ImageClock | None, pair: tuple[str, str], finger: str
+) -> TagStream:
     views, given = list(map(pb.CubeView.FromString, records.columns_of(pair[0]).data)), records.columns_of(pair[1])
     poses = {k: PoseInFrame.FromString(own).pose for k, own in zip(given.sequence.tolist(), given.data, strict=True)}
     position, quaternion = np.full((len(views), 3), np.nan), np.full((len(views), 4), np.nan)
@@ -89,11 +105,14 @@ def _stream(records: Records, camera: str, clock: ClockModel | None, pair: tuple
         np.array([v.ambiguous for v in views], dtype=bool),
         tuple(tuple(v.ids) for v in views),
         finger,
+        clock.uncertainties(device if clock.axis == "device_ns" else sequence)
+        if isinstance(clock, ImageClock)
+        else None,
     )
 
 
 def _sample(
-    clock: ClockModel | None, arrival_ns: np.ndarray, sequence: np.ndarray, device_ns: np.ndarray
+    clock: ClockModel | ImageClock | None, arrival_ns: np.ndarray, sequence: np.ndarray, device_ns: np.ndarray
 ) -> np.ndarray:
     if clock is None:
         return arrival_ns

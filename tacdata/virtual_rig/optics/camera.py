@@ -26,14 +26,15 @@ class VirtualCamera:
         delay: float = 0.035,
         seed: int = 0,
         ahead: bool = False,
+        stamps: bool = True,
     ) -> None:
         """Serve ``draw(exposure [ns]) -> uint8 (height, width)`` at ``rate`` [Hz] after a latency of ``delay`` [s].
 
         With ``ahead``, images are rendered before they are due, so that rendering adds no latency. The scene must then
-        be known beforehand.
+        be known beforehand. With ``stamps``, the time of exposure goes before each image, as uStreamer sends it.
         """
         self.clock, self.rate, self.delay = clock, rate, delay
-        self._draw, self._ahead = draw, ahead
+        self._draw, self._ahead, self._stamps = draw, ahead, stamps
         self._rng = np.random.default_rng([seed, 5])
         self.start_ns = clock.now_ns()
         self._image: tuple[int, bytes] = (-1, b"")
@@ -115,7 +116,11 @@ class VirtualCamera:
                 try:
                     while item := camera._next(number):
                         number, data = item
-                        head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
+                        head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n"
+                        if camera._stamps:
+                            seconds, part = divmod(camera.exposure_ns(number), NS)
+                            head += f"X-Timestamp: {seconds}.{part // 1000:06d}\r\n"
+                        head += "\r\n"
                         self.wfile.write(head.encode("ascii") + data + b"\r\n")
                         self.wfile.flush()
                 except OSError:

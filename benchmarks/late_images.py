@@ -1,0 +1,225 @@
+"""Whether fingertip paths stay honest when images come late: truth within 3 standard deviations, or refused.
+
+A hand grasps or wipes for `--seconds`, seen by two cameras at 20 Hz. Exposures, latencies, lost images and the work of
+the host are simulated, so the result is the same at any load of the computer. Every second seed has a busy host of one
+of `KINDS`. Of each kind, one half has cameras that stamp their images, the other has none.
+
+    python benchmarks/late_images.py [--seeds N] [--first N] [--seconds S] [--kind KIND] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from hand_paths import START, rig_of
+from scipy.spatial.transform import Rotation
+
+from tacdata.demonstrations.paths.tracking import track
+from tacdata.demonstrations.recording.reader import DemoRecording
+from tacdata.errors import TacdataError
+from tacdata.recording.clocks.clock_model import StreamLatency
+from tacdata.recording.clocks.image_clock import image_clock
+from tacdata.recording.clocks.running_clock import StreamClock
+from tacdata.recording.episode import TagStream, TaxelStream
+from tacdata.replay.targets import check_guesses, targets_of
+from tacdata.virtual_rig.demo import DELAY, FINGERS, RATE
+from tacdata.virtual_rig.world.hand import draw_hand
+
+KINDS = ("late", "late to the end", "late from the start", "bursts", "slow", "lost", "always late")
+"""How images come on a busy host: 0.2 s late for ten seconds, in the middle, to the end, or from before the start; late
+now and then; a camera that skips what it has no time for; lost images; 0.2 s late all the time.
+"""
+BEFORE = 5.0
+"""Time for which the camera is open before the recording [s]."""
+ACCUSING = ("was moved", "change places", "of the other hand", "contradict", "glued on")
+"""Words of a remark that accuses a camera or a tag."""
+
+
+def exposed(kind, seconds, rng):
+    """Return exposures and arrivals of one camera [s after the beginning of the recording], shape (n,) both."""
+    begun = -BEFORE + rng.uniform(0, 1 / RATE)
+    times = np.arange(begun, seconds, 1 / RATE)
+    late = DELAY + rng.uniform(0, 0.01, len(times))
+    begin = rng.uniform(1.0, max(seconds - 11.0, 1.1))
+    size = rng.uniform(0.15, 0.3)
+    kept = np.ones(len(times), bool)
+    if kind == "late":
+        late[(times > begin) & (times < begin + 10.0)] += size
+    elif kind == "late to the end":
+        late[times > seconds - 10.0] += size
+    elif kind == "late from the start":
+        late[times < 10.0] += size
+    elif kind == "always late":
+        late += size
+    elif kind == "bursts":
+        for moment in rng.uniform(0, seconds, 8):
+            rows = (times > moment) & (times < moment + rng.uniform(0.2, 2.0))
+            late[rows] += rng.uniform(0.02, 0.4)
+    elif kind == "lost":
+        kept = rng.random(len(times)) > rng.uniform(0.01, 0.1)
+    elif kind == "slow":
+        return slow(times[0], seconds, begin, rng)
+    arrivals = np.maximum.accumulate(times + late)
+    return times[kept], arrivals[kept] + 0.0005 * np.arange(len(times))[kept] / len(times)
+
+
+def slow(first, seconds, begin, rng):
+    """Return exposures and arrivals of a camera that skips exposures when its work takes longer than a period."""
+    times, arrivals, now, number = [], [], first, 0
+    while now < seconds:
+        exposure = first + number / RATE
+        busy = begin < now < begin + 10.0
+        ready = now + rng.lognormal(np.log(0.2 if busy else 0.01), 0.4)
+        now = max(ready, exposure + DELAY + rng.uniform(0, 0.01))
+        times.append(exposure)
+        arrivals.append(now)
+        number += max(1, int((now - exposure) * RATE))
+    return np.array(times), np.array(arrivals)
+
+
+def streams(hand, camera, eye, made, stamped, seconds, rng):
+    """Return what one camera saw of all fingers, with the times that the reader of a recording would give."""
+    times, arrivals = made
+    arrival, device = (START + np.rint(values * 1e9).astype(np.int64) for values in (arrivals, times))
+    device = device - START + 7_000_000_000_000 if stamped else np.full(len(times), -1)
+    clock = StreamClock("device_ns" if stamped else "order")
+    clock.set_latency(StreamLatency(int(DELAY * 1e9), 2_000_000))
+    number = np.arange(len(times))
+    for k in number:
+        clock.take(int(arrival[k]), int(device[k] if stamped else k))
+    rows = (arrivals >= 0) & (arrivals < seconds)
+    own = image_clock(arrival[rows], number[rows], device[rows], clock.model(), RATE)
+    counter = device[rows] if stamped else number[rows]
+    stamps, sigma = own.sample_times(arrival[rows], counter), own.uncertainties(counter)
+    return [
+        seen_by(hand, finger, camera, eye, times[rows], stamps, sigma, rng) for finger in FINGERS["fingers"]
+    ], np.abs((stamps - START) * 1e-9 - times[rows]) / sigma
+
+
+def seen_by(hand, finger, camera, eye, times, stamps, sigma, rng):
+    """Return a finger's poses at true times, under the times that they are given."""
+    world, count = np.linalg.inv(eye), len(times)
+    poses = np.array([world @ hand.tip(finger, t) for t in times])
+    across = rng.uniform(0.00005, 0.0002, count)
+    spreads = np.stack([np.radians(0.25) * np.ones(count)] * 3 + [across, across, 6 * across], axis=1)
+    noise = rng.normal(0, spreads)
+    covariance = np.zeros((count, 6, 6))
+    covariance[:, range(6), range(6)] = spreads**2
+    turns = Rotation.from_rotvec(noise[:, :3]) * Rotation.from_matrix(poses[:, :3, :3])
+    kept, first = rng.random(count) < 0.9, FINGERS["fingers"][finger]["cube"]["ids"]["+x"]
+    stream = TagStream(
+        camera,
+        stamps,
+        poses[:, :3, 3] + noise[:, 3:],
+        turns.as_quat(),
+        np.full(count, 0.1),
+        np.full(count, 2),
+        covariance,
+        np.zeros(count, bool),
+        ((first, first + 1),) * count,
+        finger,
+        sigma,
+    )
+    arrays = {k: v[kept] for k, v in vars(stream).items() if isinstance(v, np.ndarray)}
+    return replace(stream, **arrays, ids=((first, first + 1),) * int(kept.sum()))
+
+
+def felt(hand, finger, seconds, rng):
+    """Return a board's readings at 30 Hz, on the host's clock."""
+    times = np.arange(int(seconds * 30)) / 30
+    depth = np.array([hand.press(finger, t)[2] for t in times])
+    counts = 9000 + 1500 * depth[:, None] * np.linspace(0.5, 1.0, 24) + rng.normal(0, 4, (len(times), 24))
+    stamps = START + np.rint(times * 1e9).astype(np.int64)
+    return TaxelStream(stamps, stamps, np.arange(len(times)), np.round(counts))
+
+
+def judged(seed, kind, seconds, folder):
+    """Record, track and judge one hand; return its figures."""
+    rng = np.random.default_rng([seed, 29])
+    hand = draw_hand(seed, ("grasp", "wipe")[seed // 2 % 2])
+    rig, eyes = rig_of(seed)
+    stamped, both = bool(rng.random() < 0.5), bool(rng.random() < 0.5)
+    path = folder / "episode-000000.mcap"
+    path.write_bytes(b"simulated")
+    views, off = [], []
+    for k, (camera, eye) in enumerate(eyes.items()):
+        made = exposed(kind if both or k == seed % 2 else "", seconds, rng)
+        found, ratio = streams(hand, camera, eye, made, stamped, seconds, rng)
+        views, off = [*views, *found], [*off, ratio]
+    taxels = {finger: felt(hand, finger, seconds, rng) for finger in FINGERS["fingers"]}
+    recording = DemoRecording(path, rig, hand.task, taxels, tuple(views), True, ())
+    row = {"seed": seed, "kind": kind or "idle", "stamped": stamped, "both": both, "refused": "", "remarks": []}
+    row["times_outside"] = float((np.concatenate(off) > 3).mean())
+    try:
+        tracked = track(recording)
+        row["remarks"] = list(tracked.remarks)
+        row |= coverage(hand, tracked)
+        check_guesses(targets_of(tracked, None))
+    except TacdataError as error:
+        row["refused"] = error.given
+    return row
+
+
+def coverage(hand, tracked):
+    """Return the share of frames whose truth lies outside of 3 standard deviations, and the largest error [mm]."""
+    outside, worst = [], 0.0
+    for name, found in tracked.tracks.items():
+        truth = np.array([hand.tip(name, (t - START) * 1e-9)[:3, 3] for t in tracked.time_ns])
+        away, known = found.position - truth, np.isfinite(found.position).all(axis=1)
+        spread = np.sqrt(found.covariance[:, range(3, 6), range(3, 6)])
+        outside.append((np.abs(away) > 3 * spread).any(axis=1)[known])
+        worst = max(worst, float(1000 * np.nanmax(np.linalg.norm(away, axis=1))))
+    return {"outside": float(np.concatenate(outside).mean()), "worst_mm": worst}
+
+
+def main():
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=60)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=18.0)
+    parser.add_argument("--kind", choices=KINDS)
+    parser.add_argument("--json", type=Path)
+    chosen = parser.parse_args()
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(chosen.first, chosen.first + chosen.seeds):
+            kind = chosen.kind or (KINDS[seed // 2 % len(KINDS)] if seed % 2 else "")
+            rows.append(judged(seed, kind, chosen.seconds, Path(folder)))
+            print(line(rows[-1]), flush=True)
+            if chosen.json:
+                chosen.json.write_text(json.dumps(rows, indent=1) + "\n")
+    report(rows)
+
+
+def line(row):
+    """Return one recording's figures as a line."""
+    accused = [words for words in row["remarks"] if any(part in words for part in ACCUSING)]
+    return (
+        f"{row['seed']:4} {row['kind']:<20} {'stamped' if row['stamped'] else '':<8}"
+        f"{'both' if row['both'] else 'one':<5} outside {row.get('outside', float('nan')):6.2%} "
+        f"worst {row.get('worst_mm', float('nan')):5.1f} mm "
+        f"times outside {row['times_outside']:.1%} {'refused' if row['refused'] else ''} {' | '.join(accused)}"
+    )
+
+
+def report(rows):
+    """Print what all recordings come to."""
+    accused = [r for r in rows if any(part in words for words in r["remarks"] for part in ACCUSING)]
+    wrong = [r for r in rows if not r["refused"] and r["outside"] > 0.01]
+    refused = Counter(r["kind"] for r in rows if r["refused"])
+    print(f"recordings                      {len(rows)}")
+    print(f"accepted, more than 1 % outside {len(wrong)}: seeds {[r['seed'] for r in wrong]}")
+    print(f"false accusations               {len(accused)}: seeds {[r['seed'] for r in accused]}")
+    print(f"refused                         {sum(refused.values())}: {dict(refused)}")
+    print(f"refused with stamps             {sum(bool(r['refused']) and r['stamped'] for r in rows)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,211 @@
+"""The time of exposure of every image of one camera in a finished recording, each with its own uncertainty.
+
+An image arrives after a latency of at least the camera's minimum. On a busy computer the latency grows, and images are
+lost. With a time stamp of the camera the two are told apart: the line under arrival against stamp gives every exposure.
+
+Numbers given on arrival do not tell a late image from one after a lost one. Against a clock of constant period P, the
+excess E = arrival - P number rises with both and falls only when lateness ends. So the lateness of an image is at
+least E less the smallest later E, and at most that of the image before plus the rise of E. The time is taken from the
+lower bound, and half the distance of the bounds is its standard uncertainty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tacdata.recording.clocks.clock_model import ClockModel
+from tacdata.recording.clocks.envelope_fit import CRYSTAL, HIDDEN, TYPICAL, append_to_hull
+
+NS = 1e-9
+STEP_NS = 2_000_000_000
+"""Change of arrival against stamp that is a step of the camera's clock, and no lateness [ns]."""
+BLOCK_NS = 1_000_000_000
+"""Length of a block of images, of which the smallest latency counts [ns]."""
+UNSURE_NS = 1_000_000
+"""Standard uncertainty that the rate of a camera's clock leaves in the times of a recording [ns]."""
+PERIODS = 0.01
+"""Largest deviation of the period from its first guess [1]."""
+PAIRS, NEAR = 6000, 5
+"""Pairs of images from which the period is found [count]; they are at most this part of the recording apart."""
+KERNEL = 0.06
+"""Scatter of a pair's distance about a multiple of the period [periods]."""
+TURN = 3.0
+"""Multiples of the period by which the farthest pair may be off in the search [count]."""
+CLEAR = 1.3
+"""Smallest share of pairs at multiples of the period, over that of arrivals without a period [1]."""
+NTSC, AS_WELL = 1.001, 0.9
+"""Ratio of the periods of 29.97 and 30 Hz [1]; share of the best agreement at which a usual period is taken [1]."""
+CRYSTAL_SIGMA, FITTED_SIGMA = 50e-6, 300e-6
+"""Standard uncertainty of a usual period and of a fitted one [1]."""
+FAR_NS = 10_000_000_000
+"""Longest time over which the uncertainty of a period adds up: further on other images show it [ns]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImageClock:
+    """Times of all images of one camera."""
+
+    axis: str
+    """``device_ns`` or ``order``, as in `ClockModel`."""
+    counter: np.ndarray
+    """Number of each image, or its time stamp [ns], shape (n,), int64, ascending."""
+    time_ns: np.ndarray
+    """Time of exposure of each [ns], shape (n,), int64."""
+    uncertainty: np.ndarray
+    """Standard uncertainty of each time [s], shape (n,)."""
+
+    def sample_times(self, arrival_ns: np.ndarray, counter: np.ndarray) -> np.ndarray:
+        """Return times of exposure [ns], shape (m,), int64; the arrival [ns] of an image that is not known."""
+        rows, known = self._rows(counter)
+        return np.where(known, self.time_ns[rows], arrival_ns)
+
+    def uncertainties(self, counter: np.ndarray) -> np.ndarray:
+        """Return standard uncertainties of times [s], shape (m,); the largest for an image that is not known."""
+        rows, known = self._rows(counter)
+        return np.where(known, self.uncertainty[rows], self.uncertainty.max())
+
+    def _rows(self, counter: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        wanted = np.asarray(counter, np.int64)
+        rows = np.clip(np.searchsorted(self.counter, wanted), 0, len(self.counter) - 1)
+        return rows, self.counter[rows] == wanted
+
+
+def image_clock(
+    arrival_ns: np.ndarray,
+    sequence: np.ndarray,
+    device_ns: np.ndarray,
+    model: ClockModel | None,
+    rate: float | None = None,
+) -> ImageClock | None:
+    """Return the times of a camera's images; None with fewer than three.
+
+    Args:
+        arrival_ns: Host times of receipt [ns], shape (n,), int64.
+        sequence: Numbers given on arrival, shape (n,), int64.
+        device_ns: The camera's own times [ns], shape (n,), int64; -1 without one.
+        model: The clock that the recorder fitted, which also knows the images before the recording.
+        rate: Nominal rate of the camera [Hz]; None if unknown.
+    """
+    arrival, sequence, device = (np.asarray(values, np.int64) for values in (arrival_ns, sequence, device_ns))
+    stamped = bool(len(device)) and bool((device >= 0).all()) and bool((np.diff(device) > 0).all())
+    counter = device if stamped else sequence
+    order = np.argsort(counter, kind="stable")
+    arrival, counter = arrival[order], counter[order]
+    if len(arrival) < 3 or (np.diff(counter) <= 0).any():
+        return None
+    before = model if model is not None and model.axis == ("device_ns" if stamped else "order") else None
+    late, spread = _stamped(arrival, counter, before) if stamped else _numbered(arrival, counter, before, rate)
+    constant = model.latency if model is not None else None
+    time_ns = arrival - np.rint(late).astype(np.int64) - (constant.latency_ns if constant else 0)
+    sigma = np.hypot(spread, constant.uncertainty_ns if constant else 0) * NS
+    return ImageClock("device_ns" if stamped else "order", counter, time_ns, sigma)
+
+
+def _stamped(arrival: np.ndarray, device: np.ndarray, model: ClockModel | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lateness of images with time stamps, and its standard uncertainty [ns], shape (n,) both."""
+    excess = (arrival - arrival[0]) - (device - device[0]).astype(float)
+    late, spread = np.zeros(len(arrival)), np.zeros(len(arrival))
+    begins = [0, *(np.flatnonzero(np.abs(np.diff(excess)) > STEP_NS) + 1), len(arrival)]
+    for first, end in pairwise(begins):
+        rows = slice(first, end)
+        slope = _slope(device[rows] - device[first], excess[rows])
+        above = excess[rows] - slope * (device[rows] - device[first])
+        # The recorder's clock may know images before this recording that were less late.
+        floor = min([float(above.min()), *_earlier(model, arrival[rows], device[rows], above)])
+        late[rows] = above - floor
+        spread[rows] = np.hypot(_unsure(arrival[rows], late[rows]), UNSURE_NS)
+    return late, spread
+
+
+def _earlier(model: ClockModel | None, arrival: np.ndarray, device: np.ndarray, above: np.ndarray) -> list[float]:
+    """Return the levels of the recorder's lines among latencies ``above`` a line [ns], near this recording only."""
+    if model is None:
+        return []
+    middle = len(device) // 2
+    lines = (*model.earlier, model)
+    constant = model.latency.latency_ns if model.latency else 0
+    levels = [above[middle] - (arrival[middle] - line.sample_of(int(device[middle])) - constant) for line in lines]
+    return [float(level) for level in levels if abs(level - above.min()) < STEP_NS]
+
+
+def _slope(device: np.ndarray, excess: np.ndarray) -> float:
+    """Return the slope of the line under latencies [ns/ns], as steep as a crystal's drift at most."""
+    hull: list[tuple[int, int]] = []
+    for point in zip(device.tolist(), np.rint(excess).astype(np.int64).tolist(), strict=True):
+        append_to_hull(hull, point)
+    if len(hull) < 2:
+        return 0.0
+    edge = next((k for k in range(1, len(hull) - 1) if hull[k][0] >= device.mean()), len(hull) - 1)
+    (x1, y1), (x2, y2) = hull[edge - 1], hull[edge]
+    return float(np.clip((y2 - y1) / (x2 - x1), -CRYSTAL, CRYSTAL))
+
+
+def _numbered(
+    arrival: np.ndarray, number: np.ndarray, model: ClockModel | None, rate: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lateness of images without time stamps, and its standard uncertainty [ns], shape (n,) both."""
+    begun = (arrival - arrival[0]).astype(float)
+    steps = np.diff(begun) / np.diff(number)
+    period, drift = _period(begun, float(np.median(steps)), 1e9 / rate if rate else None)
+    excess = begun - period * (number - number[0])
+    least = excess - np.minimum.accumulate(excess[::-1])[::-1]
+    most = np.empty(len(excess))
+    most[0] = max(least[0], _before(model, int(arrival[0]), int(number[0])))
+    for k in range(1, len(excess)):
+        most[k] = max(least[k], most[k - 1] + excess[k] - excess[k - 1])
+    spread = np.hypot(_unsure(arrival, least), drift * min(float(begun[-1]), FAR_NS))
+    return least, np.hypot((most - least) / 2, spread)
+
+
+def _before(model: ClockModel | None, arrival_ns: int, number: int) -> float:
+    """Return how late the first image is against the recorder's lines, which know those before it [ns]; else 0."""
+    if model is None or not model.steady:
+        return 0.0
+    constant = model.latency.latency_ns if model.latency else 0
+    levels = [arrival_ns - line.sample_of(number) - constant for line in (*model.earlier, model)]
+    return float(min((level for level in levels if 0 < level < STEP_NS), default=0.0))
+
+
+def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[float, float]:
+    """Return the period of exposures [ns] and its relative uncertainty: most close pairs are multiples of it apart.
+
+    Lost images keep that, and a pair of which one image was later than the other counts for nothing. The nominal period
+    is preferred where it agrees as well.
+
+    Args:
+        begun: Arrivals [ns], shape (n,).
+        usual: Median interval [ns].
+        nominal: Nominal period [ns], or None.
+    """
+    rng = np.random.default_rng(0)
+    first = rng.integers(0, len(begun), PAIRS)
+    second = np.clip(first + rng.integers(4, max(len(begun) // NEAR, 6), PAIRS), 0, len(begun) - 1)
+    pairs = begun[second] - begun[first]
+
+    def agreeing(periods: np.ndarray) -> np.ndarray:
+        turns = pairs[None, :] / periods[:, None]
+        return np.exp(-0.5 * ((turns - np.rint(turns)) / KERNEL) ** 2).mean(axis=1)
+
+    for guess in [usual] if nominal is None else [nominal, usual]:
+        width = min(PERIODS, NEAR * guess / max(float(begun[-1]), 1.0) * TURN)
+        tried = guess * (1 + np.linspace(-width, width, 201))
+        shares = agreeing(tried)
+        best = tried[int(shares.argmax())]
+        if shares.max() < CLEAR * KERNEL * np.sqrt(2 * np.pi):
+            continue
+        for usual_period in [] if nominal is None else [nominal, nominal * NTSC]:
+            if float(agreeing(np.array([usual_period]))[0]) > AS_WELL * shares.max():
+                return usual_period, CRYSTAL_SIGMA
+        return float(best), FITTED_SIGMA
+    return (nominal or usual), FITTED_SIGMA
+
+
+def _unsure(arrival: np.ndarray, late: np.ndarray) -> float:
+    """Return the standard uncertainty of the smallest latency [ns]: how well blocks of images agree on it."""
+    block = (arrival - arrival[0]) // BLOCK_NS
+    least = np.sort([late[block == k].min() for k in np.unique(block)])
+    usual = float(np.median(late))
+    return max(TYPICAL * float(least[min(1, len(least) - 1)]), HIDDEN * min(usual, float(np.quantile(late, 0.3))))
