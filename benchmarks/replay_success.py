@@ -23,9 +23,9 @@ from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.paths.acquisition import acquire
 from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.sightings import sightings_of
-from tacdata.replay.gain_search import GripDemand
+from tacdata.replay.comparison.gain_search import GripDemand
+from tacdata.replay.comparison.trials import Trials, rate
 from tacdata.replay.scene import scene_of
-from tacdata.replay.trials import Trials, rate
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, draw_hand
 
 SHALLOW, SCATTER = 0.23, 0.04
@@ -91,7 +91,7 @@ def main():
         whole[thing] = judged(thing, chosen.hands, chosen.scenes)
         for kind in ("direct", "compensated", "chosen"):
             own = [trial for trial in whole[thing]["trials"] if trial["kind"] == kind]
-            low, high = (found := rate(own))["wilson_95"]
+            low, high = (found := rate([t["held"] for t in own]))["wilson_95"]
             grip, slip = (np.median([trial[key] for trial in own]) for key in ("grip", "slip"))
             words = f"{found['held']} of {found['of']} ({low:.0%} to {high:.0%})"
             print(f"  {kind:<12} {words:<24} grip factor {grip:.1f}, slip {1000 * slip:.1f} mm (medians)", flush=True)

@@ -67,6 +67,8 @@ def run(
     for targets in episodes:
         for words in (*doubts(targets), *_notes(targets)):
             print(f"note: {targets.recording}: {words}")
+    for table in writer.tables:
+        print(table)
     for words in (*limits, *writer.remarks):
         print(f"note: {words}")
     print(f"written to {out} ({form}), poses in frame {episodes[0].frame!r}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,8 +11,8 @@ from tacdata.commands.command import TOOLS, Result
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
+    from tacdata.replay.comparison.trials import Trials
     from tacdata.replay.scene import ReplayScene
-    from tacdata.replay.trials import Trials
 
 ORDER = 123
 PANEL = TOOLS
@@ -48,6 +48,13 @@ def run(
     least_grip: Annotated[
         float, typer.Option(help="With --find-gain: how many times the load friction at the pads must carry.")
     ] = 2.0,
+    stiffnesses: Annotated[
+        bool, typer.Option("--sweep", help="All arms at springs of 150 to 3000 N/m as well.")
+    ] = False,
+    challenges: Annotated[
+        bool,
+        typer.Option("--challenges", help="All arms, and depth fed back, in scenes unlike the demonstration as well."),
+    ] = False,
     with_guesses: Annotated[
         bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
     ] = False,
@@ -57,10 +64,10 @@ def run(
     from tacdata.demonstrations.compensation import read_gains
     from tacdata.demonstrations.paths.tracks_file import read_tracks
     from tacdata.errors import UsageError
-    from tacdata.replay.gain_search import GripDemand
+    from tacdata.replay.comparison.gain_search import GripDemand
+    from tacdata.replay.comparison.trials import Trials, challenged, result, sweep
     from tacdata.replay.scene import scene_of
     from tacdata.replay.targets import check_guesses, doubts
-    from tacdata.replay.trials import Trials, result
 
     for file in (out, view, video):
         if file is not None and file.exists():
@@ -99,14 +106,42 @@ def run(
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
     document = result(tried, seeds, scene, chosen)
+    rates = document["controls"] | document
     for kind in tried[0].paths:
-        rate = document[kind]
-        low, high = rate["wilson_95"]
-        print(f"{kind:<12} held {rate['held']} of {rate['of']} ({low:.0%} to {high:.0%}, Wilson 95 %)")
+        low, high = rates[kind]["wilson_95"]
+        print(f"{kind:<12} held {rates[kind]['held']} of {rates[kind]['of']} ({low:.0%} to {high:.0%}, Wilson 95 %)")
+    print(document["worth"])
+    if stiffnesses:
+        document["sweep"] = sweep(tried, scene, seeds)
+        _print_rows(document["sweep"], "stiffness", name)
+    if challenges:
+        document["challenges"] = challenged(tried, scene, seeds)
+        _print_rows(document["challenges"], "challenge", name)
     if out is not None:
         documents.write(out, document, "replay_result")
         print(f"written to {out}")
     return Result(document)
+
+
+def _print_rows(rows: list[dict[str, Any]], first: str, task: str) -> None:
+    """Print what each arm held, a row for each stiffness or challenge, and what depth was worth there."""
+    from tacdata.replay.comparison.trials import PUBLISHED, like_published
+
+    kinds = list(rows[0]["rates"])
+    print("\n" + "  ".join([f"{first:<24}", *(f"{kind:>11}" for kind in kinds)]))
+    for row in rows:
+        name = f"{row[first]:g} N/m" if first == "stiffness" else row[first]
+        mark = " *" if first == "stiffness" and like_published(row, task) else ""
+        cells = (f"{rate['held']:>4} of {rate['of']:<4}" for rate in row["rates"].values())
+        print("  ".join([f"{name + mark:<24}", *(f"{cell:>11}" for cell in cells)]))
+    for row in rows:
+        print(f"{row[first]:g} N/m: {row['worth']}" if first == "stiffness" else f"{row[first]}: {row['worth']}")
+    if first == "stiffness":
+        direct, moved = PUBLISHED.get(task, (0.0, 0.0))
+        print(
+            f"* as often as in the paper (Exp. 2): direct {direct:.0%}, compensated {moved:.0%}; the stiffness of its "
+            "hand, a LinkerHand O20, is not published"
+        )
 
 
 def _other_network(source: Demonstration, made: Demonstration) -> tuple[str, ...]:

@@ -28,6 +28,8 @@ class Exporter(ABC):
     def __init__(self, robot: Path | None = None, recordings: Path | None = None) -> None:
         """Keep the robot file and the folder of the recordings, where there are any; the latter hold the images."""
         self.robot, self.recordings = robot, recordings
+        self.tables: list[str] = []
+        """Tables for a person: what a robot does with each demonstration."""
         self.remarks: list[str] = []
         """What a person should know of what `write` made, though nothing of it is unfit."""
 

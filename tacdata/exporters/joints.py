@@ -18,7 +18,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replacement import replacement
 from tacdata.replay.columns import from_columns, to_columns
-from tacdata.replay.inverse_kinematics import JointPath, follow
+from tacdata.replay.inverse_kinematics import JointPath, follow, rates
 from tacdata.replay.robot import Robot, read_robot
 from tacdata.replay.targets import FingertipTargets
 
@@ -41,6 +41,8 @@ class Joints(Exporter):
         new_folder(out)
         if solved:
             self.remarks += [*robot.remarks, *_unchecked(solved[0])]
+        for targets, path in zip(episodes, solved, strict=True):
+            self.tables.append(use_table(path, targets))
         for targets, path in zip(episodes, solved, strict=True):
             stem = Path(targets.recording).stem
             said += [f"{stem}: {words}" for words in in_words(path, targets, robot.tolerance[1] is not None)]
@@ -93,15 +95,53 @@ def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) ->
     for name, rows in path.too_fast.items():
         when = _when(rows, seconds)
         said.append(f"joint {name} would have to be faster than its limit at {len(rows)} times ({when})")
+    for (first, second), rows in path.collisions.pairs.items():
+        when = _when(rows, seconds)
+        said.append(f"links {first} and {second} run into each other at {len(rows)} times ({when})")
     for name, rows in path.too_abrupt.items():
         when = _when(rows, seconds)
         said.append(f"joint {name} would have to accelerate more than its limit at {len(rows)} times ({when})")
     return said
 
 
+def use_table(path: JointPath, targets: FingertipTargets) -> str:
+    """Return the largest errors of each fingertip, and how far each joint goes, as a table of text."""
+    followed = np.isfinite(path.values).all(axis=1)
+    speed, acceleration = rates(path.values, path.time_ns)
+    rows = [
+        f"{'fingertip':<24} {'off by [mm]':>12} {'turned [deg]':>13}   (largest, at {followed.sum()} times followed)"
+    ]
+    for k, name in enumerate(targets.fingers):
+        place, turn = (
+            float(error[followed, k].max()) if followed.any() else float("nan")
+            for error in (path.position_error, path.rotation_error)
+        )
+        rows.append(f"{name:<24} {1000 * place:>12.3f} {np.degrees(turn):>13.2f}")
+    rows.append(f"{'joint':<24} {'to its limit':>12} {'speed':>13} {'of its limit':>13} {'acceleration':>13}")
+    for k, joint in enumerate(path.joints):
+        own = path.values[followed, k]
+        ends = [end for end in (joint.lower, joint.upper) if end is not None]
+        room = min((float(np.abs(own - end).min()) for end in ends), default=float("inf")) if len(own) else float("nan")
+        fastest, hardest = (_largest(values[:, k]) for values in (speed, acceleration))
+        share = f"{fastest / joint.velocity:.0%}" if joint.velocity else "unknown"
+        unit = joint.unit
+        rows.append(
+            f"{joint.name:<24} {f'{room:.3g} {unit}':>12} {f'{fastest:.3g} {unit}/s':>13} {share:>13} "
+            f"{f'{hardest:.3g} {unit}/s2':>13}"
+        )
+    return "\n".join(rows)
+
+
+def _largest(values: np.ndarray) -> float:
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if len(known) else float("nan")
+
+
 def _unchecked(path: JointPath) -> list[str]:
     """Describe which speeds and accelerations were not held against a limit, as none is known."""
     said = []
+    if path.collisions.reason:
+        said.append(f"whether links touch each other was not checked: {path.collisions.reason}")
     for what, known in (("velocity", "speed"), ("acceleration", "acceleration")):
         free = [joint.name for joint in path.joints if getattr(joint, what) is None]
         if free:
@@ -133,6 +173,7 @@ def _header(targets: FingertipTargets, path: JointPath, robot: Robot, columns: d
         "too_abrupt": {name: list(rows) for name, rows in path.too_abrupt.items()},
         "uncoupled": list(path.uncoupled),
         "other_posture": list(path.other_posture),
+        "collisions": [{"links": list(pair), "rows": list(rows)} for pair, rows in path.collisions.pairs.items()],
         "outside_workspace": {name: list(rows) for name, rows in path.outside_workspace.items()},
         "errors": {"position": largest[0], "rotation": largest[1]},
         "provenance": provenance.stamp("tacdata export", parents, {"robot": robot.name}),

@@ -16,8 +16,11 @@ from tacdata.grasping.lift import Grip, lift
 from tacdata.grasping.press_set import PressSet
 from tacdata.grasping.study import MARGIN, OTHER_MARGINS, PUBLISHED, Setup, configured, lifted, rates, trials
 from tacdata.grasping.touch import OrangeTouch
+from tacdata.replay.comparison.paired import paired
 from tacdata.sensor import Sensor
 
+GAP = "raw_taxel", "dense_depth"
+"""The two strategies whose difference is the paper's finding."""
 FINENESS = 0.25
 """Resolution of the offset to which a lift holds [mm]."""
 
@@ -92,7 +95,28 @@ def lines(found: dict[str, Any]) -> list[str]:
             paper = f"{held / of:.1%}" if of else "-"
             row += f" {share['held']:>3}/{share['of']:<3}  {f'{low:.0%} to {high:.0%}':<14} {paper:>6} |"
         said.append(row + f" {_moves(own['adjustments'])}, edge {_moves(own['edge_adjustments'])}")
-    return [*said, *_bias_lines(found), *_lifting_lines(found)]
+    return [*said, *_gap_lines(found), *_bias_lines(found), *_lifting_lines(found)]
+
+
+def _gap_lines(found: dict[str, Any]) -> list[str]:
+    """Return whether dense depth is worth more than raw taxels, as in the paper, by trials of the same oranges."""
+    held = {
+        name: {(t["position"], t["repeat"]): t["held"] for t in found["trials"] if t["strategy"] == name}
+        for name in GAP
+    }
+    raw, dense = (held[name] for name in GAP)
+    if set(raw) != set(dense) or not raw:
+        return []
+    said = []
+    for where, places in (("overall", None), ("edge", found["setup"]["edge"])):
+        chosen = [key for key in raw if places is None or key[0] in places]
+        difference = paired([dense[key] for key in chosen], [raw[key] for key in chosen])
+        low, high = difference.interval
+        (raw_held, of), (dense_held, of_dense) = (found["published"][where][name] for name in GAP)
+        paper = dense_held / of_dense - raw_held / of
+        verdict = "reproduced" if low > 0 and low <= paper <= high else "not reproduced"
+        said.append(f"dense depth less raw taxels, {where}: {difference.text}; the paper's {paper:+.0%} is {verdict}")
+    return said
 
 
 def _moves(moves: dict[str, Any]) -> str:

@@ -17,6 +17,7 @@ from tacdata.replay.kinematic_search import OTHERS, STEPS, KinematicSearch
 from tacdata.replay.kinematics import Joint, Kinematics
 from tacdata.replay.posture_path import without_jumps
 from tacdata.replay.robot import Robot
+from tacdata.replay.self_collision import SelfCollisions, self_collisions
 from tacdata.replay.targets import FingertipTargets
 
 COUPLED = 1e-4
@@ -52,6 +53,8 @@ class JointPath:
     """Rows whose targets no coupled (mimic) joints reach together."""
     other_posture: tuple[int, ...]
     """Rows that are reached only in a posture that the joints cannot take up in time."""
+    collisions: SelfCollisions
+    """Links that touch each other."""
 
 
 def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinematics]:
@@ -92,6 +95,10 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
     if robot.workspace is not None:
         outside = np.any((places < robot.workspace[0]) | (places > robot.workspace[1]), axis=-1)
     values[outside.any(axis=1)] = np.nan
+    names = tuple(joint.name for joint in model.joints)
+    touching = SelfCollisions({}, "the robot has no URDF file")
+    if robot.source is not None:
+        touching = self_collisions(robot.source, names, values, model.home)
     return JointPath(
         model.joints,
         targets.time_ns,
@@ -104,6 +111,7 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
         model.mimics,
         tuple(np.flatnonzero(uncoupled).tolist()),
         tuple(np.flatnonzero(reached & ~served).tolist()),
+        touching,
     ), model
 
 
@@ -143,13 +151,23 @@ def _rows(found: np.ndarray, fingers: tuple[str, ...]) -> dict[str, tuple[int, .
     return {name: rows for name, rows in named.items() if rows}
 
 
+def rates(values: np.ndarray, time_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return speeds, shape (n - 1, joints), and accelerations, shape (n - 2, joints), by differences [per s, s^2].
+
+    Args:
+        values: Joint values [rad or m], shape (n, joints).
+        time_ns: Times [ns], shape (n,).
+    """
+    step = (np.diff(time_ns) * 1e-9)[:, None]
+    speed = np.diff(values, axis=0) / step
+    return speed, np.diff(speed, axis=0) / ((step[1:] + step[:-1]) / 2)
+
+
 def _limits(
     joints: tuple[Joint, ...], values: np.ndarray, time_ns: np.ndarray
 ) -> tuple[dict[str, tuple[int, ...]], dict[str, tuple[int, ...]]]:
     """Return the rows that need more speed, and those that need more acceleration, than each joint has."""
-    step = (np.diff(time_ns) * 1e-9)[:, None]
-    speed = np.diff(values, axis=0) / step
-    acceleration = np.diff(speed, axis=0) / ((step[1:] + step[:-1]) / 2)
+    speed, acceleration = rates(values, time_ns)
     fast, abrupt = {}, {}
     for k, joint in enumerate(joints):
         if joint.velocity is not None:

@@ -15,7 +15,7 @@ import numpy as np
 from tacdata.errors import UsageError
 from tacdata.replay.grasp import touching
 from tacdata.replay.scene import ReplayScene
-from tacdata.replay.scene_model import PAD, Rollout, SceneModel
+from tacdata.replay.scene_model import PAD, Feedback, Rollout, SceneModel
 from tacdata.replay.targets import FingertipTargets
 
 HIGH = 0.9
@@ -58,6 +58,11 @@ class ReplayOutcome:
     """Motion, forces and slip at these times."""
 
     @property
+    def hardest(self) -> float:
+        """Largest force of a pad on the object until the verdict [N]."""
+        return float(self.path.force[self.time <= self.decided].max())
+
+    @property
     def reason(self) -> str:
         """Why the object was held or lost, in a sentence."""
         carried, load = self.grip * self.scene.load, self.scene.load
@@ -86,8 +91,12 @@ def normals(targets: FingertipTargets) -> np.ndarray:
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
 
 
-def replay_targets(targets: FingertipTargets, scene: ReplayScene, centre: np.ndarray) -> ReplayOutcome:
+def replay_targets(
+    targets: FingertipTargets, scene: ReplayScene, centre: np.ndarray, feedback: Feedback | None = None
+) -> ReplayOutcome:
     """Return the outcome of a replay for an object whose centre starts at ``centre`` [m].
+
+    With ``feedback``, a controller moves the targets by what the simulated skin feels.
 
     An object that is lifted is held if it stays high while the fingers are. An eraser is held if it never falls behind
     the fingers' strokes.
@@ -102,7 +111,7 @@ def replay_targets(targets: FingertipTargets, scene: ReplayScene, centre: np.nda
         pads = pads + np.array(scene.bias)
     ground = np.array(centre) + scene.place
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
-    path = SceneModel(scene, pads[0], ground).run(pads, seconds)
+    path = SceneModel(scene, pads[0], ground).run(pads, seconds, feedback)
     first, last = int(np.argmax(touch)), int(np.flatnonzero(high)[-1])
     behind = _behind(path.tips.mean(axis=1), path.centre, first, high if wiped else None)
     lowest = float((path.centre[high, 2] - ground[2]).min())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,10 @@ TIP = """<body name="tip{k}" pos="{x} {y} {z}" gravcomp="1">
 IMPEDANCE = 0.9
 """Impedance of the contact between skin and object [1] (MuJoCo, solver parameters)."""
 SPRING = '<position name="{joint}" joint="{joint}" kp="{kp}" kv="{kv}"/>'
+
+
+Feedback = Callable[[float, np.ndarray, float], np.ndarray]
+"""A controller: time [s], depths [m], step [s] -> displacement of the pads [m], shape (f, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +126,15 @@ class SceneModel:
         self._pad_of[[self._model.geom(f"tip{k}").id for k in range(count)]] = range(count)
         self._data.xfrc_applied[self._object, 2] = -scene.body.pull
 
-    def run(self, pads: np.ndarray, seconds: np.ndarray) -> Rollout:
-        """Follow pads' centres [m], shape (n, f, 3), at times [s], shape (n,), ascending from 0."""
+    def run(self, pads: np.ndarray, seconds: np.ndarray, feedback: Feedback | None = None) -> Rollout:
+        """Follow pads' centres [m], shape (n, f, 3), at times [s], shape (n,), ascending from 0.
+
+        Args:
+            pads: Centres.
+            seconds: Their times.
+            feedback: Moves them while it runs: time [s], depth of each pad's skin [m] and time since the last call [s]
+                -> displacement [m], shape (f, 3).
+        """
         step = mujoco().mj_step
         rows, count = len(seconds), len(self._tips)
         moments = np.arange(-SETTLE, seconds[-1] + STEP * COMMAND, STEP * COMMAND)
@@ -136,10 +148,15 @@ class SceneModel:
             np.zeros((rows, count, 3)),
         )
         row, slid, data = 0, np.zeros((count, 3)), self._data
+        depth, moved = np.zeros(count), 0.0
         for moment, command in zip(moments, wanted - self._begin.ravel(), strict=True):
-            data.ctrl[:] = command
+            data.ctrl[:] = command + moved
             step(self._model, data, COMMAND)
             contacts, touching = self._contacts()
+            if feedback is not None:
+                depth[:] = 0.0
+                np.maximum.at(depth, touching, -data.contact.dist[contacts])
+                moved = feedback(float(moment), depth, STEP * COMMAND).ravel()
             if len(contacts):
                 slid[touching] += self._sliding(contacts, touching) * STEP * COMMAND
             while row < rows and seconds[row] <= moment + STEP * COMMAND:

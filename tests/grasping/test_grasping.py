@@ -198,7 +198,8 @@ class StrongestTaxel(Strategy):
 def test_a_strategy_of_ones_own_is_one_file(presses, sensor, tmp_path, monkeypatch):
     import tacdata.grasping.strategies as room
 
-    assert strategy_names() == ["contact_only", "raw_taxel", "dense_depth"]
+    assert strategy_names()[:3] == ["contact_only", "raw_taxel", "dense_depth"]
+    assert sorted(strategy_names()) == strategies.names()
     (tmp_path / "strongest_taxel.py").write_text(OWN)
     monkeypatch.setattr(room, "__path__", [*room.__path__, str(tmp_path)])
     small(monkeypatch)
@@ -208,7 +209,7 @@ def test_a_strategy_of_ones_own_is_one_file(presses, sensor, tmp_path, monkeypat
     finally:
         sys.modules.pop("tacdata.grasping.strategies.strongest_taxel", None)
     documents.check(json.loads(json.dumps(found)), "grasp_study", "here")
-    assert list(found["rates"])[-1] == "strongest_taxel" and found["rates"]["strongest_taxel"]["overall"]["of"] == 2
+    assert "strongest_taxel" in list(found["rates"])[3:] and found["rates"]["strongest_taxel"]["overall"]["of"] == 2
     curve = found["bias"]["strongest_taxel"]
     assert set(curve) <= {*sensor.taxels.centers[:, 0].tolist(), None} and len(set(curve)) > 2
     assert any(line.startswith("strongest_taxel") for line in result.lines(found))

@@ -7,7 +7,7 @@ import pytest
 from test_scene import grasp
 
 from tacdata.errors import UsageError
-from tacdata.replay.gain_search import PRELIMINARY, GripDemand, GripSearch
+from tacdata.replay.comparison.gain_search import PRELIMINARY, GripDemand, GripSearch
 from tacdata.replay.outcome import replay_targets
 from tacdata.replay.scene import ReplayScene, drawn
 

@@ -13,9 +13,9 @@ from tacdata.demonstrations.paths.tracks_file import read_tracks, write_tracks
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import exporter
 from tacdata.recording.episode import TaxelStream
+from tacdata.replay.comparison.trials import Trials
 from tacdata.replay.scene import scene_of
 from tacdata.replay.targets import targets_of
-from tacdata.replay.trials import Trials
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.demo import VirtualDemo
 from viewers.pictures.page_frames import page_frames

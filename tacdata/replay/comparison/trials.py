@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from scipy.stats import binomtest
 
 import schemas
 from tacdata import provenance
 from tacdata.demonstrations.demonstration import Demonstration
-from tacdata.replay.gain_search import FoundGain, GripDemand, GripSearch
+from tacdata.replay.comparison.arms import CONTROLS, DEPTH, DIRECT, control_arms
+from tacdata.replay.comparison.challenges import CHALLENGES, changed
+from tacdata.replay.comparison.depth_feedback import DepthFeedback
+from tacdata.replay.comparison.gain_search import FoundGain, GripDemand, GripSearch
+from tacdata.replay.comparison.paired import worth
 from tacdata.replay.grasp import cut, first_grasp
-from tacdata.replay.outcome import ReplayOutcome, object_centre, replay_targets
+from tacdata.replay.outcome import ReplayOutcome, normals, object_centre, replay_targets
 from tacdata.replay.scene import SPREADS, ReplayScene, drawn
 from tacdata.replay.targets import FingertipTargets, targets_of
 
-DIRECT = "direct"
+CHOSEN, CLOSED = "chosen", "closed loop"
+"""Kinds of replay with a gain that was searched for, and with depth fed back while the robot presses."""
+PUBLISHED = {"grasp": (0.0, 0.9167), "wipe": (0.0, 0.90)}
+"""Shares of direct and of compensated replays that succeeded in the paper, by task [1] (Exp. 2)."""
+ALIKE = 0.1
+"""Largest difference from the paper's shares at which a stiffness is like its hand's [1]."""
+STIFFNESSES = 150.0, 300.0, 1000.0, 3000.0
+"""Stiffnesses of a sweep [N/m]; that of the paper's hand, a LinkerHand O20, is not published."""
 
 
 class Trials:
@@ -38,11 +51,54 @@ class Trials:
         self._span = first_grasp(whole)
         self.seen = cut(whole, self._span[0], self._span[2])
         self._centre = object_centre(whole, self._span[1], scene.reach)
-        self.paths = {DIRECT: self._cut(None), **{kind: self._cut(own) for kind, own in gains.items()}}
+        self.paths = {DIRECT: self._cut(None)}
+        if DEPTH in gains:
+            moved = self._cut(gains[DEPTH])
+            self.paths |= {**control_arms(self.paths[DIRECT], moved, self._readings()), DEPTH: moved}
+        self.paths |= {kind: self._cut(own) for kind, own in gains.items() if kind != DEPTH}
 
-    def one(self, kind: str, scene: ReplayScene) -> ReplayOutcome:
-        """Return the outcome of one trial, of a kind of replay, in a scene."""
-        return replay_targets(self.paths[kind], scene, self._centre)
+    def one(self, kind: str, scene: ReplayScene, seed: int = 0) -> ReplayOutcome:
+        """Return the outcome of one trial, of a kind of replay, in a scene; the seed draws a controller's errors."""
+        if kind != CLOSED:
+            return replay_targets(self.paths[kind], scene, self._centre)
+        path = self.paths[DEPTH]
+        goal = np.clip(np.nan_to_num(path.depth), 0, None) / 1000
+        seconds = (path.time_ns - path.time_ns[0]) * 1e-9
+        softness = 1 + self._scene.skin / self._scene.stiffness
+        controller = DepthFeedback(goal, seconds, normals(path), softness, seed)
+        return replay_targets(path, scene, self._centre, controller.shift)
+
+    def held_in(
+        self, scene: ReplayScene, kinds: Sequence[str], seeds: int, challenge: str = ""
+    ) -> dict[str, list[bool]]:
+        """Return what each kind held in the scenes of seeds 0, 1, ... about a scene.
+
+        Args:
+            scene: The undisturbed scene.
+            kinds: Kinds of replay.
+            seeds: Number of scenes.
+            challenge: One of `CHALLENGES`, which changes each scene; none for the scenes as drawn.
+        """
+        found: dict[str, list[bool]] = {kind: [] for kind in kinds}
+        felt = self.paths[DIRECT].depth
+        stands = CHALLENGES[challenge].force if challenge else None
+        limit = np.inf if stands is None else stands * scene.skin * float(np.nanmax(felt)) / 1000
+        for seed in range(seeds):
+            world = drawn(scene, len(self.paths[DIRECT].fingers), seed)
+            world = changed(challenge, world, seed) if challenge else world
+            for kind in kinds:
+                end = self.one(kind, world, seed)
+                found[kind].append(bool(end.held) and end.hardest <= limit)
+        return found
+
+    def _readings(self) -> np.ndarray | None:
+        """Return the sum of each finger's tared readings [counts], shape (n, f); None if a finger has none."""
+        path = self.paths[DIRECT]
+        signals = [self.made.tracks[name].signals for name in path.fingers]
+        known = [values for values in signals if values is not None]
+        if len(known) < len(signals):
+            return None
+        return np.stack([np.nansum(values[path.rows], axis=1) for values in known], axis=1)
 
     def find_gain(self, demand: GripDemand) -> FoundGain:
         """Return the smallest common gain that meets a demand in scenes of its own, which no trial below has.
@@ -64,7 +120,7 @@ class Trials:
         for seed in range(seeds):
             world = drawn(self._scene, len(self.paths[DIRECT].fingers), seed)
             for kind in self.paths:
-                end = self.one(kind, world)
+                end = self.one(kind, world, seed)
                 found.append(
                     {
                         "recording": self.made.recording,
@@ -101,24 +157,27 @@ def result(
     found = [trial for one in tried for trial in one.trials(seeds)]
     kinds, first = list(tried[0].paths), tried[0]
     parents = {"recording": first.made.recording_hash, "checkpoint": (first.made.network or {}).get("hash", "")}
-    gains = {kind: first.paths[kind].gains for kind in kinds if kind != DIRECT}
+    gains = {kind: first.paths[kind].gains for kind in kinds if kind in (DEPTH, CHOSEN)}
+    held = {kind: [t["held"] for t in found if t["kind"] == kind] for kind in kinds}
     return {
         "version": schemas.version("replay_result"),
         "recording": first.made.recording,
         "task": first.made.task,
-        "gains": gains["compensated"],
+        "gains": gains[DEPTH],
         "scene": {**scene.document, "spreads": SPREADS},
-        **{kind: rate([t for t in found if t["kind"] == kind]) for kind in kinds},
+        **{kind: rate(held[kind]) for kind in kinds if kind not in CONTROLS},
+        "controls": {kind: rate(held[kind]) for kind in kinds if kind in CONTROLS},
+        "worth": worth(held[DEPTH], {kind: held[kind] for kind in kinds if kind in CONTROLS}),
         "recordings": [
             {
                 "name": one.made.recording,
                 "hash": one.made.recording_hash,
-                "rates": {kind: rate([t for t in trials if t["kind"] == kind]) for kind in kinds},
+                "rates": {kind: rate([t["held"] for t in trials if t["kind"] == kind]) for kind in kinds},
             }
             for k, one in enumerate(tried)
             for trials in (found[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
         ],
-        **({"gain_chosen": _chosen(*chosen, gains["chosen"])} if chosen else {}),
+        **({"gain_chosen": _chosen(*chosen, gains[CHOSEN])} if chosen else {}),
         "trials": found,
         "provenance": provenance.stamp("tacdata replay", parents, {"seeds": seeds}),
     }
@@ -128,8 +187,43 @@ def _chosen(made: Demonstration, found: FoundGain, gains: dict[str, float]) -> d
     return {"recording": made.recording, "hash": made.recording_hash, "gains": gains, **found.document}
 
 
-def rate(trials: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def rate(held: Sequence[bool]) -> dict[str, Any]:
     """Return the number of successes and trials, and Wilson's interval of the proportion, 95 %."""
-    held = sum(trial["held"] for trial in trials)
-    interval = binomtest(held, len(trials)).proportion_ci(method="wilson")
-    return {"held": held, "of": len(trials), "wilson_95": list(interval)}
+    interval = binomtest(sum(held), len(held)).proportion_ci(method="wilson")
+    return {"held": sum(held), "of": len(held), "wilson_95": list(interval)}
+
+
+def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
+    """Return what each arm held at each of `STIFFNESSES`: plain data, with what depth was worth there."""
+    kinds = [kind for kind in tried[0].paths if all(kind in one.paths for one in tried)]
+    return [
+        _row({"stiffness": value}, [one.held_in(replace(scene, stiffness=value), kinds, seeds) for one in tried])
+        for value in STIFFNESSES
+    ]
+
+
+def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
+    """Return what each arm and the closed loop held in each of `CHALLENGES`: plain data."""
+    kinds = [*(kind for kind in tried[0].paths if all(kind in one.paths for one in tried)), CLOSED]
+    return [
+        _row({"challenge": name}, [one.held_in(scene, kinds, seeds, name) for one in tried], CLOSED)
+        for name in CHALLENGES
+    ]
+
+
+def _row(named: dict[str, Any], each: Sequence[dict[str, list[bool]]], judged: str = DEPTH) -> dict[str, Any]:
+    held = {kind: [hit for found in each for hit in found[kind]] for kind in each[0]}
+    rivals = {kind: held[kind] for kind in held if kind in (CONTROLS if judged == DEPTH else (*CONTROLS, DEPTH))}
+    return {
+        **named,
+        "rates": {kind: rate(values) for kind, values in held.items()},
+        "worth": worth(held[judged], rivals),
+    }
+
+
+def like_published(row: dict[str, Any], task: str) -> bool:
+    """Return whether direct and compensated replays of a row of a sweep succeed as often as the paper's."""
+    if task not in PUBLISHED:
+        return False
+    shares = [row["rates"][kind]["held"] / row["rates"][kind]["of"] for kind in (DIRECT, DEPTH)]
+    return all(abs(share - there) <= ALIKE for share, there in zip(shares, PUBLISHED[task], strict=True))

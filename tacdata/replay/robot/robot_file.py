@@ -16,6 +16,8 @@ from tacdata.replay.robot.urdf import FARTHEST, read_urdf
 
 POSITION_TOLERANCE = 0.0005
 """Default position tolerance of a target [m]."""
+ROTATION_TOLERANCE = float(np.radians(2.0))
+"""Default rotation tolerance of a target [rad]: at a pad's rim, 8 mm away, it is 0.3 mm."""
 ORIENTATION_WEIGHT = 0.02
 """Weight of a rotation error relative to a position error [m/rad]: 1 deg counts as 0.35 mm."""
 
@@ -41,7 +43,7 @@ class Robot:
     orientation_weight: float
     """Weight of a rotation error relative to a position error [m/rad]."""
     tolerance: tuple[float, float | None]
-    """Tolerance of position [m] and rotation [rad]; None: rotations are not checked."""
+    """Tolerance of position [m] and rotation [rad]; None, where rotations weigh nothing: they are not checked."""
     velocity: dict[str, float]
     """Joint -> largest speed [rad/s or m/s]: the robot file's, else the URDF's; joints without limit are missing."""
     acceleration: dict[str, float]
@@ -51,6 +53,8 @@ class Robot:
     document: dict[str, Any]
     remarks: tuple[str, ...] = ()
     """What a person should know of the URDF's limits."""
+    source: Path | None = None
+    """The URDF's file, with its shapes."""
 
 
 def read_robot(path: StrPath) -> Robot:
@@ -80,7 +84,9 @@ def read_robot(path: StrPath) -> Robot:
         for name, entry in document["fingers"].items()
     }
     allowed = document.get("tolerance", {})
-    tolerance = float(allowed.get("position", POSITION_TOLERANCE)), allowed.get("rotation")
+    weight = float(document.get("orientation_weight", ORIENTATION_WEIGHT))
+    turned = allowed.get("rotation", ROTATION_TOLERANCE if weight > 0 else None)
+    tolerance = float(allowed.get("position", POSITION_TOLERANCE)), turned
     return Robot(
         document["name"],
         urdf.text,
@@ -88,13 +94,14 @@ def read_robot(path: StrPath) -> Robot:
         _pose(document.get("base", HERE), f"{path}: base", FARTHEST),
         tips,
         document.get("home", {}),
-        float(document.get("orientation_weight", ORIENTATION_WEIGHT)),
+        weight,
         tolerance,
         velocity,
         document.get("acceleration", {}),
         _workspace(document, str(path)),
         document,
         urdf.remarks,
+        origin,
     )
 
 

@@ -1,0 +1,70 @@
+"""Closed loop by touch: fingertips press until the live estimate of depth is what the person felt.
+
+The controller knows the stiffness of robot and skin of the undisturbed scene, not of the drawn one. Its estimate is
+late and wrong as measured of a network (docs/how_to/hands.md): too shallow by a constant, with scatter.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+LATENCY = 0.13
+"""Latency of a live estimate [s]: four frames of a centred window of nine at 30 Hz (paper, Exp. 3)."""
+SHALLOW, SCATTER = 0.23, 0.04
+"""Largest constant error towards 0, and standard deviation of the scatter of a predicted depth [mm]."""
+BANDWIDTH = 3.0
+"""Rate at which the error of depth is corrected [1/s]; with `LATENCY` the phase margin is 68 degrees."""
+RELEASE = 10.0
+"""Rate at which the correction decays once the person lets go [1/s]."""
+MOST = 0.03
+"""Largest correction along the normal [m]."""
+MOST_INWARD = -0.01
+"""Largest correction away from the object [m]."""
+
+
+@dataclass
+class DepthFeedback:
+    """The controller of one replay."""
+
+    goal: np.ndarray
+    """Depth that the person felt [m], shape (n, f)."""
+    seconds: np.ndarray
+    """Times of the goal [s], shape (n,)."""
+    outward: np.ndarray
+    """Normals out of the pads [1], shape (n, f, 3)."""
+    softness: float
+    """Displacement of a target per depth of the skin, 1 + skin / robot, of the undisturbed scene [1]."""
+    seed: int
+    """Decides the errors of the live estimate."""
+
+    def __post_init__(self) -> None:
+        """Draw the errors of the estimate."""
+        self._rng = np.random.default_rng([self.seed, 31])
+        count = self.goal.shape[1]
+        self._shallow = self._rng.uniform(0, SHALLOW, count) / 1000
+        self._correction = np.zeros(count)
+        self._waiting: deque[tuple[float, np.ndarray]] = deque()
+        self._estimate = np.zeros(count)
+
+    def shift(self, moment: float, depth: np.ndarray, step: float) -> np.ndarray:
+        """Return how the pads' targets are moved [m], shape (f, 3).
+
+        Args:
+            moment: Time [s].
+            depth: Depth of each pad's skin [m], shape (f,).
+            step: Time since the last call [s].
+        """
+        noise = self._rng.normal(0, SCATTER / 1000, len(depth)) * (depth > 0)
+        self._waiting.append((moment + LATENCY, np.clip(depth - self._shallow * (depth > 0) + noise, 0, None)))
+        while self._waiting and self._waiting[0][0] <= moment:
+            self._estimate = self._waiting.popleft()[1]
+        row = min(int(np.searchsorted(self.seconds, moment)), len(self.seconds) - 1)
+        goal = self.goal[row]
+        pressing = goal > 0
+        rate = BANDWIDTH * self.softness * (goal - self._estimate)
+        self._correction += step * np.where(pressing, rate, -RELEASE * self._correction)
+        self._correction = np.clip(self._correction, MOST_INWARD, MOST)
+        return self._correction[:, None] * self.outward[row]
