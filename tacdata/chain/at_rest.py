@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -41,26 +43,51 @@ def told_at_rest(course: Course) -> tuple[np.ndarray | None, str]:
     return idle, ""
 
 
-def below_zero(depth: np.ndarray, readings: np.ndarray, whole: np.ndarray | None = None) -> float:
-    """Return how far a path goes below zero [mm] if readings answer there as they do above, else 0.
+@dataclass(frozen=True)
+class ZeroSide:
+    """How far a path goes below zero, and how much readings change there."""
 
-    A damper's piston has no side on which nothing is touched.
+    low: float
+    """Way below zero [mm]; 0 if it is too short for an answer."""
+    under: np.ndarray
+    """Range of each channel clearly below zero [its unit], shape (channels,)."""
+    whole: np.ndarray
+    """Range of each channel along the path [its unit], shape (channels,)."""
+
+    def answered(self, whole: np.ndarray) -> float:
+        """Return `low` if readings answer there as they do in the range ``whole``, else 0."""
+        # One channel alone may be one that nothing presses.
+        enough = np.linalg.norm(self.under) >= ANSWERED * max(np.linalg.norm(whole), 1e-300)
+        return self.low if enough else 0.0
+
+
+def zero_side(depth: np.ndarray, readings: np.ndarray) -> ZeroSide:
+    """Return how a path lies about zero.
 
     Args:
         depth: Along the path [mm], shape (n,).
         readings: At the same times [any unit], shape (n, channels).
-        whole: Range of each channel [the same], shape (channels,); that of these readings, unless given.
     """
     known = np.isfinite(depth) & np.isfinite(readings).any(axis=1)
     depth, readings = depth[known], readings[known]
-    if not len(depth) or depth.max() <= 0 or (low := -float(depth.min())) <= 0 or low < BELOW * float(depth.max()):
-        return 0.0
+    whole = _range(readings)
+    low = -float(depth.min(initial=0.0))
     under = depth < -CLEARLY * low
-    if under.sum() < FEWEST:
+    if depth.max(initial=0.0) <= 0 or low < BELOW * float(depth.max()) or under.sum() < FEWEST:
+        return ZeroSide(0.0, np.zeros_like(whole), whole)
+    return ZeroSide(low, _range(readings[under]), whole)
+
+
+def below_zero(sides: Sequence[ZeroSide]) -> float:
+    """Return how far paths go below zero [mm] if readings answer there as above, in half of the paths or more, else 0.
+
+    A damper's piston has no side on which nothing is touched. One press that misses the skin is no such piston.
+    """
+    if not sides:
         return 0.0
-    whole = _range(readings) if whole is None else whole
-    there = np.linalg.norm(_range(readings[under]))  # one channel alone may be one that nothing presses
-    return low if there >= ANSWERED * max(np.linalg.norm(whole), 1e-300) else 0.0
+    whole = np.max([side.whole for side in sides], axis=0)
+    each = [side.answered(whole) for side in sides]
+    return max(each) if np.count_nonzero(each) >= 0.5 * len(each) else 0.0
 
 
 def always_touched(course: Course) -> float:
@@ -68,11 +95,7 @@ def always_touched(course: Course) -> float:
     course = course.reduced if len(course.read) < course.rows else course
     edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
     spans = [slice(a, b) for a, b in pairwise(edges) if np.isfinite(course.readings[a:b]).any()]
-    if not spans:
-        return 0.0
-    whole = np.max([_range(course.readings[rows]) for rows in spans], axis=0)
-    each = [below_zero(course.tip[rows, 2], course.readings[rows], whole) for rows in spans]
-    return max(each) if np.count_nonzero(each) >= 0.5 * len(each) else 0.0
+    return below_zero([zero_side(course.tip[rows, 2], course.readings[rows]) for rows in spans])
 
 
 def _range(readings: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from tacdata.documents import composed
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.text_layout import THOUSANDS
-from tacdata.importing.units import factor, split_unit
+from tacdata.importing.units import factor, quantity_of, split_unit
 
 Selector = str | int | list[Any]
 
@@ -126,11 +126,26 @@ def axis(
 
 
 def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
-    """Return the unit of a column, by the mapping or the file; "" if neither gives one."""
+    """Return the unit of a column, by the mapping or the file; "" if neither gives one.
+
+    Raises:
+        FormatError: If the file and the mapping give different units of one quantity.
+    """
     name = single(table, entry["column"], where)
     whole = inner[1] if (inner := INNER.fullmatch(name)) and table.inner(inner[1]) else name
     inside = split_unit(whole)[1]
-    return entry.get("unit") or table.units.get(whole) or ("" if inside.isdigit() else inside)
+    stated = table.units.get(whole) or ("" if inside.isdigit() else inside)
+    if whole in table.typed:
+        return stated
+    given = entry.get("unit", "")
+    ours = quantity_of(given) if given and stated else None
+    if ours and quantity_of(stated) == ours and not np.isclose(factor(given, ours, where), factor(stated, ours, where)):
+        raise FormatError(
+            f"{where}: {table.path.name} states {stated} for {whole}, and the mapping {given}",
+            "one unit",
+            "leave unit out of the mapping; where the file is wrong, correct its header in a copy",
+        )
+    return given or stated
 
 
 def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:

@@ -14,7 +14,7 @@ import numpy as np
 
 import schemas
 from tacdata import documents, provenance
-from tacdata.chain.at_rest import below_zero
+from tacdata.chain.at_rest import ZeroSide, below_zero, zero_side
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.formats.source_format import SourceTable, read_table
@@ -98,7 +98,7 @@ class _Import:
         self.notes: list[str] = []
         self.seen: dict[tuple[Any, ...], str] = {}
         self.centre: tuple[float, float] | None = None
-        self.below = 0.0
+        self.sides: list[ZeroSide] = []
 
     def add(self, files: FileSet) -> None:
         """Import one set of files."""
@@ -173,17 +173,17 @@ class _Import:
         self.notes += imported.record["notes"]
         depth = imported.registration["origin"][2] - imported.position.values[:, 2]
         at = np.interp(imported.taxels.time_ns, imported.position.time_ns, depth)
-        self.below = max(self.below, below_zero(at, imported.taxels.values))
+        self.sides.append(zero_side(at, imported.taxels.values))
         self.presses.append(replace(imported, taxels=None, position=None, measured=()))
         rows = len(imported.taxels.time_ns)
         self.progress(f"  {path.name}  {trial or self.mapping['name']}: {rows} rows, {press.depth:.2f} mm deep")
 
     def finish(self) -> None:
         """Write the session's document."""
-        if self.below:
-            lowest = np.ceil(1000 * self.below) / 1000
+        if below := below_zero(self.sides):
+            lowest = np.ceil(1000 * below) / 1000
             self.notes.append(
-                f"readings answer as much below zero, down to {self.below:.4g} mm, as above: does it touch there, too? "
+                f"readings answer as much below zero, down to {below:.4g} mm, as above: does it touch there, too? "
                 f"Then count depth from the lowest (offset: {lowest:g} under depth, or contact); else it is no contact"
             )
         first = self.presses[0]

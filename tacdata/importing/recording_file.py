@@ -45,7 +45,9 @@ class ImportedPress:
     @property
     def rig(self) -> dict[str, Any]:
         """The stand-in for a rig file."""
-        imported = {key: self.record[key] for key in ("name", "source", "trial", "mapping_hash", "stand_ins")}
+        imported = {
+            key: self.record[key] for key in ("name", "source", "trial", "mapping_hash", "stand_ins", "set_aside")
+        }
         if specimen := self.record.get("specimen"):
             imported["specimen"] = specimen
         return {"name": self.record["name"], "registration": self.registration, "imported": imported}

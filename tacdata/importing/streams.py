@@ -11,6 +11,7 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, numbers, select, single, unit_of
 from tacdata.importing.formats.source_format import INNER, SourceTable
+from tacdata.importing.plausibility.codes import without_codes
 from tacdata.importing.plausibility.time_order import time_order
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, plain, quantity_of, split_unit
@@ -36,6 +37,8 @@ class Stream:
     notes: tuple[str, ...] = ()
     assumed: bool = False
     """Whether no file and no mapping says the unit."""
+    doubts: tuple[str, ...] = ()
+    """What was set aside or mended in its rows, as sentences."""
     stated_rate: float = 0.0
     """Rate that the source states beside its times [Hz]; 0 if it states none."""
     steps_back: tuple[str, ...] = ()
@@ -63,6 +66,8 @@ class ImportedStreams:
     depth_given: bool = False
     """Whether the position is a depth, so that its zero is the skin's surface."""
     notes: tuple[str, ...] = field(default=())
+    doubts: tuple[str, ...] = ()
+    """What was set aside or mended in the rows of any stream, as sentences."""
 
     @property
     def all(self) -> tuple[Stream, ...]:
@@ -97,7 +102,9 @@ def read_streams(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> lis
         _check_zeros(streams)
         if len(taxels) == 1:
             _check_overlap(streams)
-        stretches.append(replace(streams, notes=tuple(note for stream in streams.all for note in stream.notes)))
+        notes = tuple(note for stream in streams.all for note in stream.notes)
+        doubts = tuple(dict.fromkeys(doubt for stream in streams.all for doubt in stream.doubts))
+        stretches.append(replace(streams, notes=notes, doubts=doubts))
     return stretches
 
 
@@ -148,6 +155,7 @@ def _timed(
     values: np.ndarray,
     names: tuple[str, ...],
     unit: str,
+    doubts: tuple[str, ...] = (),
 ) -> list[Stream]:
     """Return a stream for each stretch of a file in which time never goes back."""
     clock = _clock(mapping, entry)
@@ -159,7 +167,7 @@ def _timed(
     offset_ns, stretches = round(clock.get("offset", 0.0) * 1e9), []
     for rows in order.stretches:
         spread, shared = _apart(order.time_ns[rows] + offset_ns)
-        notes = [*table.notes, *order.notes]
+        notes = [*table.notes]
         if shared:
             notes.append(
                 f"{name}: {shared} of {len(rows)} rows have the time of the row before; they are spread evenly up to "
@@ -174,6 +182,7 @@ def _timed(
                 unit,
                 zero,
                 tuple(notes),
+                doubts=(*table.doubts, *order.notes, *doubts),
                 stated_rate=table.rate,
                 steps_back=order.steps_back,
             )
@@ -224,12 +233,22 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[li
     else:
         names = select(table, entry["columns"], "taxels: columns")
     unit = entry.get("unit") or next((table.units[n] for n in names if n in table.units), "") or "as in the source"
-    values = numbers(table, names, _missing(mapping, entry), "taxels") * entry.get("scale", 1.0)
+    values, doubts = _readings(table, names, _missing(mapping, entry), entry, "taxels")
+    values = values * entry.get("scale", 1.0)
     labels = [f"{n}[{k}]" if width else n for n in names for width in (table.inner(n),) for k in range(max(width, 1))]
     if counted := "counter" in entry:
         name = single(table, entry["counter"], "taxels: counter")
         values = np.concatenate([values, numbers(table, [name], [], "taxels: counter")], axis=1)
-    return _timed(mapping, entry, table, "taxels", values, tuple(map(_label, labels)), unit), counted
+    stretches = _timed(mapping, entry, table, "taxels", values, tuple(map(_label, labels)), unit, doubts)
+    return stretches, counted
+
+
+def _readings(
+    table: SourceTable, names: list[str], missing: list[float], entry: dict[str, Any], name: str
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return columns as numbers without codes, unless the mapping trusts them; and what is missing, as sentences."""
+    values = numbers(table, names, missing, name)
+    return (values, ()) if entry.get("trusted") else without_codes(values, name, rails=name == "taxels")
 
 
 def _label(name: str) -> str:
@@ -252,7 +271,9 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
     labels = [f"{k:g}" if isinstance(k, float) else str(k) for k in known.tolist()]
     columns = {time: table.column(time)[first], **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
     unit = {time: table.units[time]} if time in table.units else {}
-    return SourceTable(table.path, columns, unit, (*table.notes, *notes)), [f"channel {label}" for label in labels]
+    return SourceTable(table.path, columns, unit, notes=(*table.notes, *notes), rate=table.rate), [
+        f"channel {label}" for label in labels
+    ]
 
 
 def _moments(
@@ -301,8 +322,11 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     down = axis(table, entry["depth" if depth_given else "z"], "mm", missing, "position: depth or z")
     columns.append(-down if depth_given else down)
     values = np.stack(np.broadcast_arrays(*columns, np.zeros(table.rows))[:3], axis=1)
+    doubts: tuple[str, ...] = ()
+    if not entry.get("trusted"):
+        values, doubts = without_codes(values, "position", rails=False)
     whole = np.isfinite(values).all(axis=1)
-    stretches = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm")
+    stretches = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm", doubts)
     if not whole.any():
         raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
     assumed = tuple(_taken_as_mm(table, entry))
@@ -331,14 +355,15 @@ def _measured(
     names = select(table, entry["columns"], f"measured: {name}")
     given = plain(entry.get("unit") or next((table.units[n] for n in names if n in table.units), ""))
     ours = quantity_of(given) if given else None
-    values = numbers(table, names, _missing(mapping, entry), f"measured: {name}") * entry.get("scale", 1.0)
+    values, doubts = _readings(table, names, _missing(mapping, entry), entry, f"measured: {name}")
+    values = values * entry.get("scale", 1.0)
     if ours in ("N", "mm"):
         values, unit = values * factor(given, ours, f"measured: {name}"), ours
     else:
         unit = given
     labels = tuple(split_unit(n)[0] for n in names) if len(names) == values.shape[1] else None
     labels = labels or tuple(str(k) for k in range(values.shape[1]))
-    stretches = _timed(mapping, entry, table, name, values, labels, unit)
+    stretches = _timed(mapping, entry, table, name, values, labels, unit, doubts)
     return [stream.chosen(np.flatnonzero(np.isfinite(stream.values).any(axis=1))) for stream in stretches]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -23,6 +24,8 @@ FASTEST = 100_000.0
 """Rows a second above which times are no times of a tactile sensor [Hz]: the unit is another one."""
 FASTEST_UNSAID, FASTEST_DATE, SLOWEST_UNSAID = 5000.0, 500.0, 1.0
 """Between these rates times need no unit [Hz]. Numbers that could be dates in days have a lower bound above."""
+LATEST = 9.2e9
+"""Times beyond cannot be held as 64 bits of nanoseconds [s]."""
 NO_UNIT = {"", "unix", "epoch", "posix", "utc", "gmt", "local", "time", "timestamp", "a.u.", "-"}
 """What stands in brackets behind a clock's name and is no unit (compared in lower case)."""
 
@@ -63,6 +66,7 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
     scale = factor(unit, "s", f"{where}: {name}")
     if scale == DAY and (dated := _dated(values)):
         return _of_days(values, dated, clock), clock.get("zero", "unix")
+    _refuse_late(values, unit, scale, f"{where}: {name}")
     _refuse_fast(values, unit, scale, f"{where}: {name}")
     middle = float(np.nanmedian(values.astype(float))) * scale if len(values) else 0.0
     looks_unix = YEAR_2000 < middle < YEAR_2100
@@ -147,6 +151,27 @@ def _refuse_unsaid(values: np.ndarray, unit: str, where: str) -> None:
     )
 
 
+def _refuse_late(values: np.ndarray, unit: str, scale: float, where: str) -> None:
+    """Refuse times that lie centuries away: in nanoseconds they have no place in 64 bits.
+
+    Raises:
+        FormatError: Saying which unit would fit.
+    """
+    known = values.astype(float)
+    known = known[np.isfinite(known)]
+    latest = float(np.abs(known).max(initial=0.0)) * scale
+    if latest < LATEST:
+        return
+    fitting = _guessed(values)
+    raise FormatError(
+        f"{where}: in {unit} its times reach {latest:.3g} s, {latest / 3.156e7:.3g} years",
+        "times of this century, or of a clock that begins at zero",
+        f"correct unit under time in the mapping, to {fitting} for example"
+        if fitting != unit
+        else "correct the column or its unit under time in the mapping",
+    )
+
+
 def _refuse_fast(values: np.ndarray, unit: str, scale: float, where: str) -> None:
     """Refuse times that come too fast in the unit that is given. Bursts are left alone: the mean counts.
 
@@ -218,7 +243,7 @@ def _joined(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[Sour
     whole = [" ".join(row) if all(row) else None for row in zip(*parts, strict=True)]
     joined = " ".join(names)
     columns = {**table.columns, joined: np.array(whole, dtype=object)}
-    return SourceTable(table.path, columns, table.units, table.notes), {**clock, "column": joined}
+    return replace(table, columns=columns), {**clock, "column": joined}
 
 
 def _as_texts(values: np.ndarray) -> list[str]:

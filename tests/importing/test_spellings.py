@@ -178,7 +178,7 @@ def test_words_for_no_value_stand_in_any_row_the_first_too(tmp_path, word):
 
 @pytest.mark.parametrize("word", ["OL", "overflow", "missing", "1'010.5"])
 def test_an_unknown_word_is_named_with_its_column_and_row(tmp_path, word):
-    error = refusal(tmp_path, text().replace("20.0000", word, 1))
+    error = refusal(tmp_path, text().replace("20.0000", word, 1).replace("20.01", word).replace("20.02", word))
     assert f"column cap0, row 1 of the data: {word!r}" in error.given
     assert ("missing in the mapping" in error.remedy) == (word != "1'010.5")
 

@@ -12,12 +12,31 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable, kind_of_bytes
-from tacdata.importing.text_layout import COMMENTS, MISSING, THOUSANDS, TextLayout, is_comment, is_number, text_layout
+from tacdata.importing.text_layout import (
+    COMMENTS,
+    MISSING,
+    THOUSANDS,
+    TextLayout,
+    is_comment,
+    is_number,
+    split,
+    text_layout,
+)
 
 SHOWN = 40
 """Letters of a text that an error quotes."""
+TAIL, FEWEST = 16 * 1024, 20
+"""Bytes and rows at a file's end by which a number that is cut off is told."""
+UNREADABLE = 0.01
+"""Largest share of a column's cells that hold no number and are missing [1]; above it the file is refused."""
 SNIFFED, HEAD = 256 * 1024, 4096
 """Bytes from which the layout is recognized; among which a header's cells may hold line breaks."""
+STATED_RATE = re.compile(
+    r"(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq\w*)?[^\d\n]{0,20}?"
+    r"(\d+(?:\.\d+)?)\s*(k?)(?:hz|s/s|sps|1/s)",
+    re.IGNORECASE,
+)
+"""How a file states its rate above its rows."""
 RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
 """How a serial monitor marks when a line came."""
 MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
@@ -59,10 +78,36 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
         notes.append(f"{path.name}: names that are given twice; the later columns are called {', '.join(twice)}")
     if not body.strip():
         raise FormatError(f"{path} has a header and no row", "one row of data or more", "leave it out")
-    columns, skipped = _parsed(body, layout, [*MISSING, *own], path)
+    columns, skipped, doubts = _parsed(body, layout, [*MISSING, *own], path)
+    if not skipped and _is_cut(body, layout):
+        whole = columns[layout.names[-1]]
+        columns[layout.names[-1]] = np.append(whole[:-1], np.nan)
+        doubts.append(f"{path.name}: the last number is cut off with the file and is missing")
     if skipped:
         notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
-    return SourceTable(path, columns, dict(layout.units), tuple(notes))
+    rate = _stated_rate(data, layout.skip)
+    return SourceTable(path, columns, dict(layout.units), notes=tuple(notes), doubts=tuple(doubts), rate=rate)
+
+
+def _stated_rate(data: bytes, skip: int) -> float:
+    """Return the rate that the lines above the rows state [Hz]; 0 if they state none."""
+    head = b"\n".join(data[:SNIFFED].split(b"\n")[:skip]).decode("utf-8", "ignore")
+    match = STATED_RATE.search(head)
+    return float(match[1]) * (1000.0 if match[2] else 1.0) if match else 0.0
+
+
+def _is_cut(body: bytes, layout: TextLayout) -> bool:
+    """Return whether a file ends inside a number: without a line end, and with fewer digits than all rows before."""
+    if body.endswith(b"\n") or layout.kinds[-1] != "float":
+        return False
+    lines = [line for line in body[-TAIL:].decode("utf-8", "ignore").split("\n")[1:] if line.strip()]
+    fields = [split(line, layout.delimiter)[-1].strip() for line in lines]
+    places = [len(field.partition(layout.decimal)[2]) if layout.decimal in field else 0 for field in fields]
+    if len(fields) < FEWEST:
+        return False
+    if min(places[:-1]) == max(places[:-1]) > 0:
+        return places[-1] < places[0]
+    return max(places) == 0 and len(fields[-1].lstrip("-")) < min(len(field.lstrip("-")) for field in fields[:-1])
 
 
 def _with_receipt(data: bytes) -> bytes:
@@ -170,8 +215,14 @@ def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[by
     return body, comments, headers
 
 
-def _parsed(body: bytes, layout: TextLayout, missing: list[str], path: Path) -> tuple[dict[str, np.ndarray], int]:
-    """Parse with the column types of the layout; if a text stands among numbers, report where."""
+def _parsed(
+    body: bytes, layout: TextLayout, missing: list[str], path: Path
+) -> tuple[dict[str, np.ndarray], int, list[str]]:
+    """Parse with the column types of the layout.
+
+    Returns:
+        Columns by name, the number of lines of another width, and what is missing, as sentences.
+    """
     import pyarrow as pa
 
     kinds = {"float": pa.float64(), "int": pa.int64(), "text": pa.string()}
@@ -180,14 +231,14 @@ def _parsed(body: bytes, layout: TextLayout, missing: list[str], path: Path) -> 
         table, skipped = _arrow(body, layout, missing, types)
     except pa.ArrowInvalid:
         table, skipped = _arrow(body, layout, missing, dict.fromkeys(layout.names, pa.string()))
-    columns = {}
+    columns, doubts = {}, []
     for name, kind in zip(layout.names, layout.kinds, strict=True):
         column = table.column(name)
         if kind == "text" or not pa.types.is_string(column.type):
             columns[name] = _array(column, kind)
         else:
-            columns[name] = _numbers(column.to_pylist(), layout, name, path)
-    return columns, skipped
+            columns[name] = _numbers(column.to_pylist(), layout, name, path, doubts)
+    return columns, skipped, doubts
 
 
 def _arrow(body: bytes, layout: TextLayout, missing: list[str], types: dict[str, Any]) -> tuple[Any, int]:
@@ -218,21 +269,34 @@ def _array(column: Any, kind: str) -> np.ndarray:
     return np.asarray(column.to_numpy(), dtype=float)
 
 
-def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path) -> np.ndarray:
-    values = np.full(len(texts), np.nan)
+def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path, doubts: list[str]) -> np.ndarray:
+    """Return texts as numbers, shape (rows,). A few cells without a number are missing and counted in ``doubts``.
+
+    Raises:
+        FormatError: If many cells hold no number, or one holds a number with a sign between its thousands.
+    """
+    values, wrong = np.full(len(texts), np.nan), []
     for row, text in enumerate(texts):
-        if text is None:
-            continue
-        if not is_number(text.strip(), layout.decimal):
-            shown = repr(text.strip()[:SHOWN])
-            thousands = THOUSANDS.fullmatch(text.strip())
-            raise FormatError(
-                f"{path}: column {name}, row {row + 1} of the data: {shown}",
-                f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",
-                "save it again without a sign between thousands"
-                if thousands
-                else f"add {shown} to missing in the mapping if it stands for no value, else correct the file",
-            )
-        field = text.strip()
-        values[row] = np.nan if field in MISSING else float(field.replace(",", ".") if layout.decimal == "," else field)
+        field = "" if text is None else text.strip()
+        if not is_number(field, layout.decimal):
+            wrong.append(row)
+        elif field not in MISSING:
+            values[row] = float(field.replace(",", ".") if layout.decimal == "," else field)
+    if not wrong:
+        return values
+    grouped = next((row for row in wrong if THOUSANDS.fullmatch((texts[row] or "").strip())), None)
+    row = wrong[0] if grouped is None else grouped
+    shown = repr((texts[row] or "").strip()[:SHOWN])
+    if grouped is not None or len(wrong) > UNREADABLE * len(texts):
+        raise FormatError(
+            f"{path}: column {name}, row {row + 1} of the data: {shown}",
+            f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",
+            f"add {shown} to missing in the mapping if it stands for no value, else correct the file"
+            if grouped is None
+            else "save it again without a sign between thousands",
+        )
+    doubts.append(
+        f"{path.name}: {len(wrong)} cells of {name} hold no number and are missing, the first in row {row + 1} of the "
+        f"data: {shown}"
+    )
     return values

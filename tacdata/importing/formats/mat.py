@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ class Mat(SourceFormat):
             arrays |= _flatten(name if len(variables) > 1 else "", value, lost)
         table = rows_of(path, arrays, options)
         notes = [f"{path.name}: neither numbers nor texts, left out: {', '.join(lost)}"] if lost else []
-        return SourceTable(path, table.columns, table.units, (*notes, *table.notes))
+        return replace(table, notes=(*notes, *table.notes))
 
 
 def _readable(variables: dict[str, Any]) -> bool:

@@ -66,8 +66,8 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
     dropped = [f"{name} ({len(values)} rows)" for name, values in columns.items() if name not in kept]
     if dropped:
         notes.append(f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}")
-    units = {name: "ns" for name, array in flat.items() if array.dtype.kind == "m"}
-    return SourceTable(path, kept, units, tuple(notes))
+    units = {name: "ns" for name, array in flat.items() if array.dtype.kind in "mM"}
+    return SourceTable(path, kept, units, frozenset(units), tuple(notes))
 
 
 def _flat(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

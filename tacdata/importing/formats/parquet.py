@@ -39,8 +39,9 @@ class Parquet(SourceFormat):
             for field in table.schema
             if field.metadata and b"unit" in field.metadata
         }
-        units |= {field.name: str(field.type.unit) for field in table.schema if pa.types.is_duration(field.type)}
-        return SourceTable(path, columns, units, tuple(notes))
+        typed = {field.name: str(field.type.unit) for field in table.schema if pa.types.is_duration(field.type)}
+        typed |= {field.name: "ns" for field in table.schema if pa.types.is_timestamp(field.type)}
+        return SourceTable(path, columns, units | typed, frozenset(typed), tuple(notes))
 
 
 def _column(column: Any, where: str, notes: list[str]) -> np.ndarray:
@@ -48,7 +49,7 @@ def _column(column: Any, where: str, notes: list[str]) -> np.ndarray:
 
     kind = column.type
     if pa.types.is_timestamp(kind):
-        return np.asarray(column.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64()).to_numpy())
+        column, kind = column.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64()), pa.int64()
     if pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind) or pa.types.is_large_list(kind):
         rows = [None if row is None else np.ravel(np.array(row, float)) for row in column.to_pylist()]
         width = max((len(row) for row in rows if row is not None), default=0) or 1
@@ -62,7 +63,7 @@ def _column(column: Any, where: str, notes: list[str]) -> np.ndarray:
         kind = kind.value_type
     if pa.types.is_decimal(kind):
         column, kind = column.cast(pa.float64()), pa.float64()
-    if pa.types.is_integer(kind) and not column.null_count and kind.bit_width == 64:
+    if pa.types.is_integer(kind) and kind.bit_width == 64 and not column.null_count:
         values = column.to_numpy()
         return values if len(values) and np.abs(values).max() > 2**53 else values.astype(float)
     if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):

@@ -59,7 +59,7 @@ class Rosbag(SourceFormat):
             for name, count in longer.items()
         ]
         units = {name: "ns" for name in columns if name == RECEIVED or name.endswith("stamp")}
-        return SourceTable(path, columns, units, tuple(notes))
+        return SourceTable(path, columns, units, notes=tuple(notes))
 
 
 @contextmanager

@@ -56,8 +56,12 @@ class SourceTable:
     """Name -> values as in the file [any], shape (rows,) or (rows, k): float64, int64, or text."""
     units: dict[str, str] = field(default_factory=dict)
     """Name -> unit, where the file gives one."""
+    typed: frozenset[str] = frozenset()
+    """Columns whose unit is a part of the file's own type, as that of a duration: no mapping overrules it."""
     notes: tuple[str, ...] = ()
     """Remarks on the reading, as sentences."""
+    doubts: tuple[str, ...] = ()
+    """Values that were left out because they cannot be measurements, as sentences."""
     rate: float = 0.0
     """Rows a second as the file states them beside its columns [Hz]; 0 if it states none."""
 

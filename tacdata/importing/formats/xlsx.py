@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime, time
 from pathlib import Path
 from typing import Any
@@ -55,7 +56,7 @@ class Xlsx(SourceFormat):
         notes = [*table.notes, *([f"{path.name}: sheet {read} is read, not {', '.join(others)}"] if others else [])]
         if any(values.dtype != object and not np.isfinite(values).any() for values in table.columns.values()):
             notes += _never_computed(path, read)
-        return SourceTable(path, table.columns, table.units, tuple(notes))
+        return replace(table, notes=tuple(notes))
 
 
 def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[SourceTable, str, list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,7 @@ class Zarr(SourceFormat):
         if ends is not None and len(ends):
             columns["episode"] = np.searchsorted(ends, np.arange(int(ends[-1])), side="right")
         table = rows_of(path, columns, options)
-        return SourceTable(path, table.columns, table.units, (*notes, *table.notes))
+        return replace(table, notes=(*notes, *table.notes))
 
 
 def _without_lost(array: Any, folder: Path, values: np.ndarray) -> tuple[np.ndarray, str]:

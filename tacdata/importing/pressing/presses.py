@@ -16,6 +16,7 @@ from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, label_of, single
 from tacdata.importing.foreign_sensor import foreign_sensor
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.plausibility.path_faults import without_faults
 from tacdata.importing.pressing.press_path import PressPath, press_path
 from tacdata.importing.pressing.schedule import ScheduledPress, read_schedule
 from tacdata.importing.recording_file import ImportedPress
@@ -125,6 +126,9 @@ def _of_stretch(
         error = FormatError(f"trial {record['trial']}: no position in it", "a position", "split otherwise")
         yield Refusal(record["trial"], error)
         return
+    if not mapping.get("position", {}).get("trusted"):
+        streams = without_faults(streams)
+    record = {**record, "set_aside": list(streams.doubts), "notes": [*streams.notes, *streams.doubts]}
     place, unsaid = _registration(mapping, streams, centre)
     cuts = _cuts(mapping, streams, scheduled, place)
     for number, (begin, end, planned) in enumerate(cuts):
@@ -134,16 +138,7 @@ def _of_stretch(
             part = replace(part, position=_commanded(planned, begin, end))
         try:
             _check_rows(part, trial)
-            yield _imported(
-                mapping,
-                beside,
-                part,
-                place,
-                planned,
-                known,
-                [*unsaid],
-                {**record, "trial": trial, "notes": list(streams.notes)},
-            )
+            yield _imported(mapping, beside, part, place, planned, known, [*unsaid], {**record, "trial": trial})
         except FormatError as error:
             yield Refusal(trial, error)
 

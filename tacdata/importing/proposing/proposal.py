@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import schemas
-from tacdata.chain.at_rest import below_zero
+from tacdata.chain.at_rest import below_zero, zero_side
 from tacdata.errors import FormatError
 from tacdata.importing.columns import unit_of
 from tacdata.importing.formats.source_format import SourceTable
@@ -185,12 +186,24 @@ def _from_the_lowest(
     if not parts:
         return
     depth = entry.get("scale", 1.0) * table.column(name).astype(float) * _in_mm(unit_of(table, entry, name))
-    if low := below_zero(depth, np.column_stack(parts).astype(float)):
+    readings = np.column_stack(parts).astype(float)
+    if low := below_zero([zero_side(depth[rows], readings[rows]) for rows in _each_press(depth)]):
         entry["offset"] = float(np.ceil(1000 * low) / 1000)
         asked.append(
             f"{name}: readings answer on both sides of its zero, so depth is counted from the lowest "
             f"(offset: {entry['offset']:g} mm); do other files go lower? Then take the lowest of all"
         )
+
+
+def _each_press(depth: np.ndarray) -> list[slice]:
+    """Return the rows from each highest point of a path to the next, one press each."""
+    known = np.nan_to_num(depth, nan=np.nanmin(depth))
+    deep = known > known.min() + 0.5 * np.ptp(known)
+    edges = np.flatnonzero(np.diff(deep.astype(np.int8)))
+    begins, ends = edges[~deep[edges]], edges[deep[edges]]
+    after = [int(begins[begins > end][0]) for end in ends if (begins > end).any()]
+    middles = [(int(end) + begin) // 2 for end, begin in zip(ends, after, strict=False)]
+    return [slice(a, b) for a, b in pairwise([0, *middles, len(depth)])]
 
 
 def _in_mm(unit: str) -> float:

@@ -45,6 +45,7 @@ def imported_findings(figures: RecordingFigures) -> list[tuple[str, str, str]]:
     if stand_ins := [text.split(":")[0] for text in episode.rig["imported"].get("stand_ins", [])]:
         text = f"the source does not say {', '.join(stand_ins)}: what stands in makes depth or labels a guess"
         found.append(("warning", "import", text))
+    found += [("warning", "import", text) for text in episode.rig["imported"].get("set_aside", [])]
     if values["rate"] and values["longest_gap"] > GAP_PERIODS * 1000 / values["rate"]:
         found.append(("warning", "taxels", f"gaps of up to {values['longest_gap'] / 1000:.1f} s without a sample"))
     missing = np.isnan(episode.taxels.counts).mean(axis=0)

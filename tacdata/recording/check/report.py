@@ -20,6 +20,9 @@ from tacdata.recording.check.session import session_findings, session_not_assess
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.session import read_session
 
+WEAK, FEWEST_PRESSES = 0.2, 4
+"""Share of the usual change of the readings below which a press is named [1], of so many presses [count] or more."""
+
 
 @dataclass(frozen=True)
 class Report:
@@ -110,7 +113,7 @@ def _of_session(session: Any, entries: list[RecordingFigures]) -> list[Finding]:
         text = f"{len(session.remaining)} of {len(session.plan.presses)} presses of the plan are not recorded"
         found.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
     if entries and is_imported(entries[0].recording.episode):
-        return [*found, *_unanswered(entries)]  # the positions of its channels may be stand-ins
+        return [*found, *_unanswered(entries), *_weak(entries)]  # the positions of its channels may be stand-ins
     return [*found, *session_findings(entries)]
 
 
@@ -121,6 +124,22 @@ def _unanswered(entries: list[RecordingFigures]) -> list[Finding]:
         return []
     text = f"no channel answers to any of {len(known)} presses: at most {max(known):.1f} times its noise"
     return [Finding(UNUSABLE, "taxels", "", text)]
+
+
+def _weak(entries: list[RecordingFigures]) -> list[Finding]:
+    """Name the presses of the same depth whose readings change far less than the others': they miss the skin."""
+    pressed = [entry for entry in entries if entry.recording.episode.press.depth >= CONTACT]
+    if len(pressed) < FEWEST_PRESSES:
+        return []
+    depths = np.array([entry.recording.episode.press.depth for entry in pressed])
+    quantiles = [np.nanquantile(entry.recording.episode.taxels.counts, [0.02, 0.98], axis=0) for entry in pressed]
+    spans = np.array([float(np.linalg.norm(np.nan_to_num(high - low))) for low, high in quantiles])
+    usual = float(np.median(spans))
+    weak = np.flatnonzero((spans < WEAK * usual) & (depths > 0.8 * np.median(depths)))
+    text = (
+        f"the readings change by less than {100 * WEAK:.0f} % of what they do in other presses: did it miss the skin?"
+    )
+    return [Finding(WARNING, "taxels", pressed[k].recording.episode.path.name, text) for k in weak.tolist()]
 
 
 def _not_assessed(entries: list[RecordingFigures]) -> list[str]:

@@ -1,0 +1,94 @@
+"""Numbers that stand for no value: overload codes of instruments, and the rails of a converter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class CodePolicy:
+    """What is a code. None of it was tuned on data."""
+
+    huge: float = 9e29
+    """Size from which a number is no reading in any unit: instruments write 9.9e37, 1e30, 4.44e49 or -1e105."""
+    far: float = 1e6
+    """Smallest ratio of a code to all readings [1]."""
+    few: int = 3
+    """Most different numbers that are so far away [count]; readings that rise through the range between are none."""
+    bits: tuple[int, ...] = (8, 10, 12, 14, 16, 18, 20, 24, 32)
+    """Widths of converters [bit]."""
+    run: int = 3
+    """Fewest readings at a rail [count]."""
+    inside: float = 0.5
+    """Largest share of a channel's readings at a rail [1]; a channel that is always there is a flag."""
+
+
+POLICY = CodePolicy()
+
+
+def without_codes(
+    values: np.ndarray, name: str, *, rails: bool, policy: CodePolicy = POLICY
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return numbers with NaN for codes, and how many there were, as sentences.
+
+    Args:
+        values: Numbers as in the file [any], shape (rows, k).
+        name: Their stream, for the sentences.
+        rails: Whether they come from a converter, whose largest number is no reading.
+        policy: What is a code.
+    """
+    codes = np.zeros(values.shape, dtype=bool)
+    for column in range(values.shape[1]):
+        codes[:, column] = _far(values[:, column], policy)
+    doubts = []
+    if codes.any():
+        doubts.append(_counted(values, codes, name, "stand for an overload or for no value"))
+    clipped = _at_rail(np.where(codes, np.nan, values), policy) if rails else np.zeros_like(codes)
+    if clipped.any():
+        doubts.append(_counted(values, clipped, name, "are the largest that its converter has, and so no readings"))
+    missing = codes | clipped
+    return (np.where(missing, np.nan, values) if missing.any() else values), tuple(doubts)
+
+
+def _counted(values: np.ndarray, chosen: np.ndarray, name: str, words: str) -> str:
+    known, counts = np.unique(values[chosen], return_counts=True)
+    order = np.argsort(-counts)[:3]
+    shown = ", ".join(f"{known[k]:.6g}" for k in order.tolist())
+    return f"{name}: {int(chosen.sum())} numbers ({shown}) {words}: they are missing (trusted: true keeps them)"
+
+
+def _far(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
+    """Return which numbers are codes by their size alone or by their distance from all others, shape (rows,), bool."""
+    size = np.abs(column)
+    codes = size >= policy.huge
+    rest = np.unique(size[np.isfinite(column) & ~codes & (column != 0)])
+    if len(rest) > policy.few:
+        steps = rest[1:] > policy.far * rest[:-1]
+        if steps[-policy.few :].any():
+            place = len(rest) - 1 - int(np.argmax(steps[::-1]))
+            usual = int((size[np.isfinite(column)] <= rest[place - 1]).sum())
+            if 2 * usual > len(column):
+                codes |= size >= rest[place]
+    return codes
+
+
+def _at_rail(values: np.ndarray, policy: CodePolicy) -> np.ndarray:
+    """Return which numbers are a converter's largest, shape (rows, k), bool; signed ones have a lower rail, too."""
+    known = values[np.isfinite(values)]
+    clipped = np.zeros(values.shape, dtype=bool)
+    if not known.size or (known != np.rint(known)).any():
+        return clipped
+    low, high = float(known.min()), float(known.max())
+    for bits in policy.bits:
+        upper = (2.0**bits - 1,) if low >= 0 else (2.0 ** (bits - 1) - 1,)
+        rails = [rail for rail in upper if high == rail]
+        if low < 0 and low == -(2.0 ** (bits - 1)):
+            rails.append(low)
+        for rail in rails:
+            here = values == rail
+            share = here.mean(axis=0)
+            clipped |= here & (share <= policy.inside) & (here.sum(axis=0) >= policy.run)
+    levels = [len(np.unique(column[np.isfinite(column)])) for column in values.T]
+    return clipped & (np.array(levels) > 2 * policy.bits[0])
