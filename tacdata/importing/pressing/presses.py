@@ -16,7 +16,7 @@ from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, label_of, single
 from tacdata.importing.foreign_sensor import foreign_sensor
 from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.plausibility.path_faults import without_faults
+from tacdata.importing.pressing.path_faults import without_faults
 from tacdata.importing.pressing.press_path import PressPath, press_path
 from tacdata.importing.pressing.schedule import ScheduledPress, read_schedule
 from tacdata.importing.recording_file import ImportedPress
