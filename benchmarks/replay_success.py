@@ -6,6 +6,11 @@ contacts that it had not learnt (`docs/how_to/hands.md`): each finger's is too s
 0.04 mm. The gain is found on one hand and tried on others, in other scenes.
 
     python benchmarks/replay_success.py [--hands N] [--scenes N] [--cases ball,can,box,eraser] [--json FILE]
+        [--arms sweep|challenges]
+
+With `--arms`, control arms without depth run in the same scenes, over stiffnesses or in scenes unlike the
+demonstration.
+Readings of their arm `raw taxels` are proportional to depth, with a gain of each fingertip that is off by up to 20 %.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ from tacdata.demonstrations.paths.acquisition import acquire
 from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.sightings import sightings_of
 from tacdata.replay.comparison.gain_search import GripDemand
-from tacdata.replay.comparison.trials import Trials, rate
+from tacdata.replay.comparison.trials import Trials, challenged, like_published, rate, sweep
 from tacdata.replay.scene import scene_of
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, draw_hand
 
@@ -62,6 +67,9 @@ def demonstration(seed, thing):
             np.logical_not(known),
             len(seen),
             0,
+            signals=np.float32(1500 * rng.uniform(0.8, 1.2))
+            * truth.astype(np.float32)[:, None]
+            * np.ones((1, 24), np.float32),
             depth=np.maximum(felt, 0).astype(np.float32)[:, None, None] * np.ones((1, 4, 4), np.float32),
         )
     identity = {"hash": f"{seed:064x}", "network": "errors as measured", "epoch": 0, "lookahead": 0, "sensor": ""}
@@ -78,6 +86,21 @@ def judged(thing, hands, scenes):
     return {"found": found.document, "trials": trials}
 
 
+def compared(thing, hands, scenes, table):
+    """Print and return what every arm held, a row for each stiffness or challenge."""
+    scene, gains = scene_of(CASES[thing], thing), {"compensated": read_gains().of(CASES[thing])}
+    tried = [Trials(demonstration(seed, thing), gains, scene) for seed in range(hands)]
+    rows = sweep(tried, scene, scenes) if table == "sweep" else challenged(tried, scene, scenes)
+    print(f"{thing}: held of {hands * scenes}: " + ", ".join(rows[0]["rates"]), flush=True)
+    for row in rows:
+        name = row.get("challenge") or f"{row['stiffness']:g} N/m"
+        mark = " *" if "stiffness" in row and like_published(row, CASES[thing]) else ""
+        print(
+            f"  {name + mark:<24} " + " ".join(f"{r['held']:>4}" for r in row["rates"].values()) + f"   {row['worth']}"
+        )
+    return {table: rows}
+
+
 def main():
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -85,9 +108,15 @@ def main():
     parser.add_argument("--scenes", type=int, default=8)
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--arms", choices=("sweep", "challenges"))
     chosen = parser.parse_args()
     whole = {}
     for thing in chosen.cases.split(","):
+        if chosen.arms:
+            whole[thing] = compared(thing, chosen.hands, chosen.scenes, chosen.arms)
+            if chosen.json:
+                chosen.json.write_text(json.dumps(whole, indent=1) + "\n")
+            continue
         whole[thing] = judged(thing, chosen.hands, chosen.scenes)
         for kind in ("direct", "compensated", "chosen"):
             own = [trial for trial in whole[thing]["trials"] if trial["kind"] == kind]

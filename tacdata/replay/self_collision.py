@@ -54,8 +54,11 @@ def self_collisions(urdf: Path, joints: tuple[str, ...], values: np.ndarray, hom
         engine.mj_collision(model, data)
         found = set()
         for contact in data.contact[: data.ncon]:
-            if contact.dist < -DEEP:
-                first, second = sorted(model.body(int(model.geom_bodyid[geom])).name for geom in contact.geom)
+            bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
+            # MuJoCo leaves out neighbours, but not those of a link that stands still.
+            joined = any(int(model.body_parentid[a]) == b for a, b in (bodies, bodies[::-1]))
+            if contact.dist < -DEEP and not joined:
+                first, second = sorted(model.body(body).name for body in bodies)
                 found.add((first, second))
         return found
 

@@ -17,7 +17,7 @@ from tacdata.errors import UsageError
 
 FAR = 0.05
 """Shift by compensation that is said [m]; the paper's gains move a target by at most 36 mm."""
-VAGUE = 0.01
+VAGUE = 0.03
 """Share of the targets that may be known worse than `GUESS` though the finger was seen [1]."""
 UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m", "depth": "mm", "gap": "1"}
 
