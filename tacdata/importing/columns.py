@@ -122,7 +122,11 @@ def axis(
     name = single(table, entry["column"], where)
     given = unit_of(table, entry, where) or unit
     values = numbers(table, [name], missing, where)[:, 0]
-    return values * factor(given, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
+    values = values * factor(given, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
+    known = values[np.isfinite(values)]
+    if "zero" in entry and len(known):
+        values = values - {"first": known[0], "lowest": known.min(), "highest": known.max()}[entry["zero"]]
+    return values
 
 
 def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:

@@ -17,10 +17,10 @@ from tacdata import documents, provenance
 from tacdata.chain.at_rest import ZeroSide, below_zero, zero_side
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
-from tacdata.importing.formats.source_format import SourceTable, read_table
+from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
 from tacdata.importing.recording_file import ImportedPress
-from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
+from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash, without_expressions
 from tacdata.importing.trials import split_tables
 from tacdata.recording import session
 from tacdata.recording.files import file_names
@@ -64,7 +64,7 @@ def import_session(
         >>> made.refused
         ()
     """
-    document = documents.read(mapping, "import_mapping")
+    document = without_expressions(documents.read(mapping, "import_mapping"))
     if out.exists():
         raise UsageError(f"{out} exists", "a new session folder", "choose another --out")
     sets = file_sets(source, document["files"])
@@ -109,7 +109,7 @@ class _Import:
             self.notes.append(copied)
             return
         try:
-            tables = {name: read_table(path, files.options(name, self.mapping)) for name, path in files.paths.items()}
+            tables = files.tables(self.mapping)
         except TacdataError as error:
             self.failures.append((files.label or self.source.name, error))
             return
@@ -134,7 +134,7 @@ class _Import:
 
         A copy is no second measurement: counted as one, it would make every error look smaller.
         """
-        tables = [files.options(name, self.mapping).get("table") for name in files.paths]
+        tables = [str(files.options(name, self.mapping).get("table")) for name in files.paths]
         same = zip(map(source_hash, files.paths.values()), tables, strict=True)
         name = ", ".join(path.name for path in files.paths.values())
         first = self.seen.setdefault(tuple(same), name)
@@ -151,7 +151,8 @@ class _Import:
             "trial": label,
             "files": [
                 {"path": path.relative_to(below).as_posix(), "sha256": source_hash(path), "rows": whole[name].rows}
-                for name, path in files.paths.items()
+                for name, first in files.paths.items()
+                for path in (first, *files.more.get(name, ()))
             ],
             "mapping": self.mapping,
             "mapping_hash": self.hash,

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from tacdata import provenance
 from tacdata.documents import composed
 from tacdata.errors import FormatError, UsageError
-from tacdata.importing.formats.source_format import tables_in
+from tacdata.importing.columns import single
+from tacdata.importing.expression import with_derived
+from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
 
 
 @dataclass(frozen=True)
@@ -23,11 +27,34 @@ class FileSet:
     """Name under ``files`` -> path."""
     fault: FormatError | None = None
     """Why the files are not complete."""
+    more: dict[str, tuple[Path, ...]] = field(default_factory=dict)
+    """Name under ``files`` -> the further files of the set, whose rows follow."""
 
     def options(self, name: str, mapping: dict[str, Any]) -> dict[str, Any]:
         """Return how a mapping has a file read, with the {parts} of its table filled in."""
         entry: dict[str, Any] = mapping["files"][name]
-        return {**entry, "table": entry["table"].format(**self.parts)} if "{" in entry.get("table", "") else entry
+        filled = isinstance(entry.get("table"), str) and "{" in entry["table"]
+        return {**entry, "table": entry["table"].format(**self.parts)} if filled else entry
+
+    def tables(self, mapping: dict[str, Any]) -> dict[str, SourceTable]:
+        """Return the rows of every file, with those of further files and sheets below each other.
+
+        Raises:
+            FormatError: If a file cannot be read, or parts have no column in common.
+        """
+        tables = {}
+        for name, path in self.paths.items():
+            options = self.options(name, mapping)
+            table = options.get("table")
+            sheets: list[str | None] = table if isinstance(table, list) else [table]
+            parts = [
+                read_table(part, {**options, "table": sheet} if sheet else options)
+                for part in (path, *self.more.get(name, ()))
+                for sheet in sheets
+            ]
+            table = parts[0] if len(parts) == 1 else joined(parts, options)
+            tables[name] = with_derived(table, options.get("derived", {}), f"files: {name}: derived")
+        return tables
 
     @property
     def label(self) -> str:
@@ -89,18 +116,24 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
                 "one or more",
                 f"correct files/{name}/path in the mapping; there is {_listing(source)}",
             )
-        if "{" in files[name].get("table", ""):
+        if isinstance(table := files[name].get("table"), str) and "{" in table:
             matches[name] = _in_tables(found, files[name])
     keys = {name: tuple(found[0][0]) for name, found in matches.items()}
     # The kind of file with the most parts defines the trials; others are shared by those whose parts agree.
     leading = max(keys, key=lambda name: len(keys[name]))
     sets = []
-    for parts, _ in matches[leading]:
-        paths, fault = {}, None
+    led = [parts for parts, _ in matches[leading]]
+    if files[leading].get("join"):
+        led = [parts for number, parts in enumerate(led) if parts not in led[:number]]
+    for parts in led:
+        paths, more, fault = {}, {}, None
         for name in files:
             fitting = [
                 p for own, p in matches[name] if all(parts.get(key, value) == value for key, value in own.items())
             ]
+            if fitting and files[name].get("join"):
+                paths[name], more[name] = fitting[0], tuple(fitting[1:])
+                continue
             if len(fitting) != 1:
                 fault = FormatError(
                     f"{len(fitting)} files {files[name]['path']} for {parts or 'the source'}",
@@ -109,8 +142,66 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
                 )
                 break
             paths[name] = fitting[0]
-        sets.append(FileSet(parts, paths, fault))
+        sets.append(FileSet(parts, paths, fault, more))
     return sets
+
+
+def without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
+    """Return a mapping in which each axis with an expression names a derived column of its file.
+
+    Raises:
+        FormatError: If an axis has both a column and an expression, or neither.
+    """
+    result = {**mapping, "files": {name: dict(entry) for name, entry in mapping["files"].items()}}
+    for section in ("position", "schedule"):
+        axes = dict(mapping.get(section, {}))
+        for key, axis in axes.items():
+            if not isinstance(axis, dict) or key == "time":
+                continue
+            if ("column" in axis) == ("expression" in axis):
+                given = f"{section}: {key} with both or neither of column and expression"
+                raise FormatError(given, "one of them", "correct the mapping")
+            if "expression" in axis:
+                entry, name = result["files"].get(axes.get("file", ""), {}), f"{section} {key}"
+                entry["derived"] = {**entry.get("derived", {}), name: axis["expression"]}
+                axes[key] = {**{k: v for k, v in axis.items() if k != "expression"}, "column": name}
+        if axes:
+            result[section] = axes
+    return result
+
+
+def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
+    """Return tables below each other, with the columns that all of them have.
+
+    Raises:
+        FormatError: If they have none in common, or the clock of a part is no number where it is to be continued.
+    """
+    shared = [name for name in parts[0].columns if all(name in part.columns for part in parts)]
+    shared = [name for name in shared if len({part.column(name).shape[1:] for part in parts}) == 1]
+    if not shared:
+        listed = "; ".join(f"{part.path.name}: {', '.join(list(part.columns)[:8])}" for part in parts)
+        raise FormatError(f"parts without a column in common ({listed})", "the same columns", "leave join out")
+    columns = {name: [part.column(name) for part in parts] for name in shared}
+    notes = [f"{parts[0].path.name}: the rows of {len(parts)} parts stand below each other"]
+    if options.get("join") == "continued" and isinstance(clock := options.get("time", {}).get("column"), str):
+        name = single(parts[0], clock, "files: time: column")
+        if any(values.dtype == object for values in columns.get(name, [np.empty(0, object)])):
+            raise FormatError(f"{name} is no number in all parts", "a clock of numbers", "write join: rows")
+        whole = [np.asarray(columns[name][0], float)]
+        for values in columns[name][1:]:
+            step = float(np.nanmedian(np.diff(whole[-1])))
+            whole.append(np.asarray(values, float) + whole[-1][-1] + step - float(values[0]))
+        columns[name] = whole
+        notes.append(f"{parts[0].path.name}: {name} is continued from part to part")
+    result = {
+        name: np.concatenate([v.astype(object) for v in values] if any(v.dtype == object for v in values) else values)
+        for name, values in columns.items()
+    }
+    lost = sorted({name for part in parts for name in part.columns} - set(shared))
+    notes += [f"{parts[0].path.name}: not in all parts, left out: {', '.join(lost[:8])}"] * bool(lost)
+    notes += [note for part in parts for note in part.notes]
+    doubts = tuple(doubt for part in parts for doubt in part.doubts)
+    return replace(parts[0], columns=result, notes=tuple(notes), doubts=doubts)
 
 
 def _in_tables(found: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) -> list[tuple[dict[str, str], Path]]:
@@ -122,7 +213,7 @@ def _in_tables(found: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) 
         if (match := re.fullmatch(_regex(entry["table"]), composed(table)))
     ]
     if not fitting:
-        tables = ", ".join(tables_in(found[0][1]))
+        tables = ", ".join(filter(None, tables_in(found[0][1]))) or "no table of its own: leave table out"
         raise UsageError(f"{found[0][1]}: no table fits {entry['table']}", tables, "correct table in the mapping")
     return fitting
 

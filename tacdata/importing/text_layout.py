@@ -262,22 +262,54 @@ def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
 
 
 def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return the names of columns and their units from the lines of a header, the last of which stands above the rows.
+
+    Names may stand above units, and groups above or below both. A name of several columns has its group before it.
+    """
     if not header:
         return tuple(str(k) for k in range(width)), {}
-    rows = [[*row, *[""] * (width - len(row))][:width] for row in header[-2:]]
-    units: dict[str, str] = {}
-    looks_like_units = len(rows) == 2 and all(rows[0][1:]) and _are_units(rows[1])
-    titles = rows[0] if looks_like_units else rows[-1]
+    rows = [[field.lstrip("\ufeff").strip() for field in [*row, *[""] * width][:width]] for row in header]
+    rows = rows[-LINES_OF_HEADER:]
+    below = next((k for k in range(len(rows) - 1, 0, -1) if _are_units(rows[k])), None)
+    if below is not None and not all(_filled(rows[:below])[1:]):
+        below = None
+    units_row = rows[below] if below is not None else None
+    titles = _filled(rows[:below])
+    groups = [row for k, row in enumerate(rows) if k != below and row != titles and not _holds_numbers(row)]
     names: list[str] = []
+    units: dict[str, str] = {}
     for k, title in enumerate(titles):
-        name = composed(title.lstrip("\ufeff").strip()) or str(k)
+        name = composed(title) or str(k)
+        if titles.count(title) > 1 and title:
+            name = " ".join([*_groups(groups, k, title), name])
         while name in names:
             name += "'"
         names.append(name)
-        unit = rows[1][k].strip("[]() ") if looks_like_units else split_unit(name)[1]
+        unit = units_row[k].strip("[]() ") if units_row else split_unit(name)[1]
         if unit and not unit.isdigit() and unit.lower() not in LABELS:  # "pos (5)" is the fifth's
             units[name] = unit
     return tuple(names), units
+
+
+def _holds_numbers(fields: list[str]) -> bool:
+    return any(field and field not in MISSING and is_number(field, ".") for field in fields)
+
+
+def _filled(rows: list[list[str]]) -> list[str]:
+    """Return the last line of titles, with those of the line above it where it has none."""
+    last = rows[-1]
+    if len(rows) < 2 or all(last) or not all(above or field for above, field in zip(rows[-2], last, strict=True)):
+        return last
+    return [field or above for above, field in zip(rows[-2], last, strict=True)]
+
+
+def _groups(rows: list[list[str]], column: int, title: str) -> list[str]:
+    """Return the nearest title of a group above a column; it holds until the next one in its line."""
+    for row in reversed(rows):
+        group = next((field for field in reversed(row[: column + 1]) if field), "")
+        if group and group != title and len({field for field in row if field}) > 1:
+            return [composed(group)]
+    return []
 
 
 def _are_units(fields: list[str]) -> bool:

@@ -24,9 +24,11 @@ def split_tables(
     Raises:
         FormatError: If no file has the column.
     """
-    column, pieces = mapping.get("trials", {}).get("column"), iter([("", tables)])
-    if column is not None:
-        pieces = _by_column(tables, column)
+    trials, pieces = mapping.get("trials", {}), iter([("", tables)])
+    if "column" in trials:
+        pieces = _by_column(tables, trials["column"])
+    elif "change" in trials:
+        pieces = _by_column(tables, trials["change"], counted=True)
     for label, rows in pieces:
         yield from _by_specimen(label, rows, mapping)
 
@@ -39,27 +41,39 @@ def _by_specimen(
     if not isinstance(entry, dict) or "column" not in entry or entry.get("file", next(iter(tables))) != read:
         yield label, tables
         return
-    words = _labels(tables[read], entry["column"])
-    said = np.flatnonzero(words != "")
-    if len(set(words[said].tolist())) < 2:
+    words = _held(_labels(tables[read], entry["column"]))
+    if len(set(words.tolist()) - {""}) < 2:
         yield label, tables
         return
-    # A word holds until the next one: some write it only into the first row of a block.
-    words = words[said[np.maximum(np.searchsorted(said, np.arange(len(words)), side="right") - 1, 0)]]
     for word in dict.fromkeys(words.tolist()):
         yield f"{label} {word}".strip(), tables | {read: _kept(tables[read], words == word)}
+
+
+def _held(words: np.ndarray) -> np.ndarray:
+    """Return words that hold until the next one: some write them only into the first row of a block."""
+    given = np.flatnonzero(words != "")
+    if not len(given):
+        return words
+    return words[given[np.maximum(np.searchsorted(given, np.arange(len(words)), side="right") - 1, 0)]]
 
 
 def _kept(table: SourceTable, rows: np.ndarray) -> SourceTable:
     return replace(table, columns={name: values[rows] for name, values in table.columns.items()})
 
 
-def _by_column(tables: dict[str, SourceTable], column: str | int) -> Iterator[tuple[str, dict[str, SourceTable]]]:
+def _by_column(
+    tables: dict[str, SourceTable], column: str | int, *, counted: bool = False
+) -> Iterator[tuple[str, dict[str, SourceTable]]]:
+    """Yield the rows of each label of a column; with ``counted``, of each run of rows with one label."""
     named: dict[str, np.ndarray] = {}
     refused = FormatError("no file to split by a column", "one or more", "correct the mapping")
     for alias, table in tables.items():
         try:
-            named[alias] = _labels(table, column)
+            labels = _labels(table, column)
+            named[alias] = _held(labels) if labels[0] and 2 * (labels == "").sum() > len(labels) else labels
+            if counted:
+                runs = np.cumsum(np.concatenate([[0], labels[1:] != labels[:-1]]))
+                named[alias] = np.array([f"{run} ({label})" for run, label in zip(runs, labels, strict=True)], object)
         except FormatError as error:  # another file may have it
             refused = error
     if not named:

@@ -14,6 +14,7 @@ from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable, kind_of_bytes
 from tacdata.importing.text_layout import (
     COMMENTS,
+    DELIMITERS,
     MISSING,
     THOUSANDS,
     TextLayout,
@@ -25,6 +26,8 @@ from tacdata.importing.text_layout import (
 
 SHOWN = 40
 """Letters of a text that an error quotes."""
+FEW_LINES, LONG, MOST_TURNED = 64, 10, 64 * 1024 * 1024
+"""Most lines, smallest ratio of fields to lines, and largest size [byte] of a text whose lines are columns."""
 TAIL, FEWEST = 16 * 1024, 20
 """Bytes and rows at a file's end by which a number that is cut off is told."""
 UNREADABLE = 0.01
@@ -66,7 +69,7 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
     Raises:
         FormatError: If it has no rows of numbers.
     """
-    data = _with_receipt(data)
+    data = _upright(_with_receipt(data), options, path, notes)
     layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
     own = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
     body, comments, headers = _body(data, layout, own)
@@ -94,6 +97,24 @@ def _stated_rate(data: bytes, skip: int) -> float:
     head = b"\n".join(data[:SNIFFED].split(b"\n")[:skip]).decode("utf-8", "ignore")
     match = STATED_RATE.search(head)
     return float(match[1]) * (1000.0 if match[2] else 1.0) if match else 0.0
+
+
+def _upright(data: bytes, options: dict[str, Any], path: Path, notes: list[str]) -> bytes:
+    """Return text with a column for each of its few, very long lines; other text as it is."""
+    lines = [line for line in data[:MOST_TURNED].split(b"\n") if line.strip()]
+    few = 2 <= len(lines) <= FEW_LINES and len(data) <= MOST_TURNED
+    if not few or options.get("transpose") is False:
+        return data
+    rows = [line.decode("utf-8", "ignore") for line in lines]
+    marks = [mark for mark in DELIMITERS if mark != " "] + [" "]
+    delimiter = max(marks, key=lambda mark: min(row.count(mark) for row in rows))
+    table = [split(row, delimiter) for row in rows]
+    widths = {len(row) for row in table}
+    if len(widths) > 1 or widths.pop() < LONG * len(table):
+        return data
+    notes.append(f"{path.name}: {len(table)} lines of {len(table[0])} fields; each line is taken for a column")
+    mark = "\t" if delimiter == " " else delimiter
+    return "\n".join(mark.join(fields) for fields in zip(*table, strict=True)).encode() + b"\n"
 
 
 def _is_cut(body: bytes, layout: TextLayout) -> bool:
@@ -137,7 +158,10 @@ def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
             raise FormatError(f"{path} is named .gz and is not compressed", "a gzip file", f"rename it to {plain}")
         raw = gzip.decompress(raw)
     notes: list[str] = []
-    encoding = options.get("encoding") or next((name for mark, name in MARKS.items() if raw.startswith(mark)), None)
+    tried = options.get("encoding")
+    if isinstance(tried, list):
+        tried = next((name for name in tried if _decodes(raw, name)), tried[-1])
+    encoding = tried or next((name for mark, name in MARKS.items() if raw.startswith(mark)), None)
     if b"\0" in raw and not encoding:
         raw = _without_zeros(path, raw, notes)
     if encoding:
@@ -153,6 +177,14 @@ def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
             notes.append(f"{path.name}: not UTF-8, read as Latin-1")
     raw = raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return _whole_cells(raw[:HEAD]) + raw[HEAD:], notes
+
+
+def _decodes(raw: bytes, encoding: str) -> bool:
+    try:
+        raw.decode(encoding)
+    except (UnicodeDecodeError, LookupError):
+        return False
+    return True
 
 
 def _whole_cells(head: bytes) -> bytes:

@@ -32,7 +32,7 @@ class Mat(SourceFormat):
         except NotImplementedError:
             return ("",)  # `read` says what to do
         names = [name for name in loaded if not name.startswith("__")]
-        whole = all(isinstance(loaded[name], dict) or (np.ndim(loaded[name]) == 2) for name in names)
+        whole = all(isinstance(loaded[name], dict) or (np.ndim(loaded[name]) in (2, 3)) for name in names)
         alike = len({re.sub(r"\d+", "#", name) for name in names}) == 1
         return tuple(names) if whole and alike and len(names) > 1 else ("",)
 

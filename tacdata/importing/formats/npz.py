@@ -12,6 +12,8 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
+LONG = 10
+"""A lone array whose second axis is longer by this factor than its first has time along it [1]."""
 WHOLE = "array"
 """Name of a file's only array."""
 
@@ -49,6 +51,7 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
     Raises:
         FormatError: If no array has that axis.
     """
+    arrays, turned = _upright(path, arrays, options)
     if (axis := options.get("trial_axis")) is not None:
         arrays = _below_each_other(path, arrays, axis)
     flat = _flat(arrays)
@@ -57,7 +60,7 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
         return SourceTable(path, {})
     lengths = [len(values) for values in columns.values()]
     rows = max(set(lengths), key=lambda length: (lengths.count(length), length))
-    notes = _shapes(path, arrays, options)
+    notes = [*turned, *_shapes(path, arrays, options)]
     for name, values in columns.items():
         if len(values) != rows and values.ndim == 2 and values.shape[1] == rows:
             columns[name] = values.T
@@ -68,6 +71,23 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
         notes.append(f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}")
     units = {name: "ns" for name, array in flat.items() if array.dtype.kind in "mM"}
     return SourceTable(path, kept, units, frozenset(units), tuple(notes))
+
+
+def _upright(
+    path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]
+) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Return arrays with time as their first axis, by the mapping or the shape of a lone array; and a note."""
+    if options.get("transpose") is not None:
+        turn = bool(options["transpose"])
+        return {name: array.T if turn and array.ndim == 2 else array for name, array in arrays.items()}, []
+    lone = next(iter(arrays.values())) if len(arrays) == 1 else None
+    if lone is None or lone.ndim != 2 or lone.dtype.names or lone.shape[1] <= LONG * lone.shape[0]:
+        return arrays, []
+    if lone.shape[0] < 2:
+        return arrays, []
+    shape = " x ".join(map(str, lone.shape))
+    words = "its second axis is taken for time (transpose: false under the file takes the first)"
+    return dict.fromkeys(arrays, lone.T), [f"{path.name}: {shape} values; {words}"]
 
 
 def _flat(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -96,7 +116,8 @@ def _shapes(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
     if array.ndim > 2:
         return [f"{path.name}: {shape} values; its first axis is taken for time (trial_axis says where trials lie)"]
     if array.ndim == 2 and array.shape[0] < array.shape[1]:
-        return [f"{path.name}: {shape} values; its first axis is taken for time; if it is the second, turn it over"]
+        words = "its first axis is taken for time; if it is the second, write transpose: true under the file"
+        return [f"{path.name}: {shape} values; {words}"]
     return []
 
 

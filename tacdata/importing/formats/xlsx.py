@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import re
+import zipfile
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, time
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,12 @@ from tacdata.importing.formats.csv import table_of
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable
 
 TABS = {"delimiter": "tab", "decimal": "."}
+MERGED = re.compile(rb'<(?:\w+:)?mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
+HIDDEN = re.compile(rb'<(?:\w+:)?row [^>]*hidden="(?:1|true)"[^>]*>')
+NUMBERED = re.compile(rb'\br="(\d+)"')
+"""How a sheet marks merged ranges, hidden rows and the number of a row."""
+MOST_MARKED = 300_000_000
+"""Largest sheet whose marks are read [byte]."""
 HEAD = 60
 """Rows of a sheet that tell whether it holds numbers."""
 
@@ -32,10 +40,10 @@ class Xlsx(SourceFormat):
 
         book, found = load_workbook(path, read_only=True, data_only=True), []
         try:
-            for sheet in book.worksheets:
+            for sheet in [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]:
                 sheet.reset_dimensions()
                 with suppress(FormatError):
-                    table_of(path, _as_text(sheet, HEAD), TABS, [])
+                    table_of(path, _as_text(sheet, _Marks(), [], HEAD), TABS, [])
                     found.append(sheet.title)
         finally:
             book.close()
@@ -61,18 +69,21 @@ class Xlsx(SourceFormat):
 
 def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[SourceTable, str, list[str]]:
     """Return the sheet that is meant, else the first with rows of numbers; its name, and those of other full sheets."""
-    wanted, refused, sheets = options.get("table"), None, {}
-    for sheet in [book[wanted]] if wanted else book.worksheets:
+    wanted, refused, sheets, notes = options.get("table"), None, {}, {}
+    visible = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
+    for sheet in [book[wanted]] if wanted else visible or book.worksheets:
         sheet.reset_dimensions()  # programs other than Excel write wrong ones, by which rows would be cut off
-        if text := _as_text(sheet):
+        notes[sheet.title] = []
+        if text := _as_text(sheet, _marks(path, sheet), notes[sheet.title]):
             sheets[sheet.title] = text
+    hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != wanted]
     for name, data in sheets.items():
         try:
-            table = table_of(path, data, {**options, **TABS}, [])
+            table = table_of(path, data, {**options, **TABS}, [f"{path.name}: {note}" for note in notes[name]])
         except FormatError as error:
             refused = refused or error
             continue
-        return table, name, [other for other in sheets if other != name]
+        return table, name, [*(other for other in sheets if other != name), *(f"{other} (hidden)" for other in hidden)]
     raise FormatError(
         f"{path}: no sheet with rows of numbers ({', '.join(sheets)})" if refused else f"{path} holds no rows",
         "a sheet with a header and rows",
@@ -80,13 +91,55 @@ def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[Source
     )
 
 
-def _as_text(sheet: Any, most: int | None = None) -> bytes:
-    """Return a sheet's rows as text with tabs between cells; empty if no cell is full."""
+@dataclass(frozen=True)
+class _Marks:
+    """What a sheet shows beside the values of its cells."""
+
+    merged: tuple[tuple[int, int, int, int], ...] = ()
+    """First and last row and column of each merged range, from 0."""
+    hidden: frozenset[int] = frozenset()
+    """Rows that a filter or a person hides, from 0."""
+
+
+def _marks(path: Path, sheet: Any) -> _Marks:
+    """Return the merged ranges and the hidden rows of a sheet."""
+    name = str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
+    with zipfile.ZipFile(path) as archive:
+        if name not in archive.namelist() or archive.getinfo(name).file_size > MOST_MARKED:
+            return _Marks()
+        text = archive.read(name)
+    merged = []
+    for match in MERGED.finditer(text):
+        left, top, right, bottom = (group.decode() for group in match.groups())
+        merged.append((int(top) - 1, int(bottom) - 1, _column_number(left), _column_number(right)))
+    rows = (NUMBERED.search(match[0]) for match in HIDDEN.finditer(text))
+    return _Marks(tuple(merged), frozenset(int(match[1]) - 1 for match in rows if match))
+
+
+def _column_number(letters: str) -> int:
+    number = 0
+    for letter in letters:
+        number = 26 * number + ord(letter) - ord("A") + 1
+    return number - 1
+
+
+def _as_text(sheet: Any, marks: _Marks, notes: list[str], most: int | None = None) -> bytes:
+    """Return a sheet's rows as text with tabs between cells; empty if no cell is full.
+
+    A merged cell fills its range. Hidden rows are left out and counted in ``notes``.
+    """
     text = io.StringIO()
     rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True, max_row=most)]
     width = max(map(len, rows), default=0)
-    csv.writer(text, delimiter="\t", lineterminator="\n").writerows([*r, *[""] * (width - len(r))] for r in rows)
-    return text.getvalue().encode() if any(map(any, rows)) else b""
+    rows = [[*row, *[""] * (width - len(row))] for row in rows]
+    for top, bottom, left, right in marks.merged:
+        for row in rows[top : bottom + 1]:
+            row[left : right + 1] = [rows[top][left]] * len(row[left : right + 1])
+    shown = [row for number, row in enumerate(rows) if number not in marks.hidden]
+    if len(shown) < len(rows):
+        notes.append(f"{len(rows) - len(shown)} hidden rows are left out; show them and save it again to import them")
+    csv.writer(text, delimiter="\t", lineterminator="\n").writerows(shown)
+    return text.getvalue().encode() if any(map(any, shown)) else b""
 
 
 def _never_computed(path: Path, sheet: str) -> list[str]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import TacdataError
-from tacdata.importing.formats.source_format import read_table
 from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import file_sets
@@ -29,7 +28,7 @@ def tried(source: Path, mapping: dict[str, Any], beside: Path) -> str:
         first = next((files for files in sets if not files.fault), sets[0])
         if first.fault:
             raise first.fault
-        tables = {name: read_table(path, first.options(name, mapping)) for name, path in first.paths.items()}
+        tables = first.tables(mapping)
         centre = centre_of(mapping, tables)
         outcomes = [
             press
