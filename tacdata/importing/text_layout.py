@@ -275,7 +275,8 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         below = None
     units_row = rows[below] if below is not None else None
     titles = _filled(rows[:below])
-    groups = [row for k, row in enumerate(rows) if k != below and row != titles and not _holds_numbers(row)]
+    first = max((k + 1 for k, row in enumerate(rows) if _holds_numbers(row)), default=0)
+    groups = [row for k, row in enumerate(rows) if first <= k != below and row != titles]
     names: list[str] = []
     units: dict[str, str] = {}
     for k, title in enumerate(titles):
