@@ -145,6 +145,18 @@ class Course:
         return np.where(self.first, 0.0, rate)
 
     @cached_property
+    def clock(self) -> np.ndarray:
+        """Time over the time of the last row [1], shape (n,)."""
+        return self.time / max(float(self.time[-1]), 1e-9)
+
+    @cached_property
+    def warmth(self) -> np.ndarray:
+        """Temperature above its mean [10 K], shape (n,); 0 where none was measured."""
+        if self.temperature is None:
+            return np.zeros(self.rows)
+        return np.nan_to_num((self.temperature - np.nanmean(self.temperature)) / 10.0)
+
+    @cached_property
     def dithers(self) -> np.ndarray:
         """Noise of x, y and depth, as the standard deviation of what a row is off the line through its neighbours [mm].
 

@@ -1,21 +1,10 @@
 """Play of the depth drive."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
-import numpy as np
-
-from tacdata.chain import State
 from tacdata.chain.memory import dead_band
-from tacdata.effects.effect import AtRest, Effect, Family, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter, State, Values
 
 
 class Backlash(Effect):
-    """Play of the depth drive."""
-
-    title = "Play of the depth drive"
-    catalogue = ("K7",)
     stage = "kinematics"
     moves = ("tag", "label", "signal", "force")
     group = "loading and unloading"
@@ -30,11 +19,8 @@ class Backlash(Effect):
     at_rest = AtRest.STAYS
     seen_by_tag = True
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         half = 0.5 * float(values["b"])
         if half == 0.0:
             return state
-        pose = state.pose.copy()
-        pose[:, 2] += dead_band(pose[:, 2], half, state.course.dither) + half
-        return replace(state, pose=pose)
+        return state.deeper(dead_band(state.depth, half, state.course.dither) + half)

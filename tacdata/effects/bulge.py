@@ -1,24 +1,18 @@
 """Far neighbours lose load: the skin is less compressible."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 
-from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Family, Parameter
+from tacdata.effects.effect import Course, Effect, Family, Parameter, Response, State, Values
 
 
 class Bulge(Effect):
-    """Far neighbours lose load: the skin is less compressible."""
-
-    title = "Far neighbours lose load: the skin is less compressible"
-    catalogue = ("M8",)
     stage = "mechanics"
     moves = ("label", "signal")
     group = "lateral spread"
     family = Family.CROSSTALK
+    memoryless = True
     equation = "q_i = q_i - k sum_j w_ij q_j, w = exp(-((r_ij / p - l) / (0.35 l))^2), p the least pitch"
     source = "a bonded layer that keeps its volume rises at about its thickness: Johnson, Contact Mechanics, sec. 5.8"
     experiment = "the same presses with a flat punch and with a sphere: channels far away change their sign"
@@ -27,8 +21,7 @@ class Bulge(Effect):
         Parameter("l", "pitches", "how far away", 2.0, 1.0, 4.0, grid=(1.5, 2.0, 2.7)),
     )
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         centers = state.course.centers
         if centers is None:
             return state
@@ -38,7 +31,6 @@ class Bulge(Effect):
         return replace(state, load=state.load - values["k"] * state.load @ ring)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot show it; empty if they may."""
         if course.centers is None:
             return "the places of the channels are not known"
-        return "a fitted response takes up whatever has no memory" if response.fitted else ""
+        return super().unjudgeable(course, response)

@@ -1,21 +1,12 @@
 """Creep: readings go on growing at constant depth, and come back late."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
-import numpy as np
-
-from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_pass
-from tacdata.effects.effect import AtRest, Effect, Family, Parameter
+from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values
 
 
 class Creep(Effect):
-    """Creep: readings go on growing at constant depth, and come back late."""
-
-    title = "Creep: readings go on growing at constant depth, and come back late"
-    catalogue = ("M1", "M3")
     stage = "mechanics"
     moves = ("signal",)
     group = "hold time"
@@ -32,11 +23,9 @@ class Creep(Effect):
     )
     at_rest = AtRest.GOES_ON
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
-        late = state.load - low_pass(state.load, state.course.step, float(values["tau"]))
-        return replace(state, load=state.load - values["f"] * late)
+    def apply(self, state: State, values: Values) -> State:
+        lag = state.load - low_pass(state.load, state.course.step, float(values["tau"]))
+        return replace(state, load=state.load - values["f"] * lag)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot show it; empty if they may."""
         return "a single row an episode" if course.rows <= 2 * course.episodes else ""

@@ -1,21 +1,14 @@
-"""Dry friction of a guide or a seal: the same force against every motion."""
-
-from __future__ import annotations
+"""Dry friction of a guide or a seal: the same force against every motion, at any rate and depth."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from tacdata.chain import Course, State
 from tacdata.chain.memory import slipping
-from tacdata.effects.effect import AtRest, Effect, Family, Parameter
+from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, State, Values
 
 
 class DryFriction(Effect):
-    """Dry friction of a guide or a seal: the same force against every motion."""
-
-    title = "Dry friction of a guide or a seal: the same force against every motion, at any rate and depth"
-    catalogue = ("K17",)
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
@@ -37,8 +30,7 @@ class DryFriction(Effect):
     )
     at_rest = AtRest.STAYS
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         course = state.course
         way = max(float(values["w"]) * course.span, 1e-9)
         depth = np.maximum(state.depth, 0.0)

@@ -1,28 +1,59 @@
-"""What an effect's file holds.
+"""Base class of the effects. A file of this folder holds one mechanism.
 
-A file ``tacdata/effects/my_effect.py`` defines one class derived from `Effect`: class attributes say what it is,
-`apply` does it to a `State` at its stage. At every amplitude's default it must change nothing. A parameter with a
-``grid`` is a shape (a time constant, a width): it is tried at those values and refined later; any other is an
-amplitude, in which the effect is nearly linear around 0.
+A file ``tacdata/effects/my_effect.py`` begins with one sentence, the title. Its first class is derived from `Effect`
+and bears the file's name. Class attributes describe it, and `apply` changes a `State` at its stage. At the default of
+every amplitude it must change nothing. A parameter with a ``grid`` is a shape (a time constant, a width): it is tried
+at those values and refined later. Any other is an amplitude, in which the effect is nearly linear around 0.
 
-What an effect is to the search for a missing one is class data, too (its traits): whether presses of one rate show
-it, whether it follows the clock, what it is without a force reading. No other file names effects.
+Further classes of the file are other forms of the same mechanism. Their names are those of the classes in lower case:
+`RelaxationRead` is the form ``relaxation_read`` of ``relaxation``. Verdicts record these names, so they are a format.
+
+The role of an effect in the search is class data, too (its traits): whether presses of one rate show it, whether it
+follows the clock, how it resembles a gain. No other file names effects.
+
+Three numbers of a new effect need a judgement, not a measurement:
+
+``form_error``
+    Relative standard deviation of the contribution after the parameters are fitted. The search ignores a second effect
+    that explains less than ``form_error ** 2`` of the energy of the first. 0.02 for geometry, arithmetic and clocks;
+    0.05 for a description with few terms; 0.1 (default) for the law of a material. Compare two published laws of the
+    same thing: their difference is the error of either.
+``odds``
+    Prior odds against a common effect. They only matter if two effects fit nearly as well: the margin between the two
+    grows from z to sqrt(z^2 - 2 ln odds). 1 (default) unless physics makes the effect rare in soft skins; state that
+    reason in a comment.
+``distributed``
+    True (default) if the skin or the rig may have the effect at several sizes at once, as a rubber has many time
+    constants: then the same effect at other sizes is part of its model error. False for a single number, as a delay
+    is: several delays at once are a filter, which is another effect.
 """
 
 from __future__ import annotations
 
 import functools
+import re
+import sys
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
 
 from tacdata import registry
 from tacdata.chain import Course, Response, State
+from tacdata.errors import UsageError
+
+__all__ = ["Course", "Response", "State"]
 
 ROOM, BASE = "tacdata.effects", "effect"
+MEMORYLESS = "a fitted response takes up whatever has no memory"
+"""Reason why recordings cannot show an effect without memory if the response was fitted to them."""
+
+type Values = dict[str, np.ndarray]
+"""Value of every parameter, 0-d, or of shape (channels,) if it is ``per_channel``."""
 
 
 @dataclass(frozen=True)
@@ -36,61 +67,61 @@ class Parameter:
     meaning: str
     """What it is."""
     typical: float
-    """Size that would not surprise (the prior's standard deviation), in its unit."""
+    """Usual size (standard deviation of the prior), in its unit."""
     low: float
     """Least physical value, in its unit."""
     high: float
     """Largest physical value, in its unit."""
     default: float = 0.0
-    """Value at which the effect is not there."""
+    """Value at which the effect is absent."""
     grid: tuple[float, ...] = ()
     """Values to try of a shape parameter; empty for an amplitude."""
     per_channel: bool = False
-    """Whether every channel has its own."""
+    """Whether it has a value for each channel."""
 
 
 class Family(StrEnum):
-    """What kind of thing an effect is, as a lab would go about it. A verdict may name the family before the effect."""
+    """Kind of an effect, by where a lab would look first. A verdict may name the family before the effect."""
 
     SKIN_MEMORY = "memory of the skin"
     """The skin relaxes, creeps, softens or wears."""
     FRICTION_AND_PLAY = "friction and play"
-    """Readings or the tip hang back, whatever the rate."""
+    """Readings or the tip lag, independent of the rate."""
     DELAY_AND_FILTER = "delay and filtering"
     """Readings, or the guide, come late."""
     KINEMATICS = "kinematics"
-    """The tip is elsewhere than the guide says."""
+    """The tip is not where the guide reports it."""
     CONTACT = "contact"
-    """How the tool meets the skin, and the skin its support."""
+    """Contact of the tool with the skin, and of the skin with its support."""
     RESPONSE_CURVE = "stiffness and response curve"
-    """How much a taxel says of how much depth."""
+    """Reading of a taxel as a function of depth."""
     DRIFT = "gain and offset in time"
     """Readings change with the clock or with temperature."""
     CROSSTALK = "crosstalk and spread"
-    """Taxels say what happens at others."""
+    """Readings respond to loads on other taxels."""
     SIMULATION = "simulation"
-    """The simulation, not the world."""
+    """Errors of the simulation."""
     OTHER = "of no family"
-    """A family of its own."""
+    """None of the others."""
 
 
 class AtRest(StrEnum):
-    """What becomes of an effect while the tip stands still. Presses of one rate show nothing else of it."""
+    """Course of an effect while the tip is at rest. At a single rate of pressing, only this distinguishes it."""
 
     CATCHES_UP = "catches up"
-    """It was behind, and is over soon: a delay, a filter."""
+    """The lag ends soon: a delay, a filter."""
     FALLS_BACK = "falls back"
-    """It was ahead, and is over at once: what grows with the rate itself."""
+    """The excess ends at once: it grows with the rate itself."""
     STAYS = "stays"
-    """It stays as it is: play, friction."""
+    """It does not change: play, friction."""
     GOES_ON = "goes on"
-    """It goes on slowly: creep."""
+    """It continues slowly: creep."""
     RELAXES = "relaxes"
-    """It goes on, and a hold as long as its time constant shows it: relaxation."""
+    """It continues, and a hold as long as its time constant shows it: relaxation."""
 
 
 class Growth(StrEnum):
-    """What an effect grows with. Evenly spaced presses do not separate the two."""
+    """Variable with which an effect grows. Evenly spaced presses do not separate the two."""
 
     PRESSES = "presses"
     """The number of presses at a place."""
@@ -99,7 +130,7 @@ class Growth(StrEnum):
 
 
 class GainKind(StrEnum):
-    """Which gain of the readings an effect is: calibration reads it off."""
+    """Kind of gain of the readings: calibration measures it."""
 
     COMMON = "common"
     """One for all channels."""
@@ -108,16 +139,16 @@ class GainKind(StrEnum):
 
 
 class LikeGain(StrEnum):
-    """How like a common gain an effect is where no force is read."""
+    """Similarity of an effect to a common gain if no force is read."""
 
     EQUAL = "equal"
-    """It is the same: calibration takes it up."""
+    """The two are the same: calibration absorbs it."""
     SIMILAR = "similar"
-    """It is nearly the same: a common gain is not named beside it."""
+    """The two are nearly the same: a common gain is not named together with it."""
 
 
 class Scale(StrEnum):
-    """Whose lengths an effect stretches. Without a third length, the two cannot be separated."""
+    """Lengths that an effect stretches. Without a third length, the two cannot be separated."""
 
     DRIVE = "drive"
     OBSERVER = "observer"
@@ -127,40 +158,40 @@ class Scale(StrEnum):
 class Effect(ABC):
     """A physical effect that a model may lack."""
 
+    name: ClassVar[str]
+    """The file's name for its first class; for another form, the class's name in lower case."""
     title: ClassVar[str]
-    """What it is, in words."""
-    catalogue: ClassVar[tuple[str, ...]]
-    """Its numbers in the catalogue: M skin, G geometry, K guide, T taxel, D data, E environment, S simulator."""
+    """One phrase: the docstring of the file, or that of the class for another form."""
+    mechanism: ClassVar[str] = ""
+    """Name shared by all forms of the same thing, which a verdict gives: by default the file's name."""
     stage: ClassVar[str]
-    """Where it acts (`tacdata.chain.STAGES`)."""
+    """Stage at which it acts (`tacdata.chain.STAGES`)."""
     moves: ClassVar[tuple[str, ...]]
-    """What it changes: tag, label, signal, force."""
+    """Streams that it changes: tag, label, signal, force."""
     group: ClassVar[str]
-    """Ambiguity group: effects that look alike in ordinary presses."""
+    """Ambiguity group: effects that resemble each other in ordinary presses."""
     family: ClassVar[Family] = Family.OTHER
-    """What kind of thing it is; the same for all forms of a mechanism."""
+    """Kind of effect; the same for all forms of a mechanism."""
     equation: ClassVar[str]
-    """What it does."""
-    source: ClassVar[str]
-    """Where the equation comes from."""
+    """Equation of `apply`."""
+    source: ClassVar[str] = "standard form"
+    """Origin of the equation."""
     experiment: ClassVar[str]
-    """The experiment that separates it from its group."""
+    """Experiment that separates it from its group."""
     parameters: ClassVar[tuple[Parameter, ...]]
     """Its numbers."""
     seen_by_tag: ClassVar[bool] = False
     """Whether a tag on the carriage sees it (kinematics only)."""
     by_channel: ClassVar[bool] = False
-    """Whether it mixes channels, or treats each in a way of its own."""
+    """Whether it mixes channels, or differs between them."""
+    memoryless: ClassVar[bool] = False
+    """Whether the pose alone determines it: a response that was fitted to the recordings absorbs it."""
     form_error: ClassVar[float] = 0.1
-    """How far its equation may be off, over its contribution, as a standard deviation [1]; less where it is geometry,
-    arithmetic or a clock rather than a law of a material."""
+    """Relative standard deviation of the equation's error, over its contribution [1] (see the top of this file)."""
     distributed: ClassVar[bool] = True
-    """Whether it may be of several sizes at once. A delay of several is a filter."""
+    """Whether it may have several sizes at once (see the top of this file)."""
     odds: ClassVar[float] = 1.0
-    """How likely it is in a soft skin before any data, over an effect that is not rare [1]; less than 1 only where
-    there is a physical reason."""
-    mechanism: ClassVar[str] = ""
-    """The name it shares with other functional forms of the same thing; empty: its own."""
+    """Prior odds in a soft skin, against an effect that is not rare [1] (see the top of this file)."""
     word: ClassVar[str] = ""
     """The mechanism as a person calls it; empty: its name with blanks. The same for all forms."""
     at_rest: ClassVar[AtRest | None] = None
@@ -168,33 +199,37 @@ class Effect(ABC):
     times_by_radius: ClassVar[float | None] = None
     """For linear memory of load: power of the tool's radius by which its times grow [1]; None for all else."""
     memory_by_depth: ClassVar[bool] = False
-    """For linear memory of load: whether what relaxes grows with depth."""
+    """For linear memory of load: whether the relaxing share grows with depth."""
     grows_with: ClassVar[Growth | None] = None
-    """For what grows from press to press; needs unevenly spaced presses."""
+    """For growth from press to press; needs unevenly spaced presses."""
     follows_clock: ClassVar[bool] = False
-    """Whether it shows in how episodes follow each other: drifting offsets look like it."""
+    """Whether it depends on the order of the episodes: drifting offsets resemble it."""
     gain: ClassVar[GainKind | None] = None
     """For a gain of the readings."""
     like_gain: ClassVar[LikeGain | None] = None
-    """For what needs a force reading to be separated from a common gain."""
+    """For an effect that needs a force reading to be separated from a common gain."""
     scale: ClassVar[Scale | None] = None
     """For a scale of lengths."""
     in_series: ClassVar[bool] = False
-    """Whether it gives way in series with what is pressed. Specimens of other stiffness tell."""
+    """Whether it is a compliance in series with the pressed specimen. Specimens of other stiffness separate them."""
     changes_skin: ClassVar[bool] = False
-    """Whether labels are solved anew with another skin (`thickness_factor`)."""
+    """Whether labels are solved again with another skin (`thickness_factor`)."""
     each_episode: ClassVar[bool] = False
-    """Whether every episode has a small amount of its own, as errors of place: a nuisance beside other effects."""
+    """Whether every episode has a small amount of it, as errors of place: a nuisance parameter of all other effects."""
 
-    @property
-    def name(self) -> str:
-        """The file's name."""
-        return type(self).__module__.rsplit(".", 1)[-1]
+    def __init_subclass__(cls) -> None:
+        """Take names and title from the file."""
+        file = cls.__module__.rsplit(".", 1)[-1]
+        module = sys.modules[cls.__module__]
+        cls.name = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower() if _forms(module) else file
+        cls.mechanism = cls.mechanism or file
+        cls.__doc__ = cls.__doc__ or module.__doc__ or ""
+        cls.title = cls.__doc__.split("\n")[0].removesuffix(".")
 
     @property
     def called(self) -> str:
         """The name that a verdict gives: the mechanism."""
-        return self.mechanism or self.name
+        return self.mechanism
 
     @property
     def spoken(self) -> str:
@@ -212,54 +247,54 @@ class Effect(ABC):
         return tuple(p for p in self.parameters if p.grid)
 
     @abstractmethod
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
+    def apply(self, state: State, values: Values) -> State:
         """Return the state after the effect.
 
         Args:
-            state: Before it.
-            values: Value of every parameter, 0-d, or of shape (channels,) where it is ``per_channel``.
+            state: State at its stage, without the effect.
+            values: Value of every parameter, 0-d, or of shape (channels,) if it is ``per_channel``.
         """
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return in words why such recordings cannot show it at all; empty if they may."""
-        return ""
+        """Return the reason why such recordings cannot show it at all; empty if they may."""
+        return MEMORYLESS if self.memoryless and response.fitted else ""
 
-    def time_constant(self, values: dict[str, np.ndarray]) -> float:
-        """Return how long a tip must stand until it is over [s]; 0 if it has no time constant."""
+    def time_constant(self, values: Values) -> float:
+        """Return the time at rest after which it is over [s]; 0 if it has no time constant."""
         return max((float(np.max(values[p.name])) for p in self.parameters if p.unit == "s"), default=0.0)
 
-    def delay(self, values: dict[str, np.ndarray]) -> float:
-        """Return by how much readings come later than what they belong to [s]; 0 for most effects."""
+    def delay(self, values: Values) -> float:
+        """Return the delay of the readings [s]; 0 for most effects."""
         return 0.0
 
-    def nested(self, values: dict[str, np.ndarray]) -> Placed | None:
+    def nested(self, values: Values) -> Placed | None:
         """Return the model nested in it, with its values; None for most effects."""
         return None
 
-    def thickness_factor(self, values: dict[str, np.ndarray]) -> float:
-        """Return the skin's thickness over the nominal one [1]; 1 for most effects."""
+    def thickness_factor(self, values: Values) -> float:
+        """Return the skin's thickness over the nominal thickness [1]; 1 for most effects."""
         return 1.0
 
-    def of_force(self, values: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
+    def of_force(self, values: Values) -> Values | None:
         """Return values by which readings would change as the force does; None for most effects: they do already."""
         return None
 
-    def remark(self, values: dict[str, np.ndarray]) -> str:
-        """Return what finding it says of the recordings, with the remedy; empty for most effects."""
+    def remark(self, values: Values) -> str:
+        """Return its meaning for the recordings, with the remedy; empty for most effects."""
         return ""
 
 
 @dataclass(frozen=True)
 class Placed:
-    """An effect with its numbers, ready to act."""
+    """An effect with its numbers."""
 
     effect: Effect
-    values: dict[str, np.ndarray]
+    values: Values
     """Value of every parameter."""
 
     @property
     def stage(self) -> str:
-        """Where it acts."""
+        """Stage at which it acts."""
         return self.effect.stage
 
     @property
@@ -273,17 +308,30 @@ class Placed:
 
 
 def load(name: str) -> Effect:
-    """Return one effect by its file's name.
+    """Return an effect by the name of its file, or of its form.
 
     Raises:
         UsageError: If there is none.
     """
-    kind: type[Effect] = registry.load(ROOM, BASE, name, Effect)
-    return kind()
+    try:
+        forms = _forms(registry.load_module(ROOM, BASE, name))
+    except UsageError:
+        # Forms have no file of their own: only the files know their names.
+        for effect in library():
+            if effect.name == name:
+                return type(effect)()
+        raise
+    if not forms:
+        raise UsageError(
+            f"the file {name}.py of the effects defines no class derived from Effect",
+            "one class, and one for each further form",
+            f"derive the class in {name}.py from tacdata.effects.Effect",
+        )
+    return forms[0]()
 
 
 def library() -> tuple[Effect, ...]:
-    """Return every modelled effect, by name.
+    """Return every modelled effect, in all its forms, by name.
 
     Example:
         >>> from tacdata.effects import library, load
@@ -298,4 +346,17 @@ def library() -> tuple[Effect, ...]:
 @functools.cache
 def _library(folders: tuple[str, ...]) -> tuple[Effect, ...]:
     """Return the effects of some folders, read once."""
-    return tuple(load(name) for name in registry.names(ROOM, BASE))
+    files = (registry.load_module(ROOM, BASE, name) for name in registry.names(ROOM, BASE))
+    return tuple(sorted((form() for file in files for form in _forms(file)), key=lambda effect: effect.name))
+
+
+def _forms(module: ModuleType) -> Sequence[type[Effect]]:
+    """Return the public effects that a file defines, in the order of the file."""
+    return [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type)
+        and issubclass(value, Effect)
+        and value.__module__ == module.__name__
+        and not value.__name__.startswith("_")
+    ]

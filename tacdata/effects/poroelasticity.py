@@ -1,18 +1,13 @@
 """Fluid moves through the skin."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 from scipy.special import erfcinv
 
-from tacdata.chain import Course, Response, State
 from tacdata.chain.memory import low_passes
-from tacdata.effects.effect import Effect, Family, Parameter
+from tacdata.effects.effect import Course, Effect, Family, Parameter, Response, State, Values
 
 ROOTS = 6
-"""First-order means in place of the root."""
+"""Number of first-order means that approximate the root."""
 _LEVY = 0.25 / np.square(erfcinv((np.arange(ROOTS) + 0.5) / ROOTS))
 SPECTRUM = (*((0.908**2 * float(rate), 0.491 / ROOTS) for rate in _LEVY), (1.679, 0.509))
 """Rates over 1 / tau, and shares [1]: exp(-c sqrt(t)) is a mixture of exp(-c^2 u t), u following a Levy distribution,
@@ -20,10 +15,6 @@ of density u^-1.5 exp(-1 / (4 u)) / (2 sqrt(pi))."""
 
 
 class Poroelasticity(Effect):
-    """Fluid moves through the skin."""
-
-    title = "Fluid moves through the skin"
-    catalogue = ("M14",)
     stage = "mechanics"
     moves = ("signal", "force")
     group = "hold time"
@@ -44,24 +35,22 @@ class Poroelasticity(Effect):
         Parameter("tau", "s", "time at the median radius", 10.0, 0.5, 500.0, grid=(1.0, 4.0, 16.0, 60.0)),
     )
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         course = state.course
         radii = np.array([tool.radius for tool in course.tools], dtype=float)
         radii = np.where(np.isfinite(radii), radii, np.nanmedian(radii))
-        both = np.column_stack([state.load, state.force])
-        slow = np.zeros_like(both)
+        loads = state.loads
+        slow = np.zeros_like(loads)
         rates, shares = np.array(SPECTRUM).T
         for t, radius in enumerate(radii):
             rows = course.tool == t
             tau = float(values["tau"]) * radius / np.median(radii)
-            own = np.where(rows[:, None], both, 0.0)
-            # What one tool pressed out comes back while another presses, too.
-            slow += low_passes(own, course.step, tau / rates, shares)
-        both = both - values["f"] * slow
-        return replace(state, load=both[:, :-1], force=both[:, -1])
+            pressed = np.where(rows[:, None], loads, 0.0)
+            # The fluid that one tool has displaced returns also while another tool presses.
+            slow += low_passes(pressed, course.step, tau / rates, shares)
+        loads = loads - values["f"] * slow
+        return state.with_loads(loads)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot show it; empty if they may."""
         radii = {tool.radius for tool in course.tools if np.isfinite(tool.radius)}
-        return "one radius of indenter: it cannot be told from relaxation" if len(radii) < 2 else ""
+        return "one radius of indenter: it cannot be distinguished from relaxation" if len(radii) < 2 else ""

@@ -1,21 +1,10 @@
 """Readings change only in steps, late both ways."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
-import numpy as np
-
-from tacdata.chain import State
 from tacdata.chain.memory import play
-from tacdata.effects.effect import AtRest, Effect, Family, Parameter
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter, State, Values
 
 
 class QuantizationHysteresis(Effect):
-    """Readings change only in steps, late both ways."""
-
-    title = "Readings change only in steps, late both ways"
-    catalogue = ("T8",)
     stage = "readout"
     moves = ("signal",)
     group = "loading and unloading"
@@ -27,9 +16,8 @@ class QuantizationHysteresis(Effect):
     parameters = (Parameter("w", "largest rise", "half the dead band", 0.02, 0.0, 0.3),)
     at_rest = AtRest.STAYS
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         width = float(values["w"]) * state.response.largest(state.signal)
         if width <= 0.0:
             return state
-        return replace(state, signal=play(state.signal, width) + width)
+        return state.with_signal(play(state.signal, width) + width)

@@ -1,22 +1,13 @@
 """Softening after the first large strain (Mullins)."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 from scipy.special import erf
 
-from tacdata.chain import State
 from tacdata.chain.memory import running_max
-from tacdata.effects.effect import Effect, Family, Parameter
+from tacdata.effects.effect import Course, Effect, Family, Growth, Parameter, Response, State, Values
 
 
 class Softening(Effect):
-    """Softening after the first large strain (Mullins)."""
-
-    title = "Softening after the first large strain (Mullins)"
-    catalogue = ("M4",)
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
@@ -32,9 +23,45 @@ class Softening(Effect):
         Parameter("m", "1", "sharpness", 0.2, 0.02, 2.0, grid=(0.08, 0.3, 1.0)),
     )
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         work = np.maximum(state.depth, 0.0) ** 2.5
-        most = running_max(work, state.course.row_site)
-        ease = 1 - values["a"] * erf((most - work) / (values["m"] * max(float(work.max()), 1e-9)))
-        return replace(state, load=state.load * ease[:, None], force=state.force * ease)
+        largest = running_max(work, state.course.row_site)
+        return state.scaled(1 - values["a"] * erf((largest - work) / (values["m"] * max(float(work.max()), 1e-9))))
+
+
+class SofteningOfDepth(Softening):
+    """Softening after the first large strain, by the share of the deepest press so far."""
+
+    equation = "q = q_e (1 - a erf((W_max - W) / (b W_max))), W = d^2.5 at that place"
+    source = "Ogden & Roxburgh, Proc. R. Soc. A 455 (1999) 2861, with m = b W_max: Abaqus' Mullins effect"
+    parameters = (
+        Parameter("a", "1", "softened share", 0.08, 0.0, 0.9),
+        Parameter("b", "1", "sharpness", 0.8, 0.05, 3.0, grid=(0.3, 1.0)),
+    )
+
+    def apply(self, state: State, values: Values) -> State:
+        work = np.maximum(state.depth, 0.0) ** 2.5
+        largest = running_max(work, state.course.row_site)
+        return state.scaled(1 - values["a"] * erf((largest - work) / (values["b"] * np.maximum(largest, 1e-9))))
+
+
+class WearIn(Softening):
+    """Each press at a place takes a little of the response."""
+
+    source = "standard form"
+
+    equation = "q = q_e (1 - a (1 - exp(-k / n))), k presses at that place before"
+    experiment = "ten presses at a virgin place, an hour of rest, then again"
+    parameters = (
+        Parameter("a", "1", "lost share after many presses", 0.05, -0.9, 0.9),
+        Parameter("n", "1", "presses until most is lost", 3.0, 0.3, 100.0, grid=(1.0, 5.0, 25.0)),
+    )
+    grows_with = Growth.PRESSES
+
+    def apply(self, state: State, values: Values) -> State:
+        course = state.course
+        presses = np.array([np.sum(course.site[:k] == course.site[k]) for k in range(course.episodes)], dtype=float)
+        return state.scaled((1 + values["a"] * np.expm1(-presses / values["n"]))[course.episode])
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        return "no place was pressed twice" if len(set(course.site.tolist())) == course.episodes else ""

@@ -1,26 +1,17 @@
 """The skin's face is not parallel to the guide."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 
-from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Family, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter, State, Values
 
 
 class Tilt(Effect):
-    """The skin's face is not parallel to the guide."""
-
-    title = "The skin's face is not parallel to the guide"
-    catalogue = ("K3",)
     stage = "kinematics"
     moves = ("label", "signal", "force")
     group = "depth offset"
     family = Family.KINEMATICS
+    memoryless = True
     equation = "d -> d + a x + b y"
-    source = "standard form"
     experiment = "touch off at three corners"
     form_error = 0.02
     parameters = (
@@ -28,11 +19,6 @@ class Tilt(Effect):
         Parameter("b", "mm/mm", "slope along y", 0.01, -0.2, 0.2),
     )
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         x, y, depth = state.pose.T
-        return replace(state, pose=np.stack([x, y, depth + values["a"] * x + values["b"] * y], axis=-1))
-
-    def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot show it; empty if they may."""
-        return "a fitted response takes up whatever has no memory" if response.fitted else ""
+        return state.with_pose(np.stack([x, y, depth + values["a"] * x + values["b"] * y], axis=-1))

@@ -1,42 +1,31 @@
 """The skin resists faster presses more."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 
-from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import AtRest, Effect, Family, Parameter
+from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values
 
 UNIT_RATE = 1.0
 """Rate at which the share is given [mm/s]."""
 
 
 class Viscosity(Effect):
-    """The skin resists faster presses more."""
-
-    title = "The skin resists faster presses more"
-    catalogue = ("M1",)
     stage = "mechanics"
     moves = ("signal", "force")
     group = "loading and unloading"
     family = Family.SKIN_MEMORY
     equation = "r = r_e max(0, 1 + k sgn(v) |v / (1 mm/s)|^n), v the rate of depth"
     source = "n = 1: Kelvin-Voigt; n < 1: rubber, Bergstrom & Boyce, J. Mech. Phys. Solids 46, 1998, 931"
-    experiment = "presses at three rates over a decade: peaks grow with the rate, and nothing goes on in a hold"
+    experiment = "presses at three rates over a decade: peaks grow with the rate, and readings are constant in a hold"
     parameters = (
         Parameter("k", "1", "share added at 1 mm/s", 0.05, 0.0, 2.0),
         Parameter("n", "1", "power of the rate", 0.5, 0.1, 1.5, grid=(0.25, 0.6, 1.0)),
     )
     at_rest = AtRest.FALLS_BACK
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
+    def apply(self, state: State, values: Values) -> State:
         rate = state.course.speed / UNIT_RATE
         factor = np.maximum(1 + values["k"] * np.sign(rate) * np.abs(rate) ** values["n"], 0.0)
-        return replace(state, load=state.load * factor[:, None], force=state.force * factor)
+        return state.scaled(factor)
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot show it; empty if they may."""
         return "the tip never moves" if not np.any(course.speed) else ""

@@ -1,29 +1,20 @@
 """Lateral error of registration."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 
-from tacdata.chain import Course, Response, State
-from tacdata.effects.effect import Effect, Family, Parameter
+from tacdata.effects.effect import Effect, Family, Parameter, State, Values
 
 
 class XyOffset(Effect):
-    """Lateral error of registration."""
-
-    title = "Lateral error of registration"
-    catalogue = ("K1", "G6")
     stage = "kinematics"
     moves = ("label", "signal")
     group = "lateral"
     family = Family.KINEMATICS
+    memoryless = True
     word = "offset in x and y"
     equation = "(x, y) -> (x + dx, y + dy)"
-    source = "standard form"
     experiment = (
-        "a cross of presses around one taxel from opposite sides; optical touch-off of the skin's edges tells "
+        "a cross of presses around one taxel from opposite sides; optical touch-off of the skin's edges separates "
         "a shifted skin from a shifted frame"
     )
     form_error = 0.02
@@ -33,11 +24,5 @@ class XyOffset(Effect):
     )
     each_episode = True
 
-    def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
-        """Return the state after it."""
-        shift = np.stack([values["dx"], values["dy"], np.zeros(())], axis=-1)
-        return replace(state, pose=state.pose + shift)
-
-    def unjudgeable(self, course: Course, response: Response) -> str:
-        """Return why such recordings cannot show it; empty if they may."""
-        return "a fitted response takes up whatever has no memory" if response.fitted else ""
+    def apply(self, state: State, values: Values) -> State:
+        return state.with_pose(state.pose + np.stack([values["dx"], values["dy"], np.zeros(())], axis=-1))

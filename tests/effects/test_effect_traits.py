@@ -50,8 +50,6 @@ from tacdata.effects.effect import AtRest, Effect, GainKind, Growth, LikeGain, P
 class Newcomer(Effect):
     """Readings are smeared and grow."""
 
-    title = "Readings are smeared and grow"
-    catalogue = ("X1",)
     stage = "{stage}"
     moves = ("signal",)
     group = "lag"

@@ -19,8 +19,6 @@ FIRST_SHARE = 0.03
 class Spectrum(Effect):
     """Stress relaxation by any mixture of times."""
 
-    title = "Stress relaxation by any mixture of times"
-    catalogue = ("M1",)
     stage = "mechanics"
     moves = ("signal", "force")
     group = "hold time"
