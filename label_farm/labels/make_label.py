@@ -18,14 +18,12 @@ ERROR = (
     "of each pixel: root sum of squares of (interpolation between states + offset from the solved configuration) and "
     "of the mesh's estimate; error is its root mean square over the pixels"
 )
-TAXEL = ("taxel_force", "taxel_closure", "taxel_area")
-"""What a label says of each protrusion."""
-ALWAYS = ("signed", "error_map", "force", "force_error", "interpolation_error")
-"""What it says of map and force."""
-CONTACT = ("traction", "taxel_pressure")
-"""What it says of contact with the indenter and the board, where the path has it."""
-UNCERTAIN = ("uncertainty", "force_uncertainty", "taxel_force_uncertainty", "taxel_closure_uncertainty")
-"""Standard deviations that a label takes over from its path, where the path has them."""
+LOADS = ("taxel_force", "taxel_closure", "taxel_area")
+"""Loads of each taxel, in the order of `Loads`."""
+COMPUTED = ("signed", "error_map", "force", "force_error", "interpolation_error")
+"""Quantities that a label computes from several of its path, or with a bound on their error."""
+CARRIED = tuple(name for name in columns.ALL if name in columns.PATH and name not in COMPUTED)
+"""Quantities that a label interpolates from those of the same name in its path, if the path has them."""
 
 _DECIDING = (
     "label_farm.presses.interpolate",
@@ -64,31 +62,30 @@ def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
         tip=request.tip,
         error=np.sqrt((error_map**2).mean(axis=(1, 2))).astype(np.float32),
         provenance=_provenance(request, solution, remarks),
-        **{name: values[name].astype(columns.DTYPES[name]) for name in values},
+        **{name: values[name].astype(columns.ALL[name].dtype) for name in values},
     )
 
 
 def _untouched(request: LabelRequest) -> dict[str, np.ndarray]:
-    """Return zeros; a frame that touches after all is in doubt by its whole depth.
+    """Return zeros; the error of a frame that touches in spite of its plan is up to its depth.
 
-    Without contact nothing that has a spread acts; that of height is not followed into contact.
+    Without contact no spread acts. A spread of height that leads to contact is not followed.
     """
-    contact = CONTACT if request.sensor.contact.board else CONTACT[:1]
-    zeros = _zeros(request, (*contact, *(UNCERTAIN if request.sensor.uncertainty else ())))
+    met = {"": True, "board": bool(request.sensor.contact.board), "spreads": bool(request.sensor.uncertainty)}
+    zeros = _zeros(request, [name for name in CARRIED if met[columns.PATH[name].needs]])
     doubt = np.maximum(request.tip[:, 2], 0.0)
     return zeros | {"error_map": np.broadcast_to(doubt[:, None, None], zeros["signed"].shape)}
 
 
-def _zeros(request: LabelRequest, where_known: Sequence[str]) -> dict[str, np.ndarray]:
-    frames, shape, taxels = len(request.time_ns), request.sensor.map.shape, request.sensor.taxels.count
-    wanted = [*ALWAYS, *TAXEL, *where_known]
-    return {name: np.zeros(columns.shape(name, frames, shape, taxels)) for name in wanted}
+def _zeros(request: LabelRequest, carried: Sequence[str]) -> dict[str, np.ndarray]:
+    size = len(request.time_ns), request.sensor.map.shape, request.sensor.taxels.count
+    return {name: np.zeros(columns.ALL[name].shape(*size)) for name in (*COMPUTED, *carried)}
 
 
 def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.ndarray]:
     """Return each frame's values from the neighbouring states of its branch."""
-    known = [name for name in (*CONTACT, *UNCERTAIN) if getattr(solution, name) is not None]
-    values = _zeros(request, known)
+    carried = [name for name in CARRIED if getattr(solution, name) is not None]
+    values = _zeros(request, carried)
     for loading in (True, False):
         chosen = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)
         if not chosen.any():
@@ -103,9 +100,9 @@ def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.n
         lost = np.linalg.norm(force.bound(depth), axis=1)
         values["force_error"][chosen] = np.hypot(lost, mesh_force[:, 0])
         values["interpolation_error"][chosen] = surface.left_out_beside(depth)
-        for name in (*TAXEL, *known):
-            found = Branch.of(solution, name, loading).at(depth)
-            values[name][chosen] = found.reshape(-1, *values[name].shape[1:])
+        for name in carried:
+            states = Branch.of(solution, name, loading).at(depth)
+            values[name][chosen] = states.reshape(-1, *values[name].shape[1:])
     return values
 
 
@@ -113,7 +110,7 @@ def _readings(sensor: Sensor, values: dict[str, np.ndarray]) -> tuple[dict[str, 
     """Return what the taxels read, and in words what saturates; nothing if the sensor says nothing of it."""
     if sensor.transduction is None:
         return {}, ()
-    readings = Transducer.of(sensor).read(Loads(*(values[name] for name in TAXEL)))
+    readings = Transducer.of(sensor).read(Loads(*(values[name] for name in LOADS)))
     return {"taxel_capacitance": readings.capacitance, "taxel_counts": readings.counts}, readings.remarks
 
 

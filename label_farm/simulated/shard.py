@@ -15,13 +15,16 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.labels import PathSolution
+from tacdata.labels.columns import PATH_REQUIRED
 from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 
 GRAIN = 1e-4
 """Resolution of stored maps [mm]: far below the mesh's error. 16 bits reach 3.2 mm; deeper maps take 32."""
-_FIELDS = ("taxel_force", "taxel_closure", "taxel_area", "force", "residual", "penetration")
-"""Arrays of a solution that are kept in single precision."""
+_GRAINED = ("surface", "numerical")
+"""Maps of a solution, stored as multiples of `GRAIN`."""
+_SINGLE = tuple(name for name in PATH_REQUIRED if name not in (*_GRAINED, "depth"))
+"""Arrays of a solution that are stored in single precision."""
 _NAME = re.compile(r"presses-(\d{7})-(\d{7})\.npz")
 
 
@@ -51,10 +54,10 @@ class Shard:
             "depth": _joined([s.depth for s in known], float),
             "about": np.array(json.dumps({"identity": self.identity, "failed": dict(self.failed)}, sort_keys=True)),
         }
-        for name in ("surface", "numerical"):
+        for name in _GRAINED:
             grains = _joined([np.round(getattr(s, name) / GRAIN) for s in known], np.int32)
             arrays[name] = grains.astype(np.int16) if np.abs(grains).max(initial=0) < 2**15 else grains
-        for name in (*_FIELDS, "force_error", "taxel_force_error"):
+        for name in _SINGLE:
             arrays[name] = _joined([getattr(s, name) for s in known], np.float32)
         buffer = io.BytesIO()
         np.savez_compressed(buffer, **arrays)  # ty: ignore[invalid-argument-type]
@@ -130,7 +133,7 @@ class StoredSolutions(Mapping[int, PathSolution]):
     def __getitem__(self, number: int) -> PathSolution:
         """Return the solution of a press, in double precision."""
         values = {name: stored[self._places[number]].astype(float) for name, stored in self._arrays.items()}
-        for name in ("surface", "numerical"):
+        for name in _GRAINED:
             values[name] *= GRAIN
         return PathSolution(**values, provenance={"made_by": "tacdata.skin", "parents": self._identity})
 

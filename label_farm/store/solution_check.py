@@ -5,44 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from label_farm.presses.job import Job
-from label_farm.store import solution_file
 from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
+from tacdata.labels.columns import PATH, PATH_OPTIONAL
 from tacdata.sensor import Sensor
-from tacdata.sensor.protrusion_pixels import PIXELS
 
 
 def check_solution(job: Job, solution: PathSolution, sensor: Sensor) -> None:
-    """Refuse a solution that is not finite, of another path, or of other shapes than the sensor's.
+    """Refuse a solution that is not finite, not of the job's path, or not of the sensor's shapes.
 
     Raises:
         SolveError: If a value is not finite, a shape is not the sensor's, or the path is not the job's.
     """
     states = len(solution.depth)
-    shapes = {
-        "depth": (states,),
-        "surface": (states, *sensor.map.shape),
-        "numerical": (states, *sensor.map.shape),
-        "taxel_force": (states, sensor.taxels.count),
-        "taxel_force_error": (states, sensor.taxels.count),
-        "taxel_closure": (states, sensor.taxels.count),
-        "taxel_area": (states, sensor.taxels.count),
-        "force": (states, 3),
-        "force_error": (states,),
-        "residual": (states,),
-        "penetration": (states,),
-        "traction": (states, 3, *sensor.map.shape),
-        "taxel_pressure": (states, sensor.taxels.count, PIXELS, PIXELS),
-        "status_steps": (states,),
-        "equilibrium_steps": (states,),
-        "uncertainty": (states, *sensor.map.shape),
-        "force_uncertainty": (states, 3),
-        "taxel_force_uncertainty": (states, sensor.taxels.count),
-        "taxel_closure_uncertainty": (states, sensor.taxels.count),
-    }
-    for name, shape in shapes.items():
-        if name in solution_file.OPTIONAL and getattr(solution, name) is None:
+    for name, quantity in PATH.items():
+        if name in PATH_OPTIONAL and getattr(solution, name) is None:
             continue
+        shape = quantity.shape(states, sensor.map.shape, sensor.taxels.count)
         values = np.asarray(getattr(solution, name))
         if values.shape != shape or not np.isfinite(values).all():
             raise SolveError(

@@ -16,33 +16,10 @@ from label_farm.presses.job import Job
 from tacdata import documents
 from tacdata.errors import FormatError
 from tacdata.labels import PathSolution
+from tacdata.labels.columns import PATH, PATH_OPTIONAL, PATH_REQUIRED
 
 HEADER = "header.json"
-UNITS = {
-    "depth": "mm",
-    "surface": "mm",
-    "numerical": "mm",
-    "taxel_force": "N",
-    "taxel_force_error": "N",
-    "taxel_closure": "mm",
-    "taxel_area": "mm^2",
-    "force": "N",
-    "force_error": "N",
-    "residual": "1",
-    "penetration": "mm",
-}
-OPTIONAL = {
-    "traction": "MPa",
-    "taxel_pressure": "MPa",
-    "status_steps": "1",
-    "equilibrium_steps": "1",
-    "uncertainty": "mm",
-    "force_uncertainty": "N",
-    "taxel_force_uncertainty": "N",
-    "taxel_closure_uncertainty": "mm",
-}
-"""Units of arrays that older releases did not write, or that are there where the sensor file states spreads."""
-PACKED = ("traction.npy", "taxel_pressure.npy")
+PACKED = tuple(f"{name}.npy" for name, quantity in PATH.items() if quantity.sparse)
 """Members that are compressed."""
 REMEDY = "remove it and run `tacdata label` again: results can always be made anew"
 EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -55,15 +32,15 @@ class SolutionVersionError(FormatError):
 def encode(job: Job, solution: PathSolution) -> bytes:
     """Return the file's bytes; the same arrays give the same members whenever they are written."""
     members, arrays = {}, {}
-    for name, unit in {**UNITS, **OPTIONAL}.items():
-        if name in OPTIONAL and getattr(solution, name) is None:
+    for name, quantity in PATH.items():
+        if name in PATH_OPTIONAL and getattr(solution, name) is None:
             continue
         values = np.ascontiguousarray(getattr(solution, name), dtype=np.float64)
         stream = io.BytesIO()
         np.save(stream, values, allow_pickle=False)
         members[f"{name}.npy"] = stream.getvalue()
         digest = hashlib.sha256(stream.getvalue()).hexdigest()
-        arrays[name] = {"unit": unit, "dtype": "float64", "shape": list(values.shape), "sha256": digest}
+        arrays[name] = {"unit": quantity.unit, "dtype": "float64", "shape": list(values.shape), "sha256": digest}
     header = {
         "version": schemas.version("path_solution"),
         "key": job.key,
@@ -76,8 +53,8 @@ def encode(job: Job, solution: PathSolution) -> bytes:
     with zipfile.ZipFile(stream, "w") as archive:
         text = json.dumps(header, indent=1, allow_nan=False).encode()
         for name, content in {HEADER: text, **members}.items():
-            # The digits of maps hardly shrink, and trying cost more than all else that is done here. A pressure is 0
-            # where nothing touches: it shrinks to a tenth.
+            # Digits of maps hardly shrink, and trying cost more than all other steps here. A pressure is 0 outside
+            # the contact: it shrinks to a tenth.
             kind = zipfile.ZIP_DEFLATED if name in PACKED else zipfile.ZIP_STORED
             archive.writestr(zipfile.ZipInfo(name, EPOCH), content, kind, compresslevel=1)
     return stream.getvalue()
@@ -94,7 +71,7 @@ def decode(data: bytes, origin: str) -> tuple[Job, PathSolution]:
             header = json.loads(archive.read(HEADER))
             _check_version(header, origin)
             documents.check(header, "path_solution", origin)
-            names = [*UNITS, *(name for name in OPTIONAL if name in header["arrays"])]
+            names = [*PATH_REQUIRED, *(name for name in PATH_OPTIONAL if name in header["arrays"])]
             arrays = {name: _array(archive, name, header["arrays"][name], origin) for name in names}
     except (
         zipfile.BadZipFile,

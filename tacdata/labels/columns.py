@@ -1,60 +1,44 @@
-"""The columns of a label: names, units, types and shapes, and whether a label's arrays agree with them."""
+"""The columns of a label and the arrays of a solved path, read off their classes; whether a label agrees with them."""
 
 from __future__ import annotations
+
+from dataclasses import MISSING, fields
+from typing import get_type_hints
 
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.labels.label import Label
-from tacdata.sensor.protrusion_pixels import PIXELS
+from tacdata.labels.label import Label, PathSolution
+from tacdata.labels.quantity import Quantity
 
-REQUIRED = {
-    "time_ns": ("ns", "int64", "frame"),
-    "tip": ("mm", "float64", "vector"),
-    "signed": ("mm", "float32", "map"),
-    "taxel_force": ("N", "float32", "taxels"),
-    "taxel_closure": ("mm", "float32", "taxels"),
-    "taxel_area": ("mm^2", "float32", "taxels"),
-    "force": ("N", "float32", "vector"),
-    "error_map": ("mm", "float16", "map"),
-    "error": ("mm", "float32", "frame"),
-    "force_error": ("N", "float32", "frame"),
-}
-"""Unit, type and kind of each column that every label has; the first axis is the frames."""
-OPTIONAL = {
-    "traction": ("MPa", "float16", "vector map"),
-    "taxel_pressure": ("MPa", "float16", "taxel maps"),
-    "interpolation_error": ("mm", "float32", "frame"),
-    "uncertainty": ("mm", "float16", "map"),
-    "force_uncertainty": ("N", "float32", "vector"),
-    "taxel_force_uncertainty": ("N", "float32", "taxels"),
-    "taxel_closure_uncertainty": ("mm", "float32", "taxels"),
-    "taxel_capacitance": ("pF", "float32", "taxels"),
-    "taxel_counts": ("counts", "float32", "taxels"),
-}
-"""The same of columns that a label has where something is known of them; else `Label` holds None."""
+
+def _quantities(kind: type[Label | PathSolution], required: bool) -> dict[str, Quantity]:
+    """Return the quantities of a class, in the order of its fields: those with a default are optional."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {
+        field.name: quantity
+        for field in fields(kind)
+        if (field.default is MISSING) == required
+        for quantity in getattr(hints[field.name], "__metadata__", ())
+        if isinstance(quantity, Quantity)
+    }
+
+
+REQUIRED = _quantities(Label, required=True)
+"""Columns that every label has; the first axis is the frames."""
+OPTIONAL = _quantities(Label, required=False)
+"""Columns that a label has if they are known; else `Label` holds None."""
 ALL = {**REQUIRED, **OPTIONAL}
-UNITS = {name: unit for name, (unit, _, _) in ALL.items()}
-DTYPES = {name: dtype for name, (_, dtype, _) in ALL.items()}
-NDIM = {"frame": 1, "vector": 2, "taxels": 2, "map": 3, "vector map": 4, "taxel maps": 4}
+PATH_REQUIRED = _quantities(PathSolution, required=True)
+"""Arrays that every solved path has; the first axis is the states."""
+PATH_OPTIONAL = _quantities(PathSolution, required=False)
+"""Arrays that older releases did not write, or that need a property of the sensor file; else None."""
+PATH = {**PATH_REQUIRED, **PATH_OPTIONAL}
 
 
 def present(label: Label) -> tuple[str, ...]:
     """Return the columns that a label has."""
     return tuple(name for name in ALL if name in REQUIRED or getattr(label, name) is not None)
-
-
-def shape(name: str, frames: int, pixels: tuple[int, int], taxels: int) -> tuple[int, ...]:
-    """Return a column's shape."""
-    kinds = {
-        "frame": (),
-        "vector": (3,),
-        "taxels": (taxels,),
-        "map": pixels,
-        "vector map": (3, *pixels),
-        "taxel maps": (taxels, PIXELS, PIXELS),
-    }
-    return (frames, *kinds[ALL[name][2]])
 
 
 def check(label: Label, origin: str) -> None:
@@ -74,7 +58,7 @@ def check(label: Label, origin: str) -> None:
     wrong = {
         name: np.shape(getattr(label, name))
         for name in present(label)
-        if np.shape(getattr(label, name)) != shape(name, frames, pixels, taxels)
+        if np.shape(getattr(label, name)) != ALL[name].shape(frames, pixels, taxels)
     }
     if wrong:
         raise FormatError(
@@ -87,7 +71,7 @@ def check(label: Label, origin: str) -> None:
 
 
 def _check_column(values: np.ndarray, name: str, frames: int, origin: str) -> None:
-    ndim = NDIM[ALL[name][2]]
+    ndim = len(ALL[name].shape(frames, (1, 1), 1))
     if values.ndim != ndim or len(values) != frames or frames == 0:
         raise FormatError(
             f"{origin}: label.{name} has shape {values.shape}",

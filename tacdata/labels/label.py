@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from tacdata.display import Displayed
+from tacdata.labels.quantity import Quantity
 
 _OPTIONAL = ("traction", "taxel_pressure", "uncertainty", "taxel_capacitance", "taxel_counts")
 """Quantities that a description names where they are known."""
@@ -18,53 +19,53 @@ _OPTIONAL = ("traction", "taxel_pressure", "uncertainty", "taxel_capacitance", "
 class PathSolution(Displayed):
     """Equilibria along one press: loading to the deepest point, then unloading. Content of one entry of the store."""
 
-    depth: np.ndarray
+    depth: Annotated[np.ndarray, Quantity("mm", "scalar")]
     """Nominal depth of each state [mm], shape (k,); rises to its maximum, then falls; first and last are 0."""
-    surface: np.ndarray
+    surface: Annotated[np.ndarray, Quantity("mm", "map")]
     """Undeformed minus deformed height of the outer face at the pixel centres [mm], shape (k, pixels_x, pixels_y).
 
     Signed: bulging is negative. Where the skin touches the indenter, the height is that of the indenter's surface."""
-    taxel_force: np.ndarray
-    """Normal force carried by each protrusion [N], shape (k, taxels)."""
-    taxel_closure: np.ndarray
-    """Mean downward displacement over each protrusion's base [mm], shape (k, taxels)."""
-    taxel_area: np.ndarray
-    """Area of each protrusion in contact with the board, undeformed [mm^2], shape (k, taxels)."""
-    force: np.ndarray
-    """Force of the skin on the indenter [N], shape (k, 3)."""
-    numerical: np.ndarray
+    numerical: Annotated[np.ndarray, Quantity("mm", "map")]
     """Estimated error of ``surface`` by the mesh alone [mm], shape (k, pixels_x, pixels_y); 0 if none was asked for."""
-    force_error: np.ndarray
-    """The same of ``force``, all components together [N], shape (k,)."""
-    taxel_force_error: np.ndarray
+    taxel_force: Annotated[np.ndarray, Quantity("N", "taxels")]
+    """Normal force carried by each protrusion [N], shape (k, taxels)."""
+    taxel_force_error: Annotated[np.ndarray, Quantity("N", "taxels")]
     """The same of ``taxel_force`` [N], shape (k, taxels)."""
-    residual: np.ndarray
+    taxel_closure: Annotated[np.ndarray, Quantity("mm", "taxels")]
+    """Mean downward displacement over each protrusion's base [mm], shape (k, taxels)."""
+    taxel_area: Annotated[np.ndarray, Quantity("mm^2", "taxels")]
+    """Area of each protrusion in contact with the board, undeformed [mm^2], shape (k, taxels)."""
+    force: Annotated[np.ndarray, Quantity("N", "vector")]
+    """Force of the skin on the indenter [N], shape (k, 3)."""
+    force_error: Annotated[np.ndarray, Quantity("N", "scalar")]
+    """The same of ``force``, all components together [N], shape (k,)."""
+    residual: Annotated[np.ndarray, Quantity("1", "scalar")]
     """Norm of the out-of-balance force over the contact force [1], shape (k,)."""
-    penetration: np.ndarray
+    penetration: Annotated[np.ndarray, Quantity("mm", "scalar")]
     """Largest penetration of the indenter, as a mean under the hat of a contact node [mm], shape (k,)."""
     provenance: dict[str, Any]
     """What made it: key, sensor, material law, mesh, solver settings, code version, seconds."""
-    traction: np.ndarray | None = None
+    traction: Annotated[np.ndarray | None, Quantity("MPa", "vector map", sparse=True)] = None
     """Contact force on the indenter by area of the map, seen from above [MPa], shape (k, 3, pixels_x, pixels_y): z is
     pressure where the face is level, x and y are shear. Times a pixel's area it sums to ``force``. None in files of
     older releases."""
-    taxel_pressure: np.ndarray | None = None
+    taxel_pressure: Annotated[np.ndarray | None, Quantity("MPa", "taxel maps", needs="board", sparse=True)] = None
     """Pressure of each protrusion on the board, by area of its pixels (`tacdata.sensor.protrusion_pixels`) [MPa], shape
     (k, taxels, 10, 10). Times a pixel's area it sums to ``taxel_force``. None without a board, and in files of older
     releases."""
-    status_steps: np.ndarray | None = None
+    status_steps: Annotated[np.ndarray | None, Quantity("1", "scalar")] = None
     """Newton steps since the state before after which contact had another status: a node opened, closed, stuck or
     slipped [count], shape (k,). None in files of older releases; so are the next."""
-    equilibrium_steps: np.ndarray | None = None
+    equilibrium_steps: Annotated[np.ndarray | None, Quantity("1", "scalar")] = None
     """All other Newton steps since the state before [count], shape (k,)."""
-    uncertainty: np.ndarray | None = None
+    uncertainty: Annotated[np.ndarray | None, Quantity("mm", "map", needs="spreads")] = None
     """One standard deviation of ``surface`` by the spreads that the sensor file states [mm], shape (k, pixels_x,
     pixels_y); None if it states none or none was asked for. So are the three below."""
-    force_uncertainty: np.ndarray | None = None
+    force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "vector", needs="spreads")] = None
     """The same of ``force`` [N], shape (k, 3)."""
-    taxel_force_uncertainty: np.ndarray | None = None
+    taxel_force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "taxels", needs="spreads")] = None
     """The same of ``taxel_force`` [N], shape (k, taxels)."""
-    taxel_closure_uncertainty: np.ndarray | None = None
+    taxel_closure_uncertainty: Annotated[np.ndarray | None, Quantity("mm", "taxels", needs="spreads")] = None
     """The same of ``taxel_closure`` [mm], shape (k, taxels)."""
 
     def description(self) -> Iterator[str]:
@@ -92,55 +93,55 @@ class Label(Displayed):
 
     episode: int
     """Number of the episode in its session."""
-    time_ns: np.ndarray
+    time_ns: Annotated[np.ndarray, Quantity("ns", "scalar", "int64")]
     """Time of each frame [ns], shape (n,), int64: the recording's estimated sample times."""
-    tip: np.ndarray
+    tip: Annotated[np.ndarray, Quantity("mm", "vector", "float64")]
     """Nominal x, y and depth of the indenter's lowest point [mm], shape (n, 3)."""
-    signed: np.ndarray
+    signed: Annotated[np.ndarray, Quantity("mm", "map")]
     """Undeformed minus deformed height of the outer face [mm], shape (n, pixels_x, pixels_y), float32.
 
     Signed: bulging is negative. Where the skin touches the indenter, the height is that of the indenter's surface."""
-    taxel_force: np.ndarray
+    taxel_force: Annotated[np.ndarray, Quantity("N", "taxels")]
     """Normal force carried by each protrusion [N], shape (n, taxels), float32."""
-    taxel_closure: np.ndarray
+    taxel_closure: Annotated[np.ndarray, Quantity("mm", "taxels")]
     """Mean downward displacement over each protrusion's base [mm], shape (n, taxels), float32."""
-    taxel_area: np.ndarray
+    taxel_area: Annotated[np.ndarray, Quantity("mm^2", "taxels")]
     """Area of each protrusion in contact with the board, undeformed [mm^2], shape (n, taxels), float32."""
-    force: np.ndarray
+    force: Annotated[np.ndarray, Quantity("N", "vector")]
     """Force of the skin on the indenter [N], shape (n, 3), float32."""
-    error_map: np.ndarray
+    error_map: Annotated[np.ndarray, Quantity("mm", "map", "float16")]
     """Estimated numerical error of each pixel [mm], shape (n, pixels_x, pixels_y), float16: three digits suffice.
 
     Root sum of squares of the bound on what is lost between states and of the error by the mesh; the spread of
     material, thickness and registration is not in it: that is ``uncertainty``."""
-    error: np.ndarray
+    error: Annotated[np.ndarray, Quantity("mm", "scalar")]
     """Root mean square of ``error_map`` over the pixels [mm], shape (n,), float32."""
-    force_error: np.ndarray
+    force_error: Annotated[np.ndarray, Quantity("N", "scalar")]
     """Estimated numerical error of ``force``, all components together [N], shape (n,), float32; made up alike."""
     provenance: dict[str, Any]
     """What made it: recording, path solution, sensor, code."""
-    traction: np.ndarray | None = None
+    traction: Annotated[np.ndarray | None, Quantity("MPa", "vector map", "float16")] = None
     """Contact force on the indenter by area of the map, seen from above [MPa], shape (n, 3, pixels_x, pixels_y),
     float16: z is pressure where the face is level, x and y are shear. None in labels of older releases."""
-    taxel_pressure: np.ndarray | None = None
+    taxel_pressure: Annotated[np.ndarray | None, Quantity("MPa", "taxel maps", "float16", needs="board")] = None
     """Pressure of each protrusion on the board, by area of its pixels (`tacdata.sensor.protrusion_pixels`) [MPa], shape
     (n, taxels, 10, 10), float16. None without a board, and in labels of older releases."""
-    interpolation_error: np.ndarray | None = None
+    interpolation_error: Annotated[np.ndarray | None, Quantity("mm", "scalar")] = None
     """How far, at the pixel where it is most, the states beside each frame lie from what their neighbours say of them
     [mm], shape (n,), float32. A state is left out at twice the distance, so this bounds what is lost at the frame."""
-    uncertainty: np.ndarray | None = None
+    uncertainty: Annotated[np.ndarray | None, Quantity("mm", "map", "float16", needs="spreads")] = None
     """One standard deviation of each pixel by the spreads that the sensor file states [mm], shape (n, pixels_x,
     pixels_y), float16; None where the label knows of none. So are the three below."""
-    force_uncertainty: np.ndarray | None = None
+    force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "vector", needs="spreads")] = None
     """The same of ``force`` [N], shape (n, 3), float32."""
-    taxel_force_uncertainty: np.ndarray | None = None
+    taxel_force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "taxels", needs="spreads")] = None
     """The same of ``taxel_force`` [N], shape (n, taxels), float32."""
-    taxel_closure_uncertainty: np.ndarray | None = None
+    taxel_closure_uncertainty: Annotated[np.ndarray | None, Quantity("mm", "taxels", needs="spreads")] = None
     """The same of ``taxel_closure`` [mm], shape (n, taxels), float32."""
-    taxel_capacitance: np.ndarray | None = None
+    taxel_capacitance: Annotated[np.ndarray | None, Quantity("pF", "taxels", needs="transduction")] = None
     """Capacitance of each taxel that the sensor file's transduction makes of its loads [pF], shape (n, taxels),
     float32; None if the file says nothing of it."""
-    taxel_counts: np.ndarray | None = None
+    taxel_counts: Annotated[np.ndarray | None, Quantity("counts", "taxels", needs="transduction")] = None
     """The readings that go with it [counts], shape (n, taxels), float32: neither rounded nor noisy, not tared."""
 
     def description(self) -> Iterator[str]:

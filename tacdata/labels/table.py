@@ -50,11 +50,11 @@ def write(path: StrPath, label: Label) -> None:
         "pixels_x": label.signed.shape[1],
         "pixels_y": label.signed.shape[2],
         "taxels": label.taxel_force.shape[1],
-        "units": {name: columns.UNITS[name] for name in names},
+        "units": {name: columns.ALL[name].unit for name in names},
         "provenance": label.provenance,
     }
     documents.check(header, "label", str(path))
-    arrays = {name: _column(np.asarray(getattr(label, name), dtype=columns.DTYPES[name])) for name in names}
+    arrays = {name: _column(np.asarray(getattr(label, name), dtype=columns.ALL[name].dtype)) for name in names}
     table = pa.table(arrays).replace_schema_metadata({HEADER: json.dumps(header)})
     with replacement(path) as stream:
         # Digits of maps hardly repeat: dictionaries of them took as long again and made files half as large again.
@@ -119,7 +119,7 @@ def map_batches(path: StrPath, name: str, rows: int) -> Iterator[np.ndarray]:
     pixels = header["pixels_x"], header["pixels_y"]
     try:
         for batch in file.iter_batches(rows, columns=[name], use_threads=False):
-            yield _values(batch.column(0), name, columns.shape(name, len(batch), pixels, header["taxels"]))
+            yield _values(batch.column(0), name, columns.ALL[name].shape(len(batch), pixels, header["taxels"]))
     except (pa.ArrowException, OSError) as error:
         raise _damaged(path, error) from None
     except (ValueError, TypeError) as error:
@@ -135,7 +135,7 @@ def _arrays(file: pq.ParquetFile, path: Path, names: Sequence[str]) -> tuple[dic
         raise _damaged(path, error) from None
     size = (header["frames"], (header["pixels_x"], header["pixels_y"]), header["taxels"])
     try:
-        return header, {name: _values(table.column(name), name, columns.shape(name, *size)) for name in names}
+        return header, {name: _values(table.column(name), name, columns.ALL[name].shape(*size)) for name in names}
     except (ValueError, TypeError, pa.ArrowException) as error:
         raise FormatError(f"{path}: {error}", "columns as its header says", REMEDY) from None
 
@@ -204,6 +204,7 @@ def _values(column: pa.ChunkedArray | pa.Array, name: str, shape: tuple[int, ...
     if isinstance(column, pa.ChunkedArray):
         column = column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
     flat = column.flatten() if isinstance(column, pa.FixedSizeListArray) else column
-    if flat.type != pa.from_numpy_dtype(columns.DTYPES[name]) or flat.null_count:
-        raise ValueError(f"column {name} is {flat.type} with {flat.null_count} missing, not {columns.DTYPES[name]}")
+    dtype = columns.ALL[name].dtype
+    if flat.type != pa.from_numpy_dtype(dtype) or flat.null_count:
+        raise ValueError(f"column {name} is {flat.type} with {flat.null_count} missing, not {dtype}")
     return np.from_dlpack(flat).reshape(shape)  # pyarrow's own way imports pandas for it

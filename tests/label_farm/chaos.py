@@ -197,7 +197,7 @@ def fingerprint(folder, names):
         job, solution = solution_file.decode(path.read_bytes(), str(path))
         assert job.key == path.stem
         found[path.name] = hashlib.sha256(
-            b"".join(getattr(solution, n).tobytes() for n in solution_file.UNITS)
+            b"".join(getattr(solution, n).tobytes() for n in columns.PATH_REQUIRED)
         ).hexdigest()
     return found
 

@@ -38,8 +38,8 @@ def whole(frames: int = 7, **changes) -> Label:
     """The same with everything that a label may know."""
     random = np.random.default_rng(4)
     known = {
-        name: random.random(columns.shape(name, frames, (35, 26), 24)).astype(columns.DTYPES[name])
-        for name in columns.OPTIONAL
+        name: random.random(quantity.shape(frames, (35, 26), 24)).astype(quantity.dtype)
+        for name, quantity in columns.OPTIONAL.items()
     }
     return example(frames, **{**known, **changes})
 

@@ -55,7 +55,23 @@ class FastModel:
             normal[:, 2] = 2.0 * force.sum(axis=1)
             none = np.zeros((len(depth), 1, 1))
             nil = np.zeros(len(depth))
-            yield k, PathSolution(depth, none, force, 0.5 * force, 0.1 * force, normal, none, nil, force, nil, nil, {})
+            yield (
+                k,
+                PathSolution(
+                    depth=depth,
+                    surface=none,
+                    numerical=none,
+                    taxel_force=force,
+                    taxel_force_error=force,
+                    taxel_closure=0.5 * force,
+                    taxel_area=0.1 * force,
+                    force=normal,
+                    force_error=nil,
+                    residual=nil,
+                    penetration=nil,
+                    provenance={},
+                ),
+            )
 
 
 def made(tmp_path, model, reach, spacing=0.8, left_out=6):

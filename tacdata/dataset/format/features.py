@@ -95,7 +95,7 @@ def short_hash(digest: str) -> int:
 
 def unit(key: str) -> str:
     """Return the unit of a column as `read_dataset` gives it; "1" of one that is not ours."""
-    return columns.UNITS[EXTRA[key]] if key in EXTRA else UNITS.get(key, "1")
+    return columns.ALL[EXTRA[key]].unit if key in EXTRA else UNITS.get(key, "1")
 
 
 def asked_for(names: Iterable[str]) -> tuple[str, ...]:
@@ -120,7 +120,7 @@ def shapes(sensor: Sensor, extra: Iterable[str] = ()) -> dict[str, tuple[int, ..
     """Return the shape of one frame of every own column and of some of `EXTRA`; scalars are ``()``."""
     taxels = (sensor.taxels.count,)
     vectors = {STATE: taxels, RAW: taxels, DEPTH: sensor.map.shape, TIP: (3,), FORCE: (3,), TAXEL_FORCE: taxels}
-    given = {key: columns.shape(EXTRA[key], 1, sensor.map.shape, sensor.taxels.count)[1:] for key in extra}
+    given = {key: columns.ALL[EXTRA[key]].shape(1, sensor.map.shape, sensor.taxels.count)[1:] for key in extra}
     flat = {key: (int(np.prod(shape)),) if shape else () for key, shape in given.items()}
     return {key: vectors.get(key, ()) for key in DTYPES} | flat
 
@@ -129,7 +129,7 @@ def _names(key: str, sensor: Sensor) -> list[str] | None:
     across = sensor.taxels.columns
     taxels = [f"taxel_{k % across}_{k // across}" for k in range(sensor.taxels.count)]
     if key in EXTRA:
-        return taxels if columns.ALL[EXTRA[key]][2] == "taxels" else None
+        return taxels if columns.ALL[EXTRA[key]].kind == "taxels" else None
     return {
         STATE: taxels,
         RAW: taxels,

@@ -18,6 +18,7 @@ from label_farm.store import solution_file
 from label_farm.store.failure import Failure
 from label_farm.store.store import Store
 from tacdata.errors import FormatError, SolveError, UsageError
+from tacdata.labels import columns
 
 JOB = Job(SENSOR.content_hash, "a" * 64, {"shape": "sphere", "radius": 2.0}, 0.5, 0.0, 0.0, (0.0, 0.3, 1.0, 0.4, 0.0))
 SOLUTION = path(SENSOR, JOB.depths, lambda d: d**1.5)
@@ -42,7 +43,7 @@ def test_a_solution_comes_back_bit_for_bit(tmp_path):
     assert store.get(JOB) is None
     store.put(JOB, SOLUTION, SENSOR)
     found = Store(tmp_path / "store").get(JOB)
-    for name in solution_file.UNITS:
+    for name in columns.PATH_REQUIRED:
         assert np.array_equal(getattr(found, name), getattr(SOLUTION, name))
     assert found.provenance == {"law": "bump", "key": JOB.key}
     assert store.path(JOB.key) == tmp_path / "store" / JOB.key[:2] / f"{JOB.key}.npz"
@@ -72,7 +73,7 @@ def test_standard_deviations_come_back_where_they_are_known(tmp_path):
     )
     store.put(JOB, known, SENSOR)
     found = Store(tmp_path / "store").get(JOB)
-    for name in solution_file.OPTIONAL:
+    for name in columns.PATH_OPTIONAL:
         assert np.array_equal(getattr(found, name), getattr(known, name))
     store.put(JOB, SOLUTION, SENSOR)
     assert store.get(JOB).uncertainty is None
