@@ -30,7 +30,7 @@ class PathSolution(Displayed):
     taxel_force: Annotated[np.ndarray, Quantity("N", "taxels")]
     """Normal force carried by each protrusion [N], shape (k, taxels)."""
     taxel_force_error: Annotated[np.ndarray, Quantity("N", "taxels")]
-    """The same of ``taxel_force`` [N], shape (k, taxels)."""
+    """Estimated error of ``taxel_force`` by the mesh alone [N], shape (k, taxels)."""
     taxel_closure: Annotated[np.ndarray, Quantity("mm", "taxels")]
     """Mean downward displacement over each protrusion's base [mm], shape (k, taxels)."""
     taxel_area: Annotated[np.ndarray, Quantity("mm^2", "taxels")]
@@ -38,7 +38,7 @@ class PathSolution(Displayed):
     force: Annotated[np.ndarray, Quantity("N", "vector")]
     """Force of the skin on the indenter [N], shape (k, 3)."""
     force_error: Annotated[np.ndarray, Quantity("N", "scalar")]
-    """The same of ``force``, all components together [N], shape (k,)."""
+    """Estimated error of ``force`` by the mesh alone, all components together [N], shape (k,)."""
     residual: Annotated[np.ndarray, Quantity("1", "scalar")]
     """Norm of the out-of-balance force over the contact force [1], shape (k,)."""
     penetration: Annotated[np.ndarray, Quantity("mm", "scalar")]
@@ -64,7 +64,7 @@ class PathSolution(Displayed):
     force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "vector", needs="spreads")] = None
     """The same of ``force`` [N], shape (k, 3)."""
     taxel_force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "taxels", needs="spreads")] = None
-    """The same of ``taxel_force`` [N], shape (k, taxels)."""
+    """Estimated error of ``taxel_force`` by the mesh alone [N], shape (k, taxels)."""
     taxel_closure_uncertainty: Annotated[np.ndarray | None, Quantity("mm", "taxels", needs="spreads")] = None
     """The same of ``taxel_closure`` [mm], shape (k, taxels)."""
 

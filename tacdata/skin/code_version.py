@@ -1,4 +1,4 @@
-"""Which code of the skin decides what a press gives: its version is part of the model's."""
+"""Version of the code that decides the result of a press: part of the model's version."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class SkinModel:
     """A sensor's skin, meshed, factorized and ready for presses; costs seconds to build, so keep it.
 
     A request becomes a load path (`MeshedSkin.placed`). A batch solves it to states (`solve.batch`). The deformed outer
-    face of each becomes a map (`surface`). A coarser mesh says how far to trust it (`validity`).
+    face of each becomes a map (`surface`). A coarser mesh gives its numerical error (`validity`).
 
     >>> from tacdata.indenters.sphere import Sphere
     >>> from tacdata.sensor import default_sensor
@@ -85,7 +85,7 @@ class SkinModel:
         self._companion_mesh = companion
         self._stable = StableStrain(self.mesh, sensor.material)
         self.remarks = self._stable.remarks
-        """In words, what a user should know of this skin: where its material law is unstable."""
+        """Remarks for the user: the strains at which the material law is unstable."""
         self.last_run: dict[str, int] = {}
         """Newton and conjugate-gradient iterations of the last finished batch, for benchmarks."""
 
@@ -99,9 +99,9 @@ class SkinModel:
 
     @cached_property
     def identity(self) -> dict[str, str]:
-        """What decides a result: hashes of sensor, mesh and code, and the settings."""
-        asked = self.settings.error_estimate
-        coarse = {"companion": self.companion.mesh.content_hash} if asked and self.companion else {}
+        """Everything that decides a result: hashes of sensor, mesh and code, and the settings."""
+        estimated = self.settings.error_estimate
+        coarse = {"companion": self.companion.mesh.content_hash} if estimated and self.companion else {}
         return {
             "sensor": self.sensor.content_hash,
             "mesh": self.mesh.content_hash,
@@ -126,11 +126,11 @@ class SkinModel:
         """Solve presses, many at a time.
 
         Args:
-            requests: What to press.
+            requests: The presses.
             capacity: How many presses are in work at a time.
             with_displacement: Whether states hold displacements.
-            observe: Is told of every equilibrium on the way, if given.
-            coarse: What the companion found of them (`solve_coarsely`): load steps start from there.
+            observe: Receives every equilibrium on the way, if given.
+            coarse: The companion's results (`solve_coarsely`), from which load steps start.
 
         Yields:
             The press's index, the depth [mm] and the state, as found; or, in its place, why the press was given up.
@@ -146,8 +146,8 @@ class SkinModel:
             return
         batch = self.skin.batch([request for _, request in possible], min(capacity, len(possible)))
         # Columns that fall idle at the end cost, above all on a GPU: the longest paths come first.
-        possible.sort(key=lambda one: -one[1].steps(self.settings.step))
-        starts = [self._start(one) for one in coarse or ()] or [None] * (1 + max(number for number, _ in possible))
+        possible.sort(key=lambda press: -press[1].steps(self.settings.step))
+        starts = [self._start(press) for press in coarse or ()] or [None] * (1 + max(number for number, _ in possible))
         presses = (replace(self.skin.placed(number, request), coarse=starts[number]) for number, request in possible)
         yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement), observe)
         self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
@@ -188,7 +188,7 @@ class SkinModel:
         """Solve the loading of presses on the companion: for `solve_many`, and to see which states a path needs.
 
         Args:
-            requests: What to press.
+            requests: The presses.
             capacity: How many presses are in work at a time.
 
         Returns:
@@ -208,17 +208,17 @@ class SkinModel:
         """Solve presses, many at a time.
 
         Args:
-            requests: What to press.
+            requests: The presses.
             capacity: How many presses are in work at a time.
-            coarse: What `solve_coarsely` said of them, perhaps at a part of the depths; solved here if not given.
+            coarse: Results of `solve_coarsely`, perhaps at a part of the depths; solved here if not given.
 
         Yields:
             The press's index and its solution, as they are finished; or why it was given up.
         """
         rows: dict[int, list[Equilibrium]] = {number: [] for number in range(len(requests))}
         began = time.perf_counter()
-        beside = coarse or self._coarsely(requests, capacity, keep=False)
-        for number, _, state in self.states_many(requests, capacity, coarse=beside):
+        companions = coarse or self._coarsely(requests, capacity, keep=False)
+        for number, _, state in self.states_many(requests, capacity, coarse=companions):
             if isinstance(state, SolveError):
                 del rows[number]
                 yield number, state
@@ -226,18 +226,18 @@ class SkinModel:
             rows[number].append(state)
             if len(rows[number]) == len(requests[number].depths):
                 seconds, began = time.perf_counter() - began, time.perf_counter()
-                yield number, self._answer(requests[number], rows.pop(number), beside[number], seconds)
+                yield number, self._answer(requests[number], rows.pop(number), companions[number], seconds)
 
     def figures(self, request: PressRequest, depths: Sequence[float], states: list[Equilibrium]) -> Figures:
-        """Return what states (with displacements) of a press at depths [mm] say.
+        """Return maps and forces of a press's states (with displacements) at depths [mm].
 
         Maps are the indenter's surface where it touches (`tacdata.skin.surface.pressed_shape`).
         """
         grid, shapes = self.sensor.map, self.pressed_shapes(request, depths, states)
-        moved = [state.displacement for state in states]
+        displacements = [state.displacement for state in states]
         return Figures(
             np.array(depths, dtype=float),
-            self.skin.face.pressed_maps(grid.x, grid.y, moved, grid.sampling, shapes),
+            self.skin.face.pressed_maps(grid.x, grid.y, displacements, grid.sampling, shapes),
             np.array([state.force for state in states]).reshape(-1, 3),
             np.array([state.taxel_force for state in states]).reshape(-1, self.sensor.taxels.count),
         )
@@ -264,8 +264,8 @@ class SkinModel:
 
         Args:
             request: The press.
-            fine: What all of its states say.
-            coarse: What a coarser mesh says of the loading; solved here if not given.
+            fine: Maps and forces of all of its states.
+            coarse: Result of the loading on a coarser mesh; solved here if not given.
         """
         if self.companion is None:
             return estimate(self.sensor, fine, fine.first(0), 0.0, 1.0, "no coarser mesh can be made")

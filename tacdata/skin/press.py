@@ -22,7 +22,7 @@ class PressRequest:
     """
 
     indenter: Indenter
-    """What presses."""
+    """The indenter."""
     x: float
     """Place of its origin, which is its lowest point when upright [mm]."""
     y: float

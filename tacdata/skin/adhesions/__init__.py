@@ -1,4 +1,4 @@
-"""Laws of adhesion, one per file; see `adhesion_law.py` for what a file must hold."""
+"""Laws of adhesion, one per file; `adhesion_law.py` states the contents of a file."""
 
 from tacdata.skin.adhesions.adhesion_law import AdhesionLaw, load_adhesion_law
 

@@ -1,4 +1,4 @@
-"""What a file on adhesion holds.
+"""Base class of the laws of adhesion, and the contents of a law's file.
 
 ``tacdata/skin/adhesions/my_law.py`` defines one class derived from `AdhesionLaw`, without parameters of its own: work w
 and range d come from the sensor file's ``contact/adhesion``. A law is written in s = gap / d: the attraction is a

@@ -29,7 +29,7 @@ class Linear(AdhesionLaw):
 
         @wp.func
         def rest(s: wp.float64):
-            left = wp.max(wp.float64(1.0) - s, wp.float64(0.0))
-            return left * left
+            remainder = wp.max(wp.float64(1.0) - s, wp.float64(0.0))
+            return remainder * remainder
 
         return shape, slope, rest

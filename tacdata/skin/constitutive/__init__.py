@@ -1,1 +1,1 @@
-"""What material laws are built from: kinematics, invariants, principal axes."""
+"""Building blocks of material laws: kinematics, invariants, principal axes."""

@@ -40,7 +40,7 @@ class AdhesionData:
 @cache
 def _pull(distance, law: str):
     """Compile the kernel of forces for one shape and one law."""
-    shape, slope, rest = load_adhesion_law(law).functions()
+    shape, slope, reserve = load_adhesion_law(law).functions()
 
     normal = normal_function(distance)
 
@@ -72,12 +72,12 @@ def _pull(distance, law: str):
             n = R * normal(local, q)
             s = wp.max(g, zero) / length
             t = strength * shape(s)
-            wp.atomic_add(energy, b, weight * (t * wp.min(g, zero) - strength * length * rest(s)))
+            wp.atomic_add(energy, b, weight * (t * wp.min(g, zero) - strength * length * reserve(s)))
             if g > zero:
-                along = strength * slope(s) / length
-                if along < zero:
-                    along = along * friction_tangent[b]
-                stiffness[f, k, 0, b] = along
+                stiffness_along = strength * slope(s) / length
+                if stiffness_along < zero:
+                    stiffness_along = stiffness_along * friction_tangent[b]
+                stiffness[f, k, 0, b] = stiffness_along
                 for i in range(3):
                     stiffness[f, k, i + 1, b] = n[i]
             for a in range(6):
@@ -102,16 +102,18 @@ def _product(real: type):
         result: wp.array3d(dtype=real),
     ):
         f, k, b = wp.tid()
-        along = real(stiffness[f, k, 0, b])
-        if along != real(0.0):
+        stiffness_along = real(stiffness[f, k, 0, b])
+        if stiffness_along != real(0.0):
             n = vec3(real(stiffness[f, k, 1, b]), real(stiffness[f, k, 2, b]), real(stiffness[f, k, 3, b]))
-            moved = real(0.0)
+            change = real(0.0)
             for a in range(6):
                 for i in range(3):
-                    moved += shapes[k, a] * p[faces[f, a], i, b] * n[i]
+                    change += shapes[k, a] * p[faces[f, a], i, b] * n[i]
             for a in range(6):
                 for i in range(3):
-                    wp.atomic_add(result, faces[f, a], i, b, shapes[k, a] * weights[f, k] * along * moved * n[i])
+                    wp.atomic_add(
+                        result, faces[f, a], i, b, shapes[k, a] * weights[f, k] * stiffness_along * change * n[i]
+                    )
 
     return product
 
@@ -125,9 +127,9 @@ class AdhesiveSurface(ContactSurface):
         self,
         nodes: torch.Tensor,
         faces: torch.Tensor,
-        held: torch.Tensor,
+        fixed: torch.Tensor,
         distances: Mapping[float, wp.Function],
-        rough: bool,
+        frictional: bool,
         activation: float,
         stick: float,
         adhesion: Adhesion,
@@ -137,7 +139,7 @@ class AdhesiveSurface(ContactSurface):
         Raises:
             UsageError: If there is no such law.
         """
-        super().__init__(nodes, faces, held, distances, rough, activation, stick)
+        super().__init__(nodes, faces, fixed, distances, frictional, activation, stick)
         self._law = adhesion.law
         self._adhesion = filled(
             AdhesionData,

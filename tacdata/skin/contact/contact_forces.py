@@ -1,4 +1,4 @@
-"""What contact does at given displacements and multipliers: gaps, tractions, the resultant, the stiffness."""
+"""State of contact at given displacements and multipliers: gaps, tractions, the resultant, the stiffness."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Contact of faces of the skin with rigid shapes: multipliers at nodes, Coulomb friction.
 
 The normal traction is a piecewise linear field on the four sub-triangles of every quadratic face. Its values at the
-nodes are unknowns (multipliers) beside the displacements. A node either carries pressure, or the mean gap under its hat
+nodes are unknowns (multipliers), as displacements are. A node either carries pressure, or the mean gap under its hat
 is not negative. Node j is active where lambda_j - c gap_j > 0: the primal-dual active set (Hueeber and Wohlmuth,
 Comput. Methods Appl. Mech. Eng. 194 (2005) 3147). It is a Newton method for functions with kinks (Hintermueller, Ito
 and Kunisch, SIAM J. Optim. 13 (2002) 865).
@@ -35,7 +35,7 @@ SUBDIVISIONS = 2
 """The quadrature rule is repeated on the sub-triangles of the hats, on which these are linear."""
 
 _HELD = 1 - 1e-9
-"""Shear over what friction allows up to which a node sticks [1]; one that slips is returned to 1."""
+"""Largest shear over the friction limit at which a node sticks [1]; a slipping node is returned to 1."""
 
 
 class ContactSurface:
@@ -48,9 +48,9 @@ class ContactSurface:
         self,
         nodes: torch.Tensor,
         faces: torch.Tensor,
-        held: torch.Tensor,
+        fixed: torch.Tensor,
         distances: Mapping[float, wp.Function],
-        rough: bool,
+        frictional: bool,
         activation: float,
         stick: float,
         flat: bool = False,
@@ -60,16 +60,16 @@ class ContactSurface:
         Args:
             nodes: Undeformed positions [mm], shape (n, 3).
             faces: Quadratic triangles, shape (f, 6), int32.
-            held: Nodes that cannot move, shape (n,), bool; they carry no multiplier.
+            fixed: Nodes that cannot move, shape (n,), bool; they carry no multiplier.
             distances: Signed distances of the shapes (`tacdata.indenters.indenter`), by their numbers
                 (`tacdata.skin.member.conditions.shape_number`); of a single one the number is not asked for.
-            rough: Whether there is friction (its coefficient is each member's own).
+            frictional: Whether there is friction (its coefficient is each member's own).
             activation: c over Young's modulus: weight of a gap against a pressure in the active set [1/mm].
             stick: Tangential stiffness of sticking nodes over Young's modulus [1/mm].
             flat: Whether the shape's normal is the z axis everywhere.
         """
         self.faces, self.distances, self.device = faces, dict(distances), str(nodes.device)
-        self.rough, self.activation, self.flat = rough, activation, flat
+        self.rough, self.activation, self.flat = frictional, activation, flat
         self.weights, self.shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
         at_points = elements.triangle_hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
         self.mortar = Mortar(
@@ -83,7 +83,7 @@ class ContactSurface:
         """The projection onto the hats."""
         self.area = torch.as_tensor(self.mortar.area, device=nodes.device)
         """Area of each hat, undeformed [mm^2], shape (s,)."""
-        self.able = ~held[torch.as_tensor(self.mortar.nodes, device=nodes.device)]
+        self.able = ~fixed[torch.as_tensor(self.mortar.nodes, device=nodes.device)]
         """Nodes that may carry a multiplier, shape (s,), bool."""
         self._mean_nodes = self.mortar.means(nodes[:, :, None].contiguous())
         """Mean undeformed place under each hat [mm], shape (s, 3, 1)."""
@@ -104,7 +104,7 @@ class ContactSurface:
             weights=self.weights,
             area=self.area,
             stick=stick,
-            rough=int(rough),
+            rough=int(frictional),
         )
         """The same, as kernels take it."""
 
@@ -126,8 +126,8 @@ class ContactSurface:
             yield self.only, everyone
             return
         for number, distance in self.distances.items():
-            if len(chosen := everyone[conditions.shape == number]):
-                yield distance, chosen
+            if len(members := everyone[conditions.shape == number]):
+                yield distance, members
 
     def start(self, pose: Pose) -> ContactHistory:
         """Return the history of members without contact, the shape at ``pose``."""
@@ -231,27 +231,29 @@ class ContactSurface:
         )
         self.mortar.spread(slips, result)
 
-    def penetration(self, now: ContactForces) -> tuple[torch.Tensor, torch.Tensor]:
+    def penetration(self, forces: ContactForces) -> tuple[torch.Tensor, torch.Tensor]:
         """Return the largest error of the contact condition, and its mean weighted by the load [mm].
 
         That is the mean gap of nodes under pressure, in magnitude, and the penetration of all others. Both are of
         shape (b,).
         """
-        off = torch.where(now.pressure > 0, now.gap.abs(), (-now.gap).clamp_min(0.0) * self.able[:, None])
-        load = now.pressure.abs() * self.area[:, None]
-        mean = (load * off).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
-        return off.amax(dim=0), mean
+        violation = torch.where(
+            forces.pressure > 0, forces.gap.abs(), (-forces.gap).clamp_min(0.0) * self.able[:, None]
+        )
+        load = forces.pressure.abs() * self.area[:, None]
+        mean = (load * violation).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
+        return violation.amax(dim=0), mean
 
-    def status(self, now: ContactForces, friction: torch.Tensor) -> torch.Tensor:
-        """Return what each node does, shape (s, b), int8: 0 is open, 1 sticks, 2 slips; ``friction``: shape (b,)."""
-        active = now.tangent.active.to(torch.int8)
+    def status(self, forces: ContactForces, friction: torch.Tensor) -> torch.Tensor:
+        """Return each node's status, shape (s, b), int8: 0 is open, 1 sticks, 2 slips; ``friction``: shape (b,)."""
+        active = forces.tangent.active.to(torch.int8)
         if not self.rough:
             return active
-        held = _HELD * friction * now.pressure.clamp_min(0.0)
-        return active + (torch.linalg.vector_norm(now.shear, dim=1) > held)
+        threshold = _HELD * friction * forces.pressure.clamp_min(0.0)
+        return active + (torch.linalg.vector_norm(forces.shear, dim=1) > threshold)
 
     def passed_through(self, u: torch.Tensor, pose: Pose, conditions: Conditions) -> torch.Tensor:
-        """Return in which members a point of the face lies above the shape, shape (b,), bool; ``u``: (n, 3, b)."""
+        """Return whether a point of the face is above the shape, shape (b,), bool; ``u``: (n, 3, b)."""
         above = torch.zeros(u.shape[2], dtype=torch.int32, device=u.device)
         members = kernel_data.member_data(conditions, pose)
         for distance, chosen in self.by_shape(conditions):
@@ -290,9 +292,9 @@ class ContactSurface:
             )
         return gap
 
-    def _zeros(self, like: torch.Tensor, *shape: int) -> torch.Tensor:
-        """Return zeros for every contact node of as many members as ``like`` has."""
-        return torch.zeros(self.count, *shape, like.shape[-1], dtype=torch.float64, device=like.device)
+    def _zeros(self, sample: torch.Tensor, *shape: int) -> torch.Tensor:
+        """Return zeros for every contact node of as many members as ``sample`` has."""
+        return torch.zeros(self.count, *shape, sample.shape[-1], dtype=torch.float64, device=sample.device)
 
 
 def face_quadrature(nodes: torch.Tensor, faces: torch.Tensor, subdivisions: int) -> tuple[torch.Tensor, torch.Tensor]:

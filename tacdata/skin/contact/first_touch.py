@@ -36,20 +36,20 @@ def _rotation(*degrees: float) -> np.ndarray:
 
 
 def rise(indenter: Indenter, turn: np.ndarray) -> float:
-    """Return how far the origin of a turned shape lies above its lowest point [mm], 0 or more.
+    """Return the height of a turned shape's origin above its lowest point [mm], 0 or more.
 
     Args:
         indenter: The shape.
         turn: Rotation to the sensor's frame, shape (3, 3).
     """
-    across, up = turn[2, :2], turn[2, 2]
-    if not np.abs(across).max() > 1e-12:
+    lateral, up = turn[2, :2], turn[2, 2]
+    if not np.abs(lateral).max() > 1e-12:
         return 0.0
     half, center, best = indenter.extent, np.zeros(2), 0.0
     for _ in range(_ZOOMS):
         samples = np.linspace(-half, half, _SAMPLES)
         x, y = np.meshgrid(center[0] + samples, center[1] + samples, indexing="ij")
-        height = across[0] * x + across[1] * y + up * indenter.profile(x, y)
+        height = lateral[0] * x + lateral[1] * y + up * indenter.profile(x, y)
         lowest = np.unravel_index(height.argmin(), height.shape)
         best = min(best, float(height[lowest]))
         center, half = np.array([x[lowest], y[lowest]]), half / _NARROWER
@@ -85,20 +85,20 @@ def reach(sensor: Sensor, request: PressRequest) -> tuple[float, float]:
     z = request.indenter.profile(x, y)
     local = np.stack([x, y, z])[:, np.isfinite(z)]
     place = turn @ local
-    there = [
+    heights = [
         np.clip(c + place[k], -h / 2, h / 2)
         for k, (c, h) in enumerate(((request.x, skin.size_x), (request.y, skin.size_y)))
     ]
-    here = float(skin.outer_height(request.x, request.y))
-    bottom = here + rise(request.indenter, turn) - deepest
-    within = bottom + place[2] <= skin.outer_height(*there)
+    height = float(skin.outer_height(request.x, request.y))
+    bottom = height + rise(request.indenter, turn) - deepest
+    within = bottom + place[2] <= skin.outer_height(*heights)
     if not within.any():
         return 0.0, 0.0
     return float(np.abs(place[0, within]).max()), float(np.abs(place[1, within]).max())
 
 
 def thickness_at(sensor: Sensor, request: PressRequest) -> float:
-    """Return the thickness of the skin under (x, y) [mm]: what a depth must stay below."""
+    """Return the thickness of the skin under (x, y) [mm], the upper limit of a depth."""
     skin = sensor.skin
     height = float(skin.outer_height(request.x, request.y))
     return min(skin.thickness, height) if skin.curved and skin.underside == "flat" else skin.thickness

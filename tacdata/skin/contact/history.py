@@ -1,4 +1,4 @@
-"""What contact remembers: where friction started from."""
+"""Memory of contact: the state from which friction started."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tacdata.skin.member.pose import Pose
 
 @dataclass(frozen=True)
 class ContactHistory(Columns):
-    """What one contact carries from one equilibrium to the next; s contact nodes, b batch members."""
+    """Memory of a contact from one equilibrium to the next; s contact nodes, b batch members."""
 
     anchor: torch.Tensor
     """Mean place of each hat in the shape's frame at the last equilibrium [mm], shape (s, 3, b)."""
@@ -24,7 +24,7 @@ class ContactHistory(Columns):
     place: torch.Tensor
     """Place of the shape at the last equilibrium [mm], shape (3, b)."""
 
-    def accept(self, now: ContactForces, pose: Pose, which: torch.Tensor) -> None:
+    def accept(self, forces: ContactForces, pose: Pose, which: torch.Tensor) -> None:
         """Make the present state of the members in ``which``, shape (b,), the one that friction starts from."""
-        gap = torch.where(now.pressure > 0, torch.zeros_like(now.gap), now.gap)
-        self.put_where(which, type(self)(now.local, now.shear, gap, pose.place))
+        gap = torch.where(forces.pressure > 0, torch.zeros_like(forces.gap), forces.gap)
+        self.put_where(which, type(self)(forces.local, forces.shear, gap, pose.place))

@@ -75,16 +75,16 @@ def friction_cone_projection(trial: wp.vec3d, limit: wp.float64, tangent: wp.flo
     """Map a trial shear traction back onto the disc of radius ``limit``.
 
     Returns:
-        The factor by which it is shortened, and the matrix that the stiffness of a slipping point lacks beside its
+        The factor by which it is shortened, and the matrix that the stiffness of a slipping point lacks, apart from its
         secant: that of the direction of slip, times ``tangent`` (0 for the secant, 1 for the tangent).
     """
     scale = wp.float64(1.0)
-    along = wp.mat33d()
+    derivative = wp.mat33d()
     size = wp.length(trial)
     if size > limit:
         scale = limit / size
-        along = (tangent / (size * size)) * wp.outer(trial, trial)
-    return scale, along
+        derivative = (tangent / (size * size)) * wp.outer(trial, trial)
+    return scale, derivative
 
 
 @wp.func
@@ -156,12 +156,12 @@ def gap_kernel(distance: wp.Function) -> wp.Kernel:
         u: wp.array3d(dtype=wp.float64),
         surface: SurfaceData,
         members: MemberData,
-        chosen: wp.array(dtype=wp.int32),
+        pressed_members: wp.array(dtype=wp.int32),
         gap: wp.array2d(dtype=wp.float64),
     ):
         """Add the share of one face to the mean gaps of its nodes, for one of the chosen members."""
         f, c = wp.tid()
-        b = chosen[c]
+        b = pressed_members[c]
         q = parameters_of(members.indenter, b)
         R = rotation_of(members.turn, b)
         tip = of_member(members.place, b)
@@ -188,7 +188,7 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
         u: wp.array3d(dtype=wp.float64),
         surface: SurfaceData,
         members: MemberData,
-        chosen: wp.array(dtype=wp.int32),
+        pressed_members: wp.array(dtype=wp.int32),
         pressure: wp.array2d(dtype=wp.float64),
         active: wp.array2d(dtype=wp.bool),
         force: wp.array3d(dtype=wp.float64),
@@ -204,7 +204,7 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
         4. If the shape is curved, how the force turns with the normal, symmetric: xx, yy, zz, xy, yz, xz.
         """
         f, c = wp.tid()
-        b = chosen[c]
+        b = pressed_members[c]
         some = wp.int32(0)
         values = Six()
         for a in range(6):
@@ -263,29 +263,29 @@ def friction(
     """Coulomb friction of one hat.
 
     1. Mean place of the hat in the shape's frame.
-    2. Trial shear: what was held, less the stiffness of sticking times the slip since.
+    2. Trial shear: the shear held before, less the stiffness of sticking times the slip since.
     3. Return mapping of the trial onto Coulomb's disc, whose radius is friction times the node's pressure.
     4. Force on the hat, and its stiffness, symmetric: xx, yy, zz, xy, yz, xz in the sensor's frame.
     """
     j, b = wp.tid()
     R = rotation_of(members.turn, b)
     tip = of_member(members.place, b)
-    now = wp.transpose(R) * (at_node(place, j, b) - tip)
+    place_now = wp.transpose(R) * (at_node(place, j, b) - tip)
     for i in range(3):
-        local[j, i, b] = now[i]
+        local[j, i, b] = place_now[i]
     coefficient = members.friction[b]
     if surface.rough == 0 or not active[j, b] or coefficient <= wp.float64(0.0):
         return
     n = wp.transpose(R) * at_node(normals, j, b)
     tangential = wp.identity(n=3, dtype=wp.float64) - wp.outer(n, n)
-    moved = wp.transpose(R) * (tip - of_member(history.place, b))
-    after = share_in_contact(history.gap[j, b], wp.dot(moved, n))
-    stick = surface.stick * members.modulus[b] * after
-    trial = tangential * (at_node(history.held, j, b) - stick * (now - at_node(history.anchor, j, b)))
-    scale, along = friction_cone_projection(
+    step = wp.transpose(R) * (tip - of_member(history.place, b))
+    share = share_in_contact(history.gap[j, b], wp.dot(step, n))
+    stick = surface.stick * members.modulus[b] * share
+    trial = tangential * (at_node(history.held, j, b) - stick * (place_now - at_node(history.anchor, j, b)))
+    scale, projection = friction_cone_projection(
         trial, coefficient * wp.max(pressure[j, b], wp.float64(0.0)), friction_tangent[b]
     )
-    D = (surface.area[j] * stick * scale) * (R * (tangential - along) * wp.transpose(R))
+    D = (surface.area[j] * stick * scale) * (R * (tangential - projection) * wp.transpose(R))
     trial = scale * trial
     total = surface.area[j] * (R * trial)
     for i in range(3):
@@ -307,7 +307,7 @@ def slip_kernel(real: type) -> wp.Kernel:
     def slip(stiffness: wp.array3d(dtype=wp.float64), slips: wp.array3d(dtype=real)):
         """Replace the slip of one hat [mm] by the force against it [N]."""
         j, b = wp.tid()
-        # One by one: names bound together stay tied to the array, and would follow what is written below.
+        # One by one: Warp names bound together refer to the array, and would change with the writes below.
         x = slips[j, 0, b]
         y = slips[j, 1, b]
         z = slips[j, 2, b]
@@ -343,14 +343,14 @@ def turn_kernel(real: type) -> wp.Kernel:
                 some = 1
         if some == 0:
             return
-        along, total = Values(), Values()
+        change, total = Values(), Values()
         for a in range(6):
             for i in range(3):
-                along[a, i] = p[faces[f, a], i, b]
+                change[a, i] = p[faces[f, a], i, b]
         for k in range(shapes.shape[0]):
             v = vec3()
             for a in range(6):
-                v += shapes[k, a] * vec3(along[a, 0], along[a, 1], along[a, 2])
+                v += shapes[k, a] * vec3(change[a, 0], change[a, 1], change[a, 2])
             xx, yy, zz = real(turn[f, k, 0, b]), real(turn[f, k, 1, b]), real(turn[f, k, 2, b])
             xy, yz, xz = real(turn[f, k, 3, b]), real(turn[f, k, 4, b]), real(turn[f, k, 5, b])
             r = vec3(

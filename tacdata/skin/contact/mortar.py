@@ -47,7 +47,7 @@ def _product(real: type) -> wp.Kernel:
 
 
 class _Rows:
-    """A sparse matrix as the kernel takes it; ``row`` says where each of its rows is added."""
+    """A sparse matrix for the kernel; ``row`` is the index at which each of its rows is added."""
 
     def __init__(self, matrix: sp.csr_matrix, row: np.ndarray, device: str) -> None:
         self._device, self._count = device, len(row)
@@ -89,10 +89,10 @@ class Mortar:
         """Contact node of each face's node, shape (f, 6)."""
         local = np.einsum("fk,kj,ka->fja", weights, hats, shapes)
         rows, columns = np.repeat(self.slots, 6, axis=1).ravel(), np.tile(faces, (1, 6)).ravel()
-        whole = sp.csr_matrix(sp.coo_matrix((local.ravel(), (rows, columns)), shape=(len(self.nodes), nodes)))
-        self.area = np.asarray(whole.sum(axis=1), dtype=np.float64).ravel()
+        matrix = sp.csr_matrix(sp.coo_matrix((local.ravel(), (rows, columns)), shape=(len(self.nodes), nodes)))
+        self.area = np.asarray(matrix.sum(axis=1), dtype=np.float64).ravel()
         """Area of each hat, undeformed [mm^2], shape (s,)."""
-        self.mean = sp.csr_matrix(sp.diags_array(1 / self.area) @ whole)
+        self.mean = sp.csr_matrix(sp.diags_array(1 / self.area) @ matrix)
         """Mean over each hat of a field on the mesh's nodes [1], shape (s, n)."""
         back = sp.csr_matrix(self.mean.T)[self.nodes]
         self._down = _Rows(self.mean, np.arange(len(self.nodes)), device)

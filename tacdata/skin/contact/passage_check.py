@@ -2,9 +2,9 @@
 
 A point that a long step carries past the middle of a thin shape is pushed out above it. There is an equilibrium there
 too, or no contact at all, with a wrong surface. So from every point of the face a ray is cast downward. Where it meets
-the shape, the point lies above it.
+the shape, the point is above it.
 
-A flank that leans lies below points, too, but grazes their rays: under a lean of 30 degrees, the most that is allowed,
+A leaning flank is below points, too, but grazes their rays: under a lean of 30 degrees, the most that is allowed,
 a ray is never deeper in the shape than half of its own length.
 """
 
@@ -36,7 +36,7 @@ def passage_kernel(distance: wp.Function) -> wp.Kernel:
         chosen: wp.array(dtype=wp.int32),
         above: wp.array(dtype=wp.int32),
     ):
-        """Mark a chosen member one of whose points of one face lies above the shape."""
+        """Mark a chosen member if a point of a face is above its shape."""
         f, c = wp.tid()
         b = chosen[c]
         q = parameters_of(members.indenter, b)
@@ -46,11 +46,11 @@ def passage_kernel(distance: wp.Function) -> wp.Kernel:
             point = deformed_point(u, surface, f, k, b, members.thickness[b]) - tip
             height = point[2]
             if height > wp.float64(0.0) and above[b] == 0:
-                off = distance(wp.transpose(R) * point, q)
+                gap = distance(wp.transpose(R) * point, q)
                 # A ray gets nearer to the shape by no more than its own length.
-                if off < (wp.float64(1.0) - _STEEPEST) * height:
+                if gap < (wp.float64(1.0) - _STEEPEST) * height:
                     # Between nodes the face dips into the shape by some micrometres: that is where the ray begins.
-                    begin = wp.min(off, wp.float64(0.0))
+                    begin = wp.min(gap, wp.float64(0.0))
                     for i in range(_SAMPLES):
                         length = height * (wp.float64(i) + wp.float64(1.0)) / wp.float64(_SAMPLES)
                         on_ray = wp.transpose(R) * wp.vec3d(point[0], point[1], height - length)

@@ -10,7 +10,7 @@ from tacdata.skin.contact.first_touch import reach, thickness_at
 from tacdata.skin.press import PressRequest
 
 _STEEPEST = 30.0
-"""Largest tilt [deg]; beyond, the depth of the lowest point says little of a press."""
+"""Largest tilt [deg]; beyond, the depth of the lowest point does not describe a press."""
 
 
 def check_press(request: PressRequest, sensor: Sensor) -> None:
@@ -55,14 +55,14 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
             "reduce the depth, or give a mesh of the shape with its holder",
         )
     half_x, half_y = reach(sensor, request)
-    over = [
+    excess = [
         abs(place) + half - size / 2
         for place, half, size in zip((request.x, request.y), (half_x, half_y), (skin.size_x, skin.size_y), strict=True)
     ]
-    if "sides" in sensor.contact.bonded and max(over) > 0 and max(request.depths) > 0:
+    if "sides" in sensor.contact.bonded and max(excess) > 0 and max(request.depths) > 0:
         raise SolveError(
             f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm, {max(request.depths):g} mm deep, reaches "
-            f"{max(over):.2f} mm over the rim, which is bonded to the frame",
+            f"{max(excess):.2f} mm over the rim, which is bonded to the frame",
             f"a footprint of {half_x:.2f} x {half_y:.2f} mm around the press inside the rim",
             "move the press inward, press less deep, or describe another bonding in the sensor file",
         )

@@ -1,4 +1,4 @@
-"""How the faces that are held move if what holds them gives way a little.
+"""Motion of the held faces if their support gives way a little.
 
 A bond of compliance c [mm/MPa] lets a held face move by u = -c t, with t the traction that it exerts on the skin. A
 film of glue of thickness h and stiffness M has c = h / M (Goland and Reissner, J. Appl. Mech. 11 (1944) A17). Held
@@ -57,7 +57,9 @@ class Bonding:
         result = torch.zeros_like(reaction)
         if self._solve:
             b = reaction.shape[2]
-            given = reaction.cpu().numpy()[self._nodes].reshape(len(self._nodes), 3 * b)
-            moved = -self._solve(np.ascontiguousarray(given)).reshape(len(self._nodes), 3, b)
-            result[torch.as_tensor(self._nodes, device=result.device)] = torch.as_tensor(moved, device=result.device)
+            load = reaction.cpu().numpy()[self._nodes].reshape(len(self._nodes), 3 * b)
+            displacement = -self._solve(np.ascontiguousarray(load)).reshape(len(self._nodes), 3, b)
+            result[torch.as_tensor(self._nodes, device=result.device)] = torch.as_tensor(
+                displacement, device=result.device
+            )
         return result

@@ -29,7 +29,7 @@ class ConditionsChange(Columns):
     """Directions in which conditions and the indenter's pose change, one a member."""
 
     conditions: Conditions
-    """Changes of law [as the law says], modulus [MPa], thickness [1], friction [1] and indenter [mm, rad]."""
+    """Changes of law [units of the law], modulus [MPa], thickness [1], friction [1] and indenter [mm, rad]."""
     pose: Pose
     """Changes of place [mm] and turn [1]."""
 
@@ -82,7 +82,7 @@ def contact_change(
     pressure: torch.Tensor,
     change: ConditionsChange,
     history: ContactHistory,
-    whole: bool = True,
+    full: bool = True,
 ) -> ContactChange:
     """Return how a contact changes along directions, at fixed status of its nodes.
 
@@ -95,26 +95,26 @@ def contact_change(
         pressure: Change of the normal traction at the nodes [MPa], shape (s, c); that of open ones is taken as 0.
         change: Change of conditions and pose.
         history: Change of the history.
-        whole: Whether gaps of open nodes are asked for, too; else those far from contact are 0.
+        full: Whether gaps of open nodes are asked for, too; else those far from contact are 0.
     """
     count, c = surface.count, du.shape[2]
 
     def zeros(*shape: int) -> torch.Tensor:
         return torch.zeros(count, *shape, c, dtype=torch.float64, device=u.device)
 
-    moved = du.clone()
-    # A thicker slab lifts what lies above z = 0.
-    moved[:, 2] += wp.to_torch(surface.data.nodes)[:, 2:].clamp_min(0.0) * change.conditions.thickness[:c]
-    now = point.now
-    active = now.tangent.active
+    displacement = du.clone()
+    # A thicker slab lifts everything above z = 0.
+    displacement[:, 2] += wp.to_torch(surface.data.nodes)[:, 2:].clamp_min(0.0) * change.conditions.thickness[:c]
+    forces = point.now
+    active = forces.tangent.active
     pressure = torch.where(active[:, :c], pressure, 0.0)
     members, d_members = member_data(conditions, point.pose), member_data(change.conditions, change.pose)
-    carried = argument(now.pressure), argument(pressure), argument(active)
-    force, gap, mean, d_mean = torch.zeros_like(moved), zeros(), zeros(3), zeros(3)
+    carried = argument(forces.pressure), argument(pressure), argument(active)
+    force, gap, mean, d_mean = torch.zeros_like(displacement), zeros(), zeros(3), zeros(3)
     wp.launch(
         normal_change_kernel(surface.only),
         dim=(len(surface.faces), c),
-        inputs=[argument(u), argument(moved), surface.data, members, d_members, *carried, int(whole)],
+        inputs=[argument(u), argument(displacement), surface.data, members, d_members, *carried, int(full)],
         outputs=[argument(value) for value in (gap, force, mean, d_mean)],
         device=surface.device,
     )
@@ -123,8 +123,8 @@ def contact_change(
         friction_change,
         dim=(count, c),
         inputs=[
-            argument(now.local),
-            argument(surface.mortar.means(moved)),
+            argument(forces.local),
+            argument(surface.mortar.means(displacement)),
             surface.data,
             members,
             d_members,

@@ -20,22 +20,22 @@ from tacdata.skin.contact.kernels import (
 
 
 @wp.func
-def point_change(moved: wp.array3d(dtype=wp.float64), surface: SurfaceData, f: int, k: int, b: int):
-    """Return the change of `deformed_point` [mm]; ``moved`` holds that of the nodes' places."""
+def point_change(displacement: wp.array3d(dtype=wp.float64), surface: SurfaceData, f: int, k: int, b: int):
+    """Return the change of `deformed_point` [mm]; ``displacement`` holds that of the nodes' places."""
     dx = wp.vec3d()
     for a in range(6):
         n = surface.faces[f, a]
-        dx += surface.shapes[k, a] * wp.vec3d(moved[n, 0, b], moved[n, 1, b], moved[n, 2, b])
+        dx += surface.shapes[k, a] * wp.vec3d(displacement[n, 0, b], displacement[n, 1, b], displacement[n, 2, b])
     return dx
 
 
 @wp.func
-def share_change(before: wp.float64, d_before: wp.float64, approach: wp.float64, d_approach: wp.float64):
+def share_change(gap: wp.float64, d_gap: wp.float64, approach: wp.float64, d_approach: wp.float64):
     """Return the change of `share_in_contact` [1]."""
     change = wp.float64(0.0)
-    if before > wp.float64(0.0):
-        if approach > before:
-            change = (before * d_approach / approach - d_before) / approach
+    if gap > wp.float64(0.0):
+        if approach > gap:
+            change = (gap * d_approach / approach - d_gap) / approach
     return change
 
 
@@ -45,10 +45,10 @@ def return_mapping_change(trial: wp.vec3d, d_trial: wp.vec3d, limit: wp.float64,
     shear, change = trial, d_trial
     size = wp.length(trial)
     if size > limit:
-        along = trial / size
-        across = d_trial - along * wp.dot(along, d_trial)
-        shear = limit * along
-        change = d_limit * along + (limit / size) * across
+        direction = trial / size
+        transverse = d_trial - direction * wp.dot(direction, d_trial)
+        shear = limit * direction
+        change = d_limit * direction + (limit / size) * transverse
     return shear, change
 
 
@@ -60,14 +60,14 @@ def turn_of_normal_function(distance: wp.Function) -> wp.Function:
     @wp.func
     def turn_of_normal(p: wp.vec3d, dp: wp.vec3d, q: Parameters, dq: Parameters):
         # Far above the rounding of the normal (4e-10), far below any radius of curvature.
-        step, least = wp.float64(1.0e-4), wp.float64(1.0e-30)
+        step, smallest = wp.float64(1.0e-4), wp.float64(1.0e-30)
         result = wp.vec3d()
         size = wp.length(dp)
-        if size > least:
+        if size > smallest:
             e = step / size
             result += (normal(p + e * dp, q) - normal(p - e * dp, q)) / (wp.float64(2.0) * e)
         size = wp.length(dq)
-        if size > least:
+        if size > smallest:
             e = step / size
             result += (normal(p, q + e * dq) - normal(p, q - e * dq)) / (wp.float64(2.0) * e)
         return result
@@ -100,14 +100,14 @@ def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def change(
         u: wp.array3d(dtype=wp.float64),
-        moved: wp.array3d(dtype=wp.float64),
+        displacement: wp.array3d(dtype=wp.float64),
         surface: SurfaceData,
         members: MemberData,
         d_members: MemberData,
         pressure: wp.array2d(dtype=wp.float64),
         d_pressure: wp.array2d(dtype=wp.float64),
         active: wp.array2d(dtype=wp.bool),
-        whole: int,
+        full: int,
         d_gap: wp.array2d(dtype=wp.float64),
         d_force: wp.array3d(dtype=wp.float64),
         mean: wp.array3d(dtype=wp.float64),
@@ -129,7 +129,7 @@ def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
                 some = 1
                 values[a] = pressure[j, b]
                 d_values[a] = d_pressure[j, b]
-        if some == 0 and whole == 0:
+        if some == 0 and full == 0:
             return
         q, dq = parameters_of(members.indenter, b), parameters_of(d_members.indenter, b)
         R, dR = rotation_of(members.turn, b), rotation_of(d_members.turn, b)
@@ -139,7 +139,7 @@ def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
             w = surface.weights[f, k]
             x = deformed_point(u, surface, f, k, b, members.thickness[b]) - tip
             local = wp.transpose(R) * x
-            moves = wp.transpose(R) * (point_change(moved, surface, f, k, b) - d_tip) + wp.transpose(dR) * x
+            moves = wp.transpose(R) * (point_change(displacement, surface, f, k, b) - d_tip) + wp.transpose(dR) * x
             n = normal(local, q)
             dg = gap_change(local, moves, n, q, dq)
             for a in range(6):
@@ -198,8 +198,8 @@ def friction_change(
     zero = wp.float64(0.0)
     R, dR = rotation_of(members.turn, b), rotation_of(d_members.turn, b)
     tip, d_tip = of_member(members.place, b), of_member(d_members.place, b)
-    now = at_node(local, j, b)
-    moves = wp.transpose(R) * (at_node(d_place, j, b) - d_tip) + wp.transpose(dR) * (R * now)
+    place = at_node(local, j, b)
+    moves = wp.transpose(R) * (at_node(d_place, j, b) - d_tip) + wp.transpose(dR) * (R * place)
     for i in range(3):
         d_local[j, i, b] = moves[i]
     coefficient = members.friction[b]
@@ -210,16 +210,16 @@ def friction_change(
     n = mean_normal / length
     dn = (turns - n * wp.dot(n, turns)) / length
     step = tip - of_member(history.place, b)
-    moved = wp.transpose(R) * step
+    slip = wp.transpose(R) * step
     d_moved = wp.transpose(dR) * step + wp.transpose(R) * (d_tip - of_member(d_history.place, b))
-    before, approach = history.gap[j, b], wp.dot(moved, n)
-    d_approach = wp.dot(d_moved, n) + wp.dot(moved, dn)
-    after = share_in_contact(before, approach)
-    d_after = share_change(before, d_history.gap[j, b], approach, d_approach)
+    gap, approach = history.gap[j, b], wp.dot(slip, n)
+    d_approach = wp.dot(d_moved, n) + wp.dot(slip, dn)
+    share = share_in_contact(gap, approach)
+    d_after = share_change(gap, d_history.gap[j, b], approach, d_approach)
     stick, d_stick = surface.stick * members.modulus[b], surface.stick * d_members.modulus[b]
-    slid, d_slid = now - at_node(history.anchor, j, b), moves - at_node(d_history.anchor, j, b)
-    w = at_node(history.held, j, b) - stick * after * slid
-    dw = at_node(d_history.held, j, b) - stick * after * d_slid - (stick * d_after + d_stick * after) * slid
+    slid, d_slid = place - at_node(history.anchor, j, b), moves - at_node(d_history.anchor, j, b)
+    w = at_node(history.held, j, b) - stick * share * slid
+    dw = at_node(d_history.held, j, b) - stick * share * d_slid - (stick * d_after + d_stick * share) * slid
     trial = w - n * wp.dot(n, w)
     d_trial = dw - dn * wp.dot(n, w) - n * (wp.dot(dn, w) + wp.dot(n, dw))
     limit, d_limit = zero, zero

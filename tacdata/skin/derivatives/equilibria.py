@@ -45,7 +45,7 @@ Slack = Callable[[torch.Tensor], torch.Tensor]
 class _Point:
     """A state at which derivatives are taken, repeated for every direction.
 
-    What is solved for stands in one field, shape (3n + s, 1, c): displacements, then the normal forces of all contact
+    The unknowns form one field, shape (3n + s, 1, c): displacements, then the normal forces of all contact
     nodes over Young's modulus times 1 mm. Residuals likewise: forces, then mean gaps times Young's modulus times 1 mm.
     So both parts of a field have one unit and nearly one size.
     """
@@ -64,19 +64,19 @@ class _Point:
         du: torch.Tensor,
         pressures: Sequence[torch.Tensor],
         history: tuple[ContactHistory, ...],
-        whole: bool = True,
+        full: bool = True,
     ) -> list[ContactChange]:
         """Return each contact's change along the directions, with displacements, pressures and history.
 
-        Without ``whole`` gaps far from contact are left out.
+        Without ``full`` gaps far from contact are left out.
         """
-        return [self._change(k, du, pressures[k], self.along[k], past, whole) for k, past in enumerate(history)]
+        return [self._change(k, du, pressures[k], self.along[k], past, full) for k, past in enumerate(history)]
 
     def product(self, du: torch.Tensor, pressures: Sequence[torch.Tensor]) -> list[ContactChange]:
         """Return each contact's change with displacements and pressures alone."""
         return [
-            self._change(k, du, pressures[k], along.zeros(), history.zeros(), whole=False)
-            for k, (along, history) in enumerate(zip(self.along, self.at.histories, strict=True))
+            self._change(k, du, pressures[k], change.zeros(), history.zeros(), full=False)
+            for k, (change, history) in enumerate(zip(self.along, self.at.histories, strict=True))
         ]
 
     def joined(self, du: torch.Tensor, pressures: Sequence[torch.Tensor]) -> torch.Tensor:
@@ -101,8 +101,8 @@ class _Point:
     def residual(self, force: torch.Tensor, changes: Sequence[ContactChange]) -> torch.Tensor:
         """Return forces [N] and the changes of active nodes' gaps as one field."""
         gaps = [
-            torch.where(now.tangent.active[:, :1], change.gap, 0.0) * self.modulus
-            for now, change in zip(self.now, changes, strict=True)
+            torch.where(forces.tangent.active[:, :1], change.gap, 0.0) * self.modulus
+            for forces, change in zip(self.now, changes, strict=True)
         ]
         return torch.cat([force.reshape(-1, force.shape[2]), *gaps])[:, None]
 
@@ -111,13 +111,13 @@ class _Point:
         k: int,
         du: torch.Tensor,
         pressure: torch.Tensor,
-        along: ConditionsChange,
+        direction: ConditionsChange,
         history: ContactHistory,
-        whole: bool = True,
+        full: bool = True,
     ) -> ContactChange:
         at = self.at
         point = ContactPoint(at.poses[k], at.histories[k], self.now[k])
-        return contact_change(self.surfaces[k], at.u, at.conditions, point, du, pressure, along, history, whole)
+        return contact_change(self.surfaces[k], at.u, at.conditions, point, du, pressure, direction, history, full)
 
 
 class PathDerivatives:
@@ -126,7 +126,7 @@ class PathDerivatives:
     def __init__(
         self,
         newton: Newton,
-        free: torch.Tensor,
+        unfixed: torch.Tensor,
         label: str,
         tolerance: float = TOLERANCE,
         slack: Slack | None = None,
@@ -136,7 +136,7 @@ class PathDerivatives:
 
         Args:
             newton: That solved the path, or one like it.
-            free: 1 for nodes that are not held, else 0, shape (n, 1, 1).
+            unfixed: 1 for nodes that are not held, else 0, shape (n, 1, 1).
             label: The press in words, for errors.
             tolerance: Error of the linear solves [1].
             slack: How held nodes move with each parameter [mm over its unit], of the reactions [N], shapes (n, 3, p);
@@ -144,13 +144,13 @@ class PathDerivatives:
             weight: Of each parameter, shape (p,), where errors of all add up (`KrylovSpace.solve`).
         """
         self._tolerance, self._slack, self._newton = tolerance, slack, newton
-        self._free, self._label, self._weight = free, label, weight
+        self._free, self._label, self._weight = unfixed, label, weight
         self.du = torch.empty(0)
         """Of the displacements [mm over the parameter's unit], shape (n, 3, p)."""
         self.changes: list[ContactChange] = []
         """Of each contact."""
         self.error = 0.0
-        """Largest error of the linear solves so far, over what they found [1]."""
+        """Largest relative error of the linear solves so far [1]."""
         self.products = 0
         """Products with the tangent so far, for benchmarks."""
         self._history: tuple[ContactHistory, ...] = ()
@@ -161,33 +161,33 @@ class PathDerivatives:
 
         Args:
             reached: The equilibrium, of one member.
-            along: What a unit of each parameter changes there, for the indenter.
+            along: Change of the indenter there by a unit of each parameter.
 
         Raises:
             SolveError: If a linear solve does not converge.
         """
         newton, count = self._newton, along.pose.place.shape[1]
-        one = replace(reached, friction_tangent=torch.ones_like(reached.friction_tangent))
-        contacts = newton.residual(one).contacts
+        unlimited = replace(reached, friction_tangent=torch.ones_like(reached.friction_tangent))
+        contacts = newton.residual(unlimited).contacts
         still = replace(along, pose=along.pose.zeros())
         directions = (along, *[still] * (len(newton.surfaces) - 1))
-        now = tuple(contact.repeat(count) for contact in contacts)
-        modulus = float(one.conditions.modulus[0])
-        point = _Point(newton.surfaces, one.repeat(count), now, directions, modulus)
-        pressures = [torch.zeros_like(contact.pressure) for contact in now]
+        forces = tuple(contact.repeat(count) for contact in contacts)
+        modulus = float(unlimited.conditions.modulus[0])
+        point = _Point(newton.surfaces, unlimited.repeat(count), forces, directions, modulus)
+        pressures = [torch.zeros_like(contact.pressure) for contact in forces]
         if not self._history:
             self.du = torch.zeros_like(point.at.u)
             self._history = tuple(history.zeros() for history in point.at.histories)
         else:
-            turns = [pose.turn for pose in one.poses]
+            turns = [pose.turn for pose in unlimited.poses]
             preconditioner = StatePreconditioner(
-                newton.preconditioner.rest, newton.surfaces, contacts, one.conditions.friction, turns
+                newton.preconditioner.rest, newton.surfaces, contacts, unlimited.conditions.friction, turns
             )
             pressures = self._solve(point, preconditioner, self._held(point))
         self.changes = point.changes(self.du, pressures, self._history)
         self._history = tuple(
-            change.accepted(contact.pressure > 0, own.pose.place.clone())
-            for change, contact, own in zip(self.changes, now, point.along, strict=True)
+            change.accepted(contact.pressure > 0, conditions.pose.place.clone())
+            for change, contact, conditions in zip(self.changes, forces, point.along, strict=True)
         )
 
     def _held(self, point: _Point) -> torch.Tensor:
@@ -199,10 +199,10 @@ class PathDerivatives:
         self._newton.add_contact_forces(point.at, external)
         return self._slack((internal - external) * (1 - self._free))
 
-    def _solve(self, point: _Point, preconditioner: StatePreconditioner, held: torch.Tensor) -> list[torch.Tensor]:
-        """Find du, at held nodes ``held``, and return the changes of the pressures."""
-        body, free, at = self._newton.body, self._free, point.at
-        known: dict[tuple[int, torch.dtype], tuple[torch.Tensor, Conditions, torch.Tensor | None]] = {}
+    def _solve(self, point: _Point, preconditioner: StatePreconditioner, bonding: torch.Tensor) -> list[torch.Tensor]:
+        """Find du, at held nodes ``bonding``, and return the changes of the pressures."""
+        body, unfixed, at = self._newton.body, self._free, point.at
+        points: dict[tuple[int, torch.dtype], tuple[torch.Tensor, Conditions, torch.Tensor | None]] = {}
         if self._prepared:
             first = torch.zeros(1, dtype=torch.long)
             self._prepared.update_one(at.u[:, :, :1].to(_WORK), at.conditions.take(first).to(_WORK), at.u.shape[2])
@@ -214,13 +214,13 @@ class PathDerivatives:
             if self._prepared and field.dtype == _WORK:
                 self._prepared.add_product(du.to(_WORK), torch.arange(key[0]), internal)
             else:
-                if key not in known:
-                    u, own = at.u[:, :, : key[0]].to(key[1]).contiguous(), at.conditions.to(key[1])
-                    known[key] = u, own, body.dilatation(u, own)
-                u, own, dilatation = known[key]
-                body.tangent_product(u, du.to(key[1]), own, internal, dilatation)
+                if key not in points:
+                    u, conditions = at.u[:, :, : key[0]].to(key[1]).contiguous(), at.conditions.to(key[1])
+                    points[key] = u, conditions, body.dilatation(u, conditions)
+                u, conditions, dilatation = points[key]
+                body.tangent_product(u, du.to(key[1]), conditions, internal, dilatation)
             changes = point.product(du, pressures)
-            return point.residual((internal - _force(changes)) * free, changes)
+            return point.residual((internal - _force(changes)) * unfixed, changes)
 
         def precondition(field: torch.Tensor) -> torch.Tensor:
             force, gaps = point.halves(field)
@@ -228,22 +228,22 @@ class PathDerivatives:
             return torch.cat([z, normal / point.modulus])[:, None]
 
         none = [torch.zeros_like(contact.pressure) for contact in point.now]
-        still = point.changes(torch.zeros_like(at.u), none, self._history, whole=False)
-        rhs = -point.residual((self._internal(point) - _force(still)) * free, still)
+        still = point.changes(torch.zeros_like(at.u), none, self._history, full=False)
+        rhs = -point.residual((self._internal(point) - _force(still)) * unfixed, still)
         if self._slack:
-            rhs -= product(point.joined(held, none))
-        before = [
-            torch.where(own.tangent.active, change.pressure, 0.0)
-            for own, change in zip(point.now, self.changes, strict=True)
+            rhs -= product(point.joined(bonding, none))
+        guesses = [
+            torch.where(conditions.tangent.active, change.pressure, 0.0)
+            for conditions, change in zip(point.now, self.changes, strict=True)
         ]
-        guess = point.joined(self.du * free, before)
-        found = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance, weight=self._weight)
-        du, pressures = point.parted(found.x)
-        self.du, self.products = du + held, self.products + found.products
-        self.error = max(self.error, float(found.error.max()))
+        guess = point.joined(self.du * unfixed, guesses)
+        solution = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance, weight=self._weight)
+        du, pressures = point.parted(solution.x)
+        self.du, self.products = du + bonding, self.products + solution.products
+        self.error = max(self.error, float(solution.error.max()))
         if not self.error <= self._tolerance:
             raise SolveError(
-                f"{self._label}: derivatives with an error of {self.error:.1e} after {found.products} products",
+                f"{self._label}: derivatives with an error of {self.error:.1e} after {solution.products} products",
                 f"at most {self._tolerance:g}",
                 "press less deep, or refine the mesh",
             )
@@ -251,16 +251,20 @@ class PathDerivatives:
 
     def _internal(self, point: _Point) -> torch.Tensor:
         """Return the change of internal forces [N] with law and thickness at fixed displacements, shape (n, 3, p)."""
-        own, along = point.at.conditions, point.along[0].conditions
-        share = (along.law / torch.where(own.law != 0, own.law, 1.0)).abs().amax(dim=0)
-        share = share.maximum((along.thickness / own.thickness).abs())
+        conditions, directions = point.at.conditions, point.along[0].conditions
+        share = (directions.law / torch.where(conditions.law != 0, conditions.law, 1.0)).abs().amax(dim=0)
+        share = share.maximum((directions.thickness / conditions.thickness).abs())
         change, moves = torch.zeros_like(point.at.u), (share > 0).nonzero()[:, 0]
         if not len(moves):
             return change
         step, u = _LAW_STEP / share[moves], point.at.u.index_select(2, moves)
-        own, along = own.take(moves), along.take(moves)
+        conditions, directions = conditions.take(moves), directions.take(moves)
         ends = [
-            replace(own, law=own.law + e * along.law, thickness=own.thickness + e * along.thickness)
+            replace(
+                conditions,
+                law=conditions.law + e * directions.law,
+                thickness=conditions.thickness + e * directions.thickness,
+            )
             for e in (step, -step)
         ]
         upper, lower = (self._newton.body.internal_force(u, end)[0] for end in ends)

@@ -1,4 +1,4 @@
-"""The parameters that a press can be differentiated by, and what each of them moves."""
+"""The parameters that a press can be differentiated by, and the quantities that each of them moves."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ UNITS = {
 - yaw, tilt_x, tilt_y: rotation about the indenter's own axis, then about the sensor's x and y, at its origin.
 - thickness: of the slab. The depth still counts from the outer face, so that the indenter rises with it. For an
   indenter that stays in place, subtract the derivative by z.
-- bonding: compliance of what holds the held faces (`tacdata.skin.derivatives.bonding`), 0 in the model."""
+- bonding: compliance of the support of held faces (`tacdata.skin.derivatives.bonding`), 0 in the model."""
 
 _STEP = 1e-5
 """Step of the central differences that turn a parameter into the numbers of a law or a shape, over its size [1]."""
@@ -81,7 +81,7 @@ def check(sensor: Sensor, indenter: Indenter, parameters: list[str]) -> None:
 def directions(
     sensor: Sensor, indenter: Indenter, parameters: list[str], own: Conditions, touch: Pose
 ) -> ConditionsChange:
-    """Return what a unit of each parameter changes, one column a parameter.
+    """Return the change by a unit of each parameter, one column a parameter.
 
     Args:
         sensor: Its material.
@@ -125,7 +125,7 @@ def _turning(name: str, turn: torch.Tensor) -> torch.Tensor:
     if name == "yaw":
         return turn @ _cross(axis.to(turn))
     if name == "tilt_y":
-        # About the y axis as the tilt about x leaves it; the shape's axis (third column) says that tilt.
+        # About the y axis after the tilt about x, which the shape's axis (third column) gives.
         lean = torch.atan2(-turn[1, 2], turn[2, 2])
         axis = float(axis[1]) * torch.stack([torch.zeros_like(lean), torch.cos(lean), torch.sin(lean)])
     return _cross(axis.to(turn)) @ turn

@@ -38,7 +38,7 @@ _STEEPER = 2.0
 height and thickness are 1 under the tip and less elsewhere."""
 
 _BESIDE = 0.02
-"""How far beside a pixel's centre its slope is taken [mm]: a punch's edge is steep within a part of a pixel."""
+"""Distance from a pixel's centre at which its slope is taken [mm]: a punch's edge is steep within part of a pixel."""
 
 _TOLERANCE = 1e-2
 """Error of the derivatives' linear solves, over the largest change that one of the spreads makes [1].
@@ -69,7 +69,7 @@ def spreads_of(sensor: Sensor, indenter: Indenter) -> dict[str, float]:
 
 
 def check_spreads(sensor: Sensor, indenter: Indenter) -> None:
-    """Refuse spreads of what no press on this skin has; sizes of indenters are passed over.
+    """Refuse spreads of parameters that no press on this skin has; sizes of indenters are ignored.
 
     Raises:
         UsageError: Naming them.
@@ -97,7 +97,7 @@ def with_uncertainty(
         model: That solved it; its companion is taken where there is one.
         request: The press.
         solution: Its states, at the depths of ``request`` or more.
-        coarse: What the companion found of the press (`SkinModel.solve_coarsely`); its states are taken from there if
+        coarse: The companion's result of the press (`SkinModel.solve_coarsely`); its states are taken from there if
             it kept them.
     """
     spreads = spreads_of(model.sensor, request.indenter)
@@ -105,7 +105,7 @@ def with_uncertainty(
         return _noted(solution, {"spreads": spreads, "remark": "no spreads stated" if not spreads else "no contact"})
     remarks = []
     cheapest = model.companion or model
-    # A path that ends early is tried again by itself: then it says why.
+    # A path that ends early is tried again alone: its error then gives the reason.
     passages = coarse.passages if coarse and len(coarse.passages) == len(loading(request).depths) else None
     ways: list[tuple[str, SkinModel, Callable[..., _Found]]] = [
         ("first_order", cheapest, lambda on, press, own: _first_order(on, press, own, passages)),
@@ -114,12 +114,12 @@ def with_uncertainty(
     ]
     for name, on, way in ways:
         try:
-            found = way(on, loading(request), spreads)
+            spread = way(on, loading(request), spreads)
         except SolveError as error:
             remarks.append(f"{name} on {len(on.mesh.nodes)} nodes: {error.given}")
             continue
         how = {"mesh": on.mesh.content_hash, "method": name, "remark": "; ".join(remarks)}
-        return _noted(replace(solution, **_along(solution.depth, found)), {"spreads": spreads, **how})
+        return _noted(replace(solution, **_along(solution.depth, spread)), {"spreads": spreads, **how})
     return _noted(solution, {"spreads": spreads, "remark": "not found: " + "; ".join(remarks)})
 
 
@@ -132,7 +132,7 @@ def _first_order(
         SolveError: If they are not found, or are much steeper than the map. Where a sharp tip is about to slip on a
             coarse mesh, they hold for next to no change.
     """
-    found = []
+    spreads_found = []
     found_by = sensitivities(model, request, list(spreads), _TOLERANCE, passages, list(spreads.values()))
     for depth, state, sensitivity in found_by:
         steep = _STEEPER * max(_slope(model, state.displacement), 0.5)
@@ -147,8 +147,8 @@ def _first_order(
                     f"at most {limit:.1f}",
                     "sample whole presses",
                 )
-        found.append((depth, propagate(sensitivity, spreads)))
-    return found
+        spreads_found.append((depth, propagate(sensitivity, spreads)))
+    return spreads_found
 
 
 def _slope(model: SkinModel, displacement: np.ndarray) -> float:
@@ -158,8 +158,8 @@ def _slope(model: SkinModel, displacement: np.ndarray) -> float:
     def height(x: float, y: float) -> np.ndarray:
         return model.skin.face.depth_map(grid.x + x, grid.y + y, displacement)
 
-    along = [height(_BESIDE, 0.0) - height(-_BESIDE, 0.0), height(0.0, _BESIDE) - height(0.0, -_BESIDE)]
-    return float(np.abs(along).max()) / (2 * _BESIDE)
+    slopes = [height(_BESIDE, 0.0) - height(-_BESIDE, 0.0), height(0.0, _BESIDE) - height(0.0, -_BESIDE)]
+    return float(np.abs(slopes).max()) / (2 * _BESIDE)
 
 
 def _sampled(model: SkinModel, request: PressRequest, spreads: dict[str, float]) -> _Found:
@@ -167,17 +167,17 @@ def _sampled(model: SkinModel, request: PressRequest, spreads: dict[str, float])
     return sampled_spread(model, request, spreads, _SAMPLES, capacity=4)
 
 
-def _along(depth: np.ndarray, found: _Found) -> dict[str, np.ndarray]:
+def _along(depth: np.ndarray, spread: _Found) -> dict[str, np.ndarray]:
     """Return the standard deviations at all states [mm or N], between those of loading linearly in depth, 0 at 0."""
-    known_at = np.array([0.0, *(at for at, _ in found)])
-    after = np.clip(np.searchsorted(known_at, depth - 1e-9), 1, len(known_at) - 1)
-    share = np.clip((depth - known_at[after - 1]) / (known_at[after] - known_at[after - 1]), 0.0, 1.0)
+    known_at = np.array([0.0, *(at for at, _ in spread)])
+    upper = np.clip(np.searchsorted(known_at, depth - 1e-9), 1, len(known_at) - 1)
+    share = np.clip((depth - known_at[upper - 1]) / (known_at[upper] - known_at[upper - 1]), 0.0, 1.0)
     result = {}
     for field in fields(Uncertainty):
-        values = np.array([getattr(part, field.name) for _, part in found])
+        values = np.array([getattr(part, field.name) for _, part in spread])
         values = np.concatenate([np.zeros_like(values[:1]), values])
         weight = share.reshape(-1, *[1] * (values.ndim - 1))
-        result[_NAMES[field.name]] = (1 - weight) * values[after - 1] + weight * values[after]
+        result[_NAMES[field.name]] = (1 - weight) * values[upper - 1] + weight * values[upper]
     return result
 
 

@@ -49,7 +49,7 @@ class Sensitivity:
 
     By Hertz's A ~ (F (1 - nu^2) / E)^(2/3): the area itself is counted in whole hats and has no derivative."""
     error: float
-    """Largest error of the linear solves up to here, over what they found [1]."""
+    """Largest relative error of the linear solves up to here [1]."""
 
 
 def sensitivities(
@@ -69,10 +69,10 @@ def sensitivities(
         model: The skin.
         request: The press.
         parameters: Names of parameters (`tacdata.skin.derivatives.parameters.known`).
-        tolerance: Error of the linear solves, over what they find [1].
+        tolerance: Relative error of the linear solves [1].
         passages: The states of the press, if the model has solved them before; solved here if not given.
         spreads: Standard deviations of the parameters: errors are then over the largest change that one of them makes.
-            None: over what each parameter changes itself.
+            None: over the change by each parameter alone.
 
     Raises:
         UsageError: If a parameter is not one of this press.
@@ -89,15 +89,15 @@ def sensitivities(
     skin = model.skin
     press, reader = skin.placed(0, request), _Reader(model, request, names)
     touch = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
-    along = directions(model.sensor, request.indenter, names, press.conditions, touch)
-    at_touch = _without_depth(names, along)
+    changes = directions(model.sensor, request.indenter, names, press.conditions, touch)
+    at_touch = _without_depth(names, changes)
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
     weight = None if spreads is None else torch.tensor(spreads, dtype=torch.float64, device=model.device)
     derivatives = PathDerivatives(skin.newton([request]), skin.free, label, tolerance, _slack(model, names), weight)
     for passage in _passed(model, request) if passages is None else passages:
         for reached in passage.reached:
-            derivatives.advance(reached, along if derivatives.changes else at_touch)
-        yield passage.depth, passage.state, reader.read(passage.state, derivatives, along)
+            derivatives.advance(reached, changes if derivatives.changes else at_touch)
+        yield passage.depth, passage.state, reader.read(passage.state, derivatives, changes)
 
 
 def _passed(model: SkinModel, request: PressRequest) -> Iterator[Passage]:
@@ -123,15 +123,15 @@ def _slack(model: SkinModel, names: list[str]) -> Slack | None:
     return lambda reaction: bonding.slack(reaction) * own
 
 
-def _without_depth(names: list[str], along: ConditionsChange) -> ConditionsChange:
+def _without_depth(names: list[str], changes: ConditionsChange) -> ConditionsChange:
     """Return the change of a path's start: a press whose depth is off by z still starts where it touches."""
-    place = along.pose.place.clone()
+    place = changes.pose.place.clone()
     place[2, [name == "z" for name in names]] = 0.0
-    return replace(along, pose=Pose(place, along.pose.turn))
+    return replace(changes, pose=Pose(place, changes.pose.turn))
 
 
 class _Reader:
-    """From derivatives of displacements and tractions to those of what is measured."""
+    """From derivatives of displacements and tractions to those of the measured quantities."""
 
     def __init__(self, model: SkinModel, request: PressRequest, names: list[str]) -> None:
         self._model, self._names = model, names
@@ -143,13 +143,13 @@ class _Reader:
         self._height = model.skin.face.height(pixels).reshape(grid.shape)
         self._nodes = torch.as_tensor(model.mesh.nodes, device=model.device)
 
-    def read(self, state: Equilibrium, derivatives: PathDerivatives, along: ConditionsChange) -> Sensitivity:
+    def read(self, state: Equilibrium, derivatives: PathDerivatives, changes: ConditionsChange) -> Sensitivity:
         """Return the derivatives of one state."""
         taxel_force = self._taxel_force(derivatives)
         return Sensitivity(
             tuple(self._names),
             self._units,
-            self._map(state, derivatives.du, along.conditions.thickness),
+            self._map(state, derivatives.du, changes.conditions.thickness),
             -derivatives.changes[0].force.sum(dim=0).T.cpu().numpy(),
             taxel_force,
             self._model.skin.reader.closure(derivatives.du).T.cpu().numpy(),
@@ -158,7 +158,7 @@ class _Reader:
         )
 
     def _map(self, state: Equilibrium, du: torch.Tensor, thickness: torch.Tensor) -> np.ndarray:
-        """Return the derivative of the map: the skin moves under the pixels, and a thicker slab lies higher."""
+        """Return the derivative of the map: the skin moves under the pixels; a thicker slab has a higher face."""
         rise = self._nodes[:, 2].clamp_min(0.0)
         moves = du.clone()
         moves[:, 2] += rise[:, None] * thickness
@@ -178,9 +178,9 @@ class _Reader:
     def _area(self, state: Equilibrium, taxel_force: np.ndarray) -> np.ndarray:
         """Return the derivative of the contact areas by Hertz's law, shape (p, taxels)."""
         material = self._model.sensor.material
-        own = {"youngs_modulus": 1 / material.youngs_modulus}
-        own["poisson_ratio"] = 2 * material.poisson_ratio / (1 - material.poisson_ratio**2)
-        softer = np.array([own.get(name, 0.0) for name in self._names])[:, None]
+        factors = {"youngs_modulus": 1 / material.youngs_modulus}
+        factors["poisson_ratio"] = 2 * material.poisson_ratio / (1 - material.poisson_ratio**2)
+        softer = np.array([factors.get(name, 0.0) for name in self._names])[:, None]
         loaded = state.taxel_force > 0
         share = np.where(loaded, taxel_force / np.where(loaded, state.taxel_force, 1.0), 0.0) - softer * loaded
         return 2 / 3 * state.taxel_area * share

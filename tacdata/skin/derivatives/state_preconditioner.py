@@ -27,7 +27,7 @@ class StatePreconditioner:
 
     def __init__(
         self,
-        rest: RestSolver,
+        solver: RestSolver,
         surfaces: Sequence[ContactSurface],
         contacts: Sequence[ContactForces],
         friction: torch.Tensor,
@@ -36,13 +36,13 @@ class StatePreconditioner:
         """Factorize.
 
         Args:
-            rest: K0^-1 and the mortar rows of the surfaces.
+            solver: K0^-1 and the mortar rows of the surfaces.
             surfaces: Of the contacts.
             contacts: At the state, one member.
             friction: Coefficient [1], shape (1,).
             turns: Rotation of each contact's shape, shape (3, 3, 1).
         """
-        self._rest, device = rest, friction.device
+        self._rest, device = solver, friction.device
         rows, places, directions, values, normals, slots = [], [], [], [], [], []
         blocks: list[tuple[torch.Tensor, torch.Tensor, torch.Tensor]] = []
         start = row = below = slot = 0
@@ -50,14 +50,14 @@ class StatePreconditioner:
             nodes = contact.tangent.active[:, 0].nonzero()[:, 0]
             frame = _frames(surface, contact.tangent.normal[nodes, :, 0])
             a, axes, ways = frame.shape
-            own = torch.arange(a, device=device)
+            diagonal = torch.arange(a, device=device)
             rows.append((below + axes * nodes[:, None] + torch.arange(axes, device=device)).flatten())
-            place = row + axes * own[:, None, None] + torch.arange(axes, device=device)[:, None]
-            direction = start + ways * own[:, None, None] + torch.arange(ways, device=device)
+            place = row + axes * diagonal[:, None, None] + torch.arange(axes, device=device)[:, None]
+            direction = start + ways * diagonal[:, None, None] + torch.arange(ways, device=device)
             places.append(place.expand_as(frame).flatten())
             directions.append(direction.expand_as(frame).flatten())
             values.append(frame.flatten())
-            normals.append(start + ways * own)
+            normals.append(start + ways * diagonal)
             slots.append(slot + nodes)
             if ways > 1:
                 blocks.append((normals[-1], *_friction(contact, nodes, frame, friction, turn[:, :, 0])))
@@ -65,13 +65,13 @@ class StatePreconditioner:
             below, slot = below + axes * surface.count, slot + surface.count
         self._rows, self._normal, self._slots = torch.cat(rows), torch.cat(normals), torch.cat(slots)
         index = torch.stack([torch.cat(directions), torch.cat(places)])
-        # PyTorch warns unless it is told whether to check; of one tensor alone it is not enough.
+        # PyTorch warns unless the check is set globally; setting it for a single tensor is not enough.
         with torch.sparse.check_sparse_tensor_invariants():
             self._along = torch.sparse_coo_tensor(index, torch.cat(values), (start, row)).coalesce()
         """Q^T."""
         self._count = below
         self._give = torch.zeros(start, start, dtype=torch.float64, device=device)
-        """What multiplies moves along the directions: 1 over the compliance for normals, D for tangents."""
+        """Stiffness along the directions: 1 over the compliance for normals, D for tangents."""
         self._factor = self._factorized(blocks) if start else None
 
     def _factorized(
@@ -80,15 +80,15 @@ class StatePreconditioner:
         used = torch.zeros(self._count, dtype=torch.bool, device=self._rows.device)
         used[self._rows] = True
         compliance = self._rest.table(used)[self._rows[:, None], self._rows].to(torch.float64)
-        turned = self._along @ (self._along @ compliance).T
-        self._give[self._normal, self._normal] = 1 / turned.diagonal()[self._normal]
-        own = torch.zeros_like(turned)
+        projected = self._along @ (self._along @ compliance).T
+        self._give[self._normal, self._normal] = 1 / projected.diagonal()[self._normal]
+        diagonal = torch.zeros_like(projected)
         for normal, stiffness, grows in blocks:
             tangent = normal[:, None] + torch.arange(1, 3, device=normal.device)
             self._give[tangent[:, :, None], tangent[:, None, :]] = stiffness
-            own[tangent, tangent] = 1.0
-            own[tangent, normal[:, None]] = -grows
-        return torch.linalg.lu_factor(own + self._give @ turned)
+            diagonal[tangent, tangent] = 1.0
+            diagonal[tangent, normal[:, None]] = -grows
+        return torch.linalg.lu_factor(diagonal + self._give @ projected)
 
     def apply(self, residual: torch.Tensor, gaps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Return displacements and normal forces of nodes.
@@ -134,8 +134,8 @@ def _friction(
     shear, limit = contact.shear[nodes, :, 0] @ turn.T, coefficient * contact.pressure[nodes, 0]
     size = torch.linalg.vector_norm(shear, dim=1)
     slips = (limit > 0) & (size >= _SLIPS * limit)
-    along = torch.where(slips, coefficient / size.clamp_min(1e-30), 0.0)[:, None] * shear
+    slip_stiffness = torch.where(slips, coefficient / size.clamp_min(1e-30), 0.0)[:, None] * shear
     return (
         torch.einsum("aip,aij,ajq->apq", tangents, stiffness, tangents),
-        torch.einsum("aip,ai->ap", tangents, along),
+        torch.einsum("aip,ai->ap", tangents, slip_stiffness),
     )

@@ -1,9 +1,9 @@
-"""Standard deviations of map and forces from the spreads of what is not known exactly.
+"""Standard deviations of map and forces from the spreads of uncertain parameters.
 
 Spreads are standard deviations of parameters (`tacdata.skin.derivatives.parameters.known`), independent of each
 other, from the
 sensor file's ``uncertainty``. To first order var(f) = sum_p (df/dp)^2 sigma_p^2 (JCGM 100:2008, eq. 10);
-`sampled_spread` says by whole presses how far that holds. It does not where the derivative vanishes or jumps within the
+`sampled_spread` tests the range of validity by whole presses. It ends where the derivative vanishes or jumps within the
 spread: under the tip, where depth falls with the square of a shift, at a punch's edge, in a press no deeper than the
 spread of z, and for protrusions that may or may not touch.
 """
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """One standard deviation of what a state says."""
+    """One standard deviation of the quantities of a state."""
 
     surface: np.ndarray
     """Of undeformed minus deformed height at the pixels [mm], shape (pixels_x, pixels_y)."""
@@ -45,7 +45,7 @@ class Uncertainty:
 
 
 QUANTITIES = ("surface", "force", "taxel_force", "taxel_closure")
-"""What has an uncertainty."""
+"""Quantities with an uncertainty."""
 
 
 def propagate(sensitivity: Sensitivity, spreads: Mapping[str, float]) -> Uncertainty:
@@ -120,11 +120,11 @@ def sampled_spread(
     bonding = spreads.pop("bonding", 0.0)
     if bonding:
         # Held faces do not move while a press is solved; to first order they do, and independently of the rest.
-        beside = [own for _, _, own in uncertainties(model, request, {"bonding": bonding})]
+        linear = [own for _, _, own in uncertainties(model, request, {"bonding": bonding})]
         if not spreads:
-            return list(zip(request.depths, beside, strict=True))
+            return list(zip(request.depths, linear, strict=True))
         drawn = sampled_spread(model, request, spreads, samples, seed, capacity)
-        return [(depth, _joined(one, other)) for (depth, one), other in zip(drawn, beside, strict=True)]
+        return [(depth, _joined(one, linear_one)) for (depth, one), linear_one in zip(drawn, linear, strict=True)]
     moves = np.random.default_rng(seed).normal(size=(samples, len(spreads))) * list(spreads.values())
     presses = (_moved(model, request, k, dict(zip(spreads, values, strict=True))) for k, values in enumerate(moves))
     batch = model.skin.batch([request], min(capacity, samples))
@@ -136,9 +136,9 @@ def sampled_spread(
     return [(depth, _spread_of(model, [states[k] for states in found])) for k, depth in enumerate(request.depths)]
 
 
-def _joined(one: Uncertainty, other: Uncertainty) -> Uncertainty:
+def _joined(first: Uncertainty, second: Uncertainty) -> Uncertainty:
     """Return the standard deviations of two independent causes together."""
-    return Uncertainty(*(np.hypot(getattr(one, name), getattr(other, name)) for name in QUANTITIES))
+    return Uncertainty(*(np.hypot(getattr(first, name), getattr(second, name)) for name in QUANTITIES))
 
 
 def _checked(model: SkinModel, request: PressRequest, spreads: Mapping[str, float] | None) -> Mapping[str, float]:
@@ -158,18 +158,18 @@ def _moved(model: SkinModel, request: PressRequest, number: int, moves: dict[str
     press = model.skin.placed(number, request)
     names, values = list(moves), torch.tensor(list(moves.values()), dtype=torch.float64, device=model.device)
     pose = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
-    along = directions(model.sensor, request.indenter, names, press.conditions, pose)
-    pairs = ((getattr(press.conditions, f.name), getattr(along.conditions, f.name)) for f in fields(Conditions))
-    own = Conditions(*(value + (change * values).sum(dim=-1, keepdim=True) for value, change in pairs))
-    place = (along.pose.place * values).sum(dim=-1).cpu().numpy()
+    changes = directions(model.sensor, request.indenter, names, press.conditions, pose)
+    pairs = ((getattr(press.conditions, f.name), getattr(changes.conditions, f.name)) for f in fields(Conditions))
+    conditions = Conditions(*(value + (change * values).sum(dim=-1, keepdim=True) for value, change in pairs))
+    place = (changes.pose.place * values).sum(dim=-1).cpu().numpy()
     # A place too low is a press too deep, on a path that starts where the indenter touches.
     place[2] -= moves.get("z", 0.0)
     depths = tuple(max(depth - moves.get("z", 0.0), 0.0) if depth else 0.0 for depth in request.depths)
-    turn = press.turn + (along.pose.turn * values).sum(dim=-1).cpu().numpy()
+    turn = press.turn + (changes.pose.turn * values).sum(dim=-1).cpu().numpy()
     # The nearest rotation.
     left, _, right = np.linalg.svd(turn)
     path = replace(press.path, depths=depths)
-    return replace(press, path=path, touch=press.touch + place, turn=left @ right, conditions=own)
+    return replace(press, path=path, touch=press.touch + place, turn=left @ right, conditions=conditions)
 
 
 def _spread_of(model: SkinModel, states: list[Equilibrium]) -> Uncertainty:

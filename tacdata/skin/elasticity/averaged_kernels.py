@@ -47,10 +47,10 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
         return value
 
     @wp.kernel(module="unique", enable_backward=False)
-    def dilatation(u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, sums: wp.array2d(dtype=real)):
+    def dilatation(u: wp.array3d(dtype=real), mesh: ElementData, material: ConstantData, sums: wp.array2d(dtype=real)):
         """Volume change of one element, weighted by its corners' shape functions."""
         e, b = wp.tid()
-        values, s = gather(u, mesh, e, b), stretch(mesh, own, e, b)
+        values, s = gather(u, mesh, e, b), stretch(mesh, material, e, b)
         total = Four()
         for q in range(4):
             H = gradient(values, mesh, e, q, s)
@@ -65,13 +65,13 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
         u: wp.array3d(dtype=real),
         p: wp.array3d(dtype=real),
         mesh: ElementData,
-        own: ConstantData,
+        material: ConstantData,
         sums: wp.array2d(dtype=real),
     ):
         """The same for the change of volume change along ``p``."""
         e, b = wp.tid()
         values, along = gather(u, mesh, e, b), gather(p, mesh, e, b)
-        s, total = stretch(mesh, own, e, b), Four()
+        s, total = stretch(mesh, material, e, b), Four()
         for q in range(4):
             cof = shifted(cofactor_change(gradient(values, mesh, e, q, s)), real(1.0))
             j = wp.ddot(cof, gradient(along, mesh, e, q, s)) * (mesh.weights[e, q] * s)
@@ -84,15 +84,15 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
     def force(
         u: wp.array3d(dtype=real),
         mesh: ElementData,
-        own: ConstantData,
+        material: ConstantData,
         average: wp.array2d(dtype=real),
         smallest: wp.array(dtype=real),
         total: wp.array3d(dtype=real),
     ):
         """Nodal forces of one element, and the smallest det F."""
         e, b = wp.tid()
-        values, result, c = gather(u, mesh, e, b), Nodal(), constants(own, b)
-        s, kappa, averages = stretch(mesh, own, e, b), bulk_of(c), at_corners(average, mesh, e, b)
+        values, result, c = gather(u, mesh, e, b), Nodal(), constants(material, b)
+        s, kappa, averages = stretch(mesh, material, e, b), bulk_of(c), at_corners(average, mesh, e, b)
         least = real(1.0e30)
         for q in range(4):
             H = gradient(values, mesh, e, q, s)
@@ -112,7 +112,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
         u: wp.array3d(dtype=real),
         p: wp.array3d(dtype=real),
         mesh: ElementData,
-        own: ConstantData,
+        material: ConstantData,
         average: wp.array2d(dtype=real),
         change: wp.array2d(dtype=real),
         total: wp.array3d(dtype=real),
@@ -125,17 +125,17 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
         """
         e, b = wp.tid()
         values, along = gather(u, mesh, e, b), gather(p, mesh, e, b)
-        result, c, s = Nodal(), constants(own, b), stretch(mesh, own, e, b)
+        result, c, s = Nodal(), constants(material, b), stretch(mesh, material, e, b)
         averages, changes = at_corners(average, mesh, e, b), at_corners(change, mesh, e, b)
         kappa = bulk_of(c)
-        most = bearable * own.modulus[b] / kappa
+        limit = bearable * material.modulus[b] / kappa
         for q in range(4):
             H, D = gradient(values, mesh, e, q, s), gradient(along, mesh, e, q, s)
             K = cofactor_change(H)
             cof = shifted(K, real(1.0))
             # Half-way through Newton's method pressures are far beyond any that will stay, and would turn the tangent
             # indefinite.
-            excess = wp.clamp(at_point(averages, mesh, q), -most, most) - volume_change(H, K)
+            excess = wp.clamp(at_point(averages, mesh, q), -limit, limit) - volume_change(H, K)
             onward = at_point(changes, mesh, q) - wp.ddot(cof, D)
             dP = tangent_of(H, D, c) + kappa * (onward * cof + excess * cross(shifted(H, real(1.0)), D))
             dP = dP * (mesh.weights[e, q] * s)
@@ -149,14 +149,14 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
     def energy(
         u: wp.array3d(dtype=real),
         mesh: ElementData,
-        own: ConstantData,
+        material: ConstantData,
         average: wp.array2d(dtype=real),
         total: wp.array(dtype=real),
     ):
         """Strain energy of one element."""
         e, b = wp.tid()
-        values, c = gather(u, mesh, e, b), constants(own, b)
-        s, averages = stretch(mesh, own, e, b), at_corners(average, mesh, e, b)
+        values, c = gather(u, mesh, e, b), constants(material, b)
+        s, averages = stretch(mesh, material, e, b), at_corners(average, mesh, e, b)
         for q in range(4):
             H = gradient(values, mesh, e, q, s)
             j = volume_change(H, cofactor_change(H))

@@ -40,15 +40,15 @@ def _mass_kernel(real: type) -> wp.Kernel:
         lumped: wp.array2d(dtype=real),
         thickness: wp.array(dtype=real),
         sums: wp.array2d(dtype=real),
-        before: wp.array2d(dtype=real),
-        after: wp.array2d(dtype=real),
+        estimate: wp.array2d(dtype=real),
+        corrected: wp.array2d(dtype=real),
     ):
         # after = before + D^-1 (sums - M before); with before = 0 it is the lumped average.
         a, b = wp.tid()
         s, spread = thickness[b], real(0.0)
         for k in range(first[a], first[a + 1]):
-            spread += (mass[0, k] + s * mass[1, k]) * before[neighbour[k], b]
-        after[a, b] = before[a, b] + (sums[a, b] - spread) / (lumped[0, a] + s * lumped[1, a])
+            spread += (mass[0, k] + s * mass[1, k]) * estimate[neighbour[k], b]
+        corrected[a, b] = estimate[a, b] + (sums[a, b] - spread) / (lumped[0, a] + s * lumped[1, a])
 
     return correct
 
@@ -87,61 +87,65 @@ class AveragedVolume:
             for dtype, real in REAL.items()
         }
 
-    def dilatation(self, u: torch.Tensor, own: Conditions) -> torch.Tensor:
+    def dilatation(self, u: torch.Tensor, conditions: Conditions) -> torch.Tensor:
         """Return the averaged J - 1 at the corners [1], shape (c, b)."""
-        return self._average(self._sums("dilatation", (u,), own), own)
+        return self._average(self._sums("dilatation", (u,), conditions), conditions)
 
-    def add_force(self, u: torch.Tensor, own: Conditions, smallest: torch.Tensor, force: torch.Tensor) -> None:
+    def add_force(self, u: torch.Tensor, conditions: Conditions, smallest: torch.Tensor, force: torch.Tensor) -> None:
         """Add the internal forces [N] at displacements ``u`` [mm], both of shape (n, 3, b).
 
         Args:
             u: Displacements.
-            own: Conditions, in the precision of ``u``.
+            conditions: Conditions, in the precision of ``u``.
             smallest: Lowered to the smallest det F [1], shape (b,).
             force: Receives the forces.
         """
-        self._launch("force", (u,), own, self.dilatation(u, own), smallest, force)
+        self._launch("force", (u,), conditions, self.dilatation(u, conditions), smallest, force)
 
     def add_product(
-        self, u: torch.Tensor, p: torch.Tensor, own: Conditions, dilatation: torch.Tensor, product: torch.Tensor
+        self, u: torch.Tensor, p: torch.Tensor, conditions: Conditions, dilatation: torch.Tensor, product: torch.Tensor
     ) -> None:
         """Add K(u) p [N]; all of shape (n, 3, b) and of one precision; ``dilatation``: that at ``u``."""
-        change = self._average(self._sums("dilatation_change", (u, p), own), own)
-        self._launch("product", (u, p), own, dilatation, change, product)
+        change = self._average(self._sums("dilatation_change", (u, p), conditions), conditions)
+        self._launch("product", (u, p), conditions, dilatation, change, product)
 
-    def add_energy(self, u: torch.Tensor, own: Conditions, total: torch.Tensor) -> None:
+    def add_energy(self, u: torch.Tensor, conditions: Conditions, total: torch.Tensor) -> None:
         """Add the strain energy [N mm], shape (b,)."""
-        self._launch("energy", (u,), own, self.dilatation(u, own), total)
+        self._launch("energy", (u,), conditions, self.dilatation(u, conditions), total)
 
-    def _sums(self, name: str, fields: tuple[torch.Tensor, ...], own: Conditions) -> torch.Tensor:
+    def _sums(self, name: str, fields: tuple[torch.Tensor, ...], conditions: Conditions) -> torch.Tensor:
         sums = torch.zeros(self.corners, fields[0].shape[2], dtype=fields[0].dtype, device=fields[0].device)
-        self._launch(name, fields, own, sums)
+        self._launch(name, fields, conditions, sums)
         return sums
 
-    def _average(self, sums: torch.Tensor, own: Conditions) -> torch.Tensor:
+    def _average(self, sums: torch.Tensor, conditions: Conditions) -> torch.Tensor:
         """Return Q times sums over the corners' surroundings, shape (c, b)."""
         average = torch.zeros_like(sums)
         for _ in range(CORRECTIONS + 1):
-            after = torch.empty_like(sums)
+            corrected = torch.empty_like(sums)
             wp.launch(
                 _mass_kernel(REAL[sums.dtype]),
                 dim=tuple(sums.shape),
-                inputs=[*self.pattern, *self.mass[sums.dtype], *map(argument, (own.thickness, sums, average))],
-                outputs=[argument(after)],
+                inputs=[*self.pattern, *self.mass[sums.dtype], *map(argument, (conditions.thickness, sums, average))],
+                outputs=[argument(corrected)],
                 device=self._device,
             )
-            average = after
+            average = corrected
         return average
 
-    def _launch(self, name: str, fields: tuple[torch.Tensor, ...], own: Conditions, *rest: torch.Tensor) -> None:
-        """Run a kernel on fields; the last of ``rest`` receives the result."""
+    def _launch(
+        self, name: str, fields: tuple[torch.Tensor, ...], conditions: Conditions, *arrays: torch.Tensor
+    ) -> None:
+        """Run a kernel on fields; the last of ``arrays`` receives the result."""
         dtype = fields[0].dtype
         real = REAL[dtype]
-        constants = filled(constant_data(real), law=own.law, modulus=own.modulus, thickness=own.thickness)
+        constants = filled(
+            constant_data(real), law=conditions.law, modulus=conditions.modulus, thickness=conditions.thickness
+        )
         wp.launch(
             getattr(averaged_kernels(self.law, real), name),
             dim=(self.elements, fields[0].shape[2]),
-            inputs=[*map(argument, fields), self.data[dtype], constants, *map(argument, rest)],
+            inputs=[*map(argument, fields), self.data[dtype], constants, *map(argument, arrays)],
             device=self._device,
         )
 

@@ -1,7 +1,7 @@
 """Internal forces of the skin and their linearization, matrix-free, for a batch of states of one mesh.
 
 Fields are laid out (nodes, 3, batch), the batch innermost. Neighbouring threads of a GPU then read neighbouring
-numbers, and a field is the right-hand side of a matrix product as it stands.
+numbers, and a field is the right-hand side of a matrix product without a copy.
 """
 
 from functools import cache
@@ -37,24 +37,24 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
     def internal_force(
         u: wp.array3d(dtype=real),
         mesh: ElementData,
-        own: ConstantData,
+        material: ConstantData,
         force: wp.array3d(dtype=real),
         smallest_volume_ratio: wp.array(dtype=real),
     ):
         """Nodal forces of one element, and the smallest det F."""
         e, b = wp.tid()
-        values, result, c = gather(u, mesh, e, b), Nodal(), constants(own, b)
-        s = stretch(mesh, own, e, b)
-        least = real(1.0e30)
+        values, result, c = gather(u, mesh, e, b), Nodal(), constants(material, b)
+        s = stretch(mesh, material, e, b)
+        smallest = real(1.0e30)
         for q in range(4):
             H = gradient(values, mesh, e, q, s)
-            least = wp.min(least, wp.determinant(wp.identity(n=3, dtype=real) + H))
+            smallest = wp.min(smallest, wp.determinant(wp.identity(n=3, dtype=real) + H))
             P = stress_of(H, c) * (mesh.weights[e, q] * s)
             for a in range(10):
                 f = P * slope(mesh, e, q, a, s)
                 for i in range(3):
                     result[a, i] = result[a, i] + f[i]
-        wp.atomic_min(smallest_volume_ratio, b, least)
+        wp.atomic_min(smallest_volume_ratio, b, smallest)
         add(result, mesh, e, b, force)
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -62,17 +62,17 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
         u: wp.array3d(dtype=real),
         p: wp.array3d(dtype=real),
         mesh: ElementData,
-        own: ConstantData,
+        material: ConstantData,
         product: wp.array3d(dtype=real),
     ):
         """Tangent stiffness of one element times nodal displacements ``p``."""
         e, b = wp.tid()
-        values, along = gather(u, mesh, e, b), gather(p, mesh, e, b)
-        result, c = Nodal(), constants(own, b)
-        s = stretch(mesh, own, e, b)
+        values, changes = gather(u, mesh, e, b), gather(p, mesh, e, b)
+        result, c = Nodal(), constants(material, b)
+        s = stretch(mesh, material, e, b)
         for q in range(4):
             H = gradient(values, mesh, e, q, s)
-            dP = tangent_of(H, gradient(along, mesh, e, q, s), c) * (mesh.weights[e, q] * s)
+            dP = tangent_of(H, gradient(changes, mesh, e, q, s), c) * (mesh.weights[e, q] * s)
             for a in range(10):
                 f = dP * slope(mesh, e, q, a, s)
                 for i in range(3):
@@ -80,11 +80,11 @@ def _kernels(law_name: str, real: type) -> SimpleNamespace:
         add(result, mesh, e, b, product)
 
     @wp.kernel(module="unique", enable_backward=False)
-    def energy(u: wp.array3d(dtype=real), mesh: ElementData, own: ConstantData, total: wp.array(dtype=real)):
+    def energy(u: wp.array3d(dtype=real), mesh: ElementData, material: ConstantData, total: wp.array(dtype=real)):
         """Strain energy of one element."""
         e, b = wp.tid()
-        values, c = gather(u, mesh, e, b), constants(own, b)
-        s = stretch(mesh, own, e, b)
+        values, c = gather(u, mesh, e, b), constants(material, b)
+        s = stretch(mesh, material, e, b)
         for q in range(4):
             H = gradient(values, mesh, e, q, s)
             wp.atomic_add(total, b, energy_of(H, c) * (mesh.weights[e, q] * s))
@@ -131,7 +131,7 @@ class Elasticity:
         return self._averaged.dilatation(u, conditions.to(u.dtype)) if self._averaged else None
 
     def prepared(self) -> PreparedTangent | None:
-        """Return what prepares a batch's tangents. A GPU has none, nor has a body without averages."""
+        """Return the prepared tangents of a batch; None on a GPU, or for a body without averages."""
         return PreparedTangent(self._averaged) if self._averaged and self.device == "cpu" else None
 
     def tangent_product(
@@ -144,12 +144,12 @@ class Elasticity:
     ) -> None:
         """Add K(u) p [N] to ``product``; all of shape (n, 3, b) and of one precision.
 
-        ``dilatation``, if given, is what `dilatation` returned for ``u``.
+        ``dilatation``, if given, is the result of `dilatation` for ``u``.
         """
         if self._averaged:
-            own = conditions.to(u.dtype)
-            known = self._averaged.dilatation(u, own) if dilatation is None else dilatation
-            self._averaged.add_product(u, p, own, known, product)
+            material = conditions.to(u.dtype)
+            dilatations = self._averaged.dilatation(u, material) if dilatation is None else dilatation
+            self._averaged.add_product(u, p, material, dilatations, product)
         else:
             self._launch("tangent_product", (u, p), conditions, product)
 
@@ -164,8 +164,10 @@ class Elasticity:
 
     def _launch(self, name: str, fields: tuple[torch.Tensor, ...], conditions: Conditions, *out: torch.Tensor) -> None:
         real = REAL[fields[0].dtype]
-        own = conditions.to(fields[0].dtype)
-        constants = filled(constant_data(real), law=own.law, modulus=own.modulus, thickness=own.thickness)
+        material = conditions.to(fields[0].dtype)
+        constants = filled(
+            constant_data(real), law=material.law, modulus=material.modulus, thickness=material.thickness
+        )
         wp.launch(
             getattr(_kernels(self.law, real), name),
             dim=(len(self.mesh.tets), fields[0].shape[2]),
@@ -178,7 +180,7 @@ class Elasticity:
 def _data(mesh: SkinMesh, slab: np.ndarray, device: str) -> dict[torch.dtype, Any]:
     """Return a mesh as kernels take it, by precision."""
     corners = np.unique(mesh.tets[:, :4], return_inverse=True)[1].reshape(-1, 4)
-    whole = {
+    arrays = {
         name: wp.array(values.astype(np.int32), dtype=wp.int32, device=device)
         for name, values in (("tets", mesh.tets), ("corners", corners), ("slab", slab))
     }
@@ -186,7 +188,7 @@ def _data(mesh: SkinMesh, slab: np.ndarray, device: str) -> dict[torch.dtype, An
     return {
         dtype: filled(
             element_data(real),
-            **whole,
+            **arrays,
             shapes=wp.array(corner_shapes(), dtype=real, device=device),
             slopes=wp.array(slopes, dtype=real, device=device),
             weights=wp.array(weights, dtype=real, device=device),

@@ -1,4 +1,4 @@
-"""What every element kernel is made of: the mesh and the members as structs, gather, gradient, scatter.
+"""Parts of every element kernel: the mesh and the members as structs, gather, gradient, scatter.
 
 Indices: e an element, q a point of its quadrature rule, a a node of it, b a batch member.
 """
@@ -14,7 +14,7 @@ from tacdata.skin.constitutive import kinematics
 
 @cache
 def element_data(real: type) -> Any:
-    """Return the struct of what never changes: the mesh in one precision."""
+    """Return the struct of constant data: the mesh in one precision."""
 
     @wp.struct
     class ElementData:
@@ -86,17 +86,17 @@ def element_functions(real: type) -> SimpleNamespace:
                 wp.atomic_add(total, n, i, b, values[a, i])
 
     @wp.func
-    def constants(own: ConstantData, b: int):
+    def constants(material: ConstantData, b: int):
         values = Parameters()
         for k in range(8):
-            values[k] = own.law[k, b]
+            values[k] = material.law[k, b]
         return values
 
     @wp.func
-    def stretch(mesh: ElementData, own: ConstantData, e: int, b: int):
+    def stretch(mesh: ElementData, material: ConstantData, e: int, b: int):
         s = real(1.0)
         if mesh.slab[e] == 1:
-            s = own.thickness[b]
+            s = material.thickness[b]
         return s
 
     return SimpleNamespace(

@@ -41,7 +41,7 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
     def moduli(
         u: wp.array3d(dtype=real),
         mesh: ElementData,
-        own: ConstantData,
+        material: ConstantData,
         average: wp.array2d(dtype=real),
         lane: wp.array(dtype=wp.int32),
         moved: real,
@@ -54,9 +54,9 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
         2. Change of stress along each entry of F; that by z over the stretch of the mesh, once and for all.
         """
         e, b = wp.tid()
-        nodal, c, s = gather(u, mesh, e, b), constants(own, b), stretch(mesh, own, e, b)
+        nodal, c, s = gather(u, mesh, e, b), constants(material, b), stretch(mesh, material, e, b)
         kappa, at = bulk_of(c), lane[b]
-        most = bearable * own.modulus[b] / kappa
+        limit = bearable * material.modulus[b] / kappa
         bulk[at] = kappa
         for q in range(4):
             H = gradient(nodal, mesh, e, q, s)
@@ -73,7 +73,7 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
                 mean = real(0.0)
                 for a in range(4):
                     mean += mesh.shapes[q, a] * average[mesh.corners[e, a], b]
-                excess = wp.clamp(mean, -most, most) - volume_change(H, K)
+                excess = wp.clamp(mean, -limit, limit) - volume_change(H, K)
                 for i in range(9):
                     D = mat33()
                     D[i // 3, i % 3] = real(1.0)
@@ -106,7 +106,7 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
 
 @cache
 def product_kernels(real: type) -> SimpleNamespace:
-    """Compile the kernels of products. ``block`` says which lanes a vector of ``p`` has."""
+    """Compile the kernels of products. ``block`` gives the lanes of a vector of ``p``."""
     ElementData, Lanes, Nine = element_data(real), wp.types.vector(LANES, real), wp.types.matrix((9, LANES), real)
 
     @wp.func
@@ -115,9 +115,9 @@ def product_kernels(real: type) -> SimpleNamespace:
         for a in range(10):
             n = mesh.tets[e, a]
             for i in range(3):
-                along = p[n, i, b]
+                direction = p[n, i, b]
                 for j in range(3):
-                    D[3 * i + j] = D[3 * i + j] + mesh.slopes[e, q, a, j] * along
+                    D[3 * i + j] = D[3 * i + j] + mesh.slopes[e, q, a, j] * direction
         return D
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -147,21 +147,21 @@ def product_kernels(real: type) -> SimpleNamespace:
         lumped: wp.array2d(dtype=real),
         thickness: wp.array(dtype=Lanes),
         sums: wp.array2d(dtype=Lanes),
-        before: wp.array2d(dtype=Lanes),
-        after: wp.array2d(dtype=Lanes),
+        estimate: wp.array2d(dtype=Lanes),
+        corrected: wp.array2d(dtype=Lanes),
     ):
         """A step of Richardson's iteration towards the average, as in `averaged_volume`."""
         a, b = wp.tid()
         s, still, slab = thickness[b], Lanes(), Lanes()
         for k in range(first[a], first[a + 1]):
-            value = before[neighbour[k], b]
+            value = estimate[neighbour[k], b]
             still += mass[0, k] * value
             slab += mass[1, k] * value
-        rest = sums[a, b] - still - wp.cw_mul(s, slab)
+        remainder = sums[a, b] - still - wp.cw_mul(s, slab)
         weight = lumped[1, a] * s
         for i in range(LANES):
             weight[i] = weight[i] + lumped[0, a]
-        after[a, b] = before[a, b] + wp.cw_div(rest, weight)
+        corrected[a, b] = estimate[a, b] + wp.cw_div(remainder, weight)
 
     @wp.kernel(module="unique", enable_backward=False)
     def product(
@@ -192,13 +192,13 @@ def product_kernels(real: type) -> SimpleNamespace:
                 Z = P[3 * i + 2]
                 for j in range(i):
                     for m in range(3):
-                        other = D[3 * j + m]
+                        entry = D[3 * j + m]
                         cx = moduli[e, q, k, o]
                         cy = moduli[e, q, k + 1, o]
                         cz = moduli[e, q, k + 2, o]
-                        X += wp.cw_mul(cx, other)
-                        Y += wp.cw_mul(cy, other)
-                        Z += wp.cw_mul(cz, other)
+                        X += wp.cw_mul(cx, entry)
+                        Y += wp.cw_mul(cy, entry)
+                        Z += wp.cw_mul(cz, entry)
                         P[3 * j + m] = P[3 * j + m] + wp.cw_mul(cx, x) + wp.cw_mul(cy, y) + wp.cw_mul(cz, z)
                         k += 3
                 xx = moduli[e, q, k, o]

@@ -4,7 +4,7 @@ Conjugate gradients multiply one tangent with some six fields. So the law is ask
 linear algebra then. Eight members go at a time. A CPU does that in one instruction. Most of the skin moves little in
 a Newton step. Its moduli stay.
 
-On a GPU memory costs. Moduli take much of it. It asks the law anew.
+On a GPU memory costs. Moduli take much of it. So it evaluates the law again.
 """
 
 from __future__ import annotations
@@ -38,23 +38,25 @@ class PreparedTangent:
             self._lane = self._lane[which]
 
     def forget(self, which: torch.Tensor) -> None:
-        """Start members, by index, anew."""
+        """Reset members, by index."""
         if len(self._lane):
             self._values[:, :, -1, self._lane[which]] = torch.inf
 
-    def update(self, u: torch.Tensor, own: Conditions, member: torch.Tensor) -> None:
+    def update(self, u: torch.Tensor, conditions: Conditions, member: torch.Tensor) -> None:
         """Prepare the tangent of some members.
 
         Args:
             u: Displacements of all [mm], shape (n, 3, b).
-            own: Conditions of all, in one precision with ``u``.
+            conditions: Conditions of all, in one precision with ``u``.
             member: Which are to be prepared, by index, shape (k,).
         """
         if u.shape[2] != len(self._lane):
             self._begin(u.shape[2])
         lane = self._lane[member]
-        u, own = u.index_select(2, member), own.take(member)
-        constants = filled(constant_data(self._real), law=own.law, modulus=own.modulus, thickness=own.thickness)
+        u, conditions = u.index_select(2, member), conditions.take(member)
+        constants = filled(
+            constant_data(self._real), law=conditions.law, modulus=conditions.modulus, thickness=conditions.thickness
+        )
         self._launch(
             moduli_kernel(self._body.law, self._real),
             self._body.elements,
@@ -62,24 +64,24 @@ class PreparedTangent:
             u,
             self._body.data[self._dtype],
             constants,
-            self._body.dilatation(u, own),
+            self._body.dilatation(u, conditions),
             lane.to(torch.int32),
             _MOVED,
             self._values,
             self._bulk,
         )
-        self._thickness[lane] = own.thickness
+        self._thickness[lane] = conditions.thickness
 
-    def update_one(self, u: torch.Tensor, own: Conditions, fields: int) -> None:
+    def update_one(self, u: torch.Tensor, conditions: Conditions, fields: int) -> None:
         """Prepare the tangent of one state for products with so many fields at a time.
 
         Args:
             u: Displacements [mm], shape (n, 3, 1).
-            own: Conditions of one member, in one precision with ``u``.
+            conditions: Conditions of one member, in one precision with ``u``.
             fields: How many; `add_product` takes the first of them as members 0, 1, ...
         """
         self._begin(1)
-        self.update(u, own, self._lane)
+        self.update(u, conditions, self._lane)
         blocks = -(-fields // LANES)
         self._values = self._values[..., :1].expand(-1, -1, -1, LANES * blocks).contiguous()
         self._bulk, self._thickness = (
@@ -95,12 +97,12 @@ class PreparedTangent:
         lanes = (LANES * block[:, None] + torch.arange(LANES)).ravel()
         wide = torch.zeros(*p.shape[:2], len(lanes), dtype=p.dtype)
         wide[:, :, place] = p
-        along, moduli, mesh = self._lanes(wide), self._lanes(self._values), body.data[self._dtype]
+        direction, moduli, mesh = self._lanes(wide), self._lanes(self._values), body.data[self._dtype]
         sums, block = torch.zeros(body.corners, len(lanes), dtype=p.dtype), block.to(torch.int32)
-        self._launch(kernels.swelling, body.elements, count, along, mesh, moduli, block, self._lanes(sums))
+        self._launch(kernels.swelling, body.elements, count, direction, mesh, moduli, block, self._lanes(sums))
         average, thickness = torch.zeros_like(sums), self._lanes(self._thickness[lanes])
         for _ in range(CORRECTIONS + 1):
-            after = torch.empty_like(sums)
+            corrected = torch.empty_like(sums)
             self._launch(
                 kernels.correct,
                 body.corners,
@@ -108,12 +110,12 @@ class PreparedTangent:
                 *body.pattern,
                 *body.mass[self._dtype],
                 thickness,
-                *map(self._lanes, (sums, average, after)),
+                *map(self._lanes, (sums, average, corrected)),
             )
-            average = after
+            average = corrected
         pressure, total = average * self._bulk[lanes], torch.zeros_like(wide)
         self._launch(
-            kernels.product, body.elements, count, along, mesh, moduli, block, *map(self._lanes, (pressure, total))
+            kernels.product, body.elements, count, direction, mesh, moduli, block, *map(self._lanes, (pressure, total))
         )
         result += total[:, :, place]
 

@@ -1,7 +1,7 @@
 """Many dense systems of a few hundred rows at once.
 
 By symmetric sweeps in blocks, whose work is matrix products: libraries' batched factorizations are made for much
-smaller matrices. Only what is on the diagonal and below it is kept up to date.
+smaller matrices. Only the lower triangle is kept up to date.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ _STRIP = 256
 """Columns that are brought up to date by one product: the wider, the more are above the diagonal, for nothing."""
 
 
-def inverse_of(matrices: torch.Tensor, row: torch.Tensor, whole: torch.Tensor) -> None:
+def inverse_of(matrices: torch.Tensor, row: torch.Tensor, inverse: torch.Tensor) -> None:
     """Invert symmetric positive definite matrices whose size is a multiple of `ROWS`.
 
     Args:
         matrices: Shape (g, m, m), of which the lower triangle is read; overwritten.
-        row: Where in ``whole`` each goes, shape (g,), int64.
-        whole: Receives the inverses, shape (b, m or more, same); rows and columns beyond m are left as they are.
+        row: Where in ``inverse`` each goes, shape (g,), int64.
+        inverse: Receives the inverses, shape (b, m or more, same); rows and columns beyond m are left as they are.
     """
     _sweep(matrices)
-    _launch("unfold", matrices, tuple(matrices.shape), matrices, row, whole)
+    _launch("unfold", matrices, tuple(matrices.shape), matrices, row, inverse)
 
 
 def _sweep(a: torch.Tensor) -> None:
@@ -33,14 +33,14 @@ def _sweep(a: torch.Tensor) -> None:
     count, size, _ = a.shape
     pivot = torch.empty(count, ROWS, ROWS, dtype=a.dtype, device=a.device)
     column = torch.empty(count, size, ROWS, dtype=a.dtype, device=a.device)
-    for here in range(0, size, ROWS):
-        _launch("take", a, tuple(column.shape), a, here, here + ROWS, column, pivot)
+    for start in range(0, size, ROWS):
+        _launch("take", a, tuple(column.shape), a, start, start + ROWS, column, pivot)
         _invert(pivot)
         swept = column @ pivot
-        for left in range(0, size, _STRIP):
-            right = min(left + _STRIP, size)
-            a[:, left:, left:right].baddbmm_(swept[:, left:], column[:, left:right].mT, alpha=-1.0)
-        _launch("put", a, tuple(column.shape), swept, pivot, here, here + ROWS, a)
+        for strip in range(0, size, _STRIP):
+            right = min(strip + _STRIP, size)
+            a[:, strip:, strip:right].baddbmm_(swept[:, strip:], column[:, strip:right].mT, alpha=-1.0)
+        _launch("put", a, tuple(column.shape), swept, pivot, start, start + ROWS, a)
 
 
 def _invert(pivot: torch.Tensor) -> None:
@@ -53,7 +53,7 @@ def _invert(pivot: torch.Tensor) -> None:
     torch.matmul(root.mT, root, out=pivot)
 
 
-def _launch(name: str, kept: torch.Tensor, dim: tuple[int, ...], *values: object) -> None:
-    if kept.numel():
-        kernel = getattr(sweep_kernels(kept.dtype), name)
-        wp.launch(kernel, dim=dim, inputs=[*map(argument, values)], device=str(kept.device))
+def _launch(name: str, matrix: torch.Tensor, dim: tuple[int, ...], *values: object) -> None:
+    if matrix.numel():
+        kernel = getattr(sweep_kernels(matrix.dtype), name)
+        wp.launch(kernel, dim=dim, inputs=[*map(argument, values)], device=str(matrix.device))

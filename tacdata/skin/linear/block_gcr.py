@@ -2,7 +2,7 @@
 
 Eisenstat, Elman and Schultz, SIAM J. Numer. Anal. 20 (1983) 345, by blocks: every direction serves every right-hand
 side, and those that come later (Parks et al., SIAM J. Sci. Comput. 28 (2006) 1651). The space is kept in single
-precision; residuals are taken anew in double, so that the accuracy is that of the products.
+precision; residuals are recomputed in double precision, so that the accuracy is that of the products.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ _INDEPENDENT = 1e-3
 mostly rounding. If they are needed, they come again, longer, in a later block."""
 
 _ENOUGH = 0.5
-"""Share of the tolerance to which the error is brought in single precision before the residual is taken anew [1]."""
+"""Share of the tolerance to which the error is brought in single precision before the residual is recomputed [1]."""
 
 
 @dataclass(frozen=True)
 class GcrSolution:
-    """What was found."""
+    """Result of a solve."""
 
     x: torch.Tensor
     """The solution, shape (n, 3, b), float64."""
     error: torch.Tensor
     """|M^-1 (rhs - A x)| over |x| [1], shape (b,), M^-1 the preconditioner: about how far x is off. 0 where the
-    right-hand side vanishes. (The residual itself says little where A holds a stiff penalty.)"""
+    right-hand side vanishes. (The residual itself is no measure of the error where A has a stiff penalty.)"""
     products: int
     """Products with the matrix."""
 
 
 class KrylovSpace:
-    """Directions z and what the matrix makes of them, w = A z, these orthonormal; for one matrix."""
+    """Directions z and their images w = A z, these orthonormal; for one matrix."""
 
-    def __init__(self, product: Field, precondition: Field, most: int = 400) -> None:
+    def __init__(self, product: Field, precondition: Field, limit: int = 400) -> None:
         """Bind the matrix.
 
         Args:
             product: A times fields, float64 or float32, of any number of columns.
             precondition: Approximate inverse of A, float32, likewise.
-            most: Largest number of directions; beyond, the space begins anew.
+            limit: Largest number of directions; then the space is emptied.
         """
-        self._product, self._precondition, self._most = product, precondition, most
+        self._product, self._precondition, self._most = product, precondition, limit
         self._z = self._w = torch.empty(0)
         self._count = 0
         self._products = 0
@@ -70,14 +70,14 @@ class KrylovSpace:
             weight: Of each solution where they add up, shape (b,): an error counts over the largest of them, as
                 weighted; None: over its own.
         """
-        there = _norm(rhs) > 0
+        nonzero = _norm(rhs) > 0
         # Without a right-hand side the solution is 0 whatever the guess.
-        x, began = torch.where(there, guess, 0.0), self._products
+        x, began = torch.where(nonzero, guess, 0.0), self._products
         while True:
             residual = rhs - self._times(x)
             size = _norm(residual).clamp_min(1e-300)
             z = self._precondition((residual / size).to(torch.float32))
-            error = torch.where(there, _norm(z) * size / _counted(_norm(x), weight).clamp_min(1e-300), 0.0)
+            error = torch.where(nonzero, _norm(z) * size / _counted(_norm(x), weight).clamp_min(1e-300), 0.0)
             used = self._products - began
             if bool((error <= tolerance).all()) or used >= limit:
                 return GcrSolution(x, error, used)
@@ -93,7 +93,7 @@ class KrylovSpace:
         residual: torch.Tensor,
         size: torch.Tensor,
         tolerance: float,
-        most: int,
+        limit: int,
         weight: torch.Tensor | None,
     ) -> torch.Tensor:
         """Return the correction of x over ``size`` that brings the error to the tolerance.
@@ -105,30 +105,30 @@ class KrylovSpace:
             residual: Of unit length, shape (n, 3, b).
             size: Lengths of the residuals, shape (b,).
             tolerance: As of `solve` [1].
-            most: Products at most.
+            limit: Products at most.
             weight: As of `solve`.
         """
         shape, extent = residual.shape, _norm(x) / size
-        left = residual.to(torch.float32).reshape(-1, shape[2])
-        found = torch.zeros_like(left)
-        wanted = torch.arange(shape[2], device=left.device)
-        for _ in range(most):
-            before = self._count
-            if before:
-                share = self._w[:before] @ left
-                found += self._z[:before].T @ share
-                left = left - self._w[:before].T @ share
-            now = torch.linalg.vector_norm(left[:, wanted], dim=0).clamp_min(1e-30)
-            z = self._precondition((left[:, wanted] / now).reshape(*shape[:2], -1))
-            reached = _counted(torch.linalg.vector_norm(found, dim=0).maximum(extent) * size, weight) / size
-            still = _norm(z) * now > _ENOUGH * tolerance * reached[wanted]
-            wanted = wanted[still]
-            if not len(wanted):
+        remainder = residual.to(torch.float32).reshape(-1, shape[2])
+        solution = torch.zeros_like(remainder)
+        columns = torch.arange(shape[2], device=remainder.device)
+        for _ in range(limit):
+            start = self._count
+            if start:
+                share = self._w[:start] @ remainder
+                solution += self._z[:start].T @ share
+                remainder = remainder - self._w[:start].T @ share
+            norms = torch.linalg.vector_norm(remainder[:, columns], dim=0).clamp_min(1e-30)
+            z = self._precondition((remainder[:, columns] / norms).reshape(*shape[:2], -1))
+            reached = _counted(torch.linalg.vector_norm(solution, dim=0).maximum(extent) * size, weight) / size
+            still = _norm(z) * norms > _ENOUGH * tolerance * reached[columns]
+            columns = columns[still]
+            if not len(columns):
                 break
             self._extend(z[:, :, still])
-            if self._count == before:
+            if self._count == start:
                 break
-        return found.to(torch.float64).reshape(shape)
+        return solution.to(torch.float64).reshape(shape)
 
     def _extend(self, z: torch.Tensor) -> None:
         """Add directions, shape (n, 3, c)."""
@@ -142,8 +142,8 @@ class KrylovSpace:
                 w = w - self._w[: self._count].T @ share
                 z = z - self._z[: self._count].T @ share
             squares, turn = torch.linalg.eigh((w.T @ w).to(torch.float64))
-            kept = squares > (_INDEPENDENT * longest) ** 2
-            mix = (turn[:, kept] / squares[kept].sqrt()).to(torch.float32)
+            independent = squares > (_INDEPENDENT * longest) ** 2
+            mix = (turn[:, independent] / squares[independent].sqrt()).to(torch.float32)
             w, z, longest = w @ mix, z @ mix, torch.ones_like(longest)
         self._append(z.T, w.T)
 

@@ -45,13 +45,13 @@ def direction_of(rows: RowData, b: int, s: int):
 
 
 @wp.func
-def put_row(rows: RowData, b: int, s: int, first: int, direction: wp.vec3, own: wp.float32, other: wp.float32):
+def put_row(rows: RowData, b: int, s: int, first: int, direction: wp.vec3, slave: wp.float32, master: wp.float32):
     """Write a constraint: its rows, its direction, by how much it gives way, alone and with the one before."""
     rows.first[b, s] = first
     for p in range(3):
         rows.direction[b, s, p] = direction[p]
-    rows.give[b, s, 0] = own
-    rows.give[b, s, 1] = other
+    rows.give[b, s, 0] = slave
+    rows.give[b, s, 1] = master
 
 
 @wp.kernel(enable_backward=False)
@@ -61,7 +61,7 @@ def describe(
     normal: wp.array3d(dtype=wp.float64),
     friction: wp.array3d(dtype=wp.float64),
     flat: int,
-    rough: int,
+    frictional: int,
     base: int,
     scale: wp.array(dtype=wp.float32),
     table: wp.array2d(dtype=wp.float32),
@@ -84,14 +84,14 @@ def describe(
     first = base + 3 * j
     n = wp.vec3(wp.float32(normal[j, 0, b]), wp.float32(normal[j, 1, b]), wp.float32(normal[j, 2, b]))
     put_row(rows, b, s, first, n, zero, zero)
-    if rough == 0:
+    if frictional == 0:
         return
-    least = wp.int32(0)
+    lowest = wp.int32(0)
     for i in range(1, 3):
-        if wp.abs(n[i]) < wp.abs(n[least]):
-            least = i
+        if wp.abs(n[i]) < wp.abs(n[lowest]):
+            lowest = i
     axis = wp.vec3(zero, zero, zero)
-    axis[least] = wp.float32(1.0)
+    axis[lowest] = wp.float32(1.0)
     t = wp.normalize(wp.cross(n, axis))
     v = wp.cross(n, t)
     xx, yy, zz = wp.float32(friction[j, 0, b]), wp.float32(friction[j, 1, b]), wp.float32(friction[j, 2, b])
@@ -140,7 +140,7 @@ def assemble(
 
 @wp.kernel(enable_backward=False)
 def along(
-    moved: wp.array2d(dtype=wp.float32),
+    change: wp.array2d(dtype=wp.float32),
     row_scale: wp.array(dtype=wp.float32),
     factor: wp.array(dtype=wp.float32),
     member: wp.array(dtype=wp.int32),
@@ -155,7 +155,7 @@ def along(
         first, n = rows.first[m, s], direction_of(rows, m, s)
         for p in range(3):
             if n[p] != wp.float32(0.0):
-                value += n[p] * moved[first + p, b] * row_scale[first + p]
+                value += n[p] * change[first + p, b] * row_scale[first + p]
     result[b, s] = value * factor[b]
 
 

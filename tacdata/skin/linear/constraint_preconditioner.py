@@ -29,18 +29,18 @@ from tacdata.skin.linear.rest_stiffness import RestSolver
 class ConstraintPreconditioner:
     """Approximate inverse of Newton's system for every member of a batch; the first surface may be rough."""
 
-    def __init__(self, rest: RestSolver, surfaces: Sequence[ContactSurface], modulus: float) -> None:
+    def __init__(self, solver: RestSolver, surfaces: Sequence[ContactSurface], modulus: float) -> None:
         """Bind K0^-1 and the contact surfaces.
 
         Args:
-            rest: K0^-1 of the nominal material; its rows are `mortar_rows` of the surfaces.
+            solver: K0^-1 of the nominal material; its rows are `mortar_rows` of the surfaces.
             surfaces: Whose constraints are held.
             modulus: Young's modulus [MPa] of the nominal material.
         """
-        self.rest, self._modulus = rest, modulus
-        self.solver = compliance_solver(rest.device)
+        self.rest, self._modulus = solver, modulus
+        self.solver = compliance_solver(solver.device)
         """S^-1 of each member."""
-        self.rows = ActiveRows(surfaces, rest, self.solver.STEP)
+        self.rows = ActiveRows(surfaces, solver, self.solver.STEP)
         """The present constraints."""
         self.scale = torch.empty(0)
         """Nominal modulus over each member's [1], shape (b,)."""
@@ -93,5 +93,5 @@ class ConstraintPreconditioner:
 
 
 def compliance_solver(device: str) -> FactoredCompliance | InvertedCompliance:
-    """Return what solves with the compliance on a device."""
+    """Return the solver of the compliance for a device."""
     return FactoredCompliance() if device == "cpu" else InvertedCompliance()

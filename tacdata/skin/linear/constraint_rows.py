@@ -1,6 +1,6 @@
 """The active nodes' constraints of every batch member: the mortar rows that each joins, and their compliance.
 
-Tensors keep their place from one Newton step to the next, and grow where more constraints come: so what reads them can
+Tensors keep their place from one Newton step to the next, and grow with the number of constraints: so their readers can
 be recorded as a CUDA graph.
 """
 
@@ -19,19 +19,19 @@ from tacdata.skin.linear.rest_stiffness import RestSolver
 from tacdata.skin.member.warp_arrays import argument, filled
 
 _TURNED, _SOFTENED = 0.02, 0.3
-"""Change of a direction [1], and of what it gives way by over itself [1], up to which members keep the constraints that
-they had: their compliance is known. It is the lag of one Newton step, and small beside what the steps leave."""
+"""Relative change of a direction [1] and of its compliance [1], up to which members keep the constraints that
+they had: their compliance is known. It is the lag of one Newton step, and small against the error of the steps."""
 
 
 class _Rows:
     """Room for constraints of members; zeros beyond a member's own."""
 
-    def __init__(self, members: int, most: int, device: torch.device | str) -> None:
-        self.first = torch.zeros(members, most, dtype=torch.int32, device=device)
+    def __init__(self, members: int, capacity: int, device: torch.device | str) -> None:
+        self.first = torch.zeros(members, capacity, dtype=torch.int32, device=device)
         """First mortar row of each constraint, shape (b, a)."""
-        self.direction = torch.zeros(members, most, 3, device=device)
-        """What it takes of this and the two that follow [1], shape (b, a, 3)."""
-        self.give = torch.zeros(members, most, 2, device=device)
+        self.direction = torch.zeros(members, capacity, 3, device=device)
+        """Weights of this entry and the next two [1], shape (b, a, 3)."""
+        self.give = torch.zeros(members, capacity, 2, device=device)
         """By how much it gives way, alone, and with the one before [mm/N], shape (b, a, 2)."""
         self.own = torch.zeros(members, dtype=torch.int32, device=device)
         """Number of constraints, shape (b,)."""
@@ -43,12 +43,12 @@ class _Rows:
     def differ(self, new: _Rows) -> torch.Tensor:
         """Return which of the first members have other constraints in ``new``, shape (b,), bool."""
         count = len(new.own)
-        turned = (self.direction[:count] - new.direction).abs().amax(dim=(1, 2)) > _TURNED
+        rotated = (self.direction[:count] - new.direction).abs().amax(dim=(1, 2)) > _TURNED
         give = self.give[:count]
         limit = _SOFTENED * torch.maximum(give[:, :, :1], new.give[:, :, :1])
         softened = ((give - new.give).abs() > limit).any(dim=2).any(dim=1)
-        others = (self.first[:count] != new.first).any(dim=1) | (self.own[:count] != new.own)
-        return turned | softened | others | (self.scale[:count] != new.scale)
+        replaced = (self.first[:count] != new.first).any(dim=1) | (self.own[:count] != new.own)
+        return rotated | softened | replaced | (self.scale[:count] != new.scale)
 
     def put(self, which: torch.Tensor, new: _Rows) -> None:
         """Replace members, by index, by those of ``new``."""
@@ -59,9 +59,9 @@ class _Rows:
 class ActiveRows:
     """Normal directions, and with friction two tangents, of each member's active nodes; a constraint each."""
 
-    def __init__(self, surfaces: Sequence[ContactSurface], rest: RestSolver, step: int) -> None:
-        """Bind the surfaces, whose mortar rows those of ``rest`` are; room grows by multiples of ``step``."""
-        self._surfaces, self._rest, self._step = tuple(surfaces), rest, step
+    def __init__(self, surfaces: Sequence[ContactSurface], solver: RestSolver, step: int) -> None:
+        """Bind the surfaces, whose mortar rows those of ``solver`` are; room grows by multiples of ``step``."""
+        self._surfaces, self._rest, self._step = tuple(surfaces), solver, step
         self._base, base = [], 0
         for surface in surfaces:
             self._base.append(base)
@@ -107,10 +107,10 @@ class ActiveRows:
             self._slots.append(count + directions * (place - 1))
             count = count + directions * place[-1]
         self.sizes = count.tolist()
-        most = -(-max(self.sizes) // self._step) * self._step
-        held, device = self._held, scale.device
-        if len(scale) > len(held.own) or most > self.most or held.own.device != device:
-            self._held = held = _Rows(max(len(scale), len(held.own)), max(most, self.most), device)
+        capacity = -(-max(self.sizes) // self._step) * self._step
+        rows, device = self._held, scale.device
+        if len(scale) > len(rows.own) or capacity > self.most or rows.own.device != device:
+            self._held = rows = _Rows(max(len(scale), len(rows.own)), max(capacity, self.most), device)
         self._table = self._rest.table(self._used())
         new = _Rows(len(scale), self.most, device)
         new.own.copy_(count)
@@ -131,8 +131,8 @@ class ActiveRows:
             )
         if not self.most:
             return []
-        which = held.differ(new).nonzero()[:, 0]
-        held.put(which, new)
+        which = rows.differ(new).nonzero()[:, 0]
+        rows.put(which, new)
         return which.tolist()
 
     def _used(self) -> torch.Tensor:
@@ -150,8 +150,8 @@ class ActiveRows:
             member: Indices, shape (g,), int64.
             room: Receives them, bordered by a unit matrix, shape (g, a, a), float32.
         """
-        held = self._held
-        self.launch(kernels.assemble, tuple(room.shape), member, held.data, held.scale, self._table, room)
+        rows = self._held
+        self.launch(kernels.assemble, tuple(room.shape), member, rows.data, rows.scale, self._table, room)
 
     def wanted(self, gaps: Sequence[torch.Tensor]) -> torch.Tensor:
         """Return changes of mean gaps [mm], by contact, shape (s, b), as values of the constraints, shape (b, a)."""

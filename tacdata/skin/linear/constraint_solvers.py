@@ -24,7 +24,7 @@ class FactoredCompliance:
     """Cholesky factors, made in double precision and kept in single."""
 
     STEP = 1
-    """Sizes that are worth being told apart."""
+    """Granularity of sizes."""
 
     place = ()
     """Nothing that stays where it is."""
@@ -34,14 +34,14 @@ class FactoredCompliance:
         self._factor: list[torch.Tensor] = []
 
     def update(
-        self, sizes: Sequence[int], changed: Sequence[int], most: int, assemble: Assemble, device: torch.device
+        self, sizes: Sequence[int], changed: Sequence[int], capacity: int, assemble: Assemble, device: torch.device
     ) -> None:
         """Factorize.
 
         Args:
             sizes: Constraints of each member.
             changed: Members whose matrices are others than before.
-            most: Constraints for which `times` has columns.
+            capacity: Constraints for which `times` has columns.
             assemble: Writes the matrices.
             device: Where.
         """
@@ -80,12 +80,12 @@ class InvertedCompliance:
         return (self.inverse.data_ptr(),)
 
     def update(
-        self, sizes: Sequence[int], changed: Sequence[int], most: int, assemble: Assemble, device: torch.device
+        self, sizes: Sequence[int], changed: Sequence[int], capacity: int, assemble: Assemble, device: torch.device
     ) -> None:
         """Invert; arguments as of `FactoredCompliance.update`."""
         self._sizes = torch.tensor(sizes, device=device)
-        if len(sizes) > len(self.inverse) or most != self.inverse.shape[1]:
-            self.inverse = torch.zeros(max(len(sizes), len(self.inverse)), most, most, device=device)
+        if len(sizes) > len(self.inverse) or capacity != self.inverse.shape[1]:
+            self.inverse = torch.zeros(max(len(sizes), len(self.inverse)), capacity, capacity, device=device)
         by_size: dict[int, list[int]] = {}
         for member in changed:
             if sizes[member]:
@@ -119,16 +119,16 @@ def side_by_side(tasks: Sequence[Callable[[], None]], device: torch.device) -> N
         for task in tasks:
             task()
         return
-    here = torch.cuda.current_stream(device)
+    current = torch.cuda.current_stream(device)
     streams = _streams(str(device))
     for stream in streams:
-        stream.wait_stream(here)
+        stream.wait_stream(current)
     for number, task in enumerate(tasks):
         stream = streams[number % _STREAMS]
         with torch.cuda.stream(stream), wp.ScopedStream(wp.stream_from_torch(stream), sync_enter=False):
             task()
     for stream in streams:
-        here.wait_stream(stream)
+        current.wait_stream(stream)
 
 
 @cache

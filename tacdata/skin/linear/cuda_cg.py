@@ -49,7 +49,7 @@ class CudaConjugateGradients:
         self._step = _COLUMNS
 
     def solve(
-        self, at: Linearization, r: torch.Tensor, gaps: Sequence[torch.Tensor], wanted: torch.Tensor, stopping: Stopping
+        self, at: Linearization, r: torch.Tensor, gaps: Sequence[torch.Tensor], mask: torch.Tensor, stopping: Stopping
     ) -> tuple[torch.Tensor, torch.Tensor, int]:
         """Solve K x = r + B^T p, B x = c; members stop by themselves.
 
@@ -57,7 +57,7 @@ class CudaConjugateGradients:
             at: The state of the tangent, float32.
             r: Right-hand sides of about norm 1, 0 where not wanted, shape (n, 3, b), float32.
             gaps: c, by contact, shape (s, b), 0 where not wanted.
-            wanted: Members to solve for, shape (b,), bool.
+            mask: Members to solve for, shape (b,), bool.
             stopping: When to end.
 
         Returns:
@@ -65,23 +65,23 @@ class CudaConjugateGradients:
         """
         answer = torch.zeros(r.shape[0] * 3, r.shape[2], device=r.device)
         forces = torch.zeros(r.shape[2], self._preconditioner.rows.most, device=r.device)
-        self._step = max(self._step, _COLUMNS * -(-len(wanted) // (_COLUMNS * _WIDTHS)))
-        count, iteration = int(wanted.sum()), 0
+        self._step = max(self._step, _COLUMNS * -(-len(mask) // (_COLUMNS * _WIDTHS)))
+        count, iteration = int(mask.sum()), 0
         if not count:
             return answer.view_as(r), forces, 0
-        now = self._begin(at, r, gaps, wanted, count, stopping.tolerance)
+        active = self._begin(at, r, gaps, mask, count, stopping.tolerance)
         for iteration in range(1, stopping.limit + 1):
-            now.run(self._iterate)
-            left = int(now.going.sum())
-            if stopping.enough(iteration, left, count):
+            active.run(self._iterate)
+            remaining = int(active.going.sum())
+            if stopping.enough(iteration, remaining, count):
                 break
-            if self._columns(left) <= _SHRINK * now.width:
-                answer[:, now.member], forces[now.member] = now.x, now.total
+            if self._columns(remaining) <= _SHRINK * active.width:
+                answer[:, active.member], forces[active.member] = active.x, active.total
                 # Some that are done fill the columns up; they stay as they are.
-                which = now.going.argsort(descending=True, stable=True)[: self._columns(left)]
-                before, now = now, self._columns_of[self._columns(left)]
-                now.take(before, which)
-        answer[:, now.member], forces[now.member] = now.x, now.total
+                which = active.going.argsort(descending=True, stable=True)[: self._columns(remaining)]
+                previous, active = active, self._columns_of[self._columns(remaining)]
+                active.take(previous, which)
+        answer[:, active.member], forces[active.member] = active.x, active.total
         return answer.view_as(r), forces, iteration
 
     def _begin(
@@ -89,118 +89,124 @@ class CudaConjugateGradients:
         at: Linearization,
         r: torch.Tensor,
         gaps: Sequence[torch.Tensor],
-        wanted: torch.Tensor,
+        mask: torch.Tensor,
         count: int,
         tolerance: float,
     ) -> ActiveColumns:
         # Others, whose right-hand side is 0, fill the columns up.
-        member = wanted.to(torch.int32).argsort(descending=True, stable=True)[: self._columns(count)]
+        member = mask.to(torch.int32).argsort(descending=True, stable=True)[: self._columns(count)]
         for width in (*range(self._step, len(member), self._step), len(member)):
             if width not in self._columns_of:
                 self._columns_of[width] = ActiveColumns(at, width, self._preconditioner, self._rest.padded)
-        now = self._columns_of[len(member)]
-        now.begin(at, member, wanted, r, tolerance)
-        self._scale(now, now.r)
-        self._hold(now, self._preconditioner.rows.wanted(gaps)[member])
-        # What the constraints answer may be any multiple of the right-hand side.
-        self._scale(now, now.r - self._rest.spread(now.soft) if self._tangent.surfaces[0].rough else now.r)
-        self._turn(now, self._rest.times(now.h))
-        return now
+        active = self._columns_of[len(member)]
+        active.begin(at, member, mask, r, tolerance)
+        self._scale(active, active.r)
+        self._hold(active, self._preconditioner.rows.wanted(gaps)[member])
+        # The reaction of the constraints may be any multiple of the right-hand side.
+        self._scale(active, active.r - self._rest.spread(active.soft) if self._tangent.surfaces[0].rough else active.r)
+        self._turn(active, self._rest.times(active.h))
+        return active
 
-    def _scale(self, now: ActiveColumns, left: torch.Tensor) -> None:
-        """Find by what residuals are multiplied for half precision, and round those that are left."""
-        rest = self._rest
-        now.size.zero_()
-        self._sum(kernels.reach, now, left, rest.order, rest.scale, now.size)
-        now.size.copy_(_ROOM / now.size.clamp_min(1e-30))
-        torch.div(now.softness, now.size, out=now.factor)
-        self._launch(kernels.load, (len(rest.order), now.width), left, rest.order, rest.scale, now.size, now.h)
+    def _scale(self, active: ActiveColumns, residual: torch.Tensor) -> None:
+        """Find the factor of residuals for half precision, and round the active ones."""
+        solver = self._rest
+        active.size.zero_()
+        self._sum(kernels.reach, active, residual, solver.order, solver.scale, active.size)
+        active.size.copy_(_ROOM / active.size.clamp_min(1e-30))
+        torch.div(active.softness, active.size, out=active.factor)
+        self._launch(
+            kernels.load, (len(solver.order), active.width), residual, solver.order, solver.scale, active.size, active.h
+        )
 
-    def _iterate(self, now: ActiveColumns) -> None:
-        rest, rows = self._rest, len(self._rest.order)
-        q = now.q.zero_().view_as(now.p)
-        self._tangent.add_product(now.at, now.p.view_as(now.at.u), now.q)
-        self._sum(kernels.curve, now, now.p, q, rest.order, now.curvature)
+    def _iterate(self, active: ActiveColumns) -> None:
+        solver, rows = self._rest, len(self._rest.order)
+        q = active.q.zero_().view_as(active.p)
+        self._tangent.add_product(active.at, active.p.view_as(active.at.u), active.q)
+        self._sum(kernels.curve, active, active.p, q, solver.order, active.curvature)
         self._launch(
             kernels.advance,
-            (rows, now.width),
-            now.x,
-            now.r,
-            now.p,
+            (rows, active.width),
+            active.x,
+            active.r,
+            active.p,
             q,
-            now.rho,
-            now.curvature,
-            now.going,
-            now.first,
-            rest.order,
-            rest.scale,
-            now.size,
-            now.h,
+            active.rho,
+            active.curvature,
+            active.going,
+            active.first,
+            solver.order,
+            solver.scale,
+            active.size,
+            active.h,
         )
-        self._hold(now)
-        w = rest.times(now.h)
-        self._sum(kernels.measure, now, w, now.r, rest.order, rest.scale, now.factor, now.rho_new)
+        self._hold(active)
+        w = solver.times(active.h)
+        self._sum(kernels.measure, active, w, active.r, solver.order, solver.scale, active.factor, active.rho_new)
         self._launch(
             kernels.judge,
-            now.width,
-            now.rho_new,
-            now.curvature,
-            now.tolerance,
-            now.goal,
-            now.rho,
-            now.beta,
-            now.going,
-            now.first,
+            active.width,
+            active.rho_new,
+            active.curvature,
+            active.tolerance,
+            active.goal,
+            active.rho,
+            active.beta,
+            active.going,
+            active.first,
         )
-        self._turn(now, w)
+        self._turn(active, w)
 
-    def _hold(self, now: ActiveColumns, wanted: torch.Tensor | None = None) -> None:
-        """Take what the constraints answer off the residual; they are to change by ``wanted``, shape (b, a)."""
-        rest, rows, shape = self._rest, self._preconditioner.rows, tuple(now.v.shape)
+    def _hold(self, active: ActiveColumns, mask: torch.Tensor | None = None) -> None:
+        """Subtract the reaction of the constraints from the residual; they are to change by ``mask``, shape (b, a)."""
+        solver, rows, shape = self._rest, self._preconditioner.rows, tuple(active.v.shape)
         if not shape[1]:
             return
-        moved = rest.rows_times(now.h)
-        rows.launch(constraint_kernels.along, shape, moved, rest.row_scale, now.factor, now.row, rows.data, now.v)
-        if wanted is not None:
-            now.v.sub_(wanted)
+        change = solver.rows_times(active.h)
+        rows.launch(
+            constraint_kernels.along, shape, change, solver.row_scale, active.factor, active.row, rows.data, active.v
+        )
+        if mask is not None:
+            active.v.sub_(mask)
         rows.launch(
             constraint_kernels.answer,
             shape,
             self._solver.inverse,
-            now.v,
-            now.row,
-            now.going,
+            active.v,
+            active.row,
+            active.going,
             rows.data,
-            now.y,
-            now.total,
+            active.y,
+            active.total,
         )
-        now.hard.zero_()
-        now.soft.zero_()
-        rows.launch(constraint_kernels.onto_rows, shape, now.y, now.row, rows.data, now.hard, now.soft)
-        up = rest.spreads
+        active.hard.zero_()
+        active.soft.zero_()
+        rows.launch(constraint_kernels.onto_rows, shape, active.y, active.row, rows.data, active.hard, active.soft)
+        up = solver.spreads
         self._launch(
             kernels.spread,
-            (len(up.row), now.width),
+            (len(up.row), active.width),
             up.start,
             up.column,
             up.value,
             up.row,
-            now.hard,
-            now.soft,
-            rest.order,
-            rest.scale,
-            now.size,
-            now.r,
-            now.h,
+            active.hard,
+            active.soft,
+            solver.order,
+            solver.scale,
+            active.size,
+            active.r,
+            active.h,
         )
 
-    def _turn(self, now: ActiveColumns, w: torch.Tensor) -> None:
-        rest = self._rest
-        self._launch(kernels.turn, (len(w), now.width), w, rest.order, rest.scale, now.factor, now.beta, now.p)
+    def _turn(self, active: ActiveColumns, w: torch.Tensor) -> None:
+        solver = self._rest
+        self._launch(
+            kernels.turn, (len(w), active.width), w, solver.order, solver.scale, active.factor, active.beta, active.p
+        )
 
-    def _sum(self, kernel: Any, now: ActiveColumns, *inputs: torch.Tensor) -> None:
+    def _sum(self, kernel: Any, active: ActiveColumns, *inputs: torch.Tensor) -> None:
         rows = len(self._rest.order)
-        self._launch(kernel, (-(-rows // int(kernels.STRIP)), now.width), *inputs)
+        self._launch(kernel, (-(-rows // int(kernels.STRIP)), active.width), *inputs)
 
     def _launch(self, kernel: Any, dim: tuple[int, ...] | int, *inputs: object) -> None:
         device = str(self._rest.order.device)

@@ -30,12 +30,12 @@ class ActiveColumns:
             at: State of a whole batch: for its sizes and device.
             width: Number of columns.
             preconditioner: Whose constraints are held.
-            padded: Rows of what the rest state's inverse is multiplied with.
+            padded: Rows of the right-hand side of the rest state's inverse.
         """
         device, nodes = at.u.device, at.u.shape[0]
-        some = torch.zeros(width, dtype=torch.int64, device=device)
+        index = torch.zeros(width, dtype=torch.int64, device=device)
         self.width, self._preconditioner = width, preconditioner
-        self.at = at.take(some)
+        self.at = at.take(index)
         """The state of these members."""
 
         def zeros(*shape: int, dtype: torch.dtype = torch.float32) -> torch.Tensor:
@@ -52,7 +52,7 @@ class ActiveColumns:
         self.member, self.row = zeros(dtype=torch.int64), zeros(dtype=torch.int32)
         """Columns in the whole batch, shape (b,), as all that follows."""
         self.softness, self.size, self.factor = zeros(), zeros(), zeros()
-        """Nominal modulus over the member's; by what residuals are multiplied for half precision [1]; their ratio."""
+        """Nominal modulus over the member's; factor of residuals for half precision [1]; their ratio."""
         self.rho, self.goal = zeros(), zeros()
         """Squared preconditioned norms of the residual: now, and where to stop."""
         self.going, self.first = zeros(dtype=torch.int32), zeros(dtype=torch.int32)
@@ -65,14 +65,14 @@ class ActiveColumns:
         self._bind()
 
     def begin(
-        self, at: Linearization, member: torch.Tensor, wanted: torch.Tensor, r: torch.Tensor, tolerance: float
+        self, at: Linearization, member: torch.Tensor, mask: torch.Tensor, r: torch.Tensor, tolerance: float
     ) -> None:
         """Take members of a whole batch, by index; other arguments as of `cuda_cg.CudaConjugateGradients.solve`."""
         self.member.copy_(member)
         self.row.copy_(member)
         torch.index_select(r.reshape(-1, r.shape[2]), -1, member, out=self.r)
         self.softness.copy_(self._preconditioner.scale[member])
-        self.going.copy_(wanted[member])
+        self.going.copy_(mask[member])
         self.first.fill_(1)
         self.tolerance.fill_(tolerance)
         self.at.take_into(at, member)
@@ -80,19 +80,19 @@ class ActiveColumns:
         for values in (self.x, self.p, self.rho, self.rho_new, self.beta, self.curvature, self.total, self.soft):
             values.zero_()
 
-    def take(self, other: ActiveColumns, which: torch.Tensor) -> None:
+    def take(self, source: ActiveColumns, which: torch.Tensor) -> None:
         """Take members of others, by index."""
         for name in (*_FIELDS, *_VALUES):
-            torch.index_select(getattr(other, name), -1, which, out=getattr(self, name))
+            torch.index_select(getattr(source, name), -1, which, out=getattr(self, name))
         for values in (self.rho_new, self.curvature):
             values.zero_()
-        self.tolerance.copy_(other.tolerance)
-        self.at.take_into(other.at, which)
+        self.tolerance.copy_(source.tolerance)
+        self.at.take_into(source.at, which)
         self._bind()
-        torch.index_select(other.total, 0, which, out=self.total)
+        torch.index_select(source.total, 0, which, out=self.total)
 
     def _bind(self) -> None:
-        """Make room for the constraints there are; what was recorded for another room is of no use."""
+        """Allocate for the present constraints; graphs recorded for another allocation are dropped."""
         rows = self._preconditioner.rows
         place = *rows.place, *self._preconditioner.solver.place
         if place != self._place:
@@ -100,7 +100,7 @@ class ActiveColumns:
             self._place, self._seen, self._graph = place, 0, None
 
     def run(self, iteration: Callable[[ActiveColumns], None]) -> None:
-        """Run an iteration: as it stands at first, so that its kernels are loaded, then from its graph."""
+        """Run an iteration: directly at first, so that its kernels are loaded, then from its graph."""
         if self.x.is_cuda and self._graph is None and self._seen:
             self._graph = self._record(iteration)
         if self._graph is None:

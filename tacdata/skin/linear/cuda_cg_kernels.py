@@ -1,6 +1,6 @@
-"""Kernels of `tacdata.skin.linear.cuda_cg`: what conjugate gradients do to fields, each field read and written once.
+"""Kernels of `tacdata.skin.linear.cuda_cg`: operations of conjugate gradients, each field read and written once.
 
-Fields are (3n, batch); ``order`` says for which degree of freedom each row of the rest state's inverse stands.
+Fields are (3n, batch); ``order`` is the degree of freedom of each row of the rest state's inverse.
 A thread does `STRIP` rows of one member, so that its sums go to memory once.
 """
 
@@ -63,18 +63,18 @@ def spread(
 ):
     """Take the constraints' forces off the residual.
 
-    Those of hard constraints for good: the preconditioner annihilates them, and what is left is small. Those of soft
+    Those of hard constraints for good: the preconditioner annihilates them, and the remainder is small. Those of soft
     ones, which the tangent holds too, for this time.
     """
     i, b = wp.tid()
-    taken, lent = wp.float32(0.0), wp.float32(0.0)
+    reaction, correction = wp.float32(0.0), wp.float32(0.0)
     for e in range(start[i], start[i + 1]):
-        taken += value[e] * hard[column[e], b]
-        lent += value[e] * soft[column[e], b]
+        reaction += value[e] * hard[column[e], b]
+        correction += value[e] * soft[column[e], b]
     k = row[i]
-    left = r[order[k], b] - taken
-    r[order[k], b] = left
-    h[k, b] = halved((left - lent) * scale[k] * size[b])
+    remainder = r[order[k], b] - reaction
+    r[order[k], b] = remainder
+    h[k, b] = halved((remainder - correction) * scale[k] * size[b])
 
 
 @wp.kernel(enable_backward=False)
@@ -117,9 +117,9 @@ def advance(
         elif curvature[b] > wp.float32(0.0):
             alpha = rho[b] / curvature[b]
         x[n, b] = x[n, b] + alpha * p[n, b]
-        left = r[n, b] - alpha * q[n, b]
-        r[n, b] = left
-        h[k, b] = halved(left * scale[k] * size[b])
+        residual = r[n, b] - alpha * q[n, b]
+        r[n, b] = residual
+        h[k, b] = halved(residual * scale[k] * size[b])
 
 
 @wp.kernel(enable_backward=False)
@@ -150,7 +150,7 @@ def judge(
     going: wp.array(dtype=wp.int32),
     first: wp.array(dtype=wp.int32),
 ):
-    """Stop members that are done; leave nothing in the sums. The first x says what is small."""
+    """Stop members that are done; clear the sums. The first x sets the scale of small values."""
     b = wp.tid()
     beta[b] = wp.float32(0.0)
     if going[b] == 1:

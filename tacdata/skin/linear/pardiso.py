@@ -47,7 +47,7 @@ class PardisoFactor:
 
         Args:
             matrix: Symmetric, all its entries stored.
-            library: What `runtime` returns.
+            library: Result of `runtime`.
 
         Raises:
             SolveError: If it is not positive definite.
@@ -56,7 +56,7 @@ class PardisoFactor:
         self._values = upper.data.astype(np.float32)
         self._starts, self._columns = upper.indptr.astype(np.int32), upper.indices.astype(np.int32)
         self._memory = _Memory(library, len(self._starts) - 1)
-        # A finalizer must hold nothing of what it finalizes.
+        # A finalizer must hold no reference to its object.
         weakref.finalize(self, self._memory.call, _RELEASE, (None, None, None))
         code = self._call(_FACTORIZE)
         if code:
@@ -88,7 +88,7 @@ class PardisoFactor:
 
 
 class _Memory:
-    """What the library keeps of one factor."""
+    """The library's data of one factor."""
 
     def __init__(self, library: Any, size: int) -> None:
         self.size = size

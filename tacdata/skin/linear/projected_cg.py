@@ -33,9 +33,9 @@ class Stopping:
     long: int = 8
     """See ``stragglers``."""
 
-    def enough(self, iteration: int, left: int, wanted: int) -> bool:
-        """Return whether to end after an iteration, with ``left`` of the ``wanted`` members not done."""
-        return not left or (iteration >= self.long and left <= int(self.stragglers * wanted))
+    def enough(self, iteration: int, remaining: int, columns: int) -> bool:
+        """Return whether to end after an iteration, with ``remaining`` of the ``columns`` members not done."""
+        return not remaining or (iteration >= self.long and remaining <= int(self.stragglers * columns))
 
 
 def projected_conjugate_gradients(
@@ -44,7 +44,7 @@ def projected_conjugate_gradients(
     preconditioner: ConstraintPreconditioner,
     rhs: torch.Tensor,
     gaps: Sequence[torch.Tensor],
-    wanted: torch.Tensor,
+    mask: torch.Tensor,
     stopping: Stopping,
 ) -> tuple[torch.Tensor, torch.Tensor, int]:
     """Solve for every batch member that is wanted; each stops by itself, and costs nothing from then on.
@@ -55,14 +55,14 @@ def projected_conjugate_gradients(
         preconditioner: Prepared for the present constraints.
         rhs: r, shape (n, 3, b), float32.
         gaps: c, by contact, shape (s, b).
-        wanted: Members to solve for, shape (b,), bool; others get 0.
+        mask: Members to solve for, shape (b,), bool; others get 0.
         stopping: When to end.
 
     Returns:
         x, shape (n, 3, b), -p as `ConstraintPreconditioner.forces` takes it, and the number of iterations.
     """
     answer, forces = torch.zeros_like(rhs), torch.zeros(rhs.shape[2], preconditioner.rows.most, device=rhs.device)
-    member, iteration = wanted.nonzero()[:, 0], 0
+    member, iteration = mask.nonzero()[:, 0], 0
     count = len(member)
     if not count:
         return answer, forces, iteration
@@ -74,12 +74,12 @@ def projected_conjugate_gradients(
     p, rho = z, _dot(r, z)
     going = rho > goal
     for iteration in range(1, stopping.limit):
-        left = int(going.sum())
-        if left < len(member):
+        remaining = int(going.sum())
+        if remaining < len(member):
             answer[:, :, member], forces[member] = x, y
             at, (member, x, r, p, y, rho, goal) = _chosen(at, going, (member, x, r, p, y.T, rho, goal))
             y = y.T
-        if stopping.enough(iteration, left, count):
+        if stopping.enough(iteration, remaining, count):
             break
         q = product(at, p)
         curvature = _dot(p, q)

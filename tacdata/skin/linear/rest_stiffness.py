@@ -100,10 +100,10 @@ def rest_solver(
         SolveError: If the inverse does not fit into the GPU's memory.
     """
     # A K0 with averages costs a sparse factor several times the fill, and saves no iterations (decision 0016).
-    known = averaged and device != "cpu"
-    stiffness = rest_stiffness(mesh, material if known == averaged else for_averaged(material), known)
-    free = np.flatnonzero(~np.repeat(fixed, 3))
-    return (SparseRest if device == "cpu" else DenseRest)(stiffness, free, rows, device)
+    prepared = averaged and device != "cpu"
+    stiffness = rest_stiffness(mesh, material if prepared == averaged else for_averaged(material), prepared)
+    unfixed = np.flatnonzero(~np.repeat(fixed, 3))
+    return (SparseRest if device == "cpu" else DenseRest)(stiffness, unfixed, rows, device)
 
 
 class _MortarRows:
@@ -121,8 +121,8 @@ def compressed_rows(matrix: sp.csr_matrix, device: str) -> torch.Tensor:
     with warnings.catch_warnings():
         # PyTorch calls compressed rows a beta, and warns that it trusts them; their products are all that is used.
         warnings.simplefilter("ignore", UserWarning)
-        made = torch.sparse_csr_tensor(starts, columns, values, size=matrix.shape)
-    return made.to(device)
+        tensor = torch.sparse_csr_tensor(starts, columns, values, size=matrix.shape)
+    return tensor.to(device)
 
 
 class SparseRest:
@@ -133,11 +133,11 @@ class SparseRest:
 
     _BLOCK = 64
 
-    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, rows: sp.csr_matrix, device: str = "cpu") -> None:
-        """Factorize; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
+    def __init__(self, stiffness: sp.csr_matrix, unfixed: np.ndarray, rows: sp.csr_matrix, device: str = "cpu") -> None:
+        """Factorize; arguments as of `rest_solver`, ``unfixed`` the degrees of freedom that are not held."""
         self.device = device
-        self._free, self._mortar = torch.as_tensor(free), _MortarRows(rows, device)
-        self._factor = factor_of(stiffness[free][:, free])
+        self._free, self._mortar = torch.as_tensor(unfixed), _MortarRows(rows, device)
+        self._factor = factor_of(stiffness[unfixed][:, unfixed])
         # Rows are filled when a press first needs them and serve every later one; memory is taken as they are.
         count = self._mortar.count
         self._table = torch.from_numpy(np.empty((count, count), dtype=np.float32))
@@ -166,7 +166,7 @@ class SparseRest:
             unit[part, torch.arange(len(part))] = 1.0
             columns = self.rows(self.apply(self.spread(unit)))
             columns[part] = (columns[part] + columns[part].T) / 2
-            # What was known before stays as it is, so that the table is symmetric.
+            # Known entries do not change, so that the table is symmetric.
             known = self._known.nonzero()[:, 0]
             columns[known] = self._table[known[:, None], part]
             self._table[part], self._table[:, part] = columns.T, columns
@@ -178,7 +178,7 @@ class DenseRest:
     """Inverse of the rest stiffness as a full matrix on a GPU: one product serves a whole batch.
 
     Scaled to a unit diagonal and rounded to half precision, at half the memory and several times the rate of single.
-    What is rounded is a preconditioner; what must hold exactly is that its constraints see the same matrix. So their
+    Rounding is harmless: it is a preconditioner. But its constraints must use exactly the same matrix. So their
     compliance M K0^-1 M^T is taken from the rounded one, and sums are kept in single precision. M K0^-1 is kept too,
     each row scaled to unit compliance: its product with a residual costs a quarter of the whole inverse's.
     """
@@ -193,17 +193,18 @@ class DenseRest:
     _BLOCK = 2048
     """Columns of M K0^-1 made at a time."""
 
-    def __init__(self, stiffness: sp.csr_matrix, free: np.ndarray, rows: sp.csr_matrix, device: str) -> None:
-        """Invert; arguments as of `rest_solver`, ``free`` the degrees of freedom that are not held."""
-        need = 2 * 8 * len(free) ** 2
+    def __init__(self, stiffness: sp.csr_matrix, unfixed: np.ndarray, rows: sp.csr_matrix, device: str) -> None:
+        """Invert; arguments as of `rest_solver`, ``unfixed`` the degrees of freedom that are not held."""
+        need = 2 * 8 * len(unfixed) ** 2
         have = need if device == "cpu" else torch.cuda.mem_get_info(device)[0]
         if need > have:
             raise SolveError(
-                f"a mesh with {len(free)} degrees of freedom, whose inverse takes {need / 2**30:.0f} GiB on {device}",
+                f"a mesh with {len(unfixed)} degrees of freedom, whose inverse takes {need / 2**30:.0f} GiB on "
+                f"{device}",
                 f"at most {have / 2**30:.0f} GiB",
                 "coarsen the mesh, or use device cpu",
             )
-        reduced = stiffness[free][:, free].tocoo()
+        reduced = stiffness[unfixed][:, unfixed].tocoo()
         place = torch.as_tensor(np.stack([reduced.row, reduced.col]), dtype=torch.int64, device=device)
         inverse = torch.zeros(reduced.shape, dtype=torch.float64, device=device)
         inverse[place[0], place[1]] = torch.as_tensor(reduced.data, device=device)
@@ -212,37 +213,39 @@ class DenseRest:
         inverse /= scale[:, None]
         inverse /= scale
         inverse.diagonal().add_(self._SHIFT)
-        self.device, self._order = device, torch.as_tensor(free, device=device)
+        self.device, self._order = device, torch.as_tensor(unfixed, device=device)
         self.order = self._order.to(torch.int32)
         """Degree of freedom of every row, shape (k,)."""
         self.scale = scale.to(torch.float32)
         """By which a right-hand side is multiplied, and then the product, shape (k,)."""
         self._scale = self.scale[:, None]
-        self.padded = -(-len(free) // self._ALIGNED) * self._ALIGNED
+        self.padded = -(-len(unfixed) // self._ALIGNED) * self._ALIGNED
         """Rows that `times` takes: one for every entry of ``order``, and zeros."""
-        self._inverse = torch.zeros(len(free), self.padded, dtype=torch.float16, device=device)
-        self._inverse[:, : len(free)] = inverse
+        self._inverse = torch.zeros(len(unfixed), self.padded, dtype=torch.float16, device=device)
+        self._inverse[:, : len(unfixed)] = inverse
         del inverse
         self._mortar = _MortarRows(rows, device)
         self.count = self._mortar.count
         """Number of mortar rows."""
-        self._compliance(rows, free)
-        self.spreads = SpreadRows(rows, free, device)
+        self._compliance(rows, unfixed)
+        self.spreads = SpreadRows(rows, unfixed, device)
 
-    def _compliance(self, rows: sp.csr_matrix, free: np.ndarray) -> None:
+    def _compliance(self, rows: sp.csr_matrix, unfixed: np.ndarray) -> None:
         """Make M K0^-1 and M K0^-1 M^T of the rounded inverse."""
-        mortar = compressed_rows(sp.csr_matrix(rows[:, free] @ sp.diags_array(self.scale.cpu().numpy())), self.device)
-        whole = torch.empty(self.count, len(self.order), device=self.device)
+        mortar = compressed_rows(
+            sp.csr_matrix(rows[:, unfixed] @ sp.diags_array(self.scale.cpu().numpy())), self.device
+        )
+        compliance = torch.empty(self.count, len(self.order), device=self.device)
         for start in range(0, len(self.order), self._BLOCK):
             part = self._inverse[start : start + self._BLOCK, : len(self.order)].T.to(torch.float32)
             # The rounded inverse is symmetric, as rounding is a function of the number alone.
-            whole[:, start : start + self._BLOCK] = mortar @ part
-        self._table = mortar @ whole.T.contiguous()
+            compliance[:, start : start + self._BLOCK] = mortar @ part
+        self._table = mortar @ compliance.T.contiguous()
         self._table = (self._table + self._table.T) / 2
         self.row_scale = self._table.diagonal().clamp_min(1e-30).sqrt().contiguous()
         """By which the product of `rows_times` is multiplied, shape (m,)."""
         self._rows = torch.zeros(self.count, self.padded, dtype=torch.float16, device=self.device)
-        self._rows[:, : len(self.order)] = whole / self.row_scale[:, None]
+        self._rows[:, : len(self.order)] = compliance / self.row_scale[:, None]
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
@@ -269,8 +272,8 @@ class DenseRest:
         """Return the scaled inverse times ``scaled``.
 
         Args:
-            scaled: right-hand sides in the order of `order`, scaled by `scale`, shape (padded, b), float16; what
-                stands beyond the rows of ``order`` is not read into the result.
+            scaled: right-hand sides in the order of `order`, scaled by `scale`, shape (padded, b), float16;
+                rows beyond those of ``order`` are not read into the result.
 
         Returns:
             The product before it is scaled, shape (k, b), float32.
@@ -285,9 +288,9 @@ class DenseRest:
 class SpreadRows:
     """M^T on the free degrees of freedom, row by row, as a kernel takes it."""
 
-    def __init__(self, rows: sp.csr_matrix, free: np.ndarray, device: str) -> None:
+    def __init__(self, rows: sp.csr_matrix, unfixed: np.ndarray, device: str) -> None:
         """Choose the rows that are not empty."""
-        up = sp.csr_matrix(sp.csr_matrix(rows.T)[free])
+        up = sp.csr_matrix(sp.csr_matrix(rows.T)[unfixed])
         loaded = np.flatnonzero(np.diff(up.indptr))
         up = sp.csr_matrix(up[loaded])
 

@@ -112,7 +112,7 @@ def sweep_kernels(dtype: torch.dtype) -> SimpleNamespace:
     def put(
         swept: wp.array3d(dtype=real), pivot: wp.array3d(dtype=real), start: int, end: int, a: wp.array3d(dtype=real)
     ):
-        """Write what `take` read, swept."""
+        """Write the block that `take` read, after its sweep."""
         b, i, c = wp.tid()
         if i < start:
             a[b, start + c, i] = swept[b, i, c]
@@ -122,9 +122,9 @@ def sweep_kernels(dtype: torch.dtype) -> SimpleNamespace:
             a[b, i, start + c] = swept[b, i, c]
 
     @wp.kernel(module="unique", enable_backward=False)
-    def unfold(a: wp.array3d(dtype=real), row: wp.array(dtype=wp.int64), whole: wp.array3d(dtype=real)):
+    def unfold(a: wp.array3d(dtype=real), row: wp.array(dtype=wp.int64), matrix: wp.array3d(dtype=real)):
         """Write the inverses, of which the negative lower triangle is known, as rows of ``whole``."""
         b, i, j = wp.tid()
-        whole[wp.int32(row[b]), i, j] = -a[b, wp.max(i, j), wp.min(i, j)]
+        matrix[wp.int32(row[b]), i, j] = -a[b, wp.max(i, j), wp.min(i, j)]
 
     return SimpleNamespace(take=take, put=put, unfold=unfold)

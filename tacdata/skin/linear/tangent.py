@@ -34,7 +34,11 @@ class Linearization(Columns):
 
 
 class TangentStiffness:
-    """K as an operator. It holds what never changes; the state is an argument."""
+    """K as an operator.
+
+    Body and surfaces never change; the state is an argument. On a CPU it also keeps a cache: the tangents that were
+    prepared for members of the present batch (`PreparedTangent`), which `keep` and `forget` follow.
+    """
 
     def __init__(self, body: Elasticity, surfaces: Sequence[ContactSurface]) -> None:
         """Bind a body and its contact surfaces."""
@@ -45,17 +49,17 @@ class TangentStiffness:
         u: torch.Tensor,
         conditions: Conditions,
         contacts: Sequence[ContactTangent],
-        wanted: torch.Tensor | None = None,
+        mask: torch.Tensor | None = None,
     ) -> Linearization:
         """Return the state that `add_product` takes.
 
-        ``u`` has the precision of the solve. The tangent is prepared for members in ``wanted``, shape (b,), bool.
+        ``u`` has the precision of the solve. The tangent is prepared for members in ``mask``, shape (b,), bool.
         """
-        own = conditions.to(u.dtype)
-        if self._prepared and wanted is not None and len(some := wanted.nonzero()[:, 0]) >= _FEW:
-            self._prepared.update(u, own, some)
-            return Linearization(u, own, tuple(contacts), None, torch.arange(u.shape[2]))
-        return Linearization(u, own, tuple(contacts), self.body.dilatation(u, own))
+        material = conditions.to(u.dtype)
+        if self._prepared and mask is not None and len(members := mask.nonzero()[:, 0]) >= _FEW:
+            self._prepared.update(u, material, members)
+            return Linearization(u, material, tuple(contacts), None, torch.arange(u.shape[2]))
+        return Linearization(u, material, tuple(contacts), self.body.dilatation(u, material))
 
     def add_product(self, at: Linearization, p: torch.Tensor, result: torch.Tensor) -> None:
         """Add K p [N] to ``result``; both of shape (n, 3, b) and of one precision, held nodes included."""
@@ -67,11 +71,11 @@ class TangentStiffness:
             surface.add_product(contact, p, result)
 
     def keep(self, which: torch.Tensor) -> None:
-        """Let go of all members but some, by index, shape (k,)."""
+        """Keep only some members, by index, shape (k,)."""
         if self._prepared:
             self._prepared.keep(which)
 
     def forget(self, which: torch.Tensor) -> None:
-        """Start members, by index, anew."""
+        """Reset members, by index."""
         if self._prepared:
             self._prepared.forget(which)

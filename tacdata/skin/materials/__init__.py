@@ -1,4 +1,4 @@
-"""Hyperelastic laws, one per file; see `law.py` for what a file must hold."""
+"""Hyperelastic laws, one per file; `law.py` states the contents of a file."""
 
 from tacdata.skin.materials.law import Law, load_law
 

@@ -27,7 +27,7 @@ class ArrudaBoyce(Law):
         return cls(inverse_links=0.25)
 
     def complaint(self) -> str:
-        """Return what is wrong with the links."""
+        """Return the fault of the links."""
         if 0 <= self.inverse_links <= 1:
             return ""
         return f"inverse_links = {self.inverse_links:g}, allowed are 0 to 1 (chains of one link or more)"

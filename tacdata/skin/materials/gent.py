@@ -26,7 +26,7 @@ class Gent(Law):
         return cls(stiffening=0.1)
 
     def complaint(self) -> str:
-        """Return what is wrong with the stiffening."""
+        """Return the fault of the stiffening."""
         return "" if 0 <= self.stiffening <= 10 else f"stiffening = {self.stiffening:g}, allowed are 0 to 10"
 
     def numbers(self, shear_modulus: float, bulk_modulus: float) -> tuple[float, ...]:
@@ -57,7 +57,7 @@ class Gent(Law):
             room = real(1.0) - y
             if y < end:
                 return half * x * log1p_ratio(-y)
-            over = m[2] * x - y
-            return half * (-wp.log(room) + over / room + half * over * over / (room * room)) / m[2]
+            excess = m[2] * x - y
+            return half * (-wp.log(room) + excess / room + half * excess * excess / (room * room)) / m[2]
 
         return LawFunctions(*first_invariant.functions(real, first_invariant.Profile(value, slope, curvature)))

@@ -1,7 +1,7 @@
-"""What a material law's file holds.
+"""Base class of the material laws, and the contents of a law's file.
 
 ``tacdata/skin/materials/my_law.py`` defines one frozen dataclass derived from `Law`. A sensor or case file names it by
-its file's name. Its fields are the law's own parameters beside Young's modulus and Poisson's ratio: pure numbers, whose
+its file's name. Its fields are parameters in addition to Young's modulus and Poisson's ratio: pure numbers, whose
 defaults make the law Neo-Hookean, set under ``material/parameters``.
 
 All Warp functions exist for double and single precision (``real``), and take either the deformation gradient F or the
@@ -65,7 +65,7 @@ class Law(ABC):
         return _second(real)
 
     def complaint(self) -> str:
-        """Return in words what is wrong with the parameters; empty if nothing is."""
+        """Return the fault of the parameters; empty if there is none."""
         return ""
 
     @property

@@ -23,7 +23,7 @@ class MooneyRivlin(Law):
         return cls(c01_share=0.2)
 
     def complaint(self) -> str:
-        """Return what is wrong with the share."""
+        """Return the fault of the share."""
         return "" if 0 <= self.c01_share <= 1 else f"c01_share = {self.c01_share:g}, allowed are 0 to 1"
 
     def numbers(self, shear_modulus: float, bulk_modulus: float) -> tuple[float, ...]:

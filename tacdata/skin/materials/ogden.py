@@ -27,7 +27,7 @@ class Ogden(Law):
         return cls(exponent=(1.3, 5.0, -2.0), share=(0.7, 0.1, 0.2))
 
     def complaint(self) -> str:
-        """Return what is wrong with exponents and shares."""
+        """Return the fault of exponents and shares."""
         if not 1 <= len(self.exponent) == len(self.share) <= TERMS:
             return (
                 f"{len(self.exponent)} exponents and {len(self.share)} shares; allowed are as many of one as of the "
@@ -41,8 +41,8 @@ class Ogden(Law):
 
     def numbers(self, shear_modulus: float, bulk_modulus: float) -> tuple[float, ...]:
         """Return mu, kappa [MPa], three exponents and three shares [1]; unused terms have the share 0."""
-        rest = TERMS - len(self.exponent)
-        return shear_modulus, bulk_modulus, *self.exponent, *([2.0] * rest), *self.share, *([0.0] * rest)
+        padding = TERMS - len(self.exponent)
+        return shear_modulus, bulk_modulus, *self.exponent, *([2.0] * padding), *self.share, *([0.0] * padding)
 
     @staticmethod
     @cache

@@ -1,1 +1,1 @@
-"""What each batch member is made of: constants, indenter, pose."""
+"""Properties of each batch member: constants, indenter, pose."""

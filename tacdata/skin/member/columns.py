@@ -32,20 +32,20 @@ class Columns:
         """Return a copy of some members, by index."""
         return _mapped(self, lambda mine: mine.index_select(-1, which))
 
-    def take_into(self, other: Self, which: torch.Tensor) -> None:
-        """Copy members of ``other``, by index, into the tensors that this one has: their addresses stay."""
-        for mine, theirs in _pairs(self, other):
-            torch.index_select(theirs, -1, which, out=mine)
+    def take_into(self, source: Self, which: torch.Tensor) -> None:
+        """Copy members of ``source``, by index, into the tensors that this one has: their addresses stay."""
+        for target, theirs in _pairs(self, source):
+            torch.index_select(theirs, -1, which, out=target)
 
-    def put(self, which: torch.Tensor, other: Self) -> None:
-        """Replace some members, by index, by those of ``other``."""
-        for mine, theirs in _pairs(self, other):
-            mine.index_copy_(-1, which, theirs)
+    def put(self, which: torch.Tensor, source: Self) -> None:
+        """Replace some members, by index, by those of ``source``."""
+        for target, theirs in _pairs(self, source):
+            target.index_copy_(-1, which, theirs)
 
-    def put_where(self, mask: torch.Tensor, other: Self) -> None:
-        """Replace the members in ``mask`` by those of ``other``, which has as many columns."""
-        for mine, theirs in _pairs(self, other):
-            mine.copy_(torch.where(mask, theirs, mine))
+    def put_where(self, mask: torch.Tensor, source: Self) -> None:
+        """Replace the members in ``mask`` by those of ``source``, which has as many columns."""
+        for target, theirs in _pairs(self, source):
+            target.copy_(torch.where(mask, theirs, target))
 
     def copy(self) -> Self:
         """Return a copy that shares no memory."""
@@ -86,14 +86,14 @@ def _joined(values: list[Any]) -> Any:
     return first
 
 
-def _pairs(mine: Any, theirs: Any) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
-    if isinstance(mine, torch.Tensor):
-        yield mine, theirs
-    elif isinstance(mine, tuple):
-        for one, other in zip(mine, theirs, strict=True):
-            yield from _pairs(one, other)
-    elif isinstance(mine, Columns):
-        yield from _pairs(tuple(_parts(mine)), tuple(_parts(theirs)))
+def _pairs(target: Any, theirs: Any) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+    if isinstance(target, torch.Tensor):
+        yield target, theirs
+    elif isinstance(target, tuple):
+        for field, counterpart in zip(target, theirs, strict=True):
+            yield from _pairs(field, counterpart)
+    elif isinstance(target, Columns):
+        yield from _pairs(tuple(_parts(target)), tuple(_parts(theirs)))
 
 
 def _parts(value: Any) -> Iterator[Any]:

@@ -1,4 +1,4 @@
-"""What may differ between the members of a batch on one mesh: elastic constants, thickness, friction, the indenter."""
+"""Properties that may differ between members of a batch on one mesh: elasticity, thickness, friction, indenter."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from tacdata.skin.member.columns import Columns
 
 @dataclass(frozen=True)
 class Conditions(Columns):
-    """What a batch member is made of and pressed by; one column a member, all tensors on one device."""
+    """Material and indenter of a batch member; one column a member, all tensors on one device."""
 
     law: torch.Tensor
-    """Parameters of the material law [as the law says], shape (8, b)."""
+    """Parameters of the material law [units of the law], shape (8, b)."""
     modulus: torch.Tensor
     """Young's modulus, by which contact stiffness is scaled [MPa], shape (b,)."""
     thickness: torch.Tensor
@@ -40,8 +40,8 @@ class Conditions(Columns):
     def pressed_by(self, indenter: Indenter) -> Conditions:
         """Return the same under a shape."""
         device = str(self.law.device)
-        own, number = indenter.device_parameters(device), shape_number(indenter)
-        return replace(self, indenter=_column(own, device), shape=_scalar(number, device))
+        parameters, number = indenter.device_parameters(device), shape_number(indenter)
+        return replace(self, indenter=_column(parameters, device), shape=_scalar(number, device))
 
 
 def shape_number(indenter: Indenter) -> float:

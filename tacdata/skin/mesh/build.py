@@ -51,17 +51,17 @@ def build_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
 
 
 def mesh_key(sensor: Sensor, settings: MeshSettings) -> str:
-    """Return the name under which a mesh is kept: a hash of what it is made from (32 hex digits)."""
+    """Return the name under which a mesh is kept: a hash of its inputs (32 hex digits)."""
     centers = sensor.taxels.centers.tolist() if sensor.skin.protrusion_radius else []
-    wanted = asdict(settings)
+    document = asdict(settings)
     if settings.tip is None or not sensor.skin.protrusion_radius:
-        wanted.pop("tip")
-    made_from = {"recipe": RECIPE, "skin": sensor.skin.identity, "protrusions": centers, "settings": wanted}
+        document.pop("tip")
+    made_from = {"recipe": RECIPE, "skin": sensor.skin.identity, "protrusions": centers, "settings": document}
     return provenance.content_hash(made_from)[:32]
 
 
 def make_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
-    """Mesh a sensor's skin anew.
+    """Mesh a sensor's skin, without the cache.
 
     Raises:
         SolveError: If the geometry cannot be meshed.
@@ -70,16 +70,16 @@ def make_mesh(sensor: Sensor, settings: MeshSettings) -> SkinMesh:
     if sensor.skin.surface is not None:
         return own_mesh(sensor, sensor.skin.surface, settings)
     # fTetWild gives another mesh at every run, once in some dozens one with a sliver, or one that cannot be snapped.
-    found, failed = [], []
-    while len(found) < _TRIES and len(failed) < _REFUSALS and (not found or found[-1][0] < _SLIVER):
+    meshes, failed = [], []
+    while len(meshes) < _TRIES and len(failed) < _REFUSALS and (not meshes or meshes[-1][0] < _SLIVER):
         try:
             mesh = quadratic(sensor, *tetrahedralize(surface(sensor, settings.tip), sensor.skin, settings))
-            found.append((quality(mesh).worst_ratio, mesh))
+            meshes.append((quality(mesh).worst_ratio, mesh))
         except SolveError as error:
             failed.append(error)
-    if not found:
+    if not meshes:
         raise failed[-1]
-    ratio, mesh = max(found, key=lambda pair: pair[0])
+    ratio, mesh = max(meshes, key=lambda pair: pair[0])
     if ratio < _FLAT:
         raise SolveError(
             f"{_TRIES} meshes of the skin all have flat or inverted elements (best of their worst ratios: {ratio:.2g})",

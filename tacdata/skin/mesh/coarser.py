@@ -52,13 +52,13 @@ def companion_mesh(sensor: Sensor, settings: MeshSettings, fine: SkinMesh) -> Sk
     The mesher keeps the geometry's own vertices and so need not follow the edge length asked for: the first of `RATIOS`
     is taken whose mesh is coarser by `LEAST_RATIO`, else the coarsest.
     """
-    found: list[SkinMesh] = []
+    meshes: list[SkinMesh] = []
     for ratio in RATIOS:
         try:
-            found.append(build_mesh(sensor, coarser(settings, ratio)))
+            meshes.append(build_mesh(sensor, coarser(settings, ratio)))
         except SolveError:
             break
-        if edge_ratio(fine, found[-1]) >= LEAST_RATIO:
-            return found[-1]
-    best = min(found, key=lambda mesh: len(mesh.outer), default=None)
+        if edge_ratio(fine, meshes[-1]) >= LEAST_RATIO:
+            return meshes[-1]
+    best = min(meshes, key=lambda mesh: len(mesh.outer), default=None)
     return best if best is not None and len(best.outer) < len(fine.outer) else None

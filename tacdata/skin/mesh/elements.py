@@ -77,8 +77,8 @@ def triangle_hats(points: np.ndarray) -> np.ndarray:
     for node, (a, b) in enumerate(FACE_EDGES, start=3):
         c = 3 - a - b
         middle = 1 - 2 * barycentric[:, c]
-        beside = np.where(at_corner[:, a], 2 * barycentric[:, b], np.where(at_corner[:, b], 2 * barycentric[:, a], 0.0))
-        result[:, node] = np.where(at_corner.any(axis=1), beside, middle)
+        shared = np.where(at_corner[:, a], 2 * barycentric[:, b], np.where(at_corner[:, b], 2 * barycentric[:, a], 0.0))
+        result[:, node] = np.where(at_corner.any(axis=1), shared, middle)
     return result
 
 

@@ -1,4 +1,4 @@
-"""Make the default sensor's meshes anew and put them among those that ship: ``python -m tacdata.skin.mesh.pin``.
+"""Regenerate the shipped meshes of the default sensor: ``python -m tacdata.skin.mesh.pin``.
 
 Needed when `tacdata.skin.mesh.build.RECIPE`, the default sensor's geometry or the default mesh settings change. It
 makes a new version of the model. Of several attempts the mesh with the best worst element is kept. The coarser meshes
@@ -26,7 +26,7 @@ def pin() -> list[Path]:
 
 
 def pin_companions(fine: SkinMesh) -> list[Path]:
-    """Pin the coarser meshes of the default sensor that are asked for beside ``fine``; return their paths."""
+    """Pin the coarser companion meshes of ``fine`` for the default sensor; return their paths."""
     paths = []
     for ratio in RATIOS:
         settings = coarser(MeshSettings(), ratio)
@@ -39,8 +39,8 @@ def pin_companions(fine: SkinMesh) -> list[Path]:
 
 
 def _best(settings: MeshSettings) -> SkinMesh:
-    made = (make_mesh(default_sensor(), settings) for _ in range(ATTEMPTS))
-    return max(made, key=lambda mesh: quality(mesh).worst_ratio)
+    meshes = (make_mesh(default_sensor(), settings) for _ in range(ATTEMPTS))
+    return max(meshes, key=lambda mesh: quality(mesh).worst_ratio)
 
 
 def _save(mesh: SkinMesh, settings: MeshSettings) -> Path:

@@ -71,10 +71,10 @@ class SkinMesh:
     def rim(self, width: float) -> np.ndarray:
         """Return True for nodes of the underside within ``width`` [mm] of its border with the sides, shape (n,)."""
         border = self.nodes[self.sides & self.bottom]
-        held = self.bottom.copy()
+        bonded = self.bottom.copy()
         if len(border):
-            held[self.bottom] = KDTree(border).query(self.nodes[self.bottom])[0] <= width
-        return held & self.bottom
+            bonded[self.bottom] = KDTree(border).query(self.nodes[self.bottom])[0] <= width
+        return bonded & self.bottom
 
     def volumes(self) -> np.ndarray:
         """Return the volume of each element by its straight-sided corners [mm^3], shape (e,)."""
@@ -109,7 +109,7 @@ class SkinMesh:
         return np.einsum("qaj,eqji->eqai", slopes, inverse), determinant * weights
 
     def save(self, path: Path) -> None:
-        """Write the mesh as an NPZ file; beside, then renamed."""
+        """Write the mesh as an NPZ file: first under a temporary name."""
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.name}.{os.getpid()}.npz")
         np.savez_compressed(temporary, **{f.name: getattr(self, f.name) for f in fields(self)})

@@ -28,7 +28,7 @@ _WILD = 0.3
 """Volume ratio det F below which an extrapolated start is not used [1]."""
 
 _HALVINGS, _SHORTER = 4, 4.0
-"""How often a step that went astray is shortened, and by what; each costs an evaluation for the whole batch."""
+"""Number and factor of the cuts of a step that diverges; each costs an evaluation for the whole batch."""
 
 _ANY, _STARTED = 1e3, 0.15
 """Residuals that stand in, whole or at the least, for that before the first step of a load step [1]."""
@@ -48,7 +48,7 @@ class PlacedPress:
     """One press as the batch takes it."""
 
     number: int
-    """By which its states are told apart."""
+    """Number that identifies its states."""
     path: LoadPath
     """Its depths."""
     touch: np.ndarray
@@ -62,11 +62,11 @@ class PlacedPress:
 
 
 Collect = Callable[[Equilibria], list[Any]]
-"""Makes of every column's state what is to be kept of it."""
+"""Converts the states of columns into results."""
 
 Observe = Callable[[list[int], Configuration], None]
-"""Is told the numbers of presses that have just reached an equilibrium, wanted or not, and their columns, before the
-history moves on."""
+"""Receives the numbers of presses that have just reached an equilibrium, requested or not, and their columns, before
+the history moves on."""
 
 
 class Batch:
@@ -113,16 +113,16 @@ class Batch:
         A press that fails yields its `SolveError` in place of a state, and no more.
 
         Args:
-            presses: What to solve, taken as columns become free.
+            presses: Presses to solve, taken as columns become free.
             collect: Makes the states that are yielded.
-            observe: Is told of every equilibrium on the way, from the touch on, if given.
+            observe: Receives every equilibrium on the way, from the touch on, if given.
 
         Raises:
             SolveError: If so many columns do not fit into a GPU's memory.
         """
         try:
             waiting = iter(presses)
-            yield from self._fill(waiting, observe)
+            self._fill(waiting, observe)
             while any(press is not None for press in self._presses):
                 self._shrink()
                 yield from self._iterate(waiting, collect, observe)
@@ -142,46 +142,46 @@ class Batch:
 
         1. Evaluate the forces; shorten steps that went astray.
         2. Judge every column: found, failed, go on.
-        3. Accept what is found; hand out the states that are wanted; send columns on, or give them the next press.
+        3. Accept converged columns; hand out requested states; send columns on, or give them the next press.
         4. Take failed columns back to their last equilibrium, for a smaller step.
-        5. Evaluate again what has changed, and take a Newton step.
+        5. Evaluate changed columns again, and take a Newton step.
         """
-        now = self._settled()
-        verdicts = self._judge(now)
-        yield from self._collect(verdicts, now, collect, observe)
+        residual = self._settled()
+        verdicts = self._judge(residual)
+        yield from self._collect(verdicts, residual, collect, observe)
         failed = self._mask(verdicts, "failed")
         yield from self._retreat(verdicts)
         changed = failed | self._mask(verdicts, "found")
         if changed.any():
-            yield from self._fill(waiting, observe)
+            self._fill(waiting, observe)
             self._start(changed)
-            now = self._updated(now, changed)
-        self._step(now)
+            residual = self._updated(residual, changed)
+        self._step(residual)
 
     def _settled(self) -> Residual:
         """Evaluate the forces, shortening steps that went astray."""
-        now, at = self._newton.residual(self._at), self._at
+        residual, at = self._newton.residual(self._at), self._at
         step = at.unknowns.minus(self._base)
         for _ in range(_HALVINGS):
             # After a start there is no step to shorten.
-            bad = self._newton.is_bad(self._before, now) & torch.isfinite(self._before)
+            bad = self._newton.is_bad(self._before, residual) & torch.isfinite(self._before)
             marks = bad.cpu().numpy()
             if not marks.any():
                 break
             factor = torch.where(bad, 1 / _SHORTER, 1.0)
             step = step.zeros().plus(step, factor)
             at.unknowns = self._base.plus(step).where(bad, at.unknowns)
-            now = self._updated(now, marks)
-        return now
+            residual = self._updated(residual, marks)
+        return residual
 
-    def _updated(self, now: Residual, changed: np.ndarray) -> Residual:
+    def _updated(self, residual: Residual, changed: np.ndarray) -> Residual:
         which = torch.as_tensor(changed.nonzero()[0], device=self._at.u.device)
-        return self._newton.updated(now, self._at, which)
+        return self._newton.updated(residual, self._at, which)
 
-    def _judge(self, now: Residual) -> list[str]:
-        changed = self._status.changed(now.contacts, self._at.conditions.friction).to(now.relative.dtype)
+    def _judge(self, residual: Residual) -> list[str]:
+        changed = self._status.changed(residual.contacts, self._at.conditions.friction).to(residual.relative.dtype)
         # Together, as a GPU is waited for each time that something is read off it.
-        columns = [changed, now.relative, now.penetration, now.mean_penetration, now.volume]
+        columns = [changed, residual.relative, residual.penetration, residual.mean_penetration, residual.volume]
         figures = torch.stack(columns, dim=1).tolist()
         verdicts = ["idle"] * len(figures)
         for column, press in enumerate(self._presses):
@@ -202,32 +202,32 @@ class Batch:
         return verdicts
 
     def _collect(
-        self, verdicts: list[str], now: Residual, collect: Collect, observe: Observe | None
+        self, verdicts: list[str], residual: Residual, collect: Collect, observe: Observe | None
     ) -> Iterator[tuple[int, float, Any]]:
         """Accept the states found and hand out those that are wanted."""
         found = [column for column, verdict in enumerate(verdicts) if verdict == "found"]
         if not found:
             return
         paths = {column: self._press(column).path for column in found}
-        turned = [(path.attempt - path.depth) * path.direction < 0 for path in paths.values()]
-        moved = self._values({column: path.attempt - path.depth for column, path in paths.items()})
-        straight = self._values({column: not back for column, back in zip(found, turned, strict=True)}) > 0
+        reversed_ = [(path.attempt - path.depth) * path.direction < 0 for path in paths.values()]
+        steps = self._values({column: path.attempt - path.depth for column, path in paths.items()})
+        straight = self._values({column: not back for column, back in zip(found, reversed_, strict=True)}) > 0
         which = self._tensor(self._mask(verdicts, "found"))
         at = self._at
         if observe:
             observe(self._numbers(found), at.take(torch.as_tensor(found, device=at.u.device)))
-        for history, contact, pose in zip(at.histories, now.contacts, at.poses, strict=True):
+        for history, contact, pose in zip(at.histories, residual.contacts, at.poses, strict=True):
             history.accept(contact, pose, which)
-        # What is not active carries nothing.
-        state = Unknowns(at.u, tuple(contact.pressure for contact in now.contacts))
+        # Inactive nodes carry no pressure.
+        state = Unknowns(at.u, tuple(contact.pressure for contact in residual.contacts))
         depth = self._values({column: path.attempt for column, path in paths.items()})
-        self._starts.accept(which, depth, moved, straight, state)
-        wanted = [column for column, path in paths.items() if path.found()]
-        if wanted:
-            columns = torch.as_tensor(wanted, device=at.u.device)
-            relative, penetration = torch.stack([now.relative, now.penetration])[:, columns].cpu().numpy()
-            changed = [self._press(column).path.changed for column in wanted]
-            spent = [self._press(column).path.taken() for column in wanted]
+        self._starts.accept(which, depth, steps, straight, state)
+        requested = [column for column, path in paths.items() if path.found()]
+        if requested:
+            columns = torch.as_tensor(requested, device=at.u.device)
+            relative, penetration = torch.stack([residual.relative, residual.penetration])[:, columns].cpu().numpy()
+            changed = [self._press(column).path.changed for column in requested]
+            spent = [self._press(column).path.taken() for column in requested]
             states = collect(
                 Equilibria(
                     columns,
@@ -237,10 +237,10 @@ class Batch:
                     penetration,
                     spent,
                     changed,
-                    now.contacts,
+                    residual.contacts,
                 )
             )
-            for column, state in zip(wanted, states, strict=True):
+            for column, state in zip(requested, states, strict=True):
                 press = self._press(column)
                 yield press.number, press.path.depth, state
         self._release([column for column, path in paths.items() if path.finished])
@@ -261,18 +261,18 @@ class Batch:
                 self._release([column])
                 yield press.number, press.path.depth, error
 
-    def _fill(self, waiting: Iterator[PlacedPress], observe: Observe | None) -> Iterator[tuple[int, float, SolveError]]:
+    def _fill(self, waiting: Iterator[PlacedPress], observe: Observe | None) -> None:
         """Put waiting presses into idle columns, the indenter just touching."""
-        taken: dict[int, PlacedPress] = {}
+        presses: dict[int, PlacedPress] = {}
         for column, press in enumerate(self._presses):
-            if press is None and (one := next(waiting, None)) is not None:
-                self._presses[column] = taken[column] = one
-        if taken:
+            if press is None and (following := next(waiting, None)) is not None:
+                self._presses[column] = presses[column] = following
+        if presses:
             at, device = self._at, self._at.u.device
-            new = np.isin(np.arange(len(self._presses)), list(taken))
-            which = torch.as_tensor(list(taken), device=device)
-            at.conditions.put(which, Conditions.joined([press.conditions for press in taken.values()]))
-            touch, turn = ([getattr(press, name) for press in taken.values()] for name in ("touch", "turn"))
+            new = np.isin(np.arange(len(self._presses)), list(presses))
+            which = torch.as_tensor(list(presses), device=device)
+            at.conditions.put(which, Conditions.joined([press.conditions for press in presses.values()]))
+            touch, turn = ([getattr(press, name) for press in presses.values()] for name in ("touch", "turn"))
             at.poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
             at.poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
             self._clear(which)
@@ -280,19 +280,18 @@ class Batch:
             for history, first in zip(at.histories, self._touched(which, observe), strict=True):
                 history.put(which, first)
             self._start(new)
-        yield from ()
 
     def _touched(self, which: torch.Tensor, observe: Observe | None) -> tuple[ContactHistory, ...]:
         """Return the histories of columns, by index, whose indenter just touches the undeformed skin."""
-        here, surfaces = self._at.take(which), self._newton.surfaces
-        here.histories = tuple(surface.start(pose) for surface, pose in zip(surfaces, here.poses, strict=True))
-        contacts = self._newton.add_contact_forces(here, torch.zeros_like(here.u))
+        members, surfaces = self._at.take(which), self._newton.surfaces
+        members.histories = tuple(surface.start(pose) for surface, pose in zip(surfaces, members.poses, strict=True))
+        contacts = self._newton.add_contact_forces(members, torch.zeros_like(members.u))
         if observe:
-            observe(self._numbers(which.tolist()), here.copy())
+            observe(self._numbers(which.tolist()), members.copy())
         everyone = torch.ones_like(which, dtype=torch.bool)
-        for history, contact, pose in zip(here.histories, contacts, here.poses, strict=True):
+        for history, contact, pose in zip(members.histories, contacts, members.poses, strict=True):
             history.accept(contact, pose, everyone)
-        return here.histories
+        return members.histories
 
     def _start(self, changed: np.ndarray) -> None:
         """Move the changed columns' indenters to the depth to try, and start from a guess of the displacements."""
@@ -301,43 +300,43 @@ class Batch:
         depth = self._values({column: press.path.depth for column, press in busy.items()})
         attempt = self._values({column: press.path.attempt for column, press in busy.items()})
         heights = self._values({c: float(press.touch[2]) - press.path.attempt for c, press in busy.items()})
-        moved, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._at.poses[0].place
-        place[2] = torch.where(moved, heights, place[2])
+        busy_mask, place = self._values(dict.fromkeys(busy, 1.0)) > 0, self._at.poses[0].place
+        place[2] = torch.where(busy_mask, heights, place[2])
         coarse = {column: press.coarse for column, press in busy.items() if press.coarse}
         guess, near = self._starts.guess(which, depth, attempt, coarse)
         columns = which.nonzero()[:, 0]
-        chosen = guess.take(columns)
-        wild = self._newton.body.internal_force(chosen.u, self._at.conditions.take(columns))[1] < _WILD
-        chosen = self._starts.accepted.take(columns).where(wild, chosen)
+        proposed = guess.take(columns)
+        wild = self._newton.body.internal_force(proposed.u, self._at.conditions.take(columns))[1] < _WILD
+        proposed = self._starts.accepted.take(columns).where(wild, proposed)
         near[columns] = torch.where(wild, TOUCHING, near[columns])
         state = self._at.unknowns.copy()
-        state.put(columns, chosen)
+        state.put(columns, proposed)
         self._at.unknowns = state
         self._at.near = torch.where(which, near, self._at.near)
         self._before = torch.where(which, torch.inf, self._before)
 
-    def _step(self, now: Residual) -> None:
+    def _step(self, residual: Residual) -> None:
         """Take one Newton step."""
         busy = self._tensor(np.array([press is not None for press in self._presses]))
         if not bool(busy.any()):
             return
         at, first = self._at, torch.isinf(self._before)
         # By the tangent, nodes may flip between opposite slips for ever; by the secant, a majorant, they do not.
-        flipping = (at.friction_tangent > 0) & (now.relative > _SLOW * self._before)
+        flipping = (at.friction_tangent > 0) & (residual.relative > _SLOW * self._before)
         self._failed_at = torch.where(first, torch.inf, self._failed_at)
         self._failed_at = torch.where(flipping, self._before.minimum(self._failed_at), self._failed_at)
-        may = now.relative < _NEARER * self._failed_at
-        at.friction_tangent = torch.where(may, self._newton.friction_tangent(now), 0.0)
+        may = residual.relative < _NEARER * self._failed_at
+        at.friction_tangent = torch.where(may, self._newton.friction_tangent(residual), 0.0)
         for press in self._presses:
             if press is not None:
                 press.path.stepped()
-        self._status.note(now.contacts, at.conditions.friction)
-        moved, changes, used = self._newton.step(at, now, busy)
+        self._status.note(residual.contacts, at.conditions.friction)
+        advanced, changes, used = self._newton.step(at, residual, busy)
         self.cg, self.newton_iterations = self.cg + used, self.newton_iterations + 1
-        # The first step of a load step changes the active set: the residual before says little, or nothing.
-        before = torch.where(at.near > 0, _ANY, now.relative)
-        self._base, self._before = at.unknowns, torch.where(first, before.clamp_min(_STARTED), before)
-        at.unknowns = self._base.plus(Unknowns(moved, changes))
+        # The first step of a load step changes the active set: the residual before it is no reference.
+        limit = torch.where(at.near > 0, _ANY, residual.relative)
+        self._base, self._before = at.unknowns, torch.where(first, limit.clamp_min(_STARTED), limit)
+        at.unknowns = self._base.plus(Unknowns(advanced, changes))
         at.near = torch.zeros_like(at.near)
 
     def _release(self, columns: list[int]) -> None:

@@ -24,28 +24,28 @@ class CoarsePath:
     @classmethod
     def of(cls, reached: Sequence[tuple[float, Unknowns]]) -> CoarsePath | None:
         """Keep states at depths above 0 [mm], each of one member; None if there are none."""
-        kept = [(at, state.single()) for at, state in reached if at > 0]
-        if not kept:
+        states = [(at, state.single()) for at, state in reached if at > 0]
+        if not states:
             return None
-        parts = [kept[0][1].zeros(), *(state for _, state in kept)]
-        return cls(np.array([0.0, *(at for at, _ in kept)]), Unknowns.joined(parts))
+        parts = [states[0][1].zeros(), *(state for _, state in states)]
+        return cls(np.array([0.0, *(at for at, _ in states)]), Unknowns.joined(parts))
 
-    def change(self, before: float, after: float) -> Unknowns | None:
+    def change(self, start: float, end: float) -> Unknowns | None:
         """Return by how much the unknowns change between two depths [mm], one column; None beyond the last state."""
-        if max(before, after) > self.depth[-1] + 1e-9:
+        if max(start, end) > self.depth[-1] + 1e-9:
             return None
-        weight = self._weights(after) - self._weights(before)
+        weight = self._weights(end) - self._weights(start)
         share = torch.as_tensor(weight, dtype=torch.float32, device=self.states.u.device)[:, None]
         return Unknowns(self.states.u @ share, tuple(part @ share for part in self.states.multipliers))
 
     def _weights(self, depth: float) -> np.ndarray:
         """Return how much each state counts at a depth [mm]: linear between states."""
-        return np.array([np.interp(depth, self.depth, one) for one in np.eye(len(self.depth))])
+        return np.array([np.interp(depth, self.depth, unit) for unit in np.eye(len(self.depth))])
 
 
 @dataclass(frozen=True)
 class CoarseStart:
-    """What a press's load steps start from: its states on a coarser mesh."""
+    """Start of a press's load steps: its states on a coarser mesh."""
 
     path: CoarsePath
     """On the coarser mesh."""
@@ -62,8 +62,10 @@ def changes(starts: Sequence[tuple[CoarseStart, float, float]]) -> tuple[list[in
     Returns:
         Which of them are known, and their changes; None if none is.
     """
-    found = [(k, start.path.change(before, after)) for k, (start, before, after) in enumerate(starts)]
-    known = [(k, change) for k, change in found if change is not None]
-    if not known:
+    candidates = [
+        (k, start.path.change(start_depth, end_depth)) for k, (start, start_depth, end_depth) in enumerate(starts)
+    ]
+    available = [(k, change) for k, change in candidates if change is not None]
+    if not available:
         return [], None
-    return [k for k, _ in known], starts[0][0].transfer.fine(Unknowns.joined([change for _, change in known]))
+    return [k for k, _ in available], starts[0][0].transfer.fine(Unknowns.joined([change for _, change in available]))

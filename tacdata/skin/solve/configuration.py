@@ -14,21 +14,21 @@ from tacdata.skin.member.pose import Pose
 
 @dataclass(frozen=True)
 class Unknowns(Columns):
-    """What Newton's method solves for; one column a member."""
+    """Unknowns of Newton's method; one column a member."""
 
     u: torch.Tensor
     """Displacements [mm], shape (n, 3, b), float64."""
     multipliers: tuple[torch.Tensor, ...]
     """Normal tractions at the nodes of each contact [MPa], shape (s, b), float64."""
 
-    def plus(self, other: Unknowns, factor: torch.Tensor | float = 1.0) -> Unknowns:
+    def plus(self, change: Unknowns, factor: torch.Tensor | float = 1.0) -> Unknowns:
         """Return the sum with others, times a factor, shape (b,)."""
-        pairs = zip(self.multipliers, other.multipliers, strict=True)
-        return Unknowns(self.u + factor * other.u, tuple(a + factor * b for a, b in pairs))
+        pairs = zip(self.multipliers, change.multipliers, strict=True)
+        return Unknowns(self.u + factor * change.u, tuple(a + factor * b for a, b in pairs))
 
-    def minus(self, other: Unknowns) -> Unknowns:
+    def minus(self, reference: Unknowns) -> Unknowns:
         """Return the difference from others."""
-        return self.plus(other, -1.0)
+        return self.plus(reference, -1.0)
 
     def flatten(self, which: torch.Tensor) -> None:
         """Set members, by index, shape (k,), to 0, in place."""
@@ -39,15 +39,15 @@ class Unknowns(Columns):
         """Return a copy in single precision."""
         return Unknowns(self.u.to(torch.float32), tuple(part.to(torch.float32) for part in self.multipliers))
 
-    def where(self, mask: torch.Tensor, other: Unknowns) -> Unknowns:
-        """Return these members where ``mask``, shape (b,), holds, else those of ``other``."""
-        pairs = zip(self.multipliers, other.multipliers, strict=True)
-        return Unknowns(torch.where(mask, self.u, other.u), tuple(torch.where(mask, a, b) for a, b in pairs))
+    def where(self, mask: torch.Tensor, alternative: Unknowns) -> Unknowns:
+        """Return these members where ``mask``, shape (b,), holds, else those of ``alternative``."""
+        pairs = zip(self.multipliers, alternative.multipliers, strict=True)
+        return Unknowns(torch.where(mask, self.u, alternative.u), tuple(torch.where(mask, a, b) for a, b in pairs))
 
 
 @dataclass
 class Configuration(Columns):
-    """Where the skin and the shapes are, what they are made of, and what contact remembers; one column a member."""
+    """Places of skin and shapes, their properties, and the memory of contact; one column a member."""
 
     u: torch.Tensor
     """Displacements [mm], shape (n, 3, b), float64."""

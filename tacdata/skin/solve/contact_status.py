@@ -1,4 +1,4 @@
-"""Which members' contact has changed its status in a Newton step: what a step was for."""
+"""Members whose contact has changed its status in a Newton step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tacdata.skin.contact.contact_surface import ContactSurface
 
 
 class ContactStatus:
-    """What every contact node of a batch did before the present step: open, sticking or slipping."""
+    """Status of every contact node of a batch before the present step: open, sticking or slipping."""
 
     def __init__(self, surfaces: Sequence[ContactSurface]) -> None:
         """Begin without a status."""
@@ -25,8 +25,8 @@ class ContactStatus:
     def changed(self, contacts: Sequence[ContactForces], friction: torch.Tensor) -> torch.Tensor:
         """Return in which members a node has another status than was noted, shape (b,), bool."""
         change = torch.zeros_like(friction, dtype=torch.bool)
-        for before, now in zip(self._before, self._of(contacts, friction), strict=False):
-            change |= (before != now).any(dim=0)
+        for previous, current in zip(self._before, self._of(contacts, friction), strict=False):
+            change |= (previous != current).any(dim=0)
         return change
 
     def keep(self, which: torch.Tensor) -> None:
@@ -34,4 +34,4 @@ class ContactStatus:
         self._before = tuple(status[:, which] for status in self._before)
 
     def _of(self, contacts: Sequence[ContactForces], friction: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        return tuple(surface.status(now, friction) for surface, now in zip(self._surfaces, contacts, strict=True))
+        return tuple(surface.status(forces, friction) for surface, forces in zip(self._surfaces, contacts, strict=True))

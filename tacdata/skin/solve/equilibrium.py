@@ -1,4 +1,4 @@
-"""What is read off an equilibrium: forces, what the taxels feel, displacements."""
+"""Results of an equilibrium: forces, loads on the taxels, displacements."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class StateReader:
         Args:
             mesh: The skin.
             taxels: Number of protrusions.
-            board: What they stand on, if anything; then the second contact of every batch is that with it.
+            board: The board under them, if any; then the second contact of every batch is with it.
             device: "cpu" or "cuda:0".
         """
         self._taxels, self._board = taxels, board
@@ -93,27 +93,27 @@ class StateReader:
         return -self._rim @ u[:, 2]
 
     def taxel_load(self, load: torch.Tensor) -> torch.Tensor:
-        """Return the sum over each protrusion of what its nodes carry, shape (taxels, k); ``load``: (s, k)."""
+        """Return the sum over each protrusion of the loads on its nodes, shape (taxels, k); ``load``: (s, k)."""
         total = torch.zeros(self._taxels, load.shape[1], dtype=torch.float64, device=load.device)
         return total.index_add_(0, self._taxel, load)
 
-    def states(self, found: Equilibria, with_displacement: bool = True) -> list[Equilibrium]:
+    def states(self, reached: Equilibria, with_displacement: bool = True) -> list[Equilibrium]:
         """Return the states that columns of a batch have reached, displacements only if they are wanted."""
-        column = found.column
-        force = -found.contacts[0].force[:, column]
+        column = reached.column
+        force = -reached.contacts[0].force[:, column]
         load = torch.zeros(self._taxels, len(column), dtype=torch.float64, device=force.device)
         area = torch.zeros_like(load)
         if self._board:
-            pressure, hat = found.contacts[1].pressure[:, column], self._board.area[:, None]
+            pressure, hat = reached.contacts[1].pressure[:, column], self._board.area[:, None]
             load.index_add_(0, self._taxel, pressure * hat)
             area.index_add_(0, self._taxel, (pressure > 0) * hat)
-        force, load, area, closure = (value.T.cpu().numpy() for value in (force, load, area, self.closure(found.u)))
+        force, load, area, closure = (value.T.cpu().numpy() for value in (force, load, area, self.closure(reached.u)))
         u = traction = [np.empty((0, 3))] * len(column)
         board = [np.empty(0)] * len(column)
         if with_displacement:
             if self._board:
-                board = found.contacts[1].pressure[:, column].T.cpu().numpy()
-            u, traction = (field.permute(2, 0, 1).cpu().numpy() for field in (found.u, _on_indenter(found)))
+                board = reached.contacts[1].pressure[:, column].T.cpu().numpy()
+            u, traction = (field.permute(2, 0, 1).cpu().numpy() for field in (reached.u, _on_indenter(reached)))
         return [
             Equilibrium(
                 u[k],
@@ -123,17 +123,17 @@ class StateReader:
                 load[k],
                 closure[k],
                 area[k],
-                float(found.relative[k]),
-                float(found.penetration[k]),
-                found.newton[k],
-                found.changed[k],
+                float(reached.relative[k]),
+                float(reached.penetration[k]),
+                reached.newton[k],
+                reached.changed[k],
             )
             for k in range(len(column))
         ]
 
 
-def _on_indenter(found: Equilibria) -> torch.Tensor:
+def _on_indenter(reached: Equilibria) -> torch.Tensor:
     """Return the contact traction on the indenter, in the sensor's frame [MPa], shape (s, 3, k)."""
-    pressed, column = found.contacts[0], found.column
+    pressed, column = reached.contacts[0], reached.column
     normal = pressed.pressure[:, None, column] * pressed.tangent.normal[:, :, column]
-    return -(normal + torch.einsum("ijk,sjk->sik", found.turn, pressed.shear[:, :, column]))
+    return -(normal + torch.einsum("ijk,sjk->sik", reached.turn, pressed.shear[:, :, column]))

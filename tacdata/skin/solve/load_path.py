@@ -12,7 +12,7 @@ _LEAST_STEP = 0.01
 """Load step below which a press is given up [mm]."""
 
 _SHALLOW = 0.1
-"""Depth that stands in for shallower ones where penetration is judged [mm]."""
+"""Least depth in the relative limit of penetration [mm]."""
 
 
 @dataclass
@@ -60,34 +60,34 @@ class LoadPath:
         self.newton, self._best, self._best_at = 0, math.inf, 0
 
     def judge(self, error: float, penetration: float, mean: float, volume: float, settings: SolverSettings) -> str:
-        """Say what to do at the present iterate: "found", "failed" or "go on".
+        """Return the verdict on the present iterate: "found", "failed" or "go on".
 
         Args:
             error: Out-of-balance force over the contact force [1].
             penetration: Largest [mm].
             mean: Mean, weighted by the load [mm].
             volume: Smallest det F [1].
-            settings: What is allowed.
+            settings: The limits.
         """
         deep = max(self.attempt, _SHALLOW)
-        # What is farthest from what is allowed says how near the solution is, from the first step on.
+        # The largest excess over its limit measures the distance from the solution, from the first step on.
         shares = (
             error / settings.residual,
             penetration / (settings.penetration * deep),
             mean / (settings.mean_penetration * deep),
         )
-        off = max(shares) if all(map(math.isfinite, shares)) else math.inf
-        if off <= 1:
+        excess = max(shares) if all(map(math.isfinite, shares)) else math.inf
+        if excess <= 1:
             return "found"
-        stuck = not off < 0.9 * self._best and self.newton - self._best_at > settings.patience
+        stuck = not excess < 0.9 * self._best and self.newton - self._best_at > settings.patience
         if stuck or not math.isfinite(error) or self.newton >= settings.newton_limit:
             self.reason = (
                 f"after {self.newton} Newton iterations the residual is {error:.1e} of the contact force (allowed "
                 f"{settings.residual:.0e}), penetration {1e3 * penetration:.1f} um, smallest det F {volume:.2f}"
             )
             return "failed"
-        if self.newton and off < 0.9 * self._best:
-            self._best, self._best_at = off, self.newton
+        if self.newton and excess < 0.9 * self._best:
+            self._best, self._best_at = excess, self.newton
         return "go on"
 
     def stepped(self) -> None:
@@ -100,7 +100,7 @@ class LoadPath:
         self.changed += self.newton > 0
 
     def taken(self) -> int:
-        """Return the Newton steps since the last wanted state, and begin to count anew."""
+        """Return the Newton steps since the last requested state, and reset the count."""
         spent, self.spent, self.changed = self.spent, 0, 0
         return spent
 

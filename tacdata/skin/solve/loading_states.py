@@ -10,10 +10,10 @@ from tacdata.skin.solve.configuration import Unknowns
 class LoadingStates:
     """For every member of a batch, displacements and multipliers at the depths it passed on its way down."""
 
-    def __init__(self, like: Unknowns) -> None:
-        """Make room for unknowns such as ``like``."""
-        batch, device = like.u.shape[2], like.u.device
-        self._shapes = [field.shape[:-1] for field in (like.u, *like.multipliers)]
+    def __init__(self, sample: Unknowns) -> None:
+        """Make room for unknowns such as ``sample``."""
+        batch, device = sample.u.shape[2], sample.u.device
+        self._shapes = [field.shape[:-1] for field in (sample.u, *sample.multipliers)]
         self._sizes = [shape.numel() for shape in self._shapes]  # ty: ignore[missing-attribute]
         self._depth = torch.full((4, batch), torch.inf, dtype=torch.float64, device=device)
         self._values = torch.zeros(4, sum(self._sizes), batch, dtype=torch.float32, device=device)
@@ -26,7 +26,7 @@ class LoadingStates:
         return self._depth.gather(0, last[None])[0]
 
     def forget(self, which: torch.Tensor) -> None:
-        """Start members, by index or mask, anew, flat at depth 0."""
+        """Reset members, by index or mask, flat at depth 0."""
         self._depth[:, which] = torch.inf
         self._depth[0, which] = 0.0
         self._values[:, :, which] = 0.0
@@ -47,9 +47,9 @@ class LoadingStates:
             self._depth = torch.cat([self._depth, torch.full_like(self._depth, torch.inf)])
             self._values = torch.cat([self._values, torch.zeros_like(self._values)])
         self._depth[row, column] = depth[column]
-        taken = state.take(column)
+        single = state.take(column)
         flat = torch.cat(
-            [field.reshape(size, -1) for field, size in zip((taken.u, *taken.multipliers), self._sizes, strict=True)]
+            [field.reshape(size, -1) for field, size in zip((single.u, *single.multipliers), self._sizes, strict=True)]
         )
         self._values[row, :, column] = flat.T.to(torch.float32)
         self._count[column] += 1
@@ -66,17 +66,17 @@ class LoadingStates:
         )
         return Unknowns(u, tuple(multipliers))
 
-    def back(self, now: Unknowns, depth: torch.Tensor, attempt: torch.Tensor, leaves: bool) -> Unknowns:
-        """Return a start for a step back up: what it was there on the way down, and what friction has left since.
+    def back(self, state: Unknowns, depth: torch.Tensor, attempt: torch.Tensor, leaves: bool) -> Unknowns:
+        """Return a start for a step back up: the state there on the way down, and the change by friction since.
 
         Args:
-            now: Unknowns at the last equilibrium.
+            state: Unknowns at the last equilibrium.
             depth: Its depth [mm], shape (b,).
             attempt: The depth to start at, likewise.
             leaves: Whether the skin is flat once the shape is back where it touched.
         """
         lag = torch.where(attempt > 0, 1.0, 0.0) if leaves else 1.0
-        return self.at(attempt).plus(now.minus(self.at(depth)), lag)
+        return self.at(attempt).plus(state.minus(self.at(depth)), lag)
 
     def _row(self, row: torch.Tensor) -> torch.Tensor:
         return self._values.gather(0, row[None, None, :].expand(1, *self._values.shape[1:]))[0]

@@ -37,7 +37,7 @@ class MeshTransfer:
         nodes, axes, count = coarse.u.shape
         u = (self._nodal @ coarse.u.reshape(nodes, axes * count)).reshape(-1, axes, count)
         pairs = zip(self._tractions, coarse.multipliers, strict=True)
-        return Unknowns(u.to(torch.float64), tuple((matrix @ one).to(torch.float64) for matrix, one in pairs))
+        return Unknowns(u.to(torch.float64), tuple((matrix @ contact).to(torch.float64) for matrix, contact in pairs))
 
 
 def nodal(coarse: SkinMesh, fine: SkinMesh) -> sp.csr_matrix:
@@ -62,9 +62,9 @@ def tractions(coarse: np.ndarray, coarse_nodes: np.ndarray, fine: np.ndarray, fi
         fine: Of the other mesh.
         fine_nodes: Its nodes [mm], shape (n, 3).
     """
-    known, slots = np.unique(coarse, return_inverse=True)
+    nodes, slots = np.unique(coarse, return_inverse=True)
     inside, face = _located(fine_nodes[np.unique(fine)], coarse_nodes[coarse[:, :3]])
-    return _matrix(elements.triangle_hats(inside[:, 1:]), slots.reshape(coarse.shape)[face], len(known))
+    return _matrix(elements.triangle_hats(inside[:, 1:]), slots.reshape(coarse.shape)[face], len(nodes))
 
 
 def _located(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,15 +78,19 @@ def _located(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.nd
     near = KDTree(corners.mean(axis=1)).query(points, count)[1].reshape(len(points), count)
     first, sides = corners[:, 0], corners[:, 1:] - corners[:, :1]
     inverse = np.linalg.pinv(sides)
-    best, chosen, shortest = np.zeros((len(points), corners.shape[1])), near[:, 0].copy(), np.full(len(points), np.inf)
+    best, elements, shortest = (
+        np.zeros((len(points), corners.shape[1])),
+        near[:, 0].copy(),
+        np.full(len(points), np.inf),
+    )
     for element in near.T:
-        rest = np.einsum("pi,pik->pk", points - first[element], inverse[element])
-        inside = np.clip(np.concatenate([1 - rest.sum(axis=1, keepdims=True), rest], axis=1), 0.0, None)
+        coordinates = np.einsum("pi,pik->pk", points - first[element], inverse[element])
+        inside = np.clip(np.concatenate([1 - coordinates.sum(axis=1, keepdims=True), coordinates], axis=1), 0.0, None)
         inside /= inside.sum(axis=1, keepdims=True)
         away = np.linalg.norm(np.einsum("pk,pki->pi", inside, corners[element]) - points, axis=1)
         closer = away < shortest - 1e-12
-        best[closer], chosen[closer], shortest[closer] = inside[closer], element[closer], away[closer]
-    return best, chosen
+        best[closer], elements[closer], shortest[closer] = inside[closer], element[closer], away[closer]
+    return best, elements
 
 
 def _matrix(values: np.ndarray, columns: np.ndarray, count: int) -> sp.csr_matrix:

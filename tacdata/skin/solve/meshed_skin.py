@@ -82,7 +82,7 @@ class MeshedSkin:
         self._held = torch.as_tensor(self.fixed, device=device)
         self.body = Elasticity(self.mesh, sensor.material.law, device, self.averaged)
         self.board = self._board() if sensor.contact.board and len(self.mesh.protrusions) else None
-        """What the protrusions stand on, if they do."""
+        """The board under the protrusions, if there is one."""
         self.reader = StateReader(self.mesh, sensor.taxels.count, self.board, device)
         self.face = OuterFace(self.mesh)
         self.tractions = TractionRaster(self.mesh, sensor.map)
@@ -95,7 +95,7 @@ class MeshedSkin:
         faces = [(self.mesh.outer, np.eye(3))]
         if self.board:
             faces.append((self.mesh.protrusions, np.eye(3)[2:]))
-        rows = sp.csr_matrix(sp.vstack([sp.kron(self._mortar(own).mean, axes) for own, axes in faces]))
+        rows = sp.csr_matrix(sp.vstack([sp.kron(self._mortar(face).mean, axes) for face, axes in faces]))
         return rest_solver(self.mesh, material, self.fixed, rows, self.device, self.averaged)
 
     @cached_property
@@ -118,23 +118,23 @@ class MeshedSkin:
             _FIRST * request.indenter.sharpest,
             _LIFT * adhesion.range if adhesion else _BACK * self.settings.step,
         )
-        origin, own = touch(self.sensor, self.face, request), self.conditions.pressed_by(request.indenter)
-        return PlacedPress(number, path, origin, rotation(request), own)
+        origin, conditions = touch(self.sensor, self.face, request), self.conditions.pressed_by(request.indenter)
+        return PlacedPress(number, path, origin, rotation(request), conditions)
 
     def surfaces(self, requests: Sequence[PressRequest]) -> tuple[ContactSurface, ...]:
         """Return the contact surfaces of presses by the shapes of ``requests``: the outer face's, then the board's."""
         outer = torch.as_tensor(self.mesh.outer, device=self.device)
         shapes = {shape_number(request.indenter): request.indenter for request in requests}
         distances, contact = {n: shape.distance_function() for n, shape in shapes.items()}, self.sensor.contact
-        given = self._nodes, outer, self._held, distances, contact.friction > 0, self.settings.activation
+        arguments = self._nodes, outer, self._held, distances, contact.friction > 0, self.settings.activation
         if contact.adhesion:
-            pressed = AdhesiveSurface(*given, self.settings.stick, contact.adhesion)
+            pressed = AdhesiveSurface(*arguments, self.settings.stick, contact.adhesion)
         else:
-            pressed = ContactSurface(*given, self.settings.stick)
+            pressed = ContactSurface(*arguments, self.settings.stick)
         return (pressed, self.board) if self.board else (pressed,)
 
     def newton(self, requests: Sequence[PressRequest]) -> Newton:
-        """Return what solves presses by the shapes of ``requests``; its preconditioner is for one batch at a time."""
+        """Return the solver of presses by the shapes of ``requests``; its preconditioner serves one batch at a time."""
         surfaces = self.surfaces(requests)
         preconditioner = ConstraintPreconditioner(self.rest, surfaces, self.sensor.material.youngs_modulus)
         return Newton(self.body, surfaces, self._held, preconditioner, self._solver)

@@ -88,11 +88,11 @@ class Newton:
         internal, volume = self.body.internal_force(at.u, at.conditions)
         external = torch.zeros_like(at.u)
         contacts = self.add_contact_forces(at, external)
-        # Without contact there is no force to compare with: E times a tenth of a millimetre squared stands in.
+        # Without contact there is no force to compare with: E times a tenth of a millimetre squared replaces it.
         scale = torch.linalg.vector_norm(external, dim=(0, 1)).maximum(0.01 * at.conditions.modulus)
         force = (external - internal) * self._free
         norm = torch.linalg.vector_norm(force, dim=(0, 1))
-        gaps = [surface.penetration(now) for surface, now in zip(self.surfaces, contacts, strict=True)]
+        gaps = [surface.penetration(forces) for surface, forces in zip(self.surfaces, contacts, strict=True)]
         largest, mean = (torch.stack(values).amax(dim=0) for values in zip(*gaps, strict=True))
         return Residual(force, norm, norm / scale, volume, largest, mean, contacts, scale)
 
@@ -105,63 +105,63 @@ class Newton:
             )
         )
 
-    def updated(self, now: Residual, at: Configuration, which: torch.Tensor) -> Residual:
+    def updated(self, residual: Residual, at: Configuration, which: torch.Tensor) -> Residual:
         """Return the residual of all members after a change of some, by index, shape (k,).
 
-        Where few have changed, these alone are evaluated, and ``now`` is changed in place.
+        Where few have changed, these alone are evaluated, and ``residual`` is changed in place.
         """
-        few = at.u.shape[2] // 2 if self._cuda else at.u.shape[2] - 1
-        if len(which) > few:
+        limit = at.u.shape[2] // 2 if self._cuda else at.u.shape[2] - 1
+        if len(which) > limit:
             return self.residual(at)
-        now.put(which, self.residual(at.take(which)))
-        return now
+        residual.put(which, self.residual(at.take(which)))
+        return residual
 
-    def friction_tangent(self, now: Residual) -> torch.Tensor:
+    def friction_tangent(self, residual: Residual) -> torch.Tensor:
         """Return the share of friction's tangent, shape (b,): 0, by the secant, for members far from the solution."""
-        return self._tangent * (now.relative < _NEAR).to(torch.float64)
+        return self._tangent * (residual.relative < _NEAR).to(torch.float64)
 
-    def is_bad(self, before: torch.Tensor, now: Residual) -> torch.Tensor:
+    def is_bad(self, limit: torch.Tensor, residual: Residual) -> torch.Tensor:
         """Return which members' step failed, shape (b,): residual more than doubled, or an element nearly inverted."""
-        return ~(now.relative <= torch.clamp_min(2.0 * before, 0.3)) | ~(now.volume >= _LEAST_VOLUME)
+        return ~(residual.relative <= torch.clamp_min(2.0 * limit, 0.3)) | ~(residual.volume >= _LEAST_VOLUME)
 
     def step(
-        self, at: Configuration, now: Residual, wanted: torch.Tensor
+        self, at: Configuration, residual: Residual, mask: torch.Tensor
     ) -> tuple[torch.Tensor, tuple[torch.Tensor, ...], int]:
         """Solve Newton's system, loosely: displacements and multipliers move together.
 
         Args:
             at: Where the tangent is taken.
-            now: The residual there.
-            wanted: Members to solve for, shape (b,), bool; others get 0.
+            residual: The residual there.
+            mask: Members to solve for, shape (b,), bool; others get 0.
 
         Returns:
             Changes of the displacements [mm], shape (n, 3, b), and of each contact's multipliers [MPa], shape (s, b),
             and the number of iterations.
         """
-        contacts = [forces.tangent for forces in now.contacts]
+        contacts = [forces.tangent for forces in residual.contacts]
         self.preconditioner.update(contacts, at.conditions.modulus)
-        size = now.scale
-        r = torch.where(wanted, now.force / size, 0.0).to(_WORK)
-        gaps = [torch.where(wanted & own.tangent.active, -own.gap / size, 0.0) for own in now.contacts]
-        here = self.tangent.at(at.u.to(_WORK), at.conditions, contacts, None if self._cuda else wanted)
+        size = residual.scale
+        r = torch.where(mask, residual.force / size, 0.0).to(_WORK)
+        gaps = [torch.where(mask & own.tangent.active, -own.gap / size, 0.0) for own in residual.contacts]
+        linearization = self.tangent.at(at.u.to(_WORK), at.conditions, contacts, None if self._cuda else mask)
         stopping = Stopping(self.settings.forcing, self.settings.cg_limit, _STRAGGLERS, _LONG)
         if self._cuda:
-            x, y, used = self._cuda.solve(here, r, gaps, wanted, stopping)
+            x, y, used = self._cuda.solve(linearization, r, gaps, mask, stopping)
         else:
             x, y, used = projected_conjugate_gradients(
-                self.product, here, self.preconditioner, r, gaps, wanted, stopping
+                self.product, linearization, self.preconditioner, r, gaps, mask, stopping
             )
-        # What is not active ends at 0.
+        # Inactive multipliers end at 0.
         changes = tuple(
-            torch.where(wanted, own.pressure - multiplier - force * size / surface.area[:, None], 0.0)
+            torch.where(mask, own.pressure - multiplier - force * size / surface.area[:, None], 0.0)
             for surface, own, multiplier, force in zip(
-                self.surfaces, now.contacts, at.multipliers, self.preconditioner.forces(y), strict=True
+                self.surfaces, residual.contacts, at.multipliers, self.preconditioner.forces(y), strict=True
             )
         )
         return x.to(torch.float64) * size, changes, used
 
-    def product(self, here: Linearization, p: torch.Tensor) -> torch.Tensor:
+    def product(self, linearization: Linearization, p: torch.Tensor) -> torch.Tensor:
         """Return the tangent times ``p`` [N] on free nodes, shape (n, 3, b)."""
         result = torch.zeros_like(p)
-        self.tangent.add_product(here, p, result)
+        self.tangent.add_product(linearization, p, result)
         return result * (self._free_work if p.dtype == _WORK else self._free)

@@ -1,4 +1,4 @@
-"""Every equilibrium that presses pass, wanted or not: what derivatives along a load path need."""
+"""Every equilibrium that presses pass, requested or not: derivatives along a load path need them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Passage:
 
 
 class PathRecorder:
-    """Keeps what `Batch.run` tells its observer, press by press; the first of a press is the touch, without load."""
+    """Observer of `Batch.run` that keeps every equilibrium, press by press; the first is the touch, without load."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -33,8 +33,8 @@ class PathRecorder:
     def __call__(self, numbers: Sequence[int], reached: Configuration) -> None:
         """Keep an equilibrium of each of some presses, one a column."""
         for column, number in enumerate(numbers):
-            one = reached.take(torch.tensor([column], device=reached.u.device))
-            self._reached.setdefault(number, []).append(one)
+            state = reached.take(torch.tensor([column], device=reached.u.device))
+            self._reached.setdefault(number, []).append(state)
 
     def take(self, number: int) -> tuple[Configuration, ...]:
         """Return the equilibria of a press since the last call."""

@@ -16,17 +16,17 @@ bear load from the first."""
 
 
 class Starts:
-    """The last equilibrium of every member of a batch, and what its next one may be."""
+    """The last equilibrium of every member of a batch, and an estimate of its next one."""
 
-    def __init__(self, like: Unknowns, sticky: bool) -> None:
+    def __init__(self, sample: Unknowns, sticky: bool) -> None:
         """Begin flat.
 
         Args:
-            like: Unknowns of as many members.
+            sample: Unknowns of as many members.
             sticky: Whether the skin sticks: a jump is foretold by nothing.
         """
-        self.accepted, self._rate = like.zeros(), like.zeros()
-        self._loading, self._sticky = LoadingStates(like), sticky
+        self.accepted, self._rate = sample.zeros(), sample.zeros()
+        self._loading, self._sticky = LoadingStates(sample), sticky
 
     def forget(self, which: torch.Tensor) -> None:
         """Take members, by index, shape (k,), back to the undeformed skin."""
@@ -40,20 +40,20 @@ class Starts:
         self._loading.keep(which)
 
     def accept(
-        self, which: torch.Tensor, depth: torch.Tensor, moved: torch.Tensor, straight: torch.Tensor, state: Unknowns
+        self, which: torch.Tensor, depth: torch.Tensor, step: torch.Tensor, straight: torch.Tensor, state: Unknowns
     ) -> None:
         """Take the marked members' unknowns as their equilibrium.
 
         Args:
             which: Members, shape (b,), bool.
             depth: Of the equilibrium [mm], shape (b,).
-            moved: Step that led to it [mm], likewise.
+            step: Step that led to it [mm], likewise.
             straight: Whether the step before went the same way, likewise.
             state: Unknowns of all members.
         """
-        along = torch.where(straight & (moved != 0), 1 / torch.where(moved != 0, moved, 1.0), 0.0)
-        rate = state.zeros().plus(state.minus(self.accepted), along)
-        self._rate = rate.where(which & ((moved != 0) | ~straight), self._rate)
+        inverse = torch.where(straight & (step != 0), 1 / torch.where(step != 0, step, 1.0), 0.0)
+        rate = state.zeros().plus(state.minus(self.accepted), inverse)
+        self._rate = rate.where(which & ((step != 0) | ~straight), self._rate)
         self.accepted = state.where(which, self.accepted)
         self._loading.add(which, depth, state)
 
@@ -82,9 +82,9 @@ class Starts:
         columns = [column for column in down if column in coarse]
         if columns:
             steps = torch.stack([depth, attempt])[:, columns].T.tolist()
-            known, change = changes([(coarse[c], *step) for c, step in zip(columns, steps, strict=True)])
+            available, change = changes([(coarse[c], *step) for c, step in zip(columns, steps, strict=True)])
             if change is not None:
-                place = torch.as_tensor([columns[k] for k in known], device=depth.device)
+                place = torch.as_tensor([columns[k] for k in available], device=depth.device)
                 guess.put(place, self.accepted.take(place).plus(change))
                 near[place] = 0.0
         return guess, near

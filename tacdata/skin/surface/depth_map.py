@@ -1,7 +1,7 @@
 """Depth maps of many states at once: the deformed outer face seen from above, on the CPU or CUDA.
 
 Depth of a sample = height of the undeformed face minus height of the uppermost sheet of the deformed face, both above
-the same (x, y). A sample above which no skin lies, deformed or undeformed, has depth 0.
+the same (x, y). A sample without skin, deformed or undeformed, has depth 0.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class DepthRaster:
         return self.measure(u)[0]
 
     def measure(self, u: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return `depth` and which share of each pixel lies under the skin [1], both (b, pixels_x, pixels_y)."""
+        """Return `depth` and the share of each pixel that the skin covers [1], both (b, pixels_x, pixels_y)."""
         return self._measured(self._height(u))
 
     def pressed(self, u: torch.Tensor, shapes: Sequence[PressedShape]) -> torch.Tensor:
@@ -75,7 +75,7 @@ class DepthRaster:
 
         Args:
             u: Displacements [mm], shape (nodes, 3, b), as of `depth`.
-            shapes: What presses in each state, and where, (b,).
+            shapes: The indenter in each state, and its place, (b,).
         """
         height = self._height(u)
         touching = self._share_of(u, height, np.stack([shape.touching for shape in shapes], axis=1))

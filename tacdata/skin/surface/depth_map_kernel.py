@@ -17,7 +17,7 @@ from typing import Any
 import warp as wp
 
 NOTHING = wp.constant(-1.0e30)
-"""Height where no triangle lies above a sample [mm]."""
+"""Height of a sample without a triangle [mm]."""
 
 
 @wp.func
@@ -32,8 +32,8 @@ def _flat(a: wp.vec3d):
 
 @wp.func
 def _position(nodes: wp.array(dtype=wp.vec3d), u: wp.array3d(dtype=Any), node: wp.int32, state: wp.int32):
-    moved = wp.vec3d(wp.float64(u[node, 0, state]), wp.float64(u[node, 1, state]), wp.float64(u[node, 2, state]))
-    return nodes[node] + moved
+    displacement = wp.vec3d(wp.float64(u[node, 0, state]), wp.float64(u[node, 1, state]), wp.float64(u[node, 2, state]))
+    return nodes[node] + displacement
 
 
 @wp.func
@@ -60,33 +60,33 @@ def _jacobian(b: wp.vec2d, c: wp.vec2d, d: wp.vec2d, e: wp.vec2d, f: wp.vec2d, x
 def _search(
     a: wp.vec2d, b: wp.vec2d, c: wp.vec2d, d: wp.vec2d, e: wp.vec2d, f: wp.vec2d, target: wp.vec2d, start: wp.vec2d
 ):
-    """Newton's method: (xi, eta, 1 if the sample lies in the triangle, 0 if not, -1 if no point was found)."""
+    """Newton's method: (xi, eta, 1 if the sample is in the triangle, 0 if not, -1 if no point was found)."""
     two, far, close = wp.float64(2.0), wp.float64(0.7), wp.float64(1.0e-12)
     xi, eta = start[0], start[1]
-    found = wp.float64(-1.0)
+    local = wp.float64(-1.0)
     for _step in range(40):
-        rest = target - (a + xi * b + eta * c + xi * xi * d + xi * eta * e + eta * eta * f)
+        remainder = target - (a + xi * b + eta * c + xi * xi * d + xi * eta * e + eta * eta * f)
         s, t = b + two * xi * d + eta * e, c + xi * e + two * eta * f
         determinant = _cross(s, t)
         if wp.abs(determinant) < wp.float64(1.0e-14):
             determinant = wp.float64(1.0e-14)
-        dxi, deta = _cross(rest, t) / determinant, _cross(s, rest) / determinant
+        dxi, deta = _cross(remainder, t) / determinant, _cross(s, remainder) / determinant
         size = wp.length(wp.vec2d(dxi, deta))
         if size > far:
             dxi, deta = dxi * far / size, deta * far / size
         xi, eta = xi + dxi, eta + deta
         if size < close:
-            found = wp.float64(0.0)
+            local = wp.float64(0.0)
             break
     edge = wp.float64(-1.0e-9)
-    if found == wp.float64(0.0) and xi > edge and eta > edge and wp.float64(1.0) - xi - eta > edge:
-        found = wp.float64(1.0)
-    return wp.vec3d(xi, eta, found)
+    if local == wp.float64(0.0) and xi > edge and eta > edge and wp.float64(1.0) - xi - eta > edge:
+        local = wp.float64(1.0)
+    return wp.vec3d(xi, eta, local)
 
 
 @wp.func
-def _height(p: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, e: wp.vec3d, f: wp.vec3d, found: wp.vec3d):
-    xi, eta = found[0], found[1]
+def _height(p: wp.vec3d, b: wp.vec3d, c: wp.vec3d, d: wp.vec3d, e: wp.vec3d, f: wp.vec3d, local: wp.vec3d):
+    xi, eta = local[0], local[1]
     return p[2] + xi * b[2] + eta * c[2] + xi * xi * d[2] + xi * eta * e[2] + eta * eta * f[2]
 
 
@@ -99,9 +99,9 @@ def _center(k: wp.int32):
         if place >= 7 - 2 * row:
             place = place - (7 - 2 * row)
             row = row + 1
-    turned = place % 2
+    flipped = place % 2
     third = wp.float64(1.0 / 12.0)
-    return wp.vec2d(wp.float64(3 * (place // 2) + 1 + turned) * third, wp.float64(3 * row + 1 + turned) * third)
+    return wp.vec2d(wp.float64(3 * (place // 2) + 1 + flipped) * third, wp.float64(3 * row + 1 + flipped) * third)
 
 
 @wp.func
@@ -121,17 +121,17 @@ def _above(
     best = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(NOTHING))
     many = not mild
     if mild:
-        found = _search(a2, b2, c2, d2, e2, f2, target, inverse * (target - a2))
-        if found[2] > wp.float64(0.0):
-            best = wp.vec3d(found[0], found[1], _height(p, b, c, d, e, f, found))
-        many = found[2] < wp.float64(0.0)
+        local = _search(a2, b2, c2, d2, e2, f2, target, inverse * (target - a2))
+        if local[2] > wp.float64(0.0):
+            best = wp.vec3d(local[0], local[1], _height(p, b, c, d, e, f, local))
+        many = local[2] < wp.float64(0.0)
     if many:
         for k in range(16):
-            found = _search(a2, b2, c2, d2, e2, f2, target, _center(k))
-            if found[2] > wp.float64(0.0):
-                z = _height(p, b, c, d, e, f, found)
+            local = _search(a2, b2, c2, d2, e2, f2, target, _center(k))
+            if local[2] > wp.float64(0.0):
+                z = _height(p, b, c, d, e, f, local)
                 if z > best[2]:
-                    best = wp.vec3d(found[0], found[1], z)
+                    best = wp.vec3d(local[0], local[1], z)
     return best
 
 
@@ -189,7 +189,7 @@ def highest(
     p3 = _position(nodes, u, faces[face, 3], state)
     p4 = _position(nodes, u, faces[face, 4], state)
     p5 = _position(nodes, u, faces[face, 5], state)
-    # The Bezier control points: the curved triangle lies within their hull.
+    # The Bezier control points: the curved triangle is within their hull.
     q3, q4, q5 = two * p3 - half * (p0 + p1), two * p4 - half * (p1 + p2), two * p5 - half * (p2 + p0)
     low = wp.min(wp.min(wp.min(p0, p1), wp.min(p2, q3)), wp.min(q4, q5))
     high = wp.max(wp.max(wp.max(p0, p1), wp.max(p2, q3)), wp.max(q4, q5))

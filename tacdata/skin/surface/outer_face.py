@@ -71,11 +71,11 @@ class OuterFace:
         local, plan = np.clip(local.reshape(-1, 2), -1.0, 2.0), self._plan[triangles.ravel()]
         target = np.repeat(points, shape[1], axis=0)
         for _ in range(_NEWTON):
-            rest = target - np.einsum("na,nai->ni", elements.triangle_shapes(local), plan)
+            remainder = target - np.einsum("na,nai->ni", elements.triangle_shapes(local), plan)
             jacobian = np.einsum("nai,nak->nik", plan, elements.triangle_gradients(local))
             regular = np.abs(np.linalg.det(jacobian)) > 1e-12
             step = np.zeros_like(local)
-            step[regular] = np.linalg.solve(jacobian[regular], rest[regular][..., None])[..., 0]
+            step[regular] = np.linalg.solve(jacobian[regular], remainder[regular][..., None])[..., 0]
             local = np.clip(local + np.clip(step, -0.5, 0.5), -1.0, 2.0)
             if np.abs(step).max(initial=0.0) < 1e-13:
                 break
@@ -98,7 +98,7 @@ class OuterFace:
     def depth_map(self, x: np.ndarray, y: np.ndarray, u: np.ndarray, sampling: str = "point") -> np.ndarray:
         """Return undeformed minus deformed height [mm] of pixels, shape (len(x), len(y)): the mesh's own map.
 
-        Where an indenter's steep flank folds the face over itself, the uppermost sheet counts. A pixel beside the
+        Where an indenter's steep flank folds the face over itself, the uppermost sheet counts. A pixel next to the
         skin, deformed or not, has depth 0.
 
         Args:
@@ -122,7 +122,7 @@ class OuterFace:
             y: Pixel centres along y [mm], ascending.
             u: Nodal displacements [mm] of each state, (b,) of shape (nodes, 3).
             sampling: As of `depth_map`.
-            shapes: What presses in each state, (b,).
+            shapes: The indenter in each state, (b,).
 
         Raises:
             UsageError: As of `depth_map`.

@@ -1,8 +1,8 @@
 """Contact tractions at nodes as forces at points of the deformed faces, and forces at points as a map.
 
-Each quadrature point of a face carries its traction times its area to where it lies now, seen from above. Its force is
+Each quadrature point of a face carries its traction times its area to its deformed place, seen from above. Its force is
 shared among the four pixels around it by bilinear weights (cloud in cell). So nothing is lost or made: the map times
-the area of a pixel sums to the force, but for what lies off the grid.
+the area of a pixel sums to the force, except for points off the grid.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class PointForces:
         """
         touching = np.flatnonzero((traction != 0).any(axis=1)[self.slots].any(axis=1))
         faces = self._faces[touching]
-        here = (self._shapes @ (self._nodes[faces] + u[faces])[:, :, :2]).reshape(-1, 2)
+        places = (self._shapes @ (self._nodes[faces] + u[faces])[:, :, :2]).reshape(-1, 2)
         force = (self._hats @ traction[self.slots[touching]]) * self._area[touching][..., None]
-        return np.repeat(touching, len(self._shapes)), here, force.reshape(len(here), traction.shape[1])
+        return np.repeat(touching, len(self._shapes)), places, force.reshape(len(places), traction.shape[1])
 
 
 def cloud_in_cell(place: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -58,7 +58,7 @@ def cloud_in_cell(place: np.ndarray, values: np.ndarray, shape: tuple[int, int])
         shape: Pixels of the map.
 
     Returns:
-        The sums, shape (c, rows, columns); what lies off the map is left out.
+        The sums, shape (c, rows, columns); points off the map are left out.
     """
     rows, columns = shape
     result = np.zeros((values.shape[1], rows * columns))
@@ -70,6 +70,6 @@ def cloud_in_cell(place: np.ndarray, values: np.ndarray, shape: tuple[int, int])
             row, column = (corner + np.array([i, j])).T
             on = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
             pixel = row[on] * columns + column[on]
-            for axis, own in enumerate(values.T):
-                result[axis] += np.bincount(pixel, share[on] * own[on], rows * columns)
+            for axis, component in enumerate(values.T):
+                result[axis] += np.bincount(pixel, share[on] * component[on], rows * columns)
     return result.reshape(len(result), rows, columns)

@@ -1,18 +1,18 @@
 """The rigid shape under a depth map: where the skin touches, its surface is the shape's.
 
-Contact closes gaps in the mean under each hat. Between nodes the mesh lies inside the shape or off it, by some
+Contact closes gaps in the mean under each hat. Between nodes the mesh is inside the shape or off it, by some
 micrometres. Heights above pixels are moved along the vertical:
 
-- A point inside the shape comes down to its surface. No skin lies in a shape. So this is never farther from the truth.
+- A point inside the shape comes down to its surface. No skin is inside a shape. So this never increases the error.
 - A point off the shape goes up to it where all nodes around carry pressure. At the rim it goes a part of the way: the
   sum of the hats of nodes that carry pressure. A node counts the less the nearer its pressure is to none. So a node
   that barely touches, in one solution and not in the next, hardly moves the map. A node amid others that touch counts
   as they do.
-- There no point stays below the shape's lowest: beside a punch's edge a coarse mesh dips and lifts off. Where something
+- There no point stays below the shape's lowest: at a punch's edge a coarse mesh dips and lifts off. Where something
   bears the skin, this holds in every face with a node that touches. Skin that hangs in a frame may sag lower.
 
 Sphere tracing finds the surface: a step as long as the distance never passes through it (Hart, The Visual Computer 12
-(1996) 527). No point lies above a shape: such states are refused (`tacdata.skin.contact.passage_check`).
+(1996) 527). No point is above a shape: such states are refused (`tacdata.skin.contact.passage_check`).
 """
 
 from __future__ import annotations
@@ -63,11 +63,11 @@ def touching_share(traction: np.ndarray, slots: np.ndarray) -> np.ndarray:
         return size
     # The mean over the contact force: nodes that barely touch do not change it.
     share = np.minimum(size / (RIM_PRESSURE * (size**2).sum() / size.sum()), 1.0)
-    least = np.ones_like(share)
+    smallest = np.ones_like(share)
     for a, b in _SIDES:
-        np.minimum.at(least, slots[:, a], share[slots[:, b]])
-        np.minimum.at(least, slots[:, b], share[slots[:, a]])
-    return np.maximum(share, least)
+        np.minimum.at(smallest, slots[:, a], share[slots[:, b]])
+        np.minimum.at(smallest, slots[:, b], share[slots[:, a]])
+    return np.maximum(share, smallest)
 
 
 def around(share: np.ndarray, slots: np.ndarray) -> np.ndarray:
@@ -99,28 +99,28 @@ def _laying_kernel(distance: wp.Function) -> wp.Kernel:
         z = bare
         way = wp.float64(1.0)
         back = wp.transpose(turn)
-        off = distance(back * (wp.vec3d(x[i], y[j], z) - place), size)
-        inside = off < wp.float64(0.0)
+        gap = distance(back * (wp.vec3d(x[i], y[j], z) - place), size)
+        inside = gap < wp.float64(0.0)
         if not inside:
             way = share[i, j]
             z = bare + wp.min(around[i, j] / _FULL, wp.float64(1.0)) * wp.max(lowest - bare, wp.float64(0.0))
             height[i, j] = z
         if way > wp.float64(0.0):
-            moved = wp.float64(0.0)
+            shift = wp.float64(0.0)
             arrived = wp.int32(0)
             for _step in range(_STEPS):
-                off = distance(back * (wp.vec3d(x[i], y[j], z + moved) - place), size)
-                if wp.abs(off) < _CLOSE:
+                gap = distance(back * (wp.vec3d(x[i], y[j], z + shift) - place), size)
+                if wp.abs(gap) < _CLOSE:
                     arrived = 1
                     break
-                if moved + off > _REACH:
+                if shift + gap > _REACH:
                     break
-                moved += off
+                shift += gap
             # A steep flank may be out of reach: down, each step is right as far as it went, up none is.
             if arrived == 0 and not inside:
-                moved = wp.float64(0.0)
-            height[i, j] = z + way * moved * wp.clamp(
-                wp.float64(2.0) * (wp.float64(1.0) - moved / _REACH), wp.float64(0.0), wp.float64(1.0)
+                shift = wp.float64(0.0)
+            height[i, j] = z + way * shift * wp.clamp(
+                wp.float64(2.0) * (wp.float64(1.0) - shift / _REACH), wp.float64(0.0), wp.float64(1.0)
             )
 
     return laying
@@ -131,7 +131,7 @@ class PressedShape:
     """A rigid shape where it presses, and the nodes that it presses."""
 
     indenter: Indenter
-    """What presses."""
+    """The indenter."""
     place: np.ndarray
     """Place of its origin [mm], shape (3,)."""
     turn: np.ndarray

@@ -22,15 +22,15 @@ class ProtrusionRaster:
     def pressure(self, u: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """Return the force by area of the map [MPa], shape (taxels, PIXELS, PIXELS).
 
-        What lies off a protrusion's pixels counts at their border, so that the map sums to the protrusion's load.
+        Points off a protrusion's pixels count at their border, so that the map sums to the protrusion's load.
 
         Args:
             u: Nodal displacements [mm], shape (nodes, 3).
             pressure: At the nodes of the protrusions, ascending, by undeformed area [MPa], shape (s,).
         """
-        face, here, force = self._forces.at(u, pressure[:, None])
+        face, places, force = self._forces.at(u, pressure[:, None])
         taxel = self._taxel[face]
-        place = (here - self._centers[taxel] - self._pixels.offsets[0]) / self._pixels.pitch
+        place = (places - self._centers[taxel] - self._pixels.offsets[0]) / self._pixels.pitch
         # The maps lie below each other; at the last centre of one all of a force falls to it.
         place = place.clip(0, PIXELS - 1) + PIXELS * np.stack([taxel, 0 * taxel], axis=-1)
         maps = cloud_in_cell(place, force, (PIXELS * len(self._centers), PIXELS))

@@ -28,6 +28,6 @@ class TractionRaster:
             traction: At the contact nodes, by undeformed area [MPa], shape (count, 3).
         """
         pitch = self._pixels.pixel_pitch
-        _, here, force = self._forces.at(u, traction)
-        place = (here - np.array([self._pixels.x[0], self._pixels.y[0]])) / pitch
+        _, places, force = self._forces.at(u, traction)
+        place = (places - np.array([self._pixels.x[0], self._pixels.y[0]])) / pitch
         return cloud_in_cell(place, force, self._pixels.shape) / pitch**2

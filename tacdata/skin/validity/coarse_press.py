@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class PressSolver(Protocol):
-    """What solves presses: `tacdata.skin.model.SkinModel`."""
+    """The solver of presses: `tacdata.skin.model.SkinModel`."""
 
     def states_many(
         self, requests: list[PressRequest], capacity: int = 1, *, observe: PathRecorder | None = None
@@ -38,7 +38,7 @@ class CoarsePress:
     figures: Figures
     """Of the states reached."""
     remark: str
-    """What is missing, in words; empty if nothing."""
+    """Missing part of the result; empty if it is complete."""
     passages: tuple[Passage, ...] = ()
     """The states with all equilibria on the way, if these were to be kept."""
     path: CoarsePath | None = None
@@ -70,13 +70,13 @@ def press_coarsely(
         One for each request, as far as it was reached.
     """
     numbers = [k for k, request in enumerate(requests) if loading(request).depths]
-    found = [[model.figures(request, [], [])] for request in requests]
+    parts_of = [[model.figures(request, [], [])] for request in requests]
     remarks = [""] * len(requests)
     passages: list[list[Passage]] = [[] for _ in requests]
     reached: list[list[tuple[float, Unknowns]]] = [[] for _ in requests]
     recorder = PathRecorder()
-    asked = [loading(requests[k]) for k in numbers]
-    for index, depth, state in model.states_many(asked, capacity, observe=recorder):
+    loadings = [loading(requests[k]) for k in numbers]
+    for index, depth, state in model.states_many(loadings, capacity, observe=recorder):
         number = numbers[index]
         if isinstance(state, SolveError):
             remarks[number] = f"the coarser mesh gave up: {state.given}"
@@ -86,10 +86,10 @@ def press_coarsely(
         if keep:
             passages[number].append(Passage(depth, state, passed))
         try:
-            found[number].append(model.figures(requests[number], [depth], [state]))
+            parts_of[number].append(model.figures(requests[number], [depth], [state]))
         except SolveError as error:
             remarks[number] = f"the coarser mesh at {depth:g} mm: {error.given}"
     return [
-        CoarsePress(Figures.joined(parts), remark, tuple(kept), CoarsePath.of(states))
-        for parts, remark, kept, states in zip(found, remarks, passages, reached, strict=True)
+        CoarsePress(Figures.joined(parts), remark, tuple(passage), CoarsePath.of(states))
+        for parts, remark, passage, states in zip(parts_of, remarks, passages, reached, strict=True)
     ]

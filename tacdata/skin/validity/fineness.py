@@ -25,7 +25,7 @@ def edge_under(mesh: SkinMesh, sensor: Sensor, request: PressRequest) -> float:
 
 
 def remark(mesh: SkinMesh, sensor: Sensor, request: PressRequest) -> str:
-    """Return in words what is finer than the mesh can see; empty if nothing is."""
+    """Return a remark on shapes finer than the mesh resolves; empty if there are none."""
     if not max(request.depths) > 0:
         return ""
     edge = edge_under(mesh, sensor, request)

@@ -13,7 +13,7 @@ from tacdata.skin.materials.law import Gradient, Law
 
 @dataclass(frozen=True)
 class LawValues:
-    """What a law says of n states."""
+    """Values of a law at n states."""
 
     energy: np.ndarray
     """W per undeformed volume [MPa], shape (n,)."""
@@ -40,21 +40,21 @@ def evaluate(
         gradient: Deformation gradient F, or with ``of="H"`` displacement gradient H = F - I [1], shape (n, 3, 3).
         direction: Change dF along which tangents are wanted [1], same shape; the gradient itself if left out.
         real: ``wp.float64`` or ``wp.float32``.
-        of: What ``gradient`` is.
+        of: Meaning of ``gradient``.
         device: Where: "cpu" or "cuda:0".
     """
     mat33, n = kinematics.matrix(real), len(gradient)
     scalar = np.float64 if real is wp.float64 else np.float32
     state = np.asarray(gradient, dtype=scalar)
     change = state if direction is None else np.asarray(direction, dtype=scalar)
-    # What `Law.stress_function` does with F: exact near rest, whatever the precision.
+    # Same as `Law.stress_function` with F: exact near rest in any precision.
     displacement = state if of == "H" else state - np.eye(3, dtype=scalar)
     states = [wp.array(a, dtype=mat33, device=device) for a in (displacement, change)]
     energy = wp.zeros(n, dtype=real, device=device)
-    others = [wp.zeros(n, dtype=mat33, device=device) for _ in range(2)]
+    outputs = [wp.zeros(n, dtype=mat33, device=device) for _ in range(2)]
     m = kinematics.parameters(real)(*numbers, *([0.0] * (8 - len(numbers))))
-    wp.launch(_kernel(type(law), real), dim=n, inputs=[*states, m], outputs=[energy, *others], device=device)
-    return LawValues(energy.numpy(), *(a.numpy() for a in others))
+    wp.launch(_kernel(type(law), real), dim=n, inputs=[*states, m], outputs=[energy, *outputs], device=device)
+    return LawValues(energy.numpy(), *(a.numpy() for a in outputs))
 
 
 @cache

@@ -63,14 +63,14 @@ def instabilities(material: Material, stretch: float = 2.0) -> list[str]:
         UsageError: If there is no such law.
         FormatError: If a parameter of the law is unknown or out of its range.
     """
-    said = ", ".join(f"{name} = {value}" for name, value in material.parameters.items()) or "its defaults"
+    values = ", ".join(f"{name} = {value}" for name, value in material.parameters.items()) or "its defaults"
     words = []
-    for found in stable_ranges(material, stretch):
-        bad = [f"below {found.lowest:.2f}"] if found.lowest > 1.0001 / stretch else []
-        bad += [f"above {found.highest:.2f}"] if found.highest < 0.9999 * stretch else []
+    for limit in stable_ranges(material, stretch):
+        bad = [f"below {limit.lowest:.2f}"] if limit.lowest > 1.0001 / stretch else []
+        bad += [f"above {limit.highest:.2f}"] if limit.highest < 0.9999 * stretch else []
         if bad:
             words.append(
-                f"material law {material.law} with {said} is unstable under {found.path} stretch {' and '.join(bad)} "
+                f"material law {material.law} with {values} is unstable under {limit.path} stretch {' and '.join(bad)} "
                 f"(tested from {1 / stretch:.2f} to {stretch:.2f})"
             )
     return words

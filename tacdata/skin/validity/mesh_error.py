@@ -36,7 +36,7 @@ FORCE_ORDER = 2.0
 """Order of the force's error [1]; measured 1.7 to 3.4, median 2.4, so that this errs on the safe side."""
 
 _LEAST_RATIO = 1.2
-"""Ratio of edge lengths that stands in for smaller ones [1]: below, the estimate would only divide by nothing."""
+"""Least ratio of edge lengths in the estimate [1]: with a smaller one it would divide by about 0."""
 
 _STEEP = 1.5
 """Reach of a neighbourhood over the half width of the contact [1]: the map's error sits in the ring at its edge."""
@@ -44,7 +44,7 @@ _STEEP = 1.5
 
 @dataclass(frozen=True)
 class Figures:
-    """What k states of a press say on one mesh."""
+    """Maps and forces of k states of a press on one mesh."""
 
     depth: np.ndarray
     """Nominal depths [mm], shape (k,)."""
@@ -76,7 +76,7 @@ class NumericalError:
     taxel_force: np.ndarray
     """Of the force on each protrusion [N], shape (k, taxels)."""
     remark: str
-    """What is missing, in words; empty if nothing."""
+    """Missing part of the estimate; empty if it is complete."""
 
     @classmethod
     def none(cls, fine: Figures) -> NumericalError:
@@ -110,9 +110,9 @@ def estimate(
     factor_of_force = 1 / (ratio**FORCE_ORDER - 1)
     pixels = np.stack(np.meshgrid(sensor.map.x, sensor.map.y, indexing="ij"), axis=-1).reshape(-1, 2)
     taxels = sensor.taxels.centers
-    apart = max(sensor.taxels.pitch_x, sensor.taxels.pitch_y)
+    pitch = max(sensor.taxels.pitch_x, sensor.taxels.pitch_y)
     surface = _local(coarse.surface - fine.surface[rows], pixels, _STEEP * reach)
-    taxel = _local(coarse.taxel_force - fine.taxel_force[rows], taxels, max(_STEEP * reach, apart))
+    taxel = _local(coarse.taxel_force - fine.taxel_force[rows], taxels, max(_STEEP * reach, pitch))
     force = _along(coarse, fine.force[rows])
 
     def at_all(values: np.ndarray) -> np.ndarray:
@@ -127,8 +127,8 @@ def _local(difference: np.ndarray, places: np.ndarray, width: float) -> np.ndarr
 
     ``width`` is two of its standard deviations [mm].
     """
-    apart = ((places[:, None] - places[None]) ** 2).sum(axis=-1)
-    weights = np.exp(-apart / (2 * (width / 2) ** 2))
+    squares = ((places[:, None] - places[None]) ** 2).sum(axis=-1)
+    weights = np.exp(-squares / (2 * (width / 2) ** 2))
     square = difference.reshape(len(difference), -1) ** 2 @ (weights / weights.sum(axis=1, keepdims=True)).T
     return np.sqrt(square).reshape(difference.shape)
 
@@ -146,13 +146,13 @@ def _along(coarse: Figures, force: np.ndarray) -> np.ndarray:
     return size * np.sqrt(np.convolve(square * touched, kernel)[1:-1] / np.maximum(total, 1e-12))
 
 
-def _by_depth(known: np.ndarray, values: np.ndarray, depth: np.ndarray) -> np.ndarray:
+def _by_depth(depths: np.ndarray, values: np.ndarray, depth: np.ndarray) -> np.ndarray:
     """Interpolate values, shape (k, ...), at depths [mm], shape (n,), linearly from 0 at 0; beyond, in proportion."""
-    known, values = np.concatenate([[0.0], known[known > 0]]), values[known > 0]
+    depths, values = np.concatenate([[0.0], depths[depths > 0]]), values[depths > 0]
     values = np.concatenate([np.zeros_like(values[:1]), values])
-    after = np.clip(np.searchsorted(known, depth), 1, len(known) - 1)
-    share = np.minimum((depth - known[after - 1]) / (known[after] - known[after - 1]), 1.0)
-    beyond = np.maximum(depth / known[-1], 1.0)
+    upper = np.clip(np.searchsorted(depths, depth), 1, len(depths) - 1)
+    share = np.minimum((depth - depths[upper - 1]) / (depths[upper] - depths[upper - 1]), 1.0)
+    beyond = np.maximum(depth / depths[-1], 1.0)
     shape = (-1, *[1] * (values.ndim - 1))
     share, beyond = share.reshape(shape), beyond.reshape(shape)
-    return beyond * (values[after - 1] + share * (values[after] - values[after - 1]))
+    return beyond * (values[upper - 1] + share * (values[upper] - values[upper - 1]))

@@ -115,7 +115,7 @@ def test_everything_that_contact_depends_on_moves_it_as_differences_say(dent):
         assert (got - value).abs().max() < 1e-5 * value.abs().max(), name
     assert torch.allclose(found.load, found.pressure * dent.surface.area[:, None])
     # Without open nodes' gaps, the rest is the same.
-    part = contact_change(dent.surface, dent.u, dent.conditions, point, du, pressure, change, history, whole=False)
+    part = contact_change(dent.surface, dent.u, dent.conditions, point, du, pressure, change, history, full=False)
     assert torch.allclose(part.force, found.force) and torch.allclose(part.gap[active], found.gap[active])
 
 

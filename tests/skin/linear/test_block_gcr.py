@@ -103,7 +103,7 @@ def test_equal_columns_and_those_without_a_right_hand_side():
 def test_a_small_space_begins_anew():
     a, rough = matrix()
     seen, rhs = Counted(a, rough), fields(5, 4)
-    found = KrylovSpace(seen.product, seen.precondition, most=8).solve(rhs, torch.zeros_like(rhs), 1e-6)
+    found = KrylovSpace(seen.product, seen.precondition, limit=8).solve(rhs, torch.zeros_like(rhs), 1e-6)
     assert (found.error <= 1e-6).all()
 
 

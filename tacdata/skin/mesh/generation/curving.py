@@ -12,18 +12,18 @@ _KEEP = 0.2
 """Share of the straight element's Jacobian determinant that a curved one must keep [1]."""
 
 
-def curve(nodes: np.ndarray, wanted: np.ndarray, tets: np.ndarray) -> np.ndarray:
-    """Return ``wanted`` positions of nodes [mm], shape (n, 3), with those taken back that would fold an element.
+def curve(nodes: np.ndarray, targets: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Return ``targets`` positions of nodes [mm], shape (n, 3), with those taken back that would fold an element.
 
     Args:
         nodes: Straight-sided positions [mm], shape (n, 3).
-        wanted: The same with mid-side nodes moved.
+        targets: The same with mid-side nodes moved.
         tets: Nodes of each tetrahedron, shape (e, 10).
 
     Raises:
         SolveError: If an element has no volume even with straight sides.
     """
-    curved = wanted.copy()
+    curved = targets.copy()
     points, _ = elements.tetrahedron_quadrature()
     slopes = elements.tetrahedron_gradients(points)
     straight = np.linalg.det(np.einsum("eai,qaj->eqij", nodes[tets], slopes))

@@ -30,7 +30,7 @@ def ftetwild(
         vertices: Of the surface [mm], shape (n, 3).
         faces: Its triangles, shape (f, 3).
         background: Points [mm], shape (p, 3), tetrahedra, shape (q, 4), and edge length at the points [mm], shape (p,).
-        edge: Edge length where the background says nothing [mm].
+        edge: Edge length outside the background [mm].
         envelope: How far the surface may move, over its size [1].
 
     Returns:
@@ -41,40 +41,40 @@ def ftetwild(
     """
     points, cells, size = background
     with tempfile.TemporaryDirectory() as scratch:
-        asked, made = Path(scratch, "asked.npz"), Path(scratch, "made.npz")
+        request, result = Path(scratch, "asked.npz"), Path(scratch, "made.npz")
         np.savez(
-            asked, vertices=vertices, faces=faces, points=points, cells=cells, size=size, edge=edge, envelope=envelope
+            request, vertices=vertices, faces=faces, points=points, cells=cells, size=size, edge=edge, envelope=envelope
         )
-        line = [sys.executable, "-P", "-m", __name__, str(asked), str(made)]
+        line = [sys.executable, "-P", "-m", __name__, str(request), str(result)]
         done = subprocess.run(line, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-        if done.returncode or not made.exists():
-            said = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+        if done.returncode or not result.exists():
+            message = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
             raise SolveError(
-                f"fTetWild gave no mesh of a surface of {len(faces)} triangles: {said}",
+                f"fTetWild gave no mesh of a surface of {len(faces)} triangles: {message}",
                 "a closed surface that bounds a solid",
                 "check the skin's sizes against one another, or choose another element size",
             )
-        with np.load(made) as found:
-            return found["vertices"], found["tets"]
+        with np.load(result) as arrays:
+            return arrays["vertices"], arrays["tets"]
 
 
-def main(asked: str, made: str) -> None:
-    """Mesh what one file asks for into another."""
+def main(request: str, result: str) -> None:
+    """Mesh the request of a file into another file."""
     import pytetwild
 
-    os.chdir(Path(made).parent)  # fTetWild leaves a file of its own in the working folder
-    with np.load(asked) as given:
+    os.chdir(Path(result).parent)  # fTetWild leaves a file of its own in the working folder
+    with np.load(request) as arrays:
         vertices, tets = pytetwild.tetrahedralize(
-            given["vertices"],
-            given["faces"].astype(np.int32),
-            edge_length_abs=float(given["edge"]),
-            epsilon=float(given["envelope"]),
+            arrays["vertices"],
+            arrays["faces"].astype(np.int32),
+            edge_length_abs=float(arrays["edge"]),
+            epsilon=float(arrays["envelope"]),
             num_threads=1,
-            bg_vertices=given["points"],
-            bg_tets=given["cells"],
-            bg_values=given["size"],
+            bg_vertices=arrays["points"],
+            bg_tets=arrays["cells"],
+            bg_values=arrays["size"],
         )
-    np.savez(made, vertices=np.asarray(vertices, dtype=float), tets=np.asarray(tets, dtype=np.int32))
+    np.savez(result, vertices=np.asarray(vertices, dtype=float), tets=np.asarray(tets, dtype=np.int32))
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ _SLIVER = 0.1
 """Share of its volume that an element must keep when its corners go to the surface [1]."""
 
 _BEND = 0.2
-"""Largest way of a mid-side node to the surface, over its edge's length: further lies an edge across a crease [1]."""
+"""Largest way of a mid-side node to the surface, over its edge's length [1]; longer ones are edges across a crease."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class _Target:
     """Its sharp edges."""
 
 
-def own_mesh(sensor: Sensor, own: OwnSurface, settings: MeshSettings) -> SkinMesh:
+def own_mesh(sensor: Sensor, surface: OwnSurface, settings: MeshSettings) -> SkinMesh:
     """Mesh a skin with a surface of its own.
 
     Raises:
@@ -61,33 +61,33 @@ def own_mesh(sensor: Sensor, own: OwnSurface, settings: MeshSettings) -> SkinMes
         FormatError: If it bounds no solid.
         SolveError: If no face is the outer one, a bonded part has none, or it cannot be meshed.
     """
-    target = _target(sensor, own)
+    target = _target(sensor, surface)
     tree = KDTree(target.outer)
     vertices, tets = oriented(
         *tetrahedralize(target.hull, sensor.skin, settings, lambda points: tree.query(points, workers=1)[0])
     )
     vertices = _on_surface(target, vertices, tets, 2 * settings.envelope * float(target.hull.scale))
-    found = float(volumes(vertices, tets).sum())
-    if abs(found - target.volume) > _VOLUME * target.volume:
+    volume = float(volumes(vertices, tets).sum())
+    if abs(volume - target.volume) > _VOLUME * target.volume:
         raise SolveError(
-            f"the mesh holds {found:.4g} mm^3, skin surface {own.file} {target.volume:.4g} mm^3",
+            f"the mesh holds {volume:.4g} mm^3, skin surface {surface.file} {target.volume:.4g} mm^3",
             f"a volume within {100 * _VOLUME:g} %",
             "choose a smaller element size or envelope: thin parts were lost",
         )
     return _named(sensor, target, with_middles(vertices, tets))
 
 
-def _target(sensor: Sensor, own: OwnSurface) -> _Target:
-    hull = read_closed(find(own.file, own.sha256, "skin"), own.scale, "skin")
+def _target(sensor: Sensor, surface: OwnSurface) -> _Target:
+    hull = read_closed(find(surface.file, surface.sha256, "skin"), surface.scale, "skin")
     corners = np.asarray(hull.vertices, dtype=float)
     centers, normals = np.asarray(hull.triangles_center), np.asarray(hull.face_normals)
-    part = own.parts(centers, normals, sensor.skin.protrusion_radius > 0)
-    wanted = ["outer", *(b for b in sensor.contact.bonded if b in PARTS)]
-    wanted += ["protrusions"] if sensor.contact.board else []
-    for name in wanted:
+    part = surface.parts(centers, normals, sensor.skin.protrusion_radius > 0)
+    parts = ["outer", *(b for b in sensor.contact.bonded if b in PARTS)]
+    parts += ["protrusions"] if sensor.contact.board else []
+    for name in parts:
         if not (part == PARTS.index(name)).any():
             raise SolveError(
-                f"no face of skin surface {own.file} is chosen as {name}",
+                f"no face of skin surface {surface.file} is chosen as {name}",
                 "at least one face for the outer face, every bonded part, and protrusions on a board",
                 f"correct skin/surface/{name}: normal, angle, low and high of its faces",
             )
@@ -107,15 +107,15 @@ def _on_surface(target: _Target, vertices: np.ndarray, tets: np.ndarray, reach: 
     surface = np.unique(boundary(tets))
     place, sharp = target.creases.snapped(vertices[surface], reach)
     place[~sharp] = target.nearest.places(vertices[surface[~sharp]]).point
-    moved = vertices.copy()
-    moved[surface] = place
+    places = vertices.copy()
+    places[surface] = place
     for _ in range(10):
-        flat = volumes(moved, tets) < _SLIVER * volumes(vertices, tets)
+        flat = volumes(places, tets) < _SLIVER * volumes(vertices, tets)
         if not flat.any():
             break
         back = np.unique(tets[flat])
-        moved[back] = vertices[back]
-    return moved
+        places[back] = vertices[back]
+    return places
 
 
 def _named(sensor: Sensor, target: _Target, body: Quadratic) -> SkinMesh:
@@ -125,12 +125,12 @@ def _named(sensor: Sensor, target: _Target, body: Quadratic) -> SkinMesh:
     nodes = _round(target, body, body.triangles(faces))
     bumps = sixes["protrusions"]
     away = np.linalg.norm(nodes[bumps[:, :3], :2].mean(axis=1)[:, None] - sensor.taxels.centers[None], axis=-1)
-    held = {}
+    parts = {}
     for name in ("sides", "bottom"):
-        held[name] = np.zeros(len(nodes), dtype=bool)
-        held[name][sixes[name].ravel()] = True
+        parts[name] = np.zeros(len(nodes), dtype=bool)
+        parts[name][sixes[name].ravel()] = True
     taxel = away.argmin(axis=1).astype(np.int32) if len(bumps) else np.zeros(0, np.int32)
-    return SkinMesh(nodes, body.tets, sixes["outer"], bumps, taxel, held["sides"], held["bottom"])
+    return SkinMesh(nodes, body.tets, sixes["outer"], bumps, taxel, parts["sides"], parts["bottom"])
 
 
 def _round(target: _Target, body: Quadratic, surface: np.ndarray) -> np.ndarray:
@@ -141,6 +141,6 @@ def _round(target: _Target, body: Quadratic, surface: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(body.nodes[edge[:, 1]] - body.nodes[edge[:, 0]], axis=1)
     place = target.nearest.places(body.nodes[middle])
     near = np.abs(place.distance) < _BEND * length
-    wanted = body.nodes.copy()
-    wanted[middle[near]] = place.point[near]
-    return curve(body.nodes, wanted, body.tets)
+    targets = body.nodes.copy()
+    targets[middle[near]] = place.point[near]
+    return curve(body.nodes, targets, body.tets)

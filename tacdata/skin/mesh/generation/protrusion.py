@@ -59,7 +59,7 @@ class Protrusion:
             offset: Points relative to the foot's centre [mm], shape (n, 3).
         """
         axis = np.zeros_like(offset)
-        # Above the sphere's centre stands the cylinder, whose radius is horizontal.
+        # Above the sphere's centre is the cylinder, whose radius is horizontal.
         axis[:, 2] = np.where(offset[:, 2] > self.center, offset[:, 2], self.center)
         radial = offset - axis
         return axis + radial * (self.sphere / np.linalg.norm(radial, axis=1, keepdims=True))
@@ -78,7 +78,7 @@ class Protrusion:
         polar, edge = 0.0, tip
         while polar < 90.0:
             polar += np.degrees(edge / self.sphere)
-            # What is left to the foot joins the last ring where it would make a sliver.
+            # A remainder at the foot that would be a sliver joins the last ring.
             polar = 90.0 if polar + 0.5 * np.degrees(edge / self.sphere) > 90.0 else polar
             count = max(round(2 * np.pi * self.sphere * np.sin(np.radians(polar)) / edge), 6)
             rings.append((float(polar), count, 0.5 * (len(rings) % 2)))

@@ -17,7 +17,7 @@ _VOLUME = 0.03
 """Share of the skin's volume that a mesh may lose or gain; coarse protrusions lose 1 % of a small skin [1]."""
 
 _ON = 1e-9
-"""Distance within which a node lies on a plane [mm]."""
+"""Distance within which a node is on a plane [mm]."""
 
 
 def quadratic(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> SkinMesh:
@@ -56,12 +56,12 @@ def _flat_volume(sensor: Sensor) -> float:
     return slab + (sensor.taxels.count * Protrusion.of(skin).volume if skin.protrusion_radius else 0.0)
 
 
-def _check_volume(sensor: Sensor, found: float) -> None:
-    """Refuse a mesh that lost part of the skin; ``found`` is its volume by corners [mm^3]."""
+def _check_volume(sensor: Sensor, volume: float) -> None:
+    """Refuse a mesh that lost part of the skin; ``volume`` is its volume by corners [mm^3]."""
     true = _flat_volume(sensor)
-    if abs(found - true) > _VOLUME * true:
+    if abs(volume - true) > _VOLUME * true:
         raise SolveError(
-            f"the mesh holds {found:.3g} mm^3, the skin {true:.3g} mm^3: faces closer than {SNAP:g} mm collapsed",
+            f"the mesh holds {volume:.3g} mm^3, the skin {true:.3g} mm^3: faces closer than {SNAP:g} mm collapsed",
             f"a volume within {100 * _VOLUME:g} %",
             f"check the skin's sizes (all above {2 * SNAP:g} mm), or choose a smaller element size",
         )
@@ -71,8 +71,8 @@ def _round(sensor: Sensor, nodes: np.ndarray, tets: np.ndarray, bumps: np.ndarra
     """Put mid-side nodes of protrusion faces on the true protrusion where the element allows it."""
     if not len(bumps):
         return nodes
-    wanted = nodes.copy()
+    targets = nodes.copy()
     center = np.concatenate([sensor.taxels.centers[taxel], np.zeros((len(taxel), 1))], axis=1)
     for k in range(3, 6):
-        wanted[bumps[:, k]] = center + Protrusion.of(sensor.skin).project(nodes[bumps[:, k]] - center)
-    return curve(nodes, wanted, tets)
+        targets[bumps[:, k]] = center + Protrusion.of(sensor.skin).project(nodes[bumps[:, k]] - center)
+    return curve(nodes, targets, tets)

@@ -25,7 +25,7 @@ _SLIVER = 0.02
 
 @dataclass(frozen=True)
 class Snapped:
-    """Tetrahedra whose surface lies on the true faces."""
+    """Tetrahedra with their surface on the true faces."""
 
     vertices: np.ndarray
     """Positions [mm], shape (v, 3)."""
@@ -34,7 +34,7 @@ class Snapped:
     faces: np.ndarray
     """Triangles of the surface, normals outward, shape (f, 3), int32."""
     taxel: np.ndarray
-    """Taxel on whose protrusion a vertex lies, or -1, shape (v,), int64."""
+    """Taxel whose protrusion has the vertex, or -1, shape (v,), int64."""
 
 
 def snap(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> Snapped:
@@ -61,9 +61,9 @@ def snap(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> Snapped:
 
 def _on_faces(sensor: Sensor, vertices: np.ndarray, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return positions with the ``surface`` vertices on their true faces, and each vertex's taxel (or -1)."""
-    skin, moved = sensor.skin, vertices.copy()
+    skin, places = sensor.skin, vertices.copy()
     taxel = np.full(len(vertices), -1)
-    p = moved[surface]
+    p = places[surface]
     for axis, half in ((0, skin.size_x / 2), (1, skin.size_y / 2)):
         near = (np.abs(np.abs(p[:, axis]) - half) < SNAP) & (p[:, 2] > -SNAP)
         p[near, axis] = np.sign(p[near, axis]) * half
@@ -73,8 +73,8 @@ def _on_faces(sensor: Sensor, vertices: np.ndarray, surface: np.ndarray) -> tupl
         bump, nearest = _on_protrusions(sensor, p)
         taxel[surface] = np.where(bump, nearest, -1)
     p[(np.abs(p[:, 2]) < SNAP) & ~bump, 2] = 0.0
-    moved[surface] = p
-    return moved, taxel
+    places[surface] = p
+    return places, taxel
 
 
 def _on_protrusions(sensor: Sensor, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
