@@ -64,7 +64,7 @@ class PathSolution(Displayed):
     force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "vector", needs="spreads")] = None
     """The same of ``force`` [N], shape (k, 3)."""
     taxel_force_uncertainty: Annotated[np.ndarray | None, Quantity("N", "taxels", needs="spreads")] = None
-    """Estimated error of ``taxel_force`` by the mesh alone [N], shape (k, taxels)."""
+    """The same of ``taxel_force`` [N], shape (k, taxels)."""
     taxel_closure_uncertainty: Annotated[np.ndarray | None, Quantity("mm", "taxels", needs="spreads")] = None
     """The same of ``taxel_closure`` [mm], shape (k, taxels)."""
 

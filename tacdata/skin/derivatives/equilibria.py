@@ -167,21 +167,21 @@ class PathDerivatives:
             SolveError: If a linear solve does not converge.
         """
         newton, count = self._newton, along.pose.place.shape[1]
-        unlimited = replace(reached, friction_tangent=torch.ones_like(reached.friction_tangent))
-        contacts = newton.residual(unlimited).contacts
+        full_tangent = replace(reached, friction_tangent=torch.ones_like(reached.friction_tangent))
+        contacts = newton.residual(full_tangent).contacts
         still = replace(along, pose=along.pose.zeros())
         directions = (along, *[still] * (len(newton.surfaces) - 1))
         forces = tuple(contact.repeat(count) for contact in contacts)
-        modulus = float(unlimited.conditions.modulus[0])
-        point = _Point(newton.surfaces, unlimited.repeat(count), forces, directions, modulus)
+        modulus = float(full_tangent.conditions.modulus[0])
+        point = _Point(newton.surfaces, full_tangent.repeat(count), forces, directions, modulus)
         pressures = [torch.zeros_like(contact.pressure) for contact in forces]
         if not self._history:
             self.du = torch.zeros_like(point.at.u)
             self._history = tuple(history.zeros() for history in point.at.histories)
         else:
-            turns = [pose.turn for pose in unlimited.poses]
+            turns = [pose.turn for pose in full_tangent.poses]
             preconditioner = StatePreconditioner(
-                newton.preconditioner.rest, newton.surfaces, contacts, unlimited.conditions.friction, turns
+                newton.preconditioner.rest, newton.surfaces, contacts, full_tangent.conditions.friction, turns
             )
             pressures = self._solve(point, preconditioner, self._held(point))
         self.changes = point.changes(self.du, pressures, self._history)
@@ -199,8 +199,8 @@ class PathDerivatives:
         self._newton.add_contact_forces(point.at, external)
         return self._slack((internal - external) * (1 - self._free))
 
-    def _solve(self, point: _Point, preconditioner: StatePreconditioner, bonding: torch.Tensor) -> list[torch.Tensor]:
-        """Find du, at held nodes ``bonding``, and return the changes of the pressures."""
+    def _solve(self, point: _Point, preconditioner: StatePreconditioner, slack: torch.Tensor) -> list[torch.Tensor]:
+        """Find du, at held nodes ``slack``, and return the changes of the pressures."""
         body, unfixed, at = self._newton.body, self._free, point.at
         points: dict[tuple[int, torch.dtype], tuple[torch.Tensor, Conditions, torch.Tensor | None]] = {}
         if self._prepared:
@@ -231,7 +231,7 @@ class PathDerivatives:
         still = point.changes(torch.zeros_like(at.u), none, self._history, full=False)
         rhs = -point.residual((self._internal(point) - _force(still)) * unfixed, still)
         if self._slack:
-            rhs -= product(point.joined(bonding, none))
+            rhs -= product(point.joined(slack, none))
         guesses = [
             torch.where(conditions.tangent.active, change.pressure, 0.0)
             for conditions, change in zip(point.now, self.changes, strict=True)
@@ -239,7 +239,7 @@ class PathDerivatives:
         guess = point.joined(self.du * unfixed, guesses)
         solution = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance, weight=self._weight)
         du, pressures = point.parted(solution.x)
-        self.du, self.products = du + bonding, self.products + solution.products
+        self.du, self.products = du + slack, self.products + solution.products
         self.error = max(self.error, float(solution.error.max()))
         if not self.error <= self._tolerance:
             raise SolveError(

@@ -45,13 +45,15 @@ def direction_of(rows: RowData, b: int, s: int):
 
 
 @wp.func
-def put_row(rows: RowData, b: int, s: int, first: int, direction: wp.vec3, slave: wp.float32, master: wp.float32):
-    """Write a constraint: its rows, its direction, by how much it gives way, alone and with the one before."""
+def put_row(
+    rows: RowData, b: int, s: int, first: int, direction: wp.vec3, compliance: wp.float32, coupling: wp.float32
+):
+    """Write a constraint: its rows, its direction, its compliance, and the coupling with the one before."""
     rows.first[b, s] = first
     for p in range(3):
         rows.direction[b, s, p] = direction[p]
-    rows.give[b, s, 0] = slave
-    rows.give[b, s, 1] = master
+    rows.give[b, s, 0] = compliance
+    rows.give[b, s, 1] = coupling
 
 
 @wp.kernel(enable_backward=False)

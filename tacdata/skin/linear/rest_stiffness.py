@@ -100,8 +100,10 @@ def rest_solver(
         SolveError: If the inverse does not fit into the GPU's memory.
     """
     # A K0 with averages costs a sparse factor several times the fill, and saves no iterations (decision 0016).
-    prepared = averaged and device != "cpu"
-    stiffness = rest_stiffness(mesh, material if prepared == averaged else for_averaged(material), prepared)
+    averaged_on_gpu = averaged and device != "cpu"
+    stiffness = rest_stiffness(
+        mesh, material if averaged_on_gpu == averaged else for_averaged(material), averaged_on_gpu
+    )
     unfixed = np.flatnonzero(~np.repeat(fixed, 3))
     return (SparseRest if device == "cpu" else DenseRest)(stiffness, unfixed, rows, device)
 

@@ -70,7 +70,7 @@ def press_coarsely(
         One for each request, as far as it was reached.
     """
     numbers = [k for k, request in enumerate(requests) if loading(request).depths]
-    parts_of = [[model.figures(request, [], [])] for request in requests]
+    figures = [[model.figures(request, [], [])] for request in requests]
     remarks = [""] * len(requests)
     passages: list[list[Passage]] = [[] for _ in requests]
     reached: list[list[tuple[float, Unknowns]]] = [[] for _ in requests]
@@ -86,10 +86,10 @@ def press_coarsely(
         if keep:
             passages[number].append(Passage(depth, state, passed))
         try:
-            parts_of[number].append(model.figures(requests[number], [depth], [state]))
+            figures[number].append(model.figures(requests[number], [depth], [state]))
         except SolveError as error:
             remarks[number] = f"the coarser mesh at {depth:g} mm: {error.given}"
     return [
         CoarsePress(Figures.joined(parts), remark, tuple(passage), CoarsePath.of(states))
-        for parts, remark, passage, states in zip(parts_of, remarks, passages, reached, strict=True)
+        for parts, remark, passage, states in zip(figures, remarks, passages, reached, strict=True)
     ]
