@@ -233,8 +233,8 @@ class PathDerivatives:
         if self._slack:
             rhs -= product(point.joined(slack, none))
         guesses = [
-            torch.where(conditions.tangent.active, change.pressure, 0.0)
-            for conditions, change in zip(point.now, self.changes, strict=True)
+            torch.where(forces.tangent.active, change.pressure, 0.0)
+            for forces, change in zip(point.now, self.changes, strict=True)
         ]
         guess = point.joined(self.du * unfixed, guesses)
         solution = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance, weight=self._weight)
