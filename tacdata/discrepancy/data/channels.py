@@ -1,10 +1,10 @@
-"""Which channels can be used, which are clipped, what their source calls them: by the recording's own numbers."""
+"""Which channels can be used, which are clipped or hold codes, and what their source calls them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,12 @@ FEWEST_STOPS = 2
 """Clipping: a channel is clipped if it stops so often..."""
 MANY_STOPPED = 10
 """...or over so many readings."""
+FAR = 1e6
+"""A reading is an instrument's code from so many times the range of the inner readings on [1]."""
+INNER = (0.05, 0.95)
+"""Quantiles between which readings are inner ones [1]."""
+STILL = 1e-3
+"""Range of a channel that hardly moves, at least [its size]."""
 MOST_NAMES = 64
 """Names of more channels are not listed."""
 
@@ -125,6 +131,50 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
         if way > 0 and abs(limit - values[at]) * min(on / way, 1.0) > FLAT_Z * max(noise, step):
             words.append(end - begin)
     return words
+
+
+def without_codes(recordings: Sequence[Recording]) -> tuple[Sequence[Recording], list[str]]:
+    """Return recordings whose codes are missing values, and in words what was set aside.
+
+    Args:
+        recordings: Of the same channels.
+    """
+    counts = np.concatenate([r.episode.taxels.counts for r in recordings]).astype(float)
+    odd = codes(counts)
+    if not odd.any():
+        return recordings, []
+    made, first = [], 0
+    for recording in recordings:
+        episode = recording.episode
+        last = first + len(episode.taxels.counts)
+        readings = np.where(odd[first:last], np.nan, episode.taxels.counts)
+        taxels = replace(episode.taxels, counts=readings)
+        made.append(replace(recording, episode=replace(episode, taxels=taxels)))
+        first = last
+    listed = [
+        f"channel {k} ({np.count_nonzero(odd[:, k])}, as {counts[odd[:, k], k][0]:.3g})"
+        for k in np.flatnonzero(odd.any(axis=0))
+    ]
+    return made, [f"readings that are an instrument's codes, set aside: {', '.join(listed)}"]
+
+
+def codes(values: np.ndarray) -> np.ndarray:
+    """Return which values are codes, shape (n, channels), bool: far beyond the range of the others.
+
+    Args:
+        values: Shape (n, channels); NaN where missing.
+    """
+    result = np.zeros(values.shape, dtype=bool)
+    for k, column in enumerate(values.T):
+        known = np.isfinite(column)
+        if not known.any():
+            continue
+        low, middle, high = np.quantile(column[known], [INNER[0], 0.5, INNER[1]])
+        # Of a channel that hardly moves, its size stands for its range.
+        size = max(float(high - low), STILL * abs(float(middle)))
+        if 0 < size < np.inf:
+            result[known, k] = np.abs(column[known] - middle) > FAR * size
+    return result
 
 
 def in_source(recordings: Sequence[Recording], channels: int) -> list[str]:

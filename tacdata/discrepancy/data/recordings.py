@@ -11,7 +11,7 @@ import numpy as np
 
 from tacdata.chain import Course, Tool
 from tacdata.chain.rows import Rows, rows_of
-from tacdata.discrepancy.data.channels import in_source, readings, usable
+from tacdata.discrepancy.data.channels import in_source, readings, usable, without_codes
 from tacdata.discrepancy.data.path_noise import resolved, without_dropouts, without_noise
 from tacdata.discrepancy.data.specimens import specimens
 from tacdata.discrepancy.data.strokes import strokes
@@ -75,9 +75,10 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
             "the same channels throughout",
             "judge sensors one at a time",
         )
-    recordings = [r for _, r in every]
+    recordings, odd = without_codes([r for _, r in every])
+    found = [(number, r.episode) for (number, _), r in zip(every, recordings, strict=True)]
     kept, limits, left_out = usable([readings(r) for r in recordings])
-    notes += in_source(recordings, min(counts)) + left_out + _dropouts([e for _, e in found])
+    notes += in_source(recordings, min(counts)) + odd + left_out + _dropouts([e for _, e in found])
     names = sorted({m.name for _, e in found for m in e.measured})
     force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
     views: dict[int, Views] = {}
