@@ -25,6 +25,8 @@ COMING_TO_REST = 30.0
 """Longest deceleration of a feed hold [s of the clock]."""
 STANDING = 3.0
 """A machine that reports the same place for so long stands still, whatever its state says [s of the clock]."""
+LONGEST_LINE = 80
+"""Longest line that is sent, with its end [bytes]."""
 LOOK = 0.05
 """Time between two reports that are compared [s, real time]."""
 LATE = (1.5, 15.0)
@@ -365,6 +367,12 @@ class Grbl(MotionController):
         """Read the controller's settings and adapt the link to them."""
         self._answers = answers = GrblSettings.read(link, ANSWER)
         link.statuses.unit, link.statuses.automatic = answers.unit, answers.reports_by_itself
+        if answers.rx_bytes and answers.rx_bytes < LONGEST_LINE:
+            raise DeviceError(
+                f"the controller on {self.port} states a receive buffer of {answers.rx_bytes} bytes",
+                f"at least {LONGEST_LINE} bytes: a line of motion must fit in",
+                "see its $I in a terminal; use a firmware with the usual 128 bytes",
+            )
         link.rx_bytes = answers.rx_bytes or link.rx_bytes
         link.statuses.place(answers.work_offset)
         answers.refuse_moves_at_start(self.port)

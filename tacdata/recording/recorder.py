@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ from tacdata.recording.live.rig_devices import RigDevices, require_channels
 from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion import sync_tap as tap_motion
 from tacdata.recording.motion.preflight import Preflight, preflight, safe_height
-from tacdata.recording.motion.press_steps import Position, Step, steps
+from tacdata.recording.motion.press_steps import Position, Step, steps, with_safe_travel
 from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.recording.session import Session, create_session, refresh, resume_session
 from tacdata.recording.sync_tap import delays
@@ -40,6 +41,8 @@ Prove = Callable[..., Position]
 """Touches the skin before the first press (`tacdata.registration.evidence.prove_zero`)."""
 JUDGED = 3
 """Presses after a start whose first contact is compared with depth zero at once; so is the first of each mounting."""
+REPORT_RATE = 5.0
+"""Status reports per second of a controller that states no rate [Hz]."""
 FIRST_FRAME = 5.0
 """Time allowed for the streams to begin [s of real time]."""
 FIRST_SEARCH = 20.0
@@ -161,6 +164,8 @@ class Recorder:
         with self._guard.opened(self.devices) as devices:
             cnc = devices.cnc
             limits = AxisLimits(np.asarray(cnc.acceleration, float), np.asarray(cnc.max_rate, float))
+            rate = cnc.describe().get("status_rate", {}).get("nominal", REPORT_RATE)
+            self.plan = replace(self.plan, motion=with_safe_travel(self.plan.motion, limits, rate))
             bounds = cnc.travel, cnc.cautions
             summary = preflight(self.plan, self.sensor, self.rig, limits, wanted, *bounds, self._tap)
             if not confirm(summary):

@@ -80,3 +80,11 @@ def test_startup_lines_that_move_are_refused(line, moves):
 def test_unusable_limits_name_the_settings():
     with pytest.raises(DeviceError, match=r"\$120 to \$122"):
         GrblSettings({"$120": "0", "$121": "10", "$122": "10"}).limits("$12", 1.0, "/dev/x")
+
+
+def test_settings_of_memory_that_was_never_written_are_refused():
+    damaged = {f"$11{axis}": "2147483.648" for axis in range(3)}
+    with pytest.raises(DeviceError, match=r"states \$110 to \$112 as 2\.14748e\+06, .*") as raised:
+        GrblSettings(damaged).limits("$11", 60.0, "/dev/ttyUSB0")
+    assert "damaged" in raised.value.allowed
+    assert GrblSettings({f"$11{axis}": "60000" for axis in range(3)}).limits("$11", 60.0, "x").max() == 1000.0

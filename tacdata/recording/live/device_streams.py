@@ -21,6 +21,8 @@ from tacdata.wire.patience import Patience
 
 BOARD = "taxel board"
 """Name of a single board in messages."""
+LATE = 0.5
+"""Lateness of this computer in a stream's silence that is named [s of real time]."""
 POLL = 0.05
 """Timeout of one read [s of the host's clock]."""
 CATCH_UP = 5.0
@@ -62,6 +64,7 @@ class DeviceStreams(ABC):
         self._sink: EpisodeWriter | None = None
         self._before: dict[str, StreamCounts] = {}
         self._passes: dict[str, int] = {}
+        self._late: dict[str, float] = {}  # by how much this computer was late in reading since the last data [s]
         self._clocks = {name: stream_clock(board) for name, board in self._boards.items()}
         self._clocks |= {name: StreamClock("order", camera.clock.rate) for name, camera in self._cameras.items()}
         self._views = [CameraStream(name, entries.get(name, {}), detect, fingers) for name in cameras]
@@ -71,6 +74,11 @@ class DeviceStreams(ABC):
         for view in self._views:
             self._work[f"camera {view.name}"] = self._camera_reader(view)
         self._threads: list[threading.Thread] = []
+
+    def _busy(self, name: str) -> str:
+        """Name this computer's own lateness in a stream's silence, as part of a sentence; empty if it was in time."""
+        late = self._late.get(name, 0.0)
+        return f", while this computer was {late:.1f} s late in reading" if late > LATE else ""
 
     def _silence_of(self, name: str) -> float:
         """Time without data after which a stream counts as silent [s of real time]."""
@@ -153,11 +161,16 @@ class DeviceStreams(ABC):
     def _run(self, name: str, read: Callable[[], int]) -> None:
         # A look comes each `POLL`, and later on a computer that is far too busy: that is no silence of the device.
         patience = Patience(self._silence_of(name), step=2 * POLL, host=self._host)
+        looked = self._host.monotonic()
         while not self._stop.is_set():
+            now = self._host.monotonic()
+            self._late[name] = self._late.get(name, 0.0) + max(now - looked - 2 * POLL, 0.0)
+            looked = now
             self._passes[name] = self._passes.get(name, 0) + 1
             try:
                 if count := read():
                     patience.restart()
+                    self._late[name] = 0.0
                     self._delivered(name, count)
                 elif patience.over():
                     self._silent(name)

@@ -25,8 +25,8 @@ MARGIN = 15.0
 """Time allowed for coming to rest at the end of a path before it counts as hung [s of the host's clock]."""
 LIFTS = 3
 """Attempts to lift the tip after a stop [count]."""
-FIRST_RISE, FIRST_SPEED = 1.0, 1.0
-"""Length [mm] and speed [mm/s] of the first part of a lift."""
+LIFT_SPEED = 2.0
+"""Greatest speed of a lift [mm/s]."""
 LETTING_GO = 10.0
 """Time allowed for a stopped motion's thread to end [s of real time]."""
 
@@ -221,16 +221,15 @@ class GuardedMotion:
         return f"the indenter was lifted off the skin, straight up from {z:.3f} to {height:.3f} mm{again}"
 
     def _rise_to(self, height: float, speed: float) -> None:
-        """Rise from rest to ``height`` [mm], slowly at first: a damaged line is then noticed near the place of rest."""
+        """Rise from rest to ``height`` [mm], slowly: a damaged line is then noticed near the place of rest."""
         x, y, z = self._rest or (np.nan, np.nan, np.inf)
-        targets = [(z + FIRST_RISE, min(speed, FIRST_SPEED))] if z + FIRST_RISE < height else []
-        for target, fast in [*targets, (height, speed)] if z < height else []:
-            self._rising = height
-            self._lifted = f"the indenter was not lifted all the way (interrupted){self._advice}"
-            self._allowed.move((x, y, target), fast, self._clock.now_ns())
-            self._cnc.rise((x, y, target), fast)
-            self._cnc.wait_idle(MARGIN + (target - z) / fast)
-            self._allowed.rested(self._clock.now_ns())
+        if z >= height:
+            return
+        self._rising, speed = height, min(speed, LIFT_SPEED)
+        self._lifted = f"the indenter was not lifted all the way (interrupted){self._advice}"
+        self._allowed.move((x, y, height), speed, self._clock.now_ns())
+        self._cnc.rise((x, y, height), speed)
+        self._cnc.wait_idle(MARGIN + (height - z) / speed)
         self._rising = None
 
     def _came_to_rest(self) -> bool:

@@ -25,6 +25,7 @@ BOARD_SILENCE, SILENT_FRAMES = 1.8, 5
 """Time without a frame after which a board counts as silent [s of real time], and in frames of a slow one."""
 AGAIN_NS = 60_000_000_000
 """Bad readings that go on are said again after this time [ns of the host's clock]."""
+TOO_BUSY = "end other programs on this computer, then check cable and power, and start again"
 TAXELS = "taxels"
 """Name of the only board's stream."""
 
@@ -119,10 +120,11 @@ class RigStreams(DeviceStreams):
                 "a stream of good frames",
                 "check cable, ground and baud rate, then the frame format",
             )
+        busy = self._busy(BOARD)
         return DeviceError(
-            f"{BOARD}: nothing received for {seconds:g} s",
+            f"{BOARD}: nothing received for {seconds:g} s{busy}",
             "a stream that goes on",
-            "check cable and power, then start again",
+            TOO_BUSY if busy else "check cable and power, then start again",
         )
 
     def _totals(self) -> dict[str, StreamCounts]:
@@ -167,9 +169,12 @@ class RigStreams(DeviceStreams):
         if name == BOARD:
             raise self._no_frames(self._board_silence)
         unreadable = "" if name.startswith("camera") else self._cnc.unreadable
+        busy = self._busy(name)
         what = f"only reports that cannot be read, the latest {unreadable!r}," if unreadable else "nothing received"
         raise DeviceError(
-            f"{name}: {what} for {self.silence:g} s", "a stream that goes on", "check cable and power, then start again"
+            f"{name}: {what} for {self.silence:g} s{busy}",
+            "a stream that goes on",
+            TOO_BUSY if busy else "check cable and power, then start again",
         )
 
     def _broken(self, name: str, error: TacdataError) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from tacdata.rig import Registration
 
 SYNC = 0.01
 """Pause that makes the controller finish its moves before it answers [s]."""
+REPORT_LAG = 0.1
+"""Longest time from the making of a report to the feed hold that follows it [s]."""
 SHORTEST_PAUSE = 0.05
 """What GRBL rounds such a pause up to [s]."""
 
@@ -77,6 +79,21 @@ def steps(press: Press, motion: MotionSettings, registration: Registration) -> t
         Step("", above, motion.approach_speed),
         Step("", seconds=max(press.recovery, SYNC)),
     )
+
+
+def with_safe_travel(motion: MotionSettings, limits: AxisLimits, report_rate: float) -> MotionSettings:
+    """Return motion settings whose travel can be stopped within the clearance above the skin.
+
+    A damaged line can send the tip down; it is noticed at the next report, and then the machine brakes.
+
+    Args:
+        motion: The plan's settings.
+        limits: The controller's axis limits.
+        report_rate: Status reports per second [Hz].
+    """
+    seconds, braking = 1.0 / report_rate + REPORT_LAG, float(limits.acceleration.min())
+    fastest = braking * (np.sqrt(seconds**2 + 2.0 * motion.clearance / braking) - seconds)
+    return replace(motion, travel_speed=min(motion.travel_speed, float(fastest)))
 
 
 def duration(path: tuple[Step, ...], start: Position, limits: AxisLimits) -> tuple[float, Position]:

@@ -91,7 +91,7 @@ ERRORS = {
 """``error:N``: why a line was refused. Grbl 1.1 uses 1 to 17 and 20 to 38; the others are grblHAL's."""
 
 ALARMS = {
-    1: "a hard limit switch closed; the position is probably lost, home again",
+    1: "a hard limit switch closed, or noise on its line was taken for it; the position is probably lost, home again",
     2: "the target lies beyond the soft limits; the position is kept",
     3: "reset while moving; steps may be lost and the position is suspect, home again",
     4: "the probe was not in its initial state before the probing move",

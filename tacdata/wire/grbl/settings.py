@@ -13,6 +13,8 @@ from tacdata.wire.grbl.link import GrblLink
 
 QUESTIONS = ("$I", "$$", "$#", "$G", "$N")
 """Queries sent at opening; Grbl answers them when idle or locked, and none moves anything."""
+IMPOSSIBLE = 1e6
+"""Rate [mm/min] or acceleration [mm/s^2] that no machine reaches: memory that was never written states 2147483.648."""
 ALWAYS_ON = 255
 """``$1`` that keeps the motors powered."""
 AXIS_WORD = re.compile(r"[XYZ]")
@@ -163,9 +165,16 @@ class GrblSettings:
         """Return three axis settings divided by ``divisor``, shape (3,), for example the rates for ``$11``.
 
         Raises:
-            DeviceError: If one is missing or not positive.
+            DeviceError: If one is missing, not positive, or too great for any machine.
         """
         values = np.array([self.number(f"{prefix}{axis}") for axis in range(3)]) / divisor
+        if np.any(values * divisor >= IMPOSSIBLE):
+            stated = ", ".join(f"{value * divisor:g}" for value in values)
+            raise DeviceError(
+                f"the controller on {port} states {prefix}0 to {prefix}2 as {stated}",
+                f"numbers below {IMPOSSIBLE:g}: its stored settings are damaged",
+                "restore them in a terminal ($RST=$), set the machine's own, then home it",
+            )
         if not np.all(values > 0):
             raise DeviceError(
                 f"the controller on {port} reports no usable {prefix}0 to {prefix}2",

@@ -1,5 +1,7 @@
 """The skin must begin at depth zero, in the first presses and in all of a session."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from recording_examples import SENSOR, Press, plan, rig
@@ -69,3 +71,17 @@ def test_a_drift_of_a_few_micrometres_a_press_is_stated():
     steady = [(k, FirstContact(rng.normal(0, 0.02), 0.02)) for k in range(200)]
     assert drift_words(steady) == ""
     assert height_words([c for _, c in steady]) is None
+
+
+@pytest.mark.parametrize(("off", "severity"), [(0.0, None), (0.04, "warning"), (0.08, "unusable")])
+def test_reports_at_rest_that_state_another_depth_are_stated(tmp_path, off, severity):
+    press = Press(0)
+    lowest = min(status.position[2] for status in press.statuses)
+    press.statuses = [
+        replace(status, position=status.position - [0.0, 0.0, off]) if status.position[2] < lowest + 1e-3 else status
+        for status in press.statuses
+    ]
+    report = check(press.write(tmp_path / "episode-000000.mcap"))
+    found = [f for f in report.findings if "from the commanded position in the hold" in f.text]
+    assert [f.severity for f in found] == ([severity] if severity else [])
+    assert not found or f"stood {off:.3f} mm" in found[0].text

@@ -3,9 +3,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from recording_examples import plan
 
 from tacdata.recording.episode import CncStream
 from tacdata.recording.motion.move_times import Command, StatusTimes, anchor, machine_path, phases, report_resolution
+from tacdata.recording.motion.press_steps import with_safe_travel
 from tacdata.recording.motion.trapezoid import AxisLimits
 
 LIMITS = AxisLimits(np.array([200.0, 200.0, 100.0]), np.array([50.0, 50.0, 10.0]))
@@ -139,3 +141,14 @@ def test_broken_off_press_follows_the_reports_instead_of_the_command():
     _, position = machine_path(moves, halted, complete=False)
     np.testing.assert_array_equal(np.unique(position, axis=0), held[None])
     assert down.target[2] == -1.0
+
+
+@pytest.mark.parametrize(("clearance", "rate"), [(3.0, 8.0), (4.0, 5.0), (10.0, 8.0)])
+def test_travel_is_stopped_within_the_clearance(clearance, rate):
+    """A damaged line may send the tip straight down; the next report shows it, then the machine brakes."""
+    motion = replace(plan().motion, clearance=clearance, travel_speed=100.0)
+    speed = with_safe_travel(motion, LIMITS, rate).travel_speed
+    unseen = 1 / rate + 0.1
+    assert speed * unseen + speed**2 / (2 * LIMITS.acceleration.min()) == pytest.approx(clearance)
+    slow = replace(motion, travel_speed=2.0)
+    assert with_safe_travel(slow, LIMITS, rate) == slow

@@ -50,24 +50,24 @@ def deepest(world):
 
 def test_a_damaged_lift_is_stopped_near_its_place_and_tried_again(lifted):
     world, words = lifted({1})
-    assert deepest(world) < DEEP + 0.5
+    assert deepest(world) < DEEP + 0.7
     assert world.position()[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
     assert re.search(r"tip:    the indenter was lifted off the skin, .* at the attempt number 2", words), words
     assert "on its way" not in words
 
 
-def test_a_lift_whose_second_part_is_damaged_is_tried_again(lifted):
-    world, words = lifted({2})
+def test_two_damaged_lifts_are_followed_by_a_third(lifted):
+    world, words = lifted({1, 2})
     assert world.position()[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
     assert "lifted off the skin" in words
-    assert "attempt number 2" in words
+    assert "attempt number 3" in words
 
 
 def test_a_lift_that_never_goes_up_is_reported_where_it_stands(lifted):
     world, words = lifted(set(range(1, 20)))
     place = world.position()
     assert place[2] < ORIGIN[2]
-    assert deepest(world) < DEEP + 3 * 0.5
+    assert deepest(world) < DEEP + 3 * 0.7
     assert "the indenter was not lifted all the way" in words
     stands = re.search(r"motion: stopped at \((\S+), (\S+), (\S+)\) mm", words)
     assert [float(value) for value in stands.groups()] == pytest.approx(place.tolist(), abs=0.02), words

@@ -370,3 +370,9 @@ def test_two_controllers_on_one_line_leave_no_known_place(tmp_path):
     assert "farther than it can have moved" in words
     assert "zero:   LOST" in words
     assert "clear of the skin" not in words
+
+
+def test_a_receive_buffer_that_takes_no_line_is_refused_before_anything_moves(tmp_path):
+    _, words = play(tmp_path, wire(lambda text: re.sub(r"^(\[OPT:\w+,\d+),\d+", r"\1,20", text)))
+    assert "states a receive buffer of 20 bytes" in words
+    assert "motion: nothing was moved" in words
