@@ -1,7 +1,7 @@
 """Whether damaged files end in words: each reader gets thousands of truncated, flipped, emptied and foreign files.
 
-A reader must return, or raise one of our own errors. Anything else is a fault, and is listed with its seed. A process
-that ends by a signal is one as well, at its end too.
+A reader must return, or raise one of our own errors, within 10 s and 1 GiB. Anything else is a fault, and is listed
+with its seed. A process that ends by a signal is one as well, at its end too. Tables are also imported whole.
 
     python benchmarks/fuzz_readers.py [--tries N] [--only NAME ...] [--json FILE]
 """
@@ -14,6 +14,8 @@ import io
 import json
 import logging
 import os
+import resource
+import signal
 import tempfile
 import traceback
 import warnings
@@ -25,6 +27,8 @@ import numpy as np
 
 from tacdata.errors import TacdataError
 
+LONGEST, LARGEST = 10, 1 << 30
+"""Time that a file may take [s], and memory of the process after it [byte]."""
 KINDS = ("cut", "flip", "zero", "insert", "swap", "empty", "foreign")
 """Kinds of damage: cut off, bytes flipped, zeroed or inserted, two parts swapped, emptied, a file of another kind."""
 
@@ -52,6 +56,11 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
     lines = [",".join(columns), *(",".join(f"{v:.5f}" for v in row) for row in zip(*columns.values(), strict=True))]
     text = "\n".join(lines).encode()
     found["csv"] = text, ".csv", table
+    found["json"] = json.dumps({name: values.tolist() for name, values in columns.items()}).encode(), ".json", table
+    by_row = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = [json.dumps(dict(zip(columns, row, strict=True))) for row in by_row]
+    found["jsonl"] = "\n".join(lines).encode(), ".jsonl", table
+    found["import"] = _press_table(), ".csv", importer(folder)
     found["csv.gz"] = gzip.compress(text, mtime=0), ".csv.gz", table
     stream = io.BytesIO()
     np.savez_compressed(stream, **columns)
@@ -122,6 +131,40 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
     return found
 
 
+def _press_table() -> bytes:
+    """Return a table of two presses."""
+    time = np.arange(0, 8, 0.02)
+    depth = np.interp(time % 4, [0, 1, 2, 3, 4], [-0.5, -0.5, 1.0, 1.0, -0.5])
+    rows = [f"{t:.3f},{d:.4f},{20 + max(d, 0):.4f}" for t, d in zip(time, depth, strict=True)]
+    return "\n".join(["t,depth,cap0", *rows]).encode()
+
+
+def importer(folder: Path) -> Callable[[Path], object]:
+    """Return what imports one table with columns t, depth and cap0 into a session that is then removed."""
+    from tacdata.importing.imported_session import import_session
+
+    mapping = folder / "import.yaml"
+    mapping.write_text(
+        "version: '1.4'\nname: a\nfiles: {data: {path: '*.csv', time: {column: t, unit: s}}}\nsensor: {name: s}\n"
+        "taxels: {file: data, columns: [cap0], unit: pF}\ntrials: {press_above: 0.3}\n"
+        "position: {file: data, depth: {column: depth, unit: mm}}\n"
+    )
+
+    def whole(path: Path) -> object:
+        with tempfile.TemporaryDirectory(dir=folder) as out:
+            return import_session(path, mapping, Path(out) / "session")
+
+    return whole
+
+
+class _TooLong(BaseException):
+    """A reader took longer than `LONGEST`."""
+
+
+def _stop(*_: object) -> None:
+    raise _TooLong
+
+
 def _bag(folder: Path, ending: str) -> bytes:
     """Return a bag of ROS 2 with one topic of readings."""
     from rosbags.rosbag2 import StoragePlugin, Writer
@@ -160,6 +203,11 @@ def _recording(folder: Path) -> bytes:
     return next(iter(sorted(made.folder.glob("*.mcap")))).read_bytes()
 
 
+def _memory() -> int:
+    """Return the most memory that the process has used so far [byte]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
 def damaged(data: bytes, kind: str, others: list[bytes], rng: np.random.Generator) -> bytes:
     """Return a file with one kind of damage."""
     broken, at = bytearray(data), int(rng.integers(len(data)))
@@ -191,6 +239,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     chosen = parser.parse_args()
     warnings.simplefilter("ignore")
+    signal.signal(signal.SIGALRM, _stop)
     logging.disable(logging.CRITICAL)
     result = {}
     with tempfile.TemporaryDirectory() as name:
@@ -211,15 +260,23 @@ def main() -> None:
                 # A name of its own: readers may remember what they read under one.
                 path = folder / f"damaged_{seed}{ending}"
                 path.write_bytes(damaged(data, KINDS[seed % len(KINDS)], others, rng))
+                signal.alarm(LONGEST)
                 try:
                     read(path)
                     counts["read"] += 1
+                except _TooLong:
+                    counts["fault"] += 1
+                    faults.setdefault(f"longer than {LONGEST} s", seed)
                 except TacdataError:
                     counts["refused"] += 1
                 except Exception as error:
                     counts["fault"] += 1
                     where = traceback.extract_tb(error.__traceback__)[-1]
                     faults.setdefault(f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}", seed)
+                signal.alarm(0)
+                if (used := _memory()) > LARGEST and not any("memory" in words for words in faults):
+                    counts["fault"] += 1
+                    faults[f"memory of {used >> 20} MiB"] = seed
                 path.unlink(missing_ok=True)
             result[what] = {**counts, "faults": faults}
             print(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import errno
 import functools
 import inspect
+import io
 import itertools
 import re
 import sys
@@ -18,7 +18,7 @@ import typer
 
 from tacdata import progress, registry, stages
 from tacdata.commands.command import Result
-from tacdata.errors import DeviceError, Exit, TacdataError, UsageError
+from tacdata.errors import Exit, TacdataError, UsageError, refused_by_system
 from tacdata.extras import missing_package
 
 ROOM, BASE = "tacdata.commands", "command"
@@ -138,33 +138,6 @@ def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
     return run
 
 
-WRITABLE = "a folder that may be written, on a disk with room"
-REFUSALS = {
-    errno.EACCES: (WRITABLE, "choose another folder, or change its permissions"),
-    errno.EPERM: (WRITABLE, "choose another folder, or change its permissions"),
-    errno.EROFS: (WRITABLE, "choose a folder on a disk that is not read-only"),
-    errno.ENOSPC: (WRITABLE, "make room, or choose a folder on another disk"),
-    errno.EDQUOT: (WRITABLE, "make room within the quota, or choose a folder on another disk"),
-    errno.EISDIR: ("the path of a file", "name a file in that folder"),
-    errno.ENOTDIR: ("a folder on every part of the path but the last", "check the path"),
-    errno.EEXIST: ("a path that is not taken", "choose another name"),
-    errno.ENOENT: ("a path that exists", "check the path; make the folder first if it is to be written to"),
-    errno.ENAMETOOLONG: ("a shorter name", "choose a shorter name"),
-    errno.EMFILE: ("fewer open files", "raise the limit of open files (ulimit -n)"),
-    errno.EIO: ("a disk without faults", "copy what is there to another disk and check this one"),
-}
-"""What the operating system refuses a file for: what is allowed, and what to do next."""
-
-
-def refused_by_system(error: OSError) -> DeviceError | None:
-    """Return an error of the file system in words; None for those that are none of a file."""
-    if error.errno not in REFUSALS:
-        return None
-    allowed, remedy = REFUSALS[error.errno]
-    paths = " to ".join(str(path) for path in (error.filename, error.filename2) if path is not None)
-    return DeviceError(f"{paths or 'a file'}: {error.strerror}", allowed, remedy)
-
-
 def last_words(error: BaseException | None) -> list[str]:
     """Return what an error says of its end: its own notes, or those of the error that it came upon.
 
@@ -218,6 +191,10 @@ def in_words(error: Any) -> UsageError:
 def main() -> None:
     """Run the command line; an error meant for a person ends in words and a non-zero exit, never a traceback."""
     stages.follow()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A console without a sign shows a question mark in its place; a name that is no text shows its bytes.
+            stream.reconfigure(errors="replace" if stream is sys.stdout else "backslashreplace")
     try:
         registry.add_project(Path.cwd())
         ended = _command(_verbs())(prog_name="tacdata", standalone_mode=False)

@@ -17,7 +17,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 import schemas
-from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.errors import WRITABLE, DeviceError, FormatError, UsageError, refused_by_system
 from tacdata.paths import StrPath
 from tacdata.replacement import replacement
 
@@ -322,11 +322,9 @@ def write_text(path: Path, text: str) -> None:
         with replacement(path) as stream:
             stream.write(text.encode())
     except OSError as error:
-        raise DeviceError(
-            f"writing {path} failed: {error}",
-            "a folder that may be written, on a disk with room",
-            "make room or choose another folder",
-        ) from error
+        reason = refused_by_system(error)
+        allowed, remedy = (reason.allowed, reason.remedy) if reason else (WRITABLE, "choose another folder")
+        raise DeviceError(f"writing {path} failed: {error}", allowed, remedy) from error
 
 
 def write(path: Path, document: dict[str, Any], schema: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from enum import IntEnum
 
 
@@ -72,3 +73,43 @@ class PackageError(TacdataError):
     """A package is missing that an extra of the install brings (`tacdata.extras`)."""
 
     exit_code = Exit.PACKAGE
+
+
+WRITABLE = "a folder that may be written, on a disk with room"
+REFUSALS = {
+    errno.EACCES: (WRITABLE, "choose another folder, or change its permissions"),
+    errno.EPERM: (WRITABLE, "choose another folder, or change its permissions"),
+    errno.EROFS: (WRITABLE, "choose a folder on a disk that is not read-only"),
+    errno.ENOSPC: (WRITABLE, "make room, or choose a folder on another disk"),
+    errno.EDQUOT: (WRITABLE, "make room within the quota, or choose a folder on another disk"),
+    errno.EISDIR: ("the path of a file", "name a file in that folder"),
+    errno.ENOTDIR: ("a folder on every part of the path but the last", "check the path"),
+    errno.EEXIST: ("a path that is not taken", "choose another name"),
+    errno.ENOENT: ("a path that exists", "check the path; make the folder first if it is to be written to"),
+    errno.ENAMETOOLONG: ("a shorter name", "choose a shorter name"),
+    errno.EMFILE: ("fewer open files", "raise the limit of open files (ulimit -n)"),
+    errno.EFBIG: ("a file that the disk can hold", "choose a disk whose files may be larger (FAT holds 4 GB)"),
+    errno.ESTALE: ("a drive that answers", "mount the network drive again, or choose a local disk"),
+    errno.ENOTCONN: ("a drive that answers", "connect the drive again, or choose a local disk"),
+    errno.ETIMEDOUT: ("a drive that answers", "connect the drive again, or choose a local disk"),
+    errno.EHOSTDOWN: ("a drive that answers", "connect the drive again, or choose a local disk"),
+    errno.ENODEV: ("a drive that answers", "connect the drive again, or choose a local disk"),
+    errno.ENXIO: ("a drive that answers", "connect the drive again, or choose a local disk"),
+    errno.ENOTEMPTY: ("a folder that nobody else writes to", "choose another name, or wait for the other command"),
+    errno.EBUSY: ("a file that nobody else has open", "close the program that uses it"),
+    errno.ETXTBSY: ("a file that nobody else has open", "close the program that uses it"),
+    errno.ELOOP: ("a link that ends at a file", "check the link"),
+    errno.EINVAL: ("what the drive supports", "choose a local disk"),
+    errno.ENOTSUP: ("what the drive supports", "choose a local disk"),
+    errno.EIO: ("a disk without faults", "copy what is there to another disk and check this one"),
+}
+"""What the operating system refuses a file for: what is allowed, and what to do next."""
+
+
+def refused_by_system(error: OSError) -> DeviceError | None:
+    """Return an error of the file system in words; None for those that are none of a file."""
+    if error.errno not in REFUSALS:
+        return None
+    allowed, remedy = REFUSALS[error.errno]
+    paths = " to ".join(str(path) for path in (error.filename, error.filename2) if path is not None)
+    return DeviceError(f"{paths or 'a file'}: {error.strerror}", allowed, remedy)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -77,7 +78,8 @@ def import_session(
         if not run.presses:
             raise run.failures[0][1]
         run.finish()
-        work.chmod(0o755)
+        with suppress(OSError):  # a drive without permissions
+            work.chmod(0o755)
         work.rename(out)
     finally:
         shutil.rmtree(work, ignore_errors=True)
@@ -164,6 +166,7 @@ class _Import:
 
     def _write(self, imported: ImportedPress) -> None:
         number = len(self.presses)
+        imported = replace(imported, record=_in_unicode(imported.record))
         press = replace(imported.press, index=number)
         plan = plan_of(self.mapping["name"], [press])
         imported = replace(imported, press=press, plan=plan)
@@ -202,6 +205,15 @@ class _Import:
         }
         documents.write(self.work / FILE, document, "session")
         session.refresh(session.read_session(self.work))
+
+
+def _in_unicode(value: Any) -> Any:
+    """Return a document without the marks of bytes that are no text, as names of files may have them."""
+    if isinstance(value, dict):
+        return {key: _in_unicode(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_in_unicode(part) for part in value]
+    return value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
 
 
 def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:

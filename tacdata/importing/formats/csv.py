@@ -40,6 +40,8 @@ STATED_RATE = re.compile(
     re.IGNORECASE,
 )
 """How a file states its rate above its rows."""
+LARGEST = 256 * 1024 * 1024
+"""Most bytes that a compressed text may become; the memory holds them some four times over."""
 RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
 """How a serial monitor marks when a line came."""
 MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
@@ -156,7 +158,14 @@ def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
         if raw and not raw.startswith(b"\x1f\x8b"):
             plain = path.name.removesuffix(".gz")
             raise FormatError(f"{path} is named .gz and is not compressed", "a gzip file", f"rename it to {plain}")
-        raw = gzip.decompress(raw)
+        with gzip.open(io.BytesIO(raw)) as stream:
+            raw = stream.read(LARGEST + 1)
+        if len(raw) > LARGEST:
+            raise FormatError(
+                f"{path} holds more than {LARGEST >> 20} MiB of text",
+                "a text that the memory holds several times over",
+                "unpack it, and split it into files of fewer rows",
+            )
     notes: list[str] = []
     tried = options.get("encoding")
     if isinstance(tried, list):

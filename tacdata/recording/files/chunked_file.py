@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from tacdata.errors import UsageError
 from tacdata.host import COMPUTER, Host
 from tacdata.provenance import code_version
 from tacdata.recording.files.mcap_records import PROFILE
+from tacdata.replacement import settle
 
 CHUNK_BYTES = 1024 * 1024
 """A chunk is closed at this size at the latest [bytes]; few chunks keep the index in memory small."""
@@ -44,7 +44,7 @@ class ChunkedFile:
         self._schemas: dict[str, int] = {}
         self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._writer.start(profile=PROFILE, library=f"tacdata {code_version()}")
-        _sync_folder(path.parent)
+        settle(path.parent)
 
     def register(self, topic: str, message: Any) -> None:
         """Open a channel for a protobuf message class."""
@@ -94,14 +94,3 @@ class ChunkedFile:
         """Close the file without a summary; never raises."""
         with suppress(OSError):
             self._stream.close()
-
-
-def _sync_folder(folder: Path) -> None:
-    """Sync a folder's entries to the disk, so that a power cut does not lose a new file's name (Unix)."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
