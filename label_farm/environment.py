@@ -28,58 +28,62 @@ def python(module: str) -> list[str]:
 
 
 DEVICE = "TACDATA_DEVICE"
-"""Variable that says where a process solves: "cpu" or a GPU such as "cuda:0"."""
+"""Variable with the device of a process: "cpu" or a GPU such as "cuda:0"."""
 
 
 def variables(device: str = "cpu") -> dict[str, str]:
     """Return the environment: one thread per process, the folder that this package was imported from, the device."""
     root = str(Path(__file__).resolve().parent.parent)
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
-    own = dict.fromkeys(THREADS, "1") | {"PYTHONPATH": path, "PYTHONUNBUFFERED": "1"}
+    environment = dict.fromkeys(THREADS, "1") | {"PYTHONPATH": path, "PYTHONUNBUFFERED": "1"}
     if device.startswith("cuda:"):
         # The process sees its own GPU alone, under the number 0.
         gpus = list(filter(None, os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",")))
         number = int(device.removeprefix("cuda:"))
-        own |= {"CUDA_VISIBLE_DEVICES": gpus[number] if number < len(gpus) else str(number), DEVICE: "cuda:0"}
+        environment |= {"CUDA_VISIBLE_DEVICES": gpus[number] if number < len(gpus) else str(number), DEVICE: "cuda:0"}
     else:
-        own |= {DEVICE: device}
-    return {**os.environ, **own}
+        environment |= {DEVICE: device}
+    return {**os.environ, **environment}
 
 
-def devices(asked: Sequence[str]) -> tuple[str, ...]:
-    """Return what workers solve on: what was asked for, "cuda" standing for all GPUs of this machine; else "cpu".
+def devices(requested: Sequence[str]) -> tuple[str, ...]:
+    """Return the devices of the workers: those requested, "cuda" for all GPUs of this machine; else "cpu".
 
     Raises:
         UsageError: If a name is neither, or a GPU is not there.
     """
-    found: list[str] = []
-    for name in asked or ("cpu",):
+    names: list[str] = []
+    for name in requested or ("cpu",):
         gpus = [] if name == "cpu" else _gpus()
-        there = gpus if name == "cuda" else [name]
-        if not there or not re.fullmatch(r"cpu|cuda:[0-9]+", there[0]) or (name != "cpu" and there[0] not in gpus):
-            known = f"this machine has {', '.join(gpus) or 'no CUDA GPU'}"
+        available = gpus if name == "cuda" else [name]
+        if (
+            not available
+            or not re.fullmatch(r"cpu|cuda:[0-9]+", available[0])
+            or (name != "cpu" and available[0] not in gpus)
+        ):
+            inventory = f"this machine has {', '.join(gpus) or 'no CUDA GPU'}"
             raise UsageError(
-                f"the device {name!r}; {known}",
+                f"the device {name!r}; {inventory}",
                 "cpu, cuda for all GPUs, or GPUs such as cuda:0",
                 "name another with --device" if gpus else "leave --device out, or see that nvidia-smi -L lists a GPU",
             )
-        found += there
-    return tuple(found)
+        names += available
+    return tuple(names)
 
 
-def idle_gpus(asked: Sequence[str]) -> str:
+def idle_gpus(requested: Sequence[str]) -> str:
     """Return in words that this machine has GPUs and no device was chosen; "" otherwise."""
-    count = 0 if asked else len(_gpus())
+    count = 0 if requested else len(_gpus())
     named = "1 CUDA GPU lies" if count == 1 else f"{count} CUDA GPUs lie"
     return f"{named} idle here: --device cuda solves on all of them" if count else ""
 
 
 def _gpus() -> list[str]:
-    found = _listed() or _counted()
+    gpus = _listed() or _counted()
     visible = os.environ.get("CUDA_VISIBLE_DEVICES")
     if visible is not None:
-        found = min(found, len(list(filter(None, visible.split(",")))))
-    return [f"cuda:{k}" for k in range(found)]
+        gpus = min(gpus, len(list(filter(None, visible.split(",")))))
+    return [f"cuda:{k}" for k in range(gpus)]
 
 
 def _listed() -> int:
@@ -102,7 +106,7 @@ def _counted() -> int:
 
 
 def end_on_terminate() -> None:
-    """Let a request to end (SIGTERM: a batch system, a service manager) run what is to be run at the end."""
+    """Let a request to end (SIGTERM: a batch system, a service manager) run the clean-up at the end."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
 
 

@@ -13,21 +13,21 @@ LOOK_SECONDS = 1.0
 """Time between two looks at the folder [s]."""
 
 SILENCE_SECONDS = 300.0
-"""Time without a new recording after which the session counts as stopped [s]: several times what a press takes."""
+"""Time without a new recording after which the session counts as stopped [s]: several times the duration of a press."""
 
 
 class GrowingSession:
     """A folder that `tacdata record` fills. It may not exist yet."""
 
-    def __init__(self, folder: Path, known: Iterable[int] = (), silence: float | None = None) -> None:
+    def __init__(self, folder: Path, numbers: Iterable[int] = (), silence: float | None = None) -> None:
         """Begin to watch.
 
         Args:
             folder: The session.
-            known: Presses that were taken already.
+            numbers: Presses that were taken already.
             silence: Time without a new recording after which it counts as stopped [s]; by default `SILENCE_SECONDS`.
         """
-        self.folder, self._known = folder, set(known)
+        self.folder, self._known = folder, set(numbers)
         self._silence = SILENCE_SECONDS if silence is None else silence
         self.ended = False
         """Whether no more is waited for: the plan is done, or nothing came for long."""
@@ -37,20 +37,20 @@ class GrowingSession:
 
     def new(self) -> dict[int, Path]:
         """Return the recordings that are finished and were not returned before, by number."""
-        now = time.monotonic()
-        if self.ended or now < self._next:
+        clock = time.monotonic()
+        if self.ended or clock < self._next:
             return {}
-        self._next = now + LOOK_SECONDS
+        self._next = clock + LOOK_SECONDS
         try:
             session = read_session(self.folder)
         except TacdataError:
             # Not there yet, or just being written.
-            self.ended = now - self._last > self._silence
+            self.ended = clock - self._last > self._silence
             return {}
-        found = {int(path.stem[-6:]): path for path in session.episodes}
-        fresh = {number: path for number, path in found.items() if number not in self._known}
+        recordings = {int(path.stem[-6:]): path for path in session.episodes}
+        fresh = {number: path for number, path in recordings.items() if number not in self._known}
         self._known |= set(fresh)
-        self._last = now if fresh else self._last
+        self._last = clock if fresh else self._last
         self.remaining = len(session.remaining)
-        self.ended = self.remaining == 0 or now - self._last > self._silence
+        self.ended = self.remaining == 0 or clock - self._last > self._silence
         return fresh

@@ -1,4 +1,4 @@
-"""One run over one session: plan, solve what is missing, write each label as soon as its press is solved."""
+"""One run over one session: plan, solve missing presses, write each label as soon as its press is solved."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Progress = Callable[[str, int, int], None]
 """Called with the stage ("read", "look" or "solve"), how much of it is done, and how much there is."""
 
 Delivered = Callable[[int, str], None]
-"""Called with an episode's number and "" once its label lies there, or the reason why it has none."""
+"""Called with an episode's number and "" once its label is written, or the reason why it has none."""
 
 
 KEPT_REQUESTS = 256
@@ -51,7 +51,7 @@ MANY = 5000
 class Labelling:
     """One run over one session. A second run goes on where a stopped one ended.
 
-    `run` does all of it. A service calls `plan` once and `settle` for every change, beside other runs.
+    `run` does all of it. A service calls `plan` once and `settle` for every change, concurrently with other runs.
     """
 
     def __init__(
@@ -70,8 +70,8 @@ class Labelling:
             folder: Where the labels go, ``SESSION/labels``.
             store: Where solved paths lie.
             settings: How to label.
-            progress: Told how far it is.
-            delivered: Called with each episode's number once its label lies there, or with the reason why it has none.
+            progress: Receives the progress.
+            delivered: Called with each episode's number once its label is written, or with the reason why it has none.
             name: Under which the run asks for jobs; by default one of its own.
             versions: Versions of models that were found already, by sensor; a service shares them among its runs.
         """
@@ -140,7 +140,7 @@ class Labelling:
         sensor: Sensor | None = None,
         paths: Mapping[int, Path] | None = None,
     ) -> int:
-        """Write what can be written at once and ask for the presses that are missing; arguments as of `run`.
+        """Write the labels that need no solving and request missing presses; arguments as of `run`.
 
         Returns:
             The ledger's last change before the store was asked for results.
@@ -201,10 +201,10 @@ class Labelling:
             self.progress("read", done, len(numbers))
             if done % FLUSH == 0:
                 self._recall.prefetch([paths[n] for n in numbers[done : done + FLUSH] if n in paths])
-            known = self._known(number)
-            if isinstance(known, Planned):
-                wishes.append(known)
-            if known:
+            recalled = self._known(number)
+            if isinstance(recalled, Planned):
+                wishes.append(recalled)
+            if recalled:
                 continue
             try:
                 wishes.append(Planned.of(self._request(number)))
@@ -215,12 +215,12 @@ class Labelling:
         return wishes, unfit
 
     def _known(self, number: int) -> Planned | bool:
-        """Return what is known of an episode from the run before; True if its label is current, False if nothing."""
+        """Return the record of an episode from the last run; True if its label is current, False without a record."""
         path = self._paths.get(number)
-        found = self._recall.find(path) if path else None
-        if path is None or found is None:
+        recalled = self._recall.find(path) if path else None
+        if path is None or recalled is None:
             return False
-        row, skin = found
+        row, skin = recalled
         if row.label and row.label == stamp(self.labels.path(number)):
             self.summary.current.append(number)
             self._delivered(number, "")
@@ -229,7 +229,7 @@ class Labelling:
         return Planned(number, row.hash, skin, self._version(skin), job)
 
     def _request(self, number: int) -> LabelRequest:
-        """Read a recording and work out what it needs.
+        """Read a recording and plan its presses.
 
         Raises:
             FormatError: If it cannot be read, or is no press.
@@ -249,11 +249,11 @@ class Labelling:
         wish = request(episode, skin, version, self.settings.ladder)
         if path is not None:
             job = json.dumps(wish.job.document) if wish.job else ""
-            made = self._made(skin, version)
+            parents = self._made(skin, version)
             if version not in self._skin_keys:
                 self._skin_keys[version] = skin_key(skin)
-            own = self._given is None
-            row = Known(path.name, source, own, self._skin_keys[version], made, wish.recording, job)
+            from_recording = self._given is None
+            row = Known(path.name, source, from_recording, self._skin_keys[version], parents, wish.recording, job)
             self._recall.note(row, skin)
         if len(self._read_already) < KEPT_REQUESTS:
             self._read_already[number] = wish
@@ -269,7 +269,7 @@ class Labelling:
         return skin
 
     def _made(self, skin: Sensor, version: str) -> str:
-        """Hash of all that decides a label beside its recording."""
+        """Hash of everything that decides a label, apart from its recording."""
         key = version + (skin.transduction.content_hash if skin.transduction else "")
         if key not in self._made_by:
             parts = [skin.document, version, asdict(self.settings.ladder), make_label.code_hash()]
@@ -278,21 +278,21 @@ class Labelling:
 
     def _version(self, sensor: Sensor) -> str:
         # By identity first: a session of a million recordings asks a million times for the same skin's.
-        known = self._keys.get(id(sensor))
-        if known is None:
+        key_of = self._keys.get(id(sensor))
+        if key_of is None:
             key = provenance.content_hash([sensor.content_hash, sensor.uncertainty])
-            known = self._keys[id(sensor)] = (sensor, key)  # kept, so that no other gets its identity
-        key = known[1]
+            key_of = self._keys[id(sensor)] = (sensor, key)  # kept, so that no other gets its identity
+        key = key_of[1]
         if key not in self._versions:
             self._versions[key] = model.version(self.settings.factory, sensor)
-        found = self._versions[key]
-        if found.content_hash not in self.sensors:
-            self.sensors[found.content_hash] = sensor
-            self.summary.remarks += found.remarks
-        return found.content_hash
+        version = self._versions[key]
+        if version.content_hash not in self.sensors:
+            self.sensors[version.content_hash] = sensor
+            self.summary.remarks += version.remarks
+        return version.content_hash
 
     def _missing(self, wishes: list[Planned]) -> dict[str, Job]:
-        """Write what can be written at once; return the jobs whose results are wanted and not present, by key."""
+        """Write the labels that need no solving; return the jobs without a result, by key."""
         missing: dict[str, Job] = {}
         stored = self.store.keys() if len(wishes) > MANY else None
         for done, wish in enumerate(wishes):
@@ -334,15 +334,15 @@ class Labelling:
         return failure
 
     def _solve(self, since: int, sensor: Sensor | None, later: GrowingSession | None) -> None:
-        """Solve what is missing; recordings that come later are taken in by the same workers."""
+        """Solve missing presses; recordings that come later are taken in by the same workers."""
         while not self._jobs and self._take_in(sensor, later) is not None:
             time.sleep(POLL_SECONDS)
         while self._jobs:
-            wanted = {version: self.sensors[version] for version in {job.model for job in self._jobs.values()}}
+            sensors = {version: self.sensors[version] for version in {job.model for job in self._jobs.values()}}
             pool = self.settings.engine(
                 self.store,
                 self.settings.factory,
-                wanted,
+                sensors,
                 self.settings.workers,
                 self.settings.lease_seconds,
                 self.settings.devices,
@@ -350,7 +350,10 @@ class Labelling:
             try:
                 # A recording of another sensor ends this run: the next one has workers for it.
                 since = pool.run(
-                    set(self._jobs), since, self.settle, lambda wanted=wanted: self._take_in(sensor, later, set(wanted))
+                    set(self._jobs),
+                    since,
+                    self.settle,
+                    lambda sensors=sensors: self._take_in(sensor, later, set(sensors)),
                 )
             finally:
                 pool.close()
@@ -361,10 +364,10 @@ class Labelling:
         """Return keys of the presses that have come; None if no more will, or one is not of these models."""
         if later is None or later.ended:
             return None
-        before, paths = set(self._jobs), later.new()
+        earlier, paths = set(self._jobs), later.new()
         if paths:
             self.plan({number: partial(read_episode, path) for number, path in paths.items()}, sensor, paths)
-        added = set(self._jobs) - before
+        added = set(self._jobs) - earlier
         return None if models and any(self._jobs[key].model not in models for key in added) else added
 
     def _write(self, wish: Planned) -> bool:

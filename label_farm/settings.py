@@ -18,11 +18,11 @@ class FarmSettings:
     """How a session is labelled."""
 
     factory: str = model.FACTORY
-    """Dotted path of what builds the skin model from a sensor."""
+    """Dotted path of the function that builds the skin model of a sensor."""
     ladder: Ladder = field(default_factory=Ladder)
     """How the states of a path are spaced."""
     uncertainty: bool = True
-    """Whether labels say what the spreads that the sensor file states make of them; costs some two thirds more."""
+    """Whether labels have uncertainties by the spreads of the sensor file; costs some two thirds more."""
     workers: int = field(default_factory=environment.cores)
     """Number of worker processes."""
     redo: bool = False
@@ -32,6 +32,6 @@ class FarmSettings:
     priority: int = 0
     """Larger comes first among the runs that share a store."""
     engine: EngineMaker = Pool
-    """What runs the jobs: `pool.Pool`, or what makes another engine."""
+    """Engine of the jobs: `pool.Pool`, or a function that makes another one."""
     devices: Sequence[str] = ("cpu",)
-    """What the workers solve on, one after the other."""
+    """Devices of the workers, one after the other."""

@@ -26,4 +26,4 @@ class LabellingSummary:
     margins: list[Margin] = field(default_factory=list)
     """How well each written label with contact is known."""
     remarks: list[str] = field(default_factory=list)
-    """What a user should know of the models, in words."""
+    """Remarks on the models for the user."""

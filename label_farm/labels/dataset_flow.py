@@ -20,7 +20,7 @@ from tacdata.recording.files.reader import read_episode
 from tacdata.sensor import Sensor
 
 SAY_SECONDS = 2.0
-"""How often at most the dataset's list of what is not in it is written anew."""
+"""Least time between updates of the dataset's list of missing episodes."""
 
 
 class DatasetFlow:
@@ -107,9 +107,9 @@ class DatasetFlow:
         return reason
 
     def _current_writer(self, sensor: str) -> DatasetWriter | None:
-        """Return the writer of the dataset as it stands; another process may have appended meanwhile."""
-        now = stamp(self._out / folder.INFO)
-        if self._writer is not None and now == self._stamp and self._writer.sensor.content_hash == sensor:
+        """Return the writer of the present dataset; another process may have appended meanwhile."""
+        current = stamp(self._out / folder.INFO)
+        if self._writer is not None and current == self._stamp and self._writer.sensor.content_hash == sensor:
             return self._writer
         if not self._out.exists():
             return None
@@ -120,10 +120,10 @@ class DatasetFlow:
     def _refuse_other_model(self, writer: DatasetWriter, skin: Sensor, model: str) -> None:
         if writer is self._writer:
             return
-        held = label_states.models_in(self._out).get(skin.content_hash, model)
-        if held != model:
+        stored = label_states.models_in(self._out).get(skin.content_hash, model)
+        if stored != model:
             raise UsageError(
-                f"{self._out} holds labels of model {held[:12]}… of this sensor",
+                f"{self._out} holds labels of model {stored[:12]}… of this sensor",
                 f"labels of one model version in a dataset; these are of {model[:12]}…",
                 "let them flow into a new dataset; `tacdata farm dataset` says what is stale in the old one",
             )

@@ -40,7 +40,7 @@ class Known(NamedTuple):
 
 
 class LabelIndex:
-    """An SQLite file beside the labels. It may be deleted: then every recording and label is read again.
+    """An SQLite file in the folder of the labels. It may be deleted: then every recording and label is read again.
 
     A file that changed in content but in neither size, time nor number is not noticed here; `tacdata label --redo`
     reads all, and every reader of a label checks its checksums.
@@ -66,7 +66,7 @@ class LabelIndex:
         return True
 
     def close(self) -> None:
-        """Close what `open` opened."""
+        """Close the connection of `open`."""
         if self._db is not None:
             self._db.close()
         self._db = None
@@ -78,10 +78,10 @@ class LabelIndex:
             " JOIN skin ON skin.hash = used.skin"
         )
         rows = self._db.execute(statement).fetchall() if self._db else []
-        return {(key, bool(own)): json.loads(text) for key, own, text in rows}
+        return {(key, bool(from_recording)): json.loads(text) for key, from_recording, text in rows}
 
     def find(self, recordings: Sequence[str]) -> dict[str, Known]:
-        """Return what is known of recordings by name, some hundreds at most: a session may have a million."""
+        """Return the records of recordings by name, some hundreds at most: a session may have a million."""
         if self._db is None or not recordings:
             return {}
         statement = f"SELECT * FROM known WHERE recording IN ({', '.join('?' * len(recordings))})"
@@ -110,7 +110,7 @@ class LabelIndex:
 def stamp(path: Path) -> str:
     """Return a file's size, time and number in words; "" if there is none."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return ""
-    return f"{found.st_size}/{found.st_mtime_ns}/{found.st_ino}"
+    return f"{status.st_size}/{status.st_mtime_ns}/{status.st_ino}"

@@ -31,7 +31,7 @@ _DECIDING = (
     "label_farm.labels.request",
     "tacdata.transduction",
 )
-"""What decides which label comes of a solution; who computes it where does not."""
+"""Code that decides the label of a solution; engines and services do not."""
 
 
 def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
@@ -39,7 +39,7 @@ def make_label(request: LabelRequest, solution: PathSolution | None) -> Label:
 
     Frames up to the deepest point follow the loading branch, later ones the unloading branch; frames whose
     nominal pose does not touch have a zero map. Readings are those that the sensor file's transduction makes of the
-    frame's loads. `Label.error_map` joins what is lost by interpolating and by
+    frame's loads. `Label.error_map` joins the loss by interpolating and by
     sharing one path among nearly equal presses, a bound, with the error that the mesh leaves, an estimate: as the root
     of the sum of their squares, since neither knows of the other. The solver's tolerances are not in it.
 
@@ -87,27 +87,27 @@ def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.n
     carried = [name for name in CARRIED if getattr(solution, name) is not None]
     values = _zeros(request, carried)
     for loading in (True, False):
-        chosen = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)
-        if not chosen.any():
+        frames = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)
+        if not frames.any():
             continue
-        depth, shape = request.tip[chosen, 2], (-1, *request.sensor.map.shape)
+        depth, shape = request.tip[frames, 2], (-1, *request.sensor.map.shape)
         surface, force = Branch.of(solution, "surface", loading), Branch.of(solution, "force", loading)
         mesh, mesh_force = (Branch.of(solution, name, loading).at(depth) for name in ("numerical", "force_error"))
-        signed = values["signed"][chosen] = surface.at(depth).reshape(shape)
-        bound = surface.bound(depth).reshape(shape) + _offset(request, signed, chosen)
-        values["error_map"][chosen] = np.hypot(bound, mesh.reshape(shape))
-        values["force"][chosen] = force.at(depth)
+        signed = values["signed"][frames] = surface.at(depth).reshape(shape)
+        bound = surface.bound(depth).reshape(shape) + _offset(request, signed, frames)
+        values["error_map"][frames] = np.hypot(bound, mesh.reshape(shape))
+        values["force"][frames] = force.at(depth)
         lost = np.linalg.norm(force.bound(depth), axis=1)
-        values["force_error"][chosen] = np.hypot(lost, mesh_force[:, 0])
-        values["interpolation_error"][chosen] = surface.left_out_beside(depth)
+        values["force_error"][frames] = np.hypot(lost, mesh_force[:, 0])
+        values["interpolation_error"][frames] = surface.left_out_beside(depth)
         for name in carried:
             states = Branch.of(solution, name, loading).at(depth)
-            values[name][chosen] = states.reshape(-1, *values[name].shape[1:])
+            values[name][frames] = states.reshape(-1, *values[name].shape[1:])
     return values
 
 
 def _readings(sensor: Sensor, values: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Return what the taxels read, and in words what saturates; nothing if the sensor says nothing of it."""
+    """Return the taxels' readings and remarks on saturation; none for a sensor without transduction."""
     if sensor.transduction is None:
         return {}, ()
     readings = Transducer.of(sensor).read(Loads(*(values[name] for name in LOADS)))
@@ -132,13 +132,13 @@ def parents(request: LabelRequest | Planned) -> dict[str, str]:
     return made_from if request.job is None else {**made_from, "solution": request.job.key}
 
 
-def _offset(request: LabelRequest, signed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+def _offset(request: LabelRequest, signed: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Change of the map [mm] if it is moved from the solved place to the frame's own."""
     if request.job is None:
         return np.zeros_like(signed)
-    moved = request.tip[chosen, :2] - np.array([request.job.x, request.job.y])
+    shift = request.tip[frames, :2] - np.array([request.job.x, request.job.y])
     along_x, along_y = np.gradient(signed, request.sensor.map.pixel_pitch, axis=(1, 2))
-    return np.abs(along_x * moved[:, 0, None, None] + along_y * moved[:, 1, None, None])
+    return np.abs(along_x * shift[:, 0, None, None] + along_y * shift[:, 1, None, None])
 
 
 def _provenance(request: LabelRequest, solution: PathSolution | None, remarks: tuple[str, ...]) -> dict:

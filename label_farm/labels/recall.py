@@ -1,4 +1,4 @@
-"""Remembers a session from the run before, so that a run reads only what changed."""
+"""Remembers a session from the run before, so that a run reads only changed files."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ class Recall:
         self._new: dict[str, Known] = {}
         self._near: dict[str, Known] = {}
 
-    def open(self, given: Sensor | None, made: Callable[[Sensor], str]) -> None:
+    def open(self, given: Sensor | None, version_of: Callable[[Sensor], str]) -> None:
         """Open the index.
 
         Args:
             given: The skin that all are labelled with; None for each recording's own.
-            made: Returns the hash of all that would decide a label of a skin now; may cost seconds.
+            version_of: Returns the hash of all that would decide a label of a skin now; may cost seconds.
         """
         if not self._index.open():
             return
-        wanted = skin_key(given) if given else None
-        for (skin, own), document in self._index.skins().items():
-            if (skin != wanted) if wanted else not own:
+        key_wanted = skin_key(given) if given else None
+        for (skin, from_recording), document in self._index.skins().items():
+            if (skin != key_wanted) if key_wanted else not from_recording:
                 continue
             try:
                 sensor = self._sensors[skin] = Sensor.from_document(document, "label index")
-                self._made[skin, own] = made(sensor)
+                self._made[skin, from_recording] = version_of(sensor)
             except FormatError:
                 continue
 
@@ -72,9 +72,9 @@ class Recall:
 
     def note_current(self, recording: Path, label: Path) -> None:
         """Note that a recording's label is current."""
-        row, now = self._row(recording.name), stamp(label)
-        if row is not None and row.label != now:
-            self._new[row.recording] = row._replace(label=now)
+        row, current = self._row(recording.name), stamp(label)
+        if row is not None and row.label != current:
+            self._new[row.recording] = row._replace(label=current)
             self._flush_full()
 
     def _row(self, name: str) -> Known | None:

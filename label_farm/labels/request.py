@@ -122,7 +122,7 @@ def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> Lab
 def _check_known(episode: Episode, sensor: Sensor) -> None:
     """Refuse imported recordings whose press or skin nobody described: their labels would be invented."""
     stand_ins = [text.split(":")[0] for text in episode.rig.get("imported", {}).get("stand_ins", [])]
-    if sensor.content_hash != episode.sensor.content_hash:  # another file says what the skin is
+    if sensor.content_hash != episode.sensor.content_hash:  # another file describes the skin
         stand_ins = [name for name in stand_ins if name.split("/")[0] in ("indenter", "contact") and name != "contact"]
     if stand_ins:
         raise FormatError(

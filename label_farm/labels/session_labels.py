@@ -47,40 +47,40 @@ class SessionLabels:
         return [*file_names.present(self.folder, file_names.FAILURE)]
 
     def sweep(self) -> None:
-        """Remove what killed writers left; a young file may belong to a living one."""
+        """Remove files of killed writers; a young file may belong to a living one."""
         for path in self.folder.glob(".episode-*"):
             with suppress(FileNotFoundError):
                 if time.time() - path.stat().st_mtime > STALE_SECONDS:
                     path.unlink()
 
     def path(self, episode: int) -> Path:
-        """Return where an episode's label lies, or would lie."""
+        """Return the path of an episode's label."""
         return file_names.label(self.folder, episode)
 
     def failure_path(self, episode: int) -> Path:
-        """Return where the reason lies if an episode has no label."""
+        """Return the path of the reason why an episode has no label."""
         return file_names.failure(self.folder, episode)
 
-    def failures(self, most: int) -> dict[str, str]:
-        """Return the reasons of up to ``most`` episodes that have no label, by episode number."""
-        found = {}
-        for number, path in islice(file_names.present(self.folder, file_names.FAILURE).items(), most):
+    def failures(self, limit: int) -> dict[str, str]:
+        """Return the reasons of up to ``limit`` episodes that have no label, by episode number."""
+        reasons = {}
+        for number, path in islice(file_names.present(self.folder, file_names.FAILURE).items(), limit):
             with suppress(FormatError):
-                found[str(number)] = Failure.read(path).reason
-        return found
+                reasons[str(number)] = Failure.read(path).reason
+        return reasons
 
     def parents(self, episode: int) -> dict[str, str] | None:
         """Return the hashes that the present label was made from; None without a readable label."""
         if episode not in self._parents:
-            found = self._read_parents(self.path(episode))
+            parents = self._read_parents(self.path(episode))
             # None is not kept: most episodes of a large session have no label yet.
-            if found is None:
+            if parents is None:
                 return None
-            self._parents[episode] = found
+            self._parents[episode] = parents
         return self._parents[episode]
 
     def forget(self, episode: int) -> None:
-        """Forget what a label was made from, as its file changed."""
+        """Forget the parents of a label, as its file changed."""
         self._parents.pop(episode, None)
 
     def _read_parents(self, path: Path) -> dict[str, str] | None:
@@ -102,16 +102,16 @@ class SessionLabels:
         Raises:
             UsageError: If a label there is of another model version than the request's.
         """
-        others = []
+        conflicts = []
         for request in requests:
-            found = self.parents(request.episode)
-            if found is not None and found.get("model") != request.model:
-                others.append((request, str(found.get("model"))))
-        if others:
-            request, model = others[0]
+            parents = self.parents(request.episode)
+            if parents is not None and parents.get("model") != request.model:
+                conflicts.append((request, str(parents.get("model"))))
+        if conflicts:
+            request, model = conflicts[0]
             wrong = f"; in {self._passed} the skin passed through the indenter" if self._passed else ""
             raise UsageError(
-                f"{self.folder} is a label store from another model version: {len(others)} of "
+                f"{self.folder} is a label store from another model version: {len(conflicts)} of "
                 f"{len(requests)} labels, first {self.path(request.episode).name}, are of "
                 f"{_short(model)}{wrong}",
                 f"labels of the current model {request.model[:12]}… (sensor, law, mesh, settings, code)",
@@ -119,7 +119,7 @@ class SessionLabels:
             )
 
     def current(self, request: LabelRequest | Planned) -> bool:
-        """Return whether the label lies there, made from exactly what this request would be made from."""
+        """Return whether the label exists with exactly the parents of this request."""
         return self.parents(request.episode) == parents(request)
 
     def write(self, request: LabelRequest, solution: PathSolution | None) -> Label:

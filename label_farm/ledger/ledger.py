@@ -53,7 +53,7 @@ class JobOutcome:
     """Running number of the change in this ledger."""
     key: str
     done: bool
-    """True if its result lies in the store, False if it failed."""
+    """True if its result is in the store, False if it failed."""
     error: str
     """Reason if it failed."""
     seconds: float
@@ -66,7 +66,7 @@ def owner_name() -> str:
 
 
 def boot_name() -> str:
-    """Return what changes with a restart of the machine, after which no lease of before can be alive."""
+    """Return an identifier that changes with a restart of the machine, after which no lease of before can be alive."""
     path = Path("/proc/sys/kernel/random/boot_id")
     return path.read_text().strip() if path.exists() else ""
 
@@ -74,7 +74,7 @@ def boot_name() -> str:
 class Ledger:
     """One connection to a ledger; each process and thread opens its own. Local disks only (WAL).
 
-    Leases are kept on the monotonic clock of the machine that the ledger lies on, so that a wall clock that jumps
+    Leases are kept on the monotonic clock of the ledger's machine, so that a wall clock that jumps
     neither ends nor prolongs one.
     """
 
@@ -147,7 +147,7 @@ class Ledger:
         self.close()
 
     def rows(self, statement: str, values: Iterable[Any] = ()) -> list[tuple]:
-        """Run one statement and return its rows; for what only looks, and for the roster."""
+        """Run one statement and return its rows; for reading, and for the roster."""
         return self._db.execute(statement, tuple(values)).fetchall()
 
     def register(self, sensors: Mapping[str, dict[str, Any]]) -> None:
@@ -167,12 +167,12 @@ class Ledger:
 
     def offered(self) -> list[str]:
         """Return the models with jobs to claim, by the priority of their first job."""
-        now = time.monotonic()
+        clock = time.monotonic()
         rows = self._db.execute(
             "SELECT version,"
             " (SELECT rank FROM job WHERE state = 0 AND model = version ORDER BY rank, changed LIMIT 1) AS first,"
             " EXISTS (SELECT 1 FROM job WHERE state = 1 AND model = version AND lease < ?) FROM model",
-            (now,),
+            (clock,),
         )
         work = [(rank, version) for version, rank, expired in rows if rank is not None or expired]
         return [version for _, version in sorted(work, key=lambda entry: (entry[0] is None, entry[0] or 0))]
@@ -181,7 +181,7 @@ class Ledger:
         """Add jobs to the queue; one that is already waiting or worked on stays as it is.
 
         Args:
-            jobs: What to compute. One that the ledger holds for done or failed is computed again.
+            jobs: The jobs. One that counts as done or failed is computed again.
             priority: Larger comes first; raises that of a job already waiting.
             run: Who asks, if the asking is to be taken back some day (`withdraw`).
         """
@@ -205,47 +205,47 @@ class Ledger:
     def claim(self, owner: str, model: str, count: int = 1) -> list[Lease]:
         """Take up to ``count`` jobs of one model version: by priority, else an expired one.
 
-        No more than a worker's share, so that none stands idle beside a full one. A job in whose company a worker died
-        is taken alone, so that it can be told which of them is to blame.
+        No more than a worker's share, so that none is idle while another is full. A job in a batch whose worker died
+        is taken alone, which identifies the job that kills.
         """
-        now = time.monotonic()
+        clock = time.monotonic()
         with self._transaction():
-            self._db.execute(f"{DROP_UNWANTED} AND model = ? AND lease < ?", (model, now))
+            self._db.execute(f"{DROP_UNWANTED} AND model = ? AND lease < ?", (model, clock))
             first = self._db.execute(FIRST_WAITING, (model,)).fetchone()
             if first is None:
-                keys = [row[0] for row in self._db.execute(FIRST_EXPIRED, (model, now))]
+                keys = [row[0] for row in self._db.execute(FIRST_EXPIRED, (model, clock))]
             elif first[1] or count == 1:
                 keys = [first[0]]
             else:
-                share = self._share(model, count, now)
+                share = self._share(model, count, clock)
                 keys = [row[0] for row in self._db.execute(WAITING_TOGETHER, (model, share))]
-            grant = (owner, self._boot, now + self.lease_seconds)
+            grant = (owner, self._boot, clock + self.lease_seconds)
             rows = [self._db.execute(TAKE, (*grant, key)).fetchone() for key in keys]
         return [_lease(document, tries) for document, tries in rows]
 
-    def _share(self, model: str, count: int, now: float) -> int:
+    def _share(self, model: str, count: int, clock: float) -> int:
         """Return how many of a model's open jobs fall to one of the living workers, at most ``count``."""
-        living = (self._boot, now - 2 * self.lease_seconds)
+        living = (self._boot, clock - 2 * self.lease_seconds)
         workers = max(1, self._db.execute(LIVING, living).fetchone()[0])
         unsettled = self._db.execute(OPEN, 2 * (model, count * workers)).fetchone()[0]
         return min(count, -(-unsettled // workers))
 
     def has_work(self, model: str) -> bool:
         """Return whether `claim` would find a job of a model version."""
-        now = time.monotonic()
+        clock = time.monotonic()
         row = self._db.execute(
             "SELECT EXISTS (SELECT 1 FROM job WHERE state = 0 AND model = ?)"
             " OR EXISTS (SELECT 1 FROM job WHERE state = 1 AND model = ? AND lease < ?)",
-            (model, model, now),
+            (model, model, clock),
         ).fetchone()
         return bool(row[0])
 
     def heartbeat(self, owner: str) -> None:
         """Renew every lease of a worker."""
-        now = time.monotonic()
-        lease = now + self.lease_seconds
+        clock = time.monotonic()
+        lease = clock + self.lease_seconds
         self._db.execute("UPDATE job SET lease = ? WHERE state = 1 AND owner = ?", (lease, owner))
-        self._db.execute("UPDATE worker SET seen = ? WHERE owner = ?", (now, owner))
+        self._db.execute("UPDATE worker SET seen = ? WHERE owner = ?", (clock, owner))
 
     def finish(self, key: str, owner: str, seconds: float) -> bool:
         """Mark a job done; False if the worker's lease was lost meanwhile (its result still counts)."""
@@ -280,21 +280,21 @@ class Ledger:
         Returns:
             The jobs not given back: the caller settles them with `fail`, under the same owner.
         """
-        held = "WHERE state = 1 AND owner = ?"
+        condition = "WHERE state = 1 AND owner = ?"
         with self._transaction():
-            count = self._db.execute(f"SELECT count(*) FROM job {held}", (owner,)).fetchone()[0]
+            count = self._db.execute(f"SELECT count(*) FROM job {condition}", (owner,)).fetchone()[0]
             self._db.execute(f"{DROP_UNWANTED} AND owner = ?", (owner,))
             if not blame:
-                self._db.execute(f"{GIVE_BACK}, tries = tries - 1 {held}", (owner,))
+                self._db.execute(f"{GIVE_BACK}, tries = tries - 1 {condition}", (owner,))
             elif count > 1:
-                self._db.execute(f"{GIVE_BACK}, tries = tries - 1, alone = 1 {held}", (owner,))
+                self._db.execute(f"{GIVE_BACK}, tries = tries - 1, alone = 1 {condition}", (owner,))
             else:
-                self._db.execute(f"{GIVE_BACK} {held} AND tries < ?", (owner, MAX_TRIES))
-            kept = self._db.execute(f"SELECT document, tries FROM job {held}", (owner,)).fetchall()
-        return [_lease(*row) for row in kept]
+                self._db.execute(f"{GIVE_BACK} {condition} AND tries < ?", (owner, MAX_TRIES))
+            rows = self._db.execute(f"SELECT document, tries FROM job {condition}", (owner,)).fetchall()
+        return [_lease(*row) for row in rows]
 
     def release_dead(self) -> None:
-        """Give back what dead processes of this machine held, and all leases from before a restart."""
+        """Give back the leases of dead processes of this machine, and all leases from before a restart."""
         for statement in (DROP_UNWANTED, f"{GIVE_BACK} WHERE state = 1"):
             self._db.execute(f"{statement} AND boot <> ?", (self._boot,))
         for owner in [row[0] for row in self._db.execute("SELECT DISTINCT owner FROM job WHERE state = 1")]:
@@ -317,8 +317,8 @@ class Ledger:
 
     def counts(self) -> dict[int, int]:
         """Return how many jobs are in each state (`WAITING`, `LEASED`, `DONE`, `FAILED`)."""
-        found = dict(self._db.execute("SELECT state, count(*) FROM job GROUP BY state").fetchall())
-        return {state: found.get(state, 0) for state in (WAITING, LEASED, DONE, FAILED)}
+        counts = dict(self._db.execute("SELECT state, count(*) FROM job GROUP BY state").fetchall())
+        return {state: counts.get(state, 0) for state in (WAITING, LEASED, DONE, FAILED)}
 
     def knows(self, key: str) -> bool:
         """Return whether a job was ever asked for."""
@@ -331,10 +331,10 @@ class Ledger:
         ).fetchone()
         return _lease(*row).job if row else None
 
-    def unsettled(self, most: int) -> int:
-        """Return how many jobs wait or are worked on, counting no further than ``most``."""
+    def unsettled(self, limit: int) -> int:
+        """Return how many jobs wait or are worked on, counting no further than ``limit``."""
         count = "SELECT count(*) FROM (SELECT 1 FROM job WHERE state = {} LIMIT ?)"
-        return sum(self._db.execute(count.format(state), (most,)).fetchone()[0] for state in (WAITING, LEASED))
+        return sum(self._db.execute(count.format(state), (limit,)).fetchone()[0] for state in (WAITING, LEASED))
 
     def withdraw(self, run: str) -> int:
         """Withdraw a run's jobs; those that no other run wants leave the queue.

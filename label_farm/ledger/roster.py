@@ -1,4 +1,4 @@
-"""The workers of a ledger: what they have done, and whether they still answer."""
+"""The workers of a ledger: their counts, and whether they still respond."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class WorkerRow:
     owner: str
     """Host and process."""
     device: str
-    """What it solves on, such as "cpu" or "cuda:0"."""
+    """Its device, such as "cpu" or "cuda:0"."""
     done: int
     """Presses solved."""
     failed: int
@@ -41,14 +41,14 @@ class Roster:
 
     def enter(self, owner: str, device: str) -> None:
         """Add a worker."""
-        now = time.monotonic()
+        clock = time.monotonic()
         self._ledger.rows(
             "INSERT OR REPLACE INTO worker (owner, device, began, seen, boot) VALUES (?, ?, ?, ?, ?)",
-            (owner, device, now, now, boot_name()),
+            (owner, device, clock, clock, boot_name()),
         )
 
     def count(self, owner: str, done: int, failed: int, busy: float) -> None:
-        """Count what a worker did whose jobs another process claims for it; ``busy`` in s."""
+        """Count the jobs of a worker whose jobs another process claims for it; ``busy`` in s."""
         self._ledger.rows(
             "UPDATE worker SET done = done + ?, failed = failed + ?, busy = busy + ?, seen = ? WHERE owner = ?",
             (done, failed, busy, time.monotonic(), owner),
@@ -64,14 +64,16 @@ class Roster:
 
     def listing(self, forget: float = 600.0) -> list[WorkerRow]:
         """Return the workers; remove those that ended, are from before a restart, or gave no sign for long [s]."""
-        now, boot, found = time.monotonic(), boot_name(), []
+        clock, boot, rows_listed = time.monotonic(), boot_name(), []
         rows = self._ledger.rows(
             "SELECT owner, device, done, failed, busy, began, seen, coalesce(note, ''), boot,"
             " (SELECT count(*) FROM job WHERE state = 1 AND job.owner = worker.owner) FROM worker ORDER BY owner"
         )
-        for owner, device, done, failed, busy, began, seen, note, its_boot, holds in rows:
-            if its_boot != boot or now - seen > forget or is_dead(owner):
+        for owner, device, done, failed, busy, began, last_sign, note, its_boot, holds in rows:
+            if its_boot != boot or clock - last_sign > forget or is_dead(owner):
                 self.leave(owner)
             else:
-                found.append(WorkerRow(owner, device, done, failed, busy, now - began, now - seen, holds, note))
-        return found
+                rows_listed.append(
+                    WorkerRow(owner, device, done, failed, busy, clock - began, clock - last_sign, holds, note)
+                )
+        return rows_listed

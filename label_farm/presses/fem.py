@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from tacdata.skin.validity.coarse_press import CoarsePress
 
 _ROUNDS = 2
-"""How often a path is solved at most until its states are near enough to each other; the coarser mesh said before where
+"""Largest number of solves of a path until its states are close enough; the coarser mesh has predicted where
 they are needed."""
 
 _AGAIN = 1.5
-"""By which factor a state must miss the tolerance for its path to be solved again [1]: what it misses is what its
-neighbours would say without it, several times what they leave out with it."""
+"""Factor by which a state must exceed the tolerance for its path to be solved again [1]: its error is that of its
+neighbours without it, several times the error with it."""
 
 _AT_A_TIME = {"cpu": 16, "cuda": 512}
 """Presses that a device solves at a time [1] (benchmarks/skin_throughput.py); a CPU reads its factor once for all."""
@@ -46,7 +46,7 @@ class FemModel:
 
         Raises:
             SolveError: If the sensor cannot be modelled.
-            UsageError: If its file states spreads of what the model does not know.
+            UsageError: If its file states spreads of unknown parameters.
         """
         from tacdata.indenters.sphere import Sphere
         from tacdata.skin.derivatives.path_uncertainty import check_spreads
@@ -59,7 +59,7 @@ class FemModel:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """In words, what a user should know of this skin."""
+        """Remarks on this skin for the user."""
         return self._model.remarks
 
     @property
@@ -83,7 +83,7 @@ class FemModel:
     def solve_many(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
         """Solve paths as batches; each is yielded as soon as its states keep the tolerance.
 
-        The coarser mesh, which is asked for the error in any case, says first where states are needed: a path that is
+        The coarser mesh, which the error estimate needs anyway, first predicts the necessary states: a path that is
         solved again is solved whole, since friction remembers it.
         """
         requests = [_request(job) for job in jobs]
@@ -92,9 +92,9 @@ class FemModel:
         open_ones = list(range(len(jobs)))
         for round_ in range(_ROUNDS):
             again = []
-            asked = [requests[k] for k in open_ones]
-            known = [coarse[k] for k in open_ones]
-            for index, solution in self._model.solve_many(asked, self._together(asked), known):
+            open_requests = [requests[k] for k in open_ones]
+            open_coarse = [coarse[k] for k in open_ones]
+            for index, solution in self._model.solve_many(open_requests, self._together(open_requests), open_coarse):
                 number = open_ones[index]
                 job, request = jobs[number], requests[number]
                 if isinstance(solution, SolveError):

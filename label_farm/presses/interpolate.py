@@ -19,7 +19,7 @@ class Branch:
     """The quantity at these depths [mm or N, as in `PathSolution`], shape (k, m); less that of the way down, if that is
     given."""
     down: Branch | None = None
-    """The way down, of a way up: what is interpolated is by how much they differ, which is little."""
+    """The way down, of a way up: their difference is interpolated, which is small."""
 
     @property
     def states(self) -> np.ndarray:
@@ -55,27 +55,27 @@ class Branch:
         if not inner:
             return np.repeat(np.abs(self.values[-1:] - self.values[:1]), len(self.depth), axis=0)
         without = [Branch(np.delete(self.depth, k), np.delete(self.values, k, axis=0)) for k in inner]
-        missed = [np.abs(rest.at(self.depth[k]) - self.values[k]) for k, rest in zip(inner, without, strict=True)]
+        missed = [np.abs(branch.at(self.depth[k]) - self.values[k]) for k, branch in zip(inner, without, strict=True)]
         return np.stack([np.max(missed[:2], axis=0), *missed, np.max(missed[-2:], axis=0)])
 
     def left_out_beside(self, depth: np.ndarray) -> np.ndarray:
-        """Return the largest `left_out` of the two states beside each of the depths [mm], shape (n,), as shape (n,).
+        """Return the largest `left_out` of the two states next to each of the depths [mm], shape (n,), as shape (n,).
 
         On a way up, that of the way down comes on top.
         """
         worst = self.left_out().max(axis=1)
-        after = np.clip(np.searchsorted(self.depth, depth), 1, len(worst) - 1)
-        own = np.maximum(worst[after - 1], worst[after])
-        return own + self.down.left_out_beside(depth) if self.down else own
+        upper = np.clip(np.searchsorted(self.depth, depth), 1, len(worst) - 1)
+        largest = np.maximum(worst[upper - 1], worst[upper])
+        return largest + self.down.left_out_beside(depth) if self.down else largest
 
     def bound(self, depth: np.ndarray) -> np.ndarray:
         """Return a bound on the error of `at` at depths [mm], shape (n,), as shape (n, m).
 
-        Where a quantity bends one way over an interval and its neighbours, it lies between the chord and the
+        Where a quantity bends one way over an interval and its neighbours, it is between the chord and the
         nearer of the two neighbouring chords prolonged into the interval; the bound is the distance of `at`
         from the farther edge of that gap. It is 0 for a path linear in depth, an upper limit on any convex or
         concave stretch, a kink included, and several times the error where the path is smooth. Before contact
-        the slope is 0; beyond the deepest state the slope is taken to go on changing as it did, and what `at`
+        the slope is 0; beyond the deepest state the slope is taken to go on changing as it did, and the part that `at`
         leaves out there is added. On a way up the bounds of the way down and of the difference add up.
         """
         slope = np.diff(self.values, axis=0) / np.diff(self.depth)[:, None]
@@ -83,15 +83,15 @@ class Branch:
         padded = np.concatenate([np.zeros_like(slope[:1]), slope, last[None]])
         inside = np.clip(depth, 0.0, self.depth[-1])
         i = np.clip(np.searchsorted(self.depth, inside, side="right") - 1, 0, len(slope) - 1)
-        after, before = (inside - self.depth[i])[:, None], (self.depth[i + 1] - inside)[:, None]
-        bend = self._own(depth) - self.values[i] - slope[i] * after
-        left, right = (padded[i] - slope[i]) * after, (slope[i] - padded[i + 2]) * before
-        nearer = np.where(np.abs(left) < np.abs(right), left, right)
+        way_in, way_out = (inside - self.depth[i])[:, None], (self.depth[i + 1] - inside)[:, None]
+        bend = self._own(depth) - self.values[i] - slope[i] * way_in
+        from_left, right = (padded[i] - slope[i]) * way_in, (slope[i] - padded[i + 2]) * way_out
+        nearer = np.where(np.abs(from_left) < np.abs(right), from_left, right)
         one_way = np.maximum(np.abs(bend), np.abs(nearer - bend))
-        within = np.where(left * right >= 0, one_way, np.abs(bend) + np.abs(nearer))
+        within = np.where(from_left * right >= 0, one_way, np.abs(bend) + np.abs(nearer))
         beyond = np.maximum(depth - self.depth[-1], 0.0)[:, None] * np.abs(slope[-1])
-        own = within + beyond
-        return own + self.down.bound(depth) if self.down else own
+        total = within + beyond
+        return total + self.down.bound(depth) if self.down else total
 
 
 def branches(depth: np.ndarray, values: np.ndarray) -> tuple[Branch, Branch]:

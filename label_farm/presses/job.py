@@ -23,7 +23,7 @@ class Job:
     indenter: dict[str, Any]
     """The indenter as plain data: shape and parameters [mm, deg]."""
     x: float
-    """Location of the indenter's tip [mm]: its lowest point, if it stands upright."""
+    """Location of the indenter's tip [mm]: its lowest point, if it is upright."""
     y: float
     """Location of the indenter's tip [mm]."""
     yaw: float

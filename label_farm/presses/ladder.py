@@ -1,6 +1,6 @@
 """The depths at which a press is solved: fine where contact begins, then in steps of at most a limit.
 
-On its way up a skin on a board says little that it did not say on its way down (decision 0024): few states are solved
+On its way up a skin on a board adds little information to its way down (decision 0024): few states are solved
 there. The model adds states where these turn out too few (`Tolerance`).
 """
 
@@ -15,7 +15,7 @@ from tacdata.errors import UsageError
 from tacdata.sensor.sensor import ContactProperties
 
 FINEST = 0.001
-"""Least step that may be asked for [mm]: far below what any mesh resolves, and a path has few enough states."""
+"""Least step that may be requested [mm]: far below what any mesh resolves, and a path has few enough states."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class Ladder:
         """Return those of the way down, rising, that cut it into steps of about the limit, into two at the least."""
         *shallower, deepest = load
         parts = max(2, int(np.ceil(deepest / self.unload_step)))
-        wanted = [deepest * k / parts for k in range(1, parts)]
-        near = {min(shallower, key=lambda rung, at=at: abs(rung - at)) for at in wanted if shallower}
+        targets = [deepest * k / parts for k in range(1, parts)]
+        near = {min(shallower, key=lambda rung, at=at: abs(rung - at)) for at in targets if shallower}
         return [*sorted(near), deepest]
 
     def _rungs(self, deepest: float, limit: float) -> list[float]:
@@ -74,7 +74,7 @@ class Ladder:
         while sum(steps) < deepest * (1 - 1e-12):
             steps.append(step)
             step = min(step * self.growth, limit)
-        # Shrinking all steps alike meets the deepest point exactly and keeps every step within its limit.
+        # Shrinking all steps by one factor meets the deepest point exactly and keeps every step within its limit.
         rungs = np.cumsum(steps) * (deepest / sum(steps))
         return [*(round(float(rung), 6) for rung in rungs[:-1]), round(deepest, 6)]
 

@@ -20,7 +20,7 @@ from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 
 FACTORY = "label_farm.presses.fem:FemModel"
-"""Dotted path of what builds the model from a sensor."""
+"""Dotted path of the function that builds the model of a sensor."""
 
 
 _TRIES = 3
@@ -32,7 +32,7 @@ class ProcessDied(SolveError):
 
 
 class Model(Protocol):
-    """What the farm asks of a solver; another one is a class with these names.
+    """Interface of a solver; another one is a class with these names.
 
     A model may also have ``batch``, how many jobs it likes at a time (1 without it), and ``solve_many(jobs)``, which
     yields each job with its solution or its SolveError as they are found, whatever became of the others.
@@ -73,7 +73,7 @@ def batch_size(model: Model) -> int:
 def solve_each(model: Model, jobs: Sequence[Job]) -> Iterator[tuple[Job, PathSolution | SolveError]]:
     """Yield each job with its solution or its error: one bad press does not stop the others.
 
-    Errors of other kinds end it: what the process holds is not trusted any more.
+    Errors of other kinds end it: the state of the process is not trusted any more.
     """
     if len(jobs) > 1 and hasattr(model, "solve_many"):
         yield from model.solve_many(jobs)  # ty: ignore[not-callable]
@@ -92,7 +92,7 @@ class Version:
     content_hash: str
     """Hash of everything in the model that decides a result."""
     remarks: tuple[str, ...] = ()
-    """In words, what a user should know of it, such as strains at which its material law is unstable."""
+    """Remarks for the user, such as strains at which its material law is unstable."""
 
 
 def version(factory: str, sensor: Sensor) -> Version:
@@ -103,12 +103,12 @@ def version(factory: str, sensor: Sensor) -> Version:
     Raises:
         SolveError: If the sensor cannot be modelled.
     """
-    asked = json.dumps({"factory": factory, "sensor": sensor.document})
+    request = json.dumps({"factory": factory, "sensor": sensor.document})
     for _ in range(_TRIES):
         finished = subprocess.run(
             environment.python("label_farm.presses.model"),
             env=environment.variables(),
-            input=asked,
+            input=request,
             capture_output=True,
             text=True,
         )
@@ -135,10 +135,10 @@ def _how(code: int) -> str:
 def main() -> None:
     """Answer one question of `version` on standard input and output."""
     answer_to = os.dup(1)
-    os.dup2(2, 1)  # what libraries print while they load must not mix with the answer
-    asked = json.load(sys.stdin)
+    os.dup2(2, 1)  # output of libraries while they load must not mix with the result
+    request = json.load(sys.stdin)
     try:
-        model = build(asked["factory"], Sensor.from_document(asked["sensor"], "sensor"))
+        model = build(request["factory"], Sensor.from_document(request["sensor"], "sensor"))
         answer = {"version": model.content_hash, "remarks": list(getattr(model, "remarks", ()))}
     except TacdataError as error:
         answer = {"kind": type(error).__name__, "error": [error.given, error.allowed, error.remedy]}

@@ -37,7 +37,7 @@ class Tolerance:
     share: float = 0.01
     """Of the depth [1]."""
     least: float = 0.005
-    """What is allowed at any depth [mm]."""
+    """Tolerance at any depth [mm]."""
 
     def __post_init__(self) -> None:
         """Refuse tolerances that nothing can meet.
@@ -69,22 +69,22 @@ class Tolerance:
     def foretold(self, path: tuple[float, ...], depth: np.ndarray, surface: np.ndarray) -> tuple[float, ...]:
         """Return a path with states added on its way down, where a coarser mesh needs them.
 
-        The way up is told by its difference from the way down.
+        The way up is described by its difference from the way down.
 
         Args:
             path: Depths of the states [mm]: rising from 0 to the deepest, then falling.
             depth: Depths that the rougher model reached while loading [mm], shape (k,), some of those of ``path``.
             surface: Its maps [mm], shape (k, pixels_x, pixels_y).
         """
-        some = depth > 0
-        if not some.any():
+        pressed = depth > 0
+        if not pressed.any():
             return path
-        depth = np.concatenate([[0.0], depth[some]])
-        surface = np.concatenate([np.zeros_like(surface[:1]), surface[some]])
+        depth = np.concatenate([[0.0], depth[pressed]])
+        surface = np.concatenate([np.zeros_like(surface[:1]), surface[pressed]])
         split = set(self._split(branches(depth, surface)[0])) - set(depth.tolist())
         result = list(path[:1])
-        for before, after in pairwise(path):
-            result += [*sorted(d for d in split if before + _LEAST_STEP <= d <= after - _LEAST_STEP), after]
+        for upper, lower in pairwise(path):
+            result += [*sorted(d for d in split if upper + _LEAST_STEP <= d <= lower - _LEAST_STEP), lower]
         return tuple(result)
 
     def exceeded(self, depth: np.ndarray, surface: np.ndarray) -> float:
@@ -92,7 +92,7 @@ class Tolerance:
         return float(max(self._missed(branch).max() for branch in branches(depth, surface)))
 
     def _missed(self, branch: Branch) -> np.ndarray:
-        """Return the error of each state of a branch if left out, over what is allowed there [1], shape (k,)."""
+        """Return the error of each state of a branch if left out, over the tolerance there [1], shape (k,)."""
         depth, flat = branch.depth, branch.states
         square = branch.left_out() ** 2
         dented = flat > _DENTED * np.maximum(depth, depth[1])[:, None]
@@ -105,7 +105,7 @@ class Tolerance:
         worst = np.maximum(missed[:-1], missed[1:])
         parts = np.clip(np.ceil(worst ** (1 / _SHARPEST)), 1, _MOST_PARTS).astype(int)
         parts = np.minimum(parts, np.maximum(1, np.floor(np.diff(depth) / _LEAST_STEP + 1e-9)).astype(int))
-        found = [float(depth[0])]
+        depths = [float(depth[0])]
         for low, high, count in zip(depth[:-1], depth[1:], parts, strict=True):
-            found += [round(float(low + (high - low) * k / count), 6) for k in range(1, count)] + [float(high)]
-        return found
+            depths += [round(float(low + (high - low) * k / count), 6) for k in range(1, count)] + [float(high)]
+        return depths

@@ -1,1 +1,1 @@
-"""What other computers run to submit, fetch and solve."""
+"""Programs of other computers: to submit, fetch and solve."""

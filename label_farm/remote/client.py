@@ -19,7 +19,7 @@ SECONDS = 60.0
 
 
 class _Unchanged(Exception):
-    """What was asked for is what the asker has."""
+    """The client already has the requested content."""
 
 
 class Client:
@@ -64,7 +64,7 @@ class Client:
         return self._document(self.send("POST", path, body, {"Content-Type": "application/json"}))
 
     def planned(self, number: str, seconds: float) -> dict[str, Any]:
-        """Return a submission once the service has looked at its recordings, or as it stands after a while.
+        """Return a submission once the service has looked at its recordings, or its state after a while.
 
         Args:
             number: Which.
@@ -90,10 +90,10 @@ class Client:
             "check --url",
         )
 
-    def content(self, path: str, known: str = "") -> bytes | None:
+    def content(self, path: str, digest: str = "") -> bytes | None:
         """Return the bytes at a path; None if they are still those of a hash that is known (SHA-256, hex)."""
         try:
-            return self.send("GET", path, headers={"If-None-Match": f'"{known}"'} if known else {})
+            return self.send("GET", path, headers={"If-None-Match": f'"{digest}"'} if digest else {})
         except _Unchanged:
             return None
 
@@ -105,10 +105,10 @@ class Client:
             UsageError: If it refuses, in its words.
             FormatError: If it finds the content wrong, in its words.
         """
-        given = dict(headers or {})
+        all_headers = dict(headers or {})
         if self._token:
-            given["Authorization"] = f"Bearer {self._token}"
-        request = urllib.request.Request(self.url + path, data=body, headers=given, method=method)
+            all_headers["Authorization"] = f"Bearer {self._token}"
+        request = urllib.request.Request(self.url + path, data=body, headers=all_headers, method=method)
         try:
             with urllib.request.urlopen(request, timeout=SECONDS) as answer:
                 return answer.read()
@@ -128,12 +128,12 @@ class Client:
 
 def refusal(entry: dict[str, Any]) -> SolveError:
     """Return why a submission was refused, in the service's own words."""
-    given, *others = entry["reason"].split("\n  ")
-    said = {key: words for key, _, words in (line.partition(":") for line in others)}
+    fault, *lines = entry["reason"].split("\n  ")
+    parts = {key: words for key, _, words in (line.partition(":") for line in lines)}
     return SolveError(
-        f"submission {entry['id']} is refused: {given}",
-        said.get("allowed", "a session whose every episode can be labelled").strip(),
-        said.get("next", "mend what is said above and submit again").strip(),
+        f"submission {entry['id']} is refused: {fault}",
+        parts.get("allowed", "a session whose every episode can be labelled").strip(),
+        parts.get("next", "mend what is said above and submit again").strip(),
     )
 
 

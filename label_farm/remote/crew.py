@@ -81,6 +81,6 @@ class Crew:
         with suppress(BrokenPipeError):
             if process.stdin is not None:
                 process.stdin.close()
-        # What it held is given back at once; where the service is away, its claims expire.
+        # Its jobs are given back at once; where the service is away, its claims expire.
         with suppress(TacdataError):
             self._client.post("/api/work/leave", {"owner": f"{socket.gethostname()}/{process.pid}"})

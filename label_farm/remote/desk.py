@@ -54,10 +54,10 @@ class RemoteDesk:
     def claim(self, version: str, count: int) -> list[Lease]:
         """Take up to ``count`` jobs of one model; none while the service cannot be reached."""
         try:
-            taken = self._client.post("/api/work/claim", self._me(version=version, count=count))
+            claims = self._client.post("/api/work/claim", self._me(version=version, count=count))
         except DeviceError:
             return []
-        return [Lease(Job.from_document(entry["job"], "the service's job"), entry["tries"]) for entry in taken]
+        return [Lease(Job.from_document(entry["job"], "the service's job"), entry["tries"]) for entry in claims]
 
     def has(self, job: Job) -> bool:
         """Return False: the service gives out no job that has a result."""
@@ -103,5 +103,5 @@ class RemoteDesk:
         self._client.post("/api/work/beat", self._me(note=text[:2000]))
 
     def leave(self) -> None:
-        """Give back what was claimed, without blame, and go."""
+        """Give claimed jobs back, without blame, and leave."""
         self._client.post("/api/work/leave", self._me())

@@ -53,28 +53,28 @@ class Fetch:
         self.fetched = Fetched()
 
     def bring(self, progress: Callable[[int, int], None] = lambda *_: None) -> None:
-        """Fetch what is finished and not here.
+        """Fetch finished labels that are not here.
 
         Args:
             progress: Called with how many episodes were looked at, and how many there are.
 
         Raises:
             UsageError: If the service does not know the submission or has no results of it, if a label is of another
-                recording than the one here, or if another label lies here (without ``redo``).
-            FormatError: If what came is no label, or one for another episode.
+                recording than the one here, or if another label is here (without ``redo``).
+            FormatError: If the content is no label, or the label of another episode.
             DeviceError: If the service cannot be reached or the disk refuses.
         """
-        known = {*self.fetched.written, *self.fetched.current}
-        there = self._client.get(f"{self._path}/results")
-        wanted = [number for number in there["labels"] if number not in known]
-        for done, number in enumerate(wanted):
-            progress(done, len(wanted))
+        local = {*self.fetched.written, *self.fetched.current}
+        remote = self._client.get(f"{self._path}/results")
+        missing = [number for number in remote["labels"] if number not in local]
+        for done, number in enumerate(missing):
+            progress(done, len(missing))
             self._bring(number)
             self.fetched.failed.pop(number, None)
-        for number in there["failures"]:
+        for number in remote["failures"]:
             if number not in self.fetched.failed:
                 self._bring_reason(number)
-        progress(len(wanted), len(wanted))
+        progress(len(missing), len(missing))
 
     def _recording(self, number: int) -> Path:
         if number not in self._recordings:
@@ -87,8 +87,8 @@ class Fetch:
 
     def _bring(self, number: int) -> None:
         path = self._labels.path(number)
-        here = hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else ""
-        content = self._client.content(f"{self._path}/labels/{number}.parquet", here)
+        local = hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else ""
+        content = self._client.content(f"{self._path}/labels/{number}.parquet", local)
         if content is None:
             self.fetched.current.append(number)
             return
@@ -114,7 +114,7 @@ class Fetch:
             unread.unlink(missing_ok=True)
 
     def _is_wanted(self, number: int, label: Label) -> bool:
-        """Return whether a label that came is to be kept; False if one made from the same things lies here."""
+        """Return whether a received label is to be kept; False if one with the same parents is here."""
         recording = self._recording(number)
         parents = dict(label.provenance["parents"])
         if label.episode != number or parents.get("recording") != provenance.file_hash(recording):
@@ -123,13 +123,13 @@ class Fetch:
                 "a label of this very file",
                 "name the session that was submitted; or submit the one that lies here",
             )
-        here = self._labels.parents(number)
-        if here == parents:
+        local = self._labels.parents(number)
+        if local == parents:
             return False
-        if here is not None and not self._redo:
+        if local is not None and not self._redo:
             raise UsageError(
                 f"{self._labels.path(number)} was made from something else than the service's label"
-                f" (model {str(here.get('model'))[:12]}…, there {str(parents.get('model'))[:12]}…)",
+                f" (model {str(local.get('model'))[:12]}…, there {str(parents.get('model'))[:12]}…)",
                 "no label there, or the same one",
                 "give --redo to replace what lies here",
             )

@@ -19,7 +19,7 @@ PIECE = 8 << 20
 
 @dataclass
 class Sent:
-    """What was sent."""
+    """Counts of a transfer."""
 
     files: int = 0
     """Files that were sent."""
@@ -60,10 +60,10 @@ def send(client: Client, folder: Path, name: str, progress: Callable[[int, int],
 
 
 def _send_file(client: Client, path: Path, name: str) -> int:
-    """Send what is missing of a file; return how many bytes that was."""
+    """Send the missing part of a file; return its number of bytes."""
     size = path.stat().st_size
-    asked: dict[str, object] = {"folder": name, "name": path.name, "size": size, "sha256": provenance.file_hash(path)}
-    answer = _piece(client, asked, 0, b"")
+    request: dict[str, object] = {"folder": name, "name": path.name, "size": size, "sha256": provenance.file_hash(path)}
+    answer = _piece(client, request, 0, b"")
     sent = 0
     with path.open("rb") as stream:
         while not answer["whole"]:
@@ -71,12 +71,12 @@ def _send_file(client: Client, path: Path, name: str) -> int:
             body = stream.read(PIECE)
             if not body:
                 raise FormatError(f"{path} became shorter while it was sent", "a finished recording", "send it again")
-            answer = _piece(client, asked, answer["have"], body)
+            answer = _piece(client, request, answer["have"], body)
             sent += len(body)
     return sent
 
 
-def _piece(client: Client, asked: dict[str, object], offset: int, body: bytes) -> dict:
-    query = urllib.parse.urlencode({**asked, "offset": offset})
+def _piece(client: Client, request: dict[str, object], offset: int, body: bytes) -> dict:
+    query = urllib.parse.urlencode({**request, "offset": offset})
     headers = {"Content-Type": "application/octet-stream"}
     return json.loads(client.send("POST", f"/api/recordings?{query}", body, headers))

@@ -24,24 +24,24 @@ AGAIN_SECONDS = 2.0
 def main() -> int:
     """Work until standard input closes; return the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    asked = json.loads(sys.stdin.readline())
-    client = Client(asked["url"], asked["token"])
+    request = json.loads(sys.stdin.readline())
+    client = Client(request["url"], request["token"])
 
     def desk() -> RemoteDesk:
-        return RemoteDesk(client, owner_name(), asked["device"])
+        return RemoteDesk(client, owner_name(), request["device"])
 
-    mine = desk()
+    remote_desk = desk()
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    seconds = _enter(mine)
+    seconds = _enter(remote_desk)
     threading.Thread(target=beat, args=(desk, seconds), daemon=True).start()
-    worker = Worker(mine, asked["factory"], strict=False)
+    worker = Worker(remote_desk, request["factory"], strict=False)
     while True:
         try:
             return work(worker)
-        except DeviceError as error:  # the line is cut: what was in work is claimed again by someone
+        except DeviceError as error:  # the line is cut: jobs in work are claimed again by another worker
             print(error, file=sys.stderr)
             time.sleep(AGAIN_SECONDS)
-            _enter(mine)
+            _enter(remote_desk)
         except TacdataError as error:
             print(error, file=sys.stderr)
             return BROKEN

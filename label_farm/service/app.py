@@ -30,7 +30,7 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 
 
 class SubmissionRequest(BaseModel):
-    """What a person may ask for; as `schemas/submission.schema.json`."""
+    """A request of a person; as `schemas/submission.schema.json`."""
 
     model_config = ConfigDict(extra="forbid")
     session: str = Field(min_length=1, max_length=1000)
@@ -57,7 +57,7 @@ def application(foreman: Foreman, token: str = "") -> Guard:
 
     Args:
         foreman: Who works the submissions off.
-        token: What every request must carry; empty for the loopback alone.
+        token: Token of every request; empty for the loopback alone.
     """
     api = FastAPI(title="tacdata label farm", version=provenance.code_version(), docs_url=None, redoc_url=None)
 
@@ -68,7 +68,7 @@ def application(foreman: Foreman, token: str = "") -> Guard:
 
     @api.exception_handler(RequestValidationError)
     async def _unfit(_: Request, error: RequestValidationError) -> JSONResponse:
-        # Without what was sent: it may be no JSON of ours (NaN, half of a surrogate pair), which cannot be answered.
+        # Without the input: it may be no valid JSON (NaN, half of a surrogate pair), which no response can contain.
         first = error.errors()[0]
         where = "/".join(str(part) for part in first["loc"][1:]) or "the request"
         content = {
@@ -109,7 +109,7 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
 
     @api.get("/api/submissions/{number}")
     def one(number: str) -> dict[str, Any]:
-        """One submission as it stands."""
+        """The present state of a submission."""
         foreman.submissions.get(number)
         entry = next(entry for entry in _listing(foreman) if entry["id"] == number)
         entry["recent"], entry["failures"] = foreman.finished(number)
@@ -117,7 +117,7 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
 
     @api.post("/api/submissions/{number}/cancel")
     def cancel(number: str) -> dict[str, Any]:
-        """Take a submission back; what is finished stays."""
+        """Take a submission back; finished labels stay."""
         return foreman.cancel(number).document
 
     @api.post("/api/submissions/{number}/priority")
@@ -150,13 +150,13 @@ def _farm(foreman: Foreman) -> dict[str, Any]:
         row["rate"] = (row["done"] + row["failed"]) / row["busy"] if row["busy"] > 0 else 0.0
         row |= foreman.gauges.usage(row["owner"])
     rate = sum(row["rate"] for row in workers if not row["note"])
-    left = waiting + leased
+    remaining = waiting + leased
     return {
         "presses": {"waiting": waiting, "in_work": leased, "solved": done, "failed": failed},
         "workers": workers,
         "rate": rate,
         "throughput": foreman.gauges.throughput(MINUTES),
-        "seconds_left": left / rate if rate and left else (0.0 if not left else None),
+        "seconds_left": remaining / rate if rate and remaining else (0.0 if not remaining else None),
         "paused": foreman.paused,
         "damaged": foreman.submissions.damaged,
         "code_version": provenance.code_version(),

@@ -10,17 +10,19 @@ LONGEST = 255
 """Bytes that a file system takes for a name."""
 
 
-def confined(root: Path, asked: str, what: str) -> Path:
+def confined(root: Path, requested: str, what: str) -> Path:
     """Return the path under ``root`` that was asked for, links followed.
 
     Raises:
         UsageError: If it is absolute, has dots, or leads out of the root.
     """
-    parts = PurePosixPath(asked)
+    parts = PurePosixPath(requested)
     refused = UsageError(
-        f"{what} {asked[:200]!r}", "a path inside the folder that the service serves", f"name it from {root.name}/ on"
+        f"{what} {requested[:200]!r}",
+        "a path inside the folder that the service serves",
+        f"name it from {root.name}/ on",
     )
-    if not asked or "\0" in asked or "\\" in asked or parts.is_absolute() or ".." in parts.parts:
+    if not requested or "\0" in requested or "\\" in requested or parts.is_absolute() or ".." in parts.parts:
         raise refused
     if any(len(part.encode(errors="replace")) > LONGEST for part in parts.parts):
         raise refused

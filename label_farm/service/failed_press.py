@@ -1,4 +1,4 @@
-"""A press that has no label, as a picture: where it was, how deep it went, and what the model said of it."""
+"""A press that has no label, as a picture: its place, its depth, and the model's error."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def _place(axes, episode: Episode) -> None:
     centers = episode.sensor.taxels.centers
     axes.scatter(centers[:, 0], centers[:, 1], marker="s", s=14, color="#b7c4d2", label="taxels")
     span = np.linspace(-max(x, y), max(x, y), 241)
-    across, along = np.meshgrid(span, span, indexing="ij")
-    height = press.indenter.profile(across, along)
+    grid_x, grid_y = np.meshgrid(span, span, indexing="ij")
+    height = press.indenter.profile(grid_x, grid_y)
     turn = np.radians(press.yaw)
-    at_x = press.x + across * np.cos(turn) - along * np.sin(turn)
-    at_y = press.y + across * np.sin(turn) + along * np.cos(turn)
+    at_x = press.x + grid_x * np.cos(turn) - grid_y * np.sin(turn)
+    at_y = press.y + grid_x * np.sin(turn) + grid_y * np.cos(turn)
     levels = [level for level in (press.depth / 3, press.depth) if np.nanmin(height) < level < np.nanmax(height)]
     if levels:
         axes.contour(at_x, at_y, np.nan_to_num(height, nan=1e9, posinf=1e9), levels=levels, colors="#c2412d")
@@ -78,6 +78,6 @@ def _course(axes, episode: Episode) -> None:
     axes.axhline(episode.press.depth, color="#c2412d", lw=0.8, ls=":")
     axes.set(xlabel="time [s]", ylabel="depth of the tip [mm]", title=f"planned: {episode.press.depth:g} mm")
     change = np.abs(episode.taxels.counts - np.median(episode.taxels.counts[:10], axis=0)).max(axis=1)
-    beside = axes.twinx()
-    beside.plot((episode.taxels.sample_ns - begin) / 1e9, change, color="#7a7a7a", lw=0.8)
-    beside.set_ylabel("largest change of a reading [counts]", color="#7a7a7a")
+    twin = axes.twinx()
+    twin.plot((episode.taxels.sample_ns - begin) / 1e9, change, color="#7a7a7a", lw=0.8)
+    twin.set_ylabel("largest change of a reading [counts]", color="#7a7a7a")

@@ -38,7 +38,7 @@ class Foreman:
     """Processes submissions until stopped. Every method may be called from any thread."""
 
     def __init__(self, root: Path, store: Store, settings: FarmSettings) -> None:
-        """Take up the store and what its last service left open.
+        """Take up the store and the open submissions of its last service.
 
         Args:
             root: Folder that sessions are named from.
@@ -87,7 +87,7 @@ class Foreman:
         """File a submission; it is on the disk when this returns.
 
         Raises:
-            UsageError: If its session or sensor is not there, or lies outside the root.
+            UsageError: If its session or sensor is missing, or outside the root.
         """
         run = self._run(wish)
         if not run.session.is_dir():
@@ -129,7 +129,7 @@ class Foreman:
             return self.submissions.get(number)
 
     def states(self) -> list[tuple[Submission, Run | None]]:
-        """Return every submission as it stands, with its run if it has one, the oldest first."""
+        """Return the state of every submission, with its run if it has one, the oldest first."""
         with self._guard:
             runs = dict(self._runs)
             listed = self.submissions.listing()
@@ -171,16 +171,16 @@ class Foreman:
             failures = sorted(run.failures.items())[:MOST_SHOWN]
             return list(run.recent)[::-1], {str(episode): reason for episode, reason in failures}
         if number not in self._finished:
-            submission, found = self.submissions.get(number), ([], {})
+            submission, finished = self.submissions.get(number), ([], {})
             with suppress(UsageError):  # its folder may be gone by now
                 labels = SessionLabels.of(self.session(number))
                 if submission.state == "done":
-                    found = labels.labelled[-RECENT:][::-1], labels.failures(MOST_SHOWN)
-            self._finished[number] = found
+                    finished = labels.labelled[-RECENT:][::-1], labels.failures(MOST_SHOWN)
+            self._finished[number] = finished
         return self._finished[number]
 
     def is_labelled(self, number: str, episode: int) -> bool:
-        """Return whether a submission's label of an episode lies there; raises as `results`."""
+        """Return whether a submission's label of an episode exists; raises as `results`."""
         run = self._with_results(number)
         if run is not None:
             return run.is_labelled(episode)
@@ -217,8 +217,10 @@ class Foreman:
         return Run(submission, self.root, self.store, self._settings, self._versions)
 
     def _hire(self) -> Engine:
-        chosen = self._settings
-        return chosen.engine(self.store, chosen.factory, None, chosen.workers, chosen.lease_seconds, chosen.devices)
+        settings = self._settings
+        return settings.engine(
+            self.store, settings.factory, None, settings.workers, settings.lease_seconds, settings.devices
+        )
 
     def _plan_all(self) -> None:
         while not self._stop.is_set():

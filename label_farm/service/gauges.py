@@ -1,4 +1,4 @@
-"""What the service has seen over time: presses settled in each minute, and what workers take of their computers."""
+"""History of the service: presses settled in each minute, and the workers' use of their computers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 from label_farm.workers.usage import Usage, local_process, usage_of
 
 KEPT = 1440
-"""Minutes that are remembered: a day. They begin anew with each service."""
+"""Minutes that are remembered: a day. They start empty with each service."""
 SHOWN = 60
 """Minutes that the page shows."""
 
@@ -44,24 +44,24 @@ class _Sample:
 class Gauges:
     """Throughput by the minute, and each worker's share of a processor and its memory. Any thread may call."""
 
-    def __init__(self, now: Callable[[], float] = time.time) -> None:
-        """Begin with nothing; ``now`` tells the time [s since 1970]."""
-        self._now, self._lock = now, Lock()
+    def __init__(self, clock: Callable[[], float] = time.time) -> None:
+        """Begin with nothing; ``clock`` tells the time [s since 1970]."""
+        self._now, self._lock = clock, Lock()
         self._minutes: deque[Minute] = deque(maxlen=KEPT)
         self._totals: tuple[int, int] | None = None
         self._samples: dict[str, _Sample] = {}
 
     def count(self, solved: int, failed: int) -> None:
-        """Take the ledger's totals; what was added since the last call belongs to this minute."""
+        """Take the ledger's totals; the increase since the last call belongs to this minute."""
         with self._lock:
             number = int(self._now() // 60)
-            before = self._totals or (solved, failed)
+            previous = self._totals or (solved, failed)
             self._totals = solved, failed
             while not self._minutes or self._minutes[-1].number < number:
                 self._minutes.append(Minute(self._minutes[-1].number + 1 if self._minutes else number))
             # A cancelled submission takes jobs out of the ledger: totals may fall.
-            self._minutes[-1].solved += max(0, solved - before[0])
-            self._minutes[-1].failed += max(0, failed - before[1])
+            self._minutes[-1].solved += max(0, solved - previous[0])
+            self._minutes[-1].failed += max(0, failed - previous[1])
 
     def measure(self, owners: Iterable[str]) -> None:
         """Look at the workers of this computer; forget those that are not named any more."""
@@ -74,11 +74,11 @@ class Gauges:
             self._samples = {owner: self._samples[owner] for owner in named if owner in self._samples}
 
     def tell(self, owner: str, usage: Usage) -> None:
-        """Take what a worker said of itself, or was seen to take."""
+        """Take a worker's own report, or its measured use."""
         with self._lock:
-            at, before = self._now(), self._samples.get(owner)
-            passed = at - before.at if before else 0.0
-            share = (usage.processor - before.usage.processor) / passed if before and passed > 0 else None
+            at, previous = self._now(), self._samples.get(owner)
+            passed = at - previous.at if previous else 0.0
+            share = (usage.processor - previous.usage.processor) / passed if previous and passed > 0 else None
             self._samples[owner] = _Sample(at, usage, share)
 
     def usage(self, owner: str) -> dict[str, float | int | None]:
@@ -90,7 +90,7 @@ class Gauges:
         used = sample.usage
         return {"processor": sample.share, "processor_seconds": used.processor, "memory": used.memory}
 
-    def throughput(self, most: int = KEPT) -> list[dict[str, Any]]:
-        """Return what was settled in each of the last minutes, the oldest first."""
+    def throughput(self, limit: int = KEPT) -> list[dict[str, Any]]:
+        """Return the counts of the last minutes, the oldest first."""
         with self._lock:
-            return [minute.document for minute in list(self._minutes)[-most:]]
+            return [minute.document for minute in list(self._minutes)[-limit:]]

@@ -17,7 +17,7 @@ SMALL, LARGE = 64 * 1024, 64 * 1024 * 1024
 """Most bytes of a request's body; the large one for results of workers and pieces of recordings."""
 ROOMY = ("/api/work/results/", "/api/recordings")
 OPEN_PATHS = ("/", "/openapi.json", "/favicon.ico")
-"""What may be had without a token: nothing of it comes from the store."""
+"""Content that needs no token: it does not come from the store."""
 LOOPBACK = re.compile(r"(localhost|127\.\d+\.\d+\.\d+|\[::1\])(:\d+)?", re.IGNORECASE)
 
 
@@ -51,10 +51,10 @@ class Guard:
 
     def _refusal(self, scope: Message, headers: dict[str, str]) -> tuple[int, str, str, str] | None:
         if self._token:
-            given = headers.get("authorization", "").removeprefix("Bearer ").strip()
-            if scope["path"] in OPEN_PATHS or hmac.compare_digest(given.encode(), self._token.encode()):
+            token = headers.get("authorization", "").removeprefix("Bearer ").strip()
+            if scope["path"] in OPEN_PATHS or hmac.compare_digest(token.encode(), self._token.encode()):
                 return None
-            what = "a wrong token" if given else "no token"
+            what = "a wrong token" if token else "no token"
             return 401, what, "the token that `tacdata farm up` was started with", "give it with --token"
         if not LOOPBACK.fullmatch(headers.get("host", "")):
             return (
@@ -84,7 +84,7 @@ async def _body(receive: Receive, limit: int) -> bytes | None:
 
 
 def _once(body: bytes, receive: Receive) -> Receive:
-    """Return a receiver that gives the body that was read, and then what comes after it."""
+    """Return a receiver that gives the body that was read, and then the rest of the stream."""
     given = False
 
     async def again() -> Message:
@@ -97,8 +97,8 @@ def _once(body: bytes, receive: Receive) -> Receive:
     return again
 
 
-async def _answer(send: Send, status: int, given: str, allowed: str, remedy: str) -> None:
-    text = json.dumps({"given": given, "allowed": allowed, "next": remedy}).encode()
+async def _answer(send: Send, status: int, fault: str, allowed: str, remedy: str) -> None:
+    text = json.dumps({"given": fault, "allowed": allowed, "next": remedy}).encode()
     headers = [(b"content-type", b"application/json"), (b"content-length", str(len(text)).encode())]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": text})

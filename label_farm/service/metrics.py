@@ -1,4 +1,4 @@
-"""The farm's state for Prometheus, at /metrics: what the page shows, as numbers with names."""
+"""The farm's state for Prometheus, at /metrics: the figures of the page, with names."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from fastapi.responses import PlainTextResponse
 
 STATES = ("waiting", "planning", "running", "done", "cancelled", "refused")
-"""States of a submission; each is told, so that a count that falls to nothing is 0 and not missing."""
+"""States of a submission; each is exported, so that an empty count is 0 and not missing."""
 KIND = "text/plain; version=0.0.4"
 """Media type of Prometheus' text format."""
 
@@ -26,7 +26,7 @@ def add_metrics(api: FastAPI, farm: Callable[[], Mapping[str, Any]], states: Cal
 
     @api.get("/metrics", response_class=PlainTextResponse)
     def metrics() -> PlainTextResponse:
-        """What Prometheus reads: presses, submissions, workers, rate."""
+        """Text for Prometheus: presses, submissions, workers, rate."""
         return PlainTextResponse(exposition(farm(), states()), media_type=KIND)
 
 
@@ -52,8 +52,8 @@ def exposition(farm: Mapping[str, Any], states: Iterable[str]) -> str:
         ("processor_seconds", "counter", "processor_seconds_total", "Processor time of a worker [s]."),
         ("memory", "gauge", "memory_bytes", "Memory that a worker holds [bytes]."),
     ):
-        seen = (row for row in workers if row[key] is not None)
-        named = (({"worker": row["owner"], "device": row["device"]}, row[key]) for row in seen)
+        rows = (row for row in workers if row[key] is not None)
+        named = (({"worker": row["owner"], "device": row["device"]}, row[key]) for row in rows)
         tell(f"worker_{name}", kind, meaning, named)
     busy = (({"worker": row["owner"], "device": row["device"]}, row["busy"]) for row in workers)
     tell("worker_busy_seconds_total", "counter", "Time that a worker spent solving [s].", busy)

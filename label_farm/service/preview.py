@@ -22,21 +22,21 @@ def deepest_frame(label: Label) -> int:
 
 
 def account(path: Path) -> str:
-    """Return who made a label, how and how well, from what is written in its file: one line a fact.
+    """Return the provenance and the error of a label, from its file: one line a fact.
 
     Raises:
         UsageError: If there is no such file.
         FormatError: If it is damaged.
     """
-    made = read_header(path)["provenance"]
-    solver = made["parameters"].get("solver") or {}
-    own = solver.get("parameters", {})
-    job = made["parameters"].get("job") or {}
-    lines = [f"label made {made['made_at']} by {made['made_by']} {made['code_version']}"]
+    stamp = read_header(path)["provenance"]
+    solver = stamp["parameters"].get("solver") or {}
+    parameters = solver.get("parameters", {})
+    job = stamp["parameters"].get("job") or {}
+    lines = [f"label made {stamp['made_at']} by {stamp['made_by']} {stamp['code_version']}"]
     if solver:
         lines.append(
             f"press solved {solver.get('made_at', '')} by worker {solver.get('worker', '?')} in "
-            f"{solver.get('seconds', float('nan')):.1f} s, on {own.get('device', '?')}"
+            f"{solver.get('seconds', float('nan')):.1f} s, on {parameters.get('device', '?')}"
         )
     else:
         lines.append("no press was solved: the indenter never touches")
@@ -44,10 +44,11 @@ def account(path: Path) -> str:
         shape = ", ".join(f"{key} {value}" for key, value in job["indenter"].items())
         lines.append(f"indenter {shape} at ({job['x']:g}, {job['y']:g}) mm, yaw {job['yaw']:g} deg")
         lines.append(f"{len(job['depths'])} states, deepest {max(job['depths']):g} mm")
-    if "newton" in own:
-        lines.append(f"law {own.get('law', '?')}; Newton steps a state: {' '.join(map(str, np.ravel(own['newton'])))}")
+    if "newton" in parameters:
+        steps = " ".join(map(str, np.ravel(parameters["newton"])))
+        lines.append(f"law {parameters.get('law', '?')}; Newton steps a state: {steps}")
     lines += _quality(read_label(path))
-    parents = made["parents"]
+    parents = stamp["parents"]
     lines += [f"{name} {parents[name]}" for name in ("recording", "model", "solution") if parents.get(name)]
     return "\n".join(lines)
 

@@ -38,9 +38,9 @@ def add_receiving(api: FastAPI, foreman: Foreman) -> None:
         sha256: Annotated[str, Query(pattern="^[0-9a-f]{64}$")],
         offset: Annotated[int, Query(ge=0, le=MOST)],
     ) -> dict[str, Any]:
-        """Take the piece of a file that begins at ``offset``; answers how much of it lies here, and if it is whole.
+        """Take the piece of a file that begins at ``offset``; return the bytes here, and whether it is complete.
 
-        A piece that does not begin where the last one ended is not taken: the answer says where to go on.
+        A piece that does not begin where the last one ended is not taken: the response states the next offset.
         """
         body = await request.body()
 

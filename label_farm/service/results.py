@@ -41,7 +41,7 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
 
     @api.get("/api/submissions/{number}/labels/{episode}.png")
     def preview(number: str, episode: int) -> Response:
-        """The deepest frame of a finished label as a picture; its depth [mm] stands in the header X-Depth."""
+        """The deepest frame of a finished label as a picture; the header X-Depth has its depth [mm]."""
         from label_farm.service.preview import picture
 
         content, depth = picture(_labels(foreman, number).path(episode))

@@ -28,7 +28,7 @@ MOST_ATTEMPTS = 20
 
 
 class Run:
-    """One submission in progress. After a restart it is planned again and finds what is finished."""
+    """One submission in progress. After a restart it is planned again and finds finished results."""
 
     def __init__(
         self, submission: Submission, root: Path, store: Store, settings: FarmSettings, versions: dict[str, Version]
@@ -62,7 +62,7 @@ class Run:
         return sorted(self._labelled)
 
     def is_labelled(self, episode: int) -> bool:
-        """Return whether the label of an episode lies there."""
+        """Return whether the label of an episode exists."""
         return episode in self._labelled
 
     def check_paths(self) -> None:
@@ -78,7 +78,7 @@ class Run:
             confined(self._root, wish.dataset, "dataset")
 
     def plan(self) -> None:
-        """Read the recordings, write what can be written, enqueue the rest; errors become words of its state."""
+        """Read recordings, write labels that need no solving, enqueue the others; errors become part of its state."""
         self.attempts += 1
         try:
             self._plan()
@@ -104,8 +104,8 @@ class Run:
         paths = {int(path.stem[-6:]): path for path in recorded.episodes}
         recordings = {number: partial(read_episode, path) for number, path in paths.items()}
         if wish.dataset:
-            out = confined(self._root, wish.dataset, "dataset")
-            self._flow = DatasetFlow(out, session, recorded.episodes, sensor)
+            dataset = confined(self._root, wish.dataset, "dataset")
+            self._flow = DatasetFlow(dataset, session, recorded.episodes, sensor)
         settings = replace(
             self._settings,
             ladder=Ladder(
@@ -138,7 +138,7 @@ class Run:
         if self._flow is not None:
             try:
                 self._flow.deliver(episode, reason)
-            except TacdataError as error:  # the labels go on; the dataset is said to be unfit
+            except TacdataError as error:  # the labels go on; the dataset is reported as unfit
                 self._flow, self.remark = None, f"nothing flows into {self.submission.dataset}: {error}"
 
     def settle(self, ledger: Ledger) -> int:
@@ -152,7 +152,7 @@ class Run:
         return len(changes)
 
     def state(self) -> Submission:
-        """Return the submission as it stands."""
+        """Return the state of the submission."""
         counted = replace(self.submission, labelled=len(self._labelled), failed=len(self.failures), reason=self.remark)
         if self.cancelled:
             return replace(counted, state="cancelled", finished_at=now())

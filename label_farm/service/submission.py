@@ -19,7 +19,7 @@ OPEN = ("waiting", "planning", "running")
 
 @dataclass(frozen=True)
 class Submission:
-    """One session to label; fields as `schemas/submission.schema.json` says."""
+    """One session to label; fields by `schemas/submission.schema.json`."""
 
     session: str
     """Folder of the recordings, from the service's root on."""
@@ -34,7 +34,7 @@ class Submission:
     redo: bool = False
     """Replace labels of another model version, try failed presses again."""
     uncertainty: bool = True
-    """Whether labels say what the sensor file's spreads make of them."""
+    """Whether labels have uncertainties by the sensor file's spreads."""
     tolerance: float = 0.005
     """States are added where maps between them would be off by more [mm]; 0: none."""
     load_step: float = 0.25
@@ -54,7 +54,7 @@ class Submission:
     episodes: int = 0
     """Recordings of the session."""
     labelled: int = 0
-    """Episodes whose label lies there."""
+    """Episodes that have a label."""
     failed: int = 0
     """Episodes that have none."""
 
@@ -71,8 +71,8 @@ class Submission:
             FormatError: If it breaks the schema.
         """
         documents.check(document, "submission", origin)
-        known = {entry.name for entry in fields(cls)}
-        return cls(**{key: value for key, value in document.items() if key in known})
+        names = {entry.name for entry in fields(cls)}
+        return cls(**{key: value for key, value in document.items() if key in names})
 
 
 class Submissions:
@@ -86,15 +86,15 @@ class Submissions:
         self.damaged: list[str] = []
         for path in sorted(self.folder.glob("*.json")):
             try:
-                found = Submission.from_document(json.loads(path.read_text()), str(path))
-                self._all[found.id] = found
+                submission = Submission.from_document(json.loads(path.read_text()), str(path))
+                self._all[submission.id] = submission
             except (ValueError, FormatError) as error:
                 self.damaged.append(f"{path}: {str(error).splitlines()[0]}")
 
     def add(self, wish: Submission) -> Submission:
         """Store a submission under the next number; it is on the disk when this returns."""
-        taken = [int(p.stem) for p in self.folder.glob("*.json") if re.fullmatch("[0-9]{6}", p.stem)]
-        filed = replace(wish, id=f"{max(taken, default=0) + 1:06d}", submitted_at=now())
+        numbers = [int(p.stem) for p in self.folder.glob("*.json") if re.fullmatch("[0-9]{6}", p.stem)]
+        filed = replace(wish, id=f"{max(numbers, default=0) + 1:06d}", submitted_at=now())
         self.keep(filed)
         return filed
 

@@ -32,15 +32,15 @@ class UpSettings:
     port: int = 8765
     """Port; 0 for any that is free."""
     token: str = ""
-    """What every request must carry."""
+    """Token of every request."""
     workers: int | None = None
     """Worker processes; None for one a GPU or core."""
     devices: tuple[str, ...] = ()
-    """What they solve on, see `environment.devices`; empty for the processor."""
+    """Their devices, see `environment.devices`; empty for the processor."""
     dask: str = ""
     """Address of a Dask scheduler, "here" to start one, or "" for local processes."""
     factory: str = ""
-    """Dotted path of what builds the model."""
+    """Dotted path of the function that builds the model."""
 
 
 def up(asked: UpSettings) -> None:
@@ -83,11 +83,13 @@ def up(asked: UpSettings) -> None:
             print("stopped: what was submitted goes on with the next `tacdata farm up`", flush=True)
 
 
-def _settings(asked: UpSettings) -> FarmSettings:
-    devices = environment.devices(asked.devices)
+def _settings(settings: UpSettings) -> FarmSettings:
+    devices = environment.devices(settings.devices)
     ready = environment.cores() if devices == ("cpu",) else len(devices)
-    workers = ready if asked.workers is None else asked.workers
-    return FarmSettings(factory=asked.factory or FACTORY, workers=workers, devices=devices, engine=_engine(asked.dask))
+    workers = ready if settings.workers is None else settings.workers
+    return FarmSettings(
+        factory=settings.factory or FACTORY, workers=workers, devices=devices, engine=_engine(settings.dask)
+    )
 
 
 def _engine(dask: str) -> EngineMaker:
@@ -98,16 +100,18 @@ def _engine(dask: str) -> EngineMaker:
     return dask_engine(dask)
 
 
-def _check_token(asked: UpSettings) -> None:
-    if asked.token and (len(asked.token) < SHORTEST_TOKEN or not asked.token.isascii() or " " in asked.token):
+def _check_token(settings: UpSettings) -> None:
+    if settings.token and (
+        len(settings.token) < SHORTEST_TOKEN or not settings.token.isascii() or " " in settings.token
+    ):
         raise UsageError(
-            f"a token of {len(asked.token)} characters",
+            f"a token of {len(settings.token)} characters",
             f"at least {SHORTEST_TOKEN}, plain letters and digits",
             "python -c 'import secrets; print(secrets.token_urlsafe())' makes one",
         )
-    if not asked.token and not _is_loopback(asked.host):
+    if not settings.token and not _is_loopback(settings.host):
         raise UsageError(
-            f"to listen on {asked.host} without a token",
+            f"to listen on {settings.host} without a token",
             "127.0.0.1, or a token that every request must carry",
             "set TACDATA_FARM_TOKEN (or --token), here and for whoever submits; put TLS before it on an open network",
         )
@@ -126,7 +130,7 @@ def _listen(host: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
-        listener.listen(128)  # before the address is said: whoever comes early waits
+        listener.listen(128)  # before the address is printed: early clients wait
     except OSError as error:
         listener.close()
         raise UsageError(

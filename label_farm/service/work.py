@@ -39,7 +39,7 @@ class ClaimRequest(RemoteWorker):
 
 
 class SignOfLife(RemoteWorker):
-    """That it lives, and what it takes of its computer."""
+    """Sign of life, with the worker's use of its computer."""
 
     processor: float | None = Field(None, ge=0, le=1e12)
     memory: int | None = Field(None, ge=0, le=2**60)
@@ -129,7 +129,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
 
     @api.post("/api/work/leave")
     def leave(hands: RemoteWorker) -> dict[str, Any]:
-        """Give back what was claimed, without blame, and go."""
+        """Give claimed jobs back, without blame, and leave."""
         with opened() as ledger:
             ledger.release(remote(hands.owner), blame=False)
             Roster(ledger).leave(remote(hands.owner))

@@ -16,7 +16,7 @@ from tacdata.errors import SolveError, UsageError
 
 
 def chosen_devices(name: str) -> tuple[str, ...]:
-    """Return what to solve on: "auto" takes all GPUs of this machine, or its CPU where it has none.
+    """Return the devices: "auto" takes all GPUs of this machine, or its CPU where it has none.
 
     Raises:
         UsageError: If the device is not there.
@@ -32,12 +32,12 @@ def chosen_devices(name: str) -> tuple[str, ...]:
 def solve_all(
     simulation: Simulation, presses: int, devices: Sequence[str], workers: int, settled: Callable[[int, str], None]
 ) -> None:
-    """Solve what is missing by ``workers`` processes; by this one if that is one.
+    """Solve missing presses by ``workers`` processes; by this one if that is one.
 
     Args:
-        simulation: What is drawn and solved.
+        simulation: The simulation.
         presses: How many presses are wanted in all.
-        devices: What the workers solve on, one after the other.
+        devices: Devices of the workers, one after the other.
         workers: How many processes.
         settled: Called with each press's number, and why it was given up or "".
 

@@ -59,7 +59,7 @@ def simulated_episode(simulation: Simulation, number: int, solution: PathSolutio
 
 
 def recording_key(simulation: Simulation, number: int) -> str:
-    """Return what stands in place of a recording's hash (hex, 64 characters): decided by what is drawn, not by when."""
+    """Return the substitute of a recording's hash (hex, 64 characters): it depends on the draw, not on its time."""
     return provenance.content_hash({"simulation": simulation.content_hash, "press": number})
 
 
@@ -70,11 +70,11 @@ def write_dataset(
     extra: Sequence[str] = (),
     done: Callable[[int, str], None] = lambda number, left_out: None,
 ) -> tuple[int, int]:
-    """Append the solved presses that a dataset lacks; an interruption keeps what is finished.
+    """Append the solved presses that a dataset lacks; an interruption keeps finished ones.
 
     Args:
-        simulation: What is drawn and solved.
-        presses: How many presses are wanted in all. Those given up are left out, and those whose skin lies above the
+        simulation: The simulation.
+        presses: How many presses are wanted in all. Those given up are left out, and those with skin above the
             shape (`swallowed_shape`).
         out: Folder of the dataset, made if missing.
         extra: Optional columns of the labels (`features.EXTRA`).
@@ -118,10 +118,10 @@ def _append(
 
 def _record(simulation: Simulation, episode: Episode, label: Label) -> EpisodeRecord:
     number, specimen = episode.number, simulation.specimen(episode.number)
-    found = frames.episode_record(episode, label, recording_key(simulation, number), simulation.sensor)
-    # The specimen's transduction stands in `simulated`, once.
-    made = found.label_provenance["parameters"]
-    made = {**found.label_provenance, "parameters": {k: v for k, v in made.items() if k != "transduction"}}
+    record = frames.episode_record(episode, label, recording_key(simulation, number), simulation.sensor)
+    # The specimen's transduction is in `simulated`, once.
+    parameters = record.label_provenance["parameters"]
+    parameters = {**record.label_provenance, "parameters": {k: v for k, v in parameters.items() if k != "transduction"}}
     drawn = {
         "plan": simulation.plan.name,
         "seed": simulation.seed,
@@ -129,18 +129,18 @@ def _record(simulation: Simulation, episode: Episode, label: Label) -> EpisodeRe
         "simulation": simulation.content_hash,
         "specimen": differences(specimen, simulation.sensor),
         "effects": [
-            {"effect": one.effect.name, "values": {name: value.tolist() for name, value in one.values.items()}}
-            for one in simulation.effects[number % len(simulation.specimens)]
+            {"effect": placed.effect.name, "values": {name: value.tolist() for name, value in placed.values.items()}}
+            for placed in simulation.effects[number % len(simulation.specimens)]
         ],
     }
-    return replace(found, specimen=specimen.name, label_provenance=made, simulated=drawn)
+    return replace(record, specimen=specimen.name, label_provenance=parameters, simulated=drawn)
 
 
 def _refuse_others(simulation: Simulation, writer: DatasetWriter, where: dict[int, Path], out: Path) -> None:
-    own = {recording_key(simulation, number) for number in where}
-    if others := writer.recordings - own:
+    keys = {recording_key(simulation, number) for number in where}
+    if foreign := writer.recordings - keys:
         raise UsageError(
-            f"{out} holds {len(others)} episodes that are not among these presses",
+            f"{out} holds {len(foreign)} episodes that are not among these presses",
             "a new folder, or a dataset of the same plan, sensor and seed with fewer presses",
             "choose another --out",
         )

@@ -31,19 +31,19 @@ class DrawnShape:
     sizes: dict[str, Any]
     """The indenter's document with ranges [mm, deg] in place of its sizes."""
     weight: float
-    """How often it is drawn beside the others [1]."""
+    """Relative weight of its draws [1]."""
     depth: Range
     """Depths of its presses [mm]."""
 
 
 @dataclass(frozen=True)
 class SpecimenSpread:
-    """What differs between the specimens of one design."""
+    """Differences between the specimens of one design."""
 
     count: int = 1
     """Number of specimens [count]."""
     skin: bool = True
-    """Whether the skin varies as the sensor file's uncertainty says."""
+    """Whether the skin varies by the sensor file's uncertainty."""
     gain: float = 0.0
     """Standard deviation of each channel's gain over the gain [1]."""
     shared_gain: float = 0.0
@@ -56,7 +56,7 @@ class SpecimenSpread:
 
 @dataclass(frozen=True)
 class ReadingNoise:
-    """What readings have on top of the transduction."""
+    """Noise, drift and rounding of readings, on top of the transduction."""
 
     readings: float = 0.0
     """Standard deviation of each reading [counts]."""
@@ -68,7 +68,7 @@ class ReadingNoise:
 
 @dataclass(frozen=True)
 class SimulationPlan:
-    """What a simulated dataset is drawn from.
+    """Distribution of a simulated dataset.
 
     Example:
         >>> from label_farm.simulated.plan import DEFAULT, read_simulation_plan
@@ -165,7 +165,7 @@ def as_range(value: float | list[float], origin: str) -> Range:
 
 
 def _above_zero(document: dict[str, Any], name: str, origin: str) -> Range:
-    found = as_range(document[name], f"{origin}: {name}")
-    if found[0] <= 0:
-        raise FormatError(f"{origin}: {name} from {found[0]:g}", "above 0", f"raise the lowest {name}")
-    return found
+    interval = as_range(document[name], f"{origin}: {name}")
+    if interval[0] <= 0:
+        raise FormatError(f"{origin}: {name} from {interval[0]:g}", "above 0", f"raise the lowest {name}")
+    return interval

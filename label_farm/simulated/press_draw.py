@@ -13,7 +13,7 @@ from tacdata.plans import Press
 from tacdata.sensor import Sensor
 
 _TRIES = 200
-"""How often a press is drawn again before the plan is said to be impossible."""
+"""How often a press is drawn again before the plan counts as impossible."""
 _PURPOSE = "simulated"
 _STREAM = 41
 """Tells the random numbers of presses from those of specimens and noise."""
@@ -73,15 +73,15 @@ def _press(plan: SimulationPlan, drawn: DrawnShape, sensor: Sensor, rng: np.rand
 
 def drawn_sizes(values: dict[str, Any], rng: np.random.Generator, origin: str) -> dict[str, Any]:
     """Return an indenter's document with each range replaced by a number drawn from it; nested solids likewise."""
-    found: dict[str, Any] = {}
+    sizes: dict[str, Any] = {}
     for name, value in values.items():
         if isinstance(value, dict):
-            found[name] = drawn_sizes(value, rng, origin)
+            sizes[name] = drawn_sizes(value, rng, origin)
         elif isinstance(value, list):
-            found[name] = _one(as_range(value, f"shapes/{origin}/{name}"), rng)
+            sizes[name] = _one(as_range(value, f"shapes/{origin}/{name}"), rng)
         else:
-            found[name] = value
-    return found
+            sizes[name] = value
+    return sizes
 
 
 def _one(values: Range, rng: np.random.Generator) -> float:

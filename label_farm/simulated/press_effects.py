@@ -1,7 +1,7 @@
 """Effects that a verdict named, laid over the readings of simulated presses.
 
-An effect of `tacdata/effects` acts on a press that stands alone: its loads and readings are those of the solved press,
-frame by frame. The label stays what it is. So effects that would move the label are refused, and so are those that
+An effect of `tacdata/effects` acts on a single press: its loads and readings are those of the solved press,
+frame by frame. The label does not change. So effects that would move the label are refused, and so are those that
 grow from press to press.
 """
 
@@ -53,14 +53,14 @@ class DrawnEffect:
         """
         effect = load(document["effect"])
         _refuse_meaningless(effect, origin)
-        known = {parameter.name: parameter for parameter in effect.parameters}
-        if unknown := sorted(set(document["values"]) - set(known)):
+        parameters = {parameter.name: parameter for parameter in effect.parameters}
+        if unknown := sorted(set(document["values"]) - set(parameters)):
             raise FormatError(
                 f"{origin}: {effect.name} with {', '.join(unknown)}",
-                f"parameters: {', '.join(known)}",
+                f"parameters: {', '.join(parameters)}",
                 "correct values; `tacdata list effects` shows them",
             )
-        values = {name: _value(known[name], given, origin, effect) for name, given in document["values"].items()}
+        values = {name: _value(parameters[name], value, origin, effect) for name, value in document["values"].items()}
         return cls(effect, values)
 
     def placed(self, rng: np.random.Generator, channels: int) -> Placed:
@@ -69,20 +69,20 @@ class DrawnEffect:
         Raises:
             FormatError: If it has numbers for another count of channels.
         """
-        found = {}
+        sizes = {}
         for parameter in self.effect.parameters:
-            given = np.asarray(self.values.get(parameter.name, parameter.default), dtype=float)
+            value = np.asarray(self.values.get(parameter.name, parameter.default), dtype=float)
             # Two numbers of a parameter that each channel has of its own are a range, unless there are two channels.
-            if given.ndim and (not parameter.per_channel or (len(given) == 2 and channels != 2)):
-                given = rng.uniform(*given, size=(channels,) if parameter.per_channel else ())
-            if given.ndim and len(given) != channels:
+            if value.ndim and (not parameter.per_channel or (len(value) == 2 and channels != 2)):
+                value = rng.uniform(*value, size=(channels,) if parameter.per_channel else ())
+            if value.ndim and len(value) != channels:
                 raise FormatError(
-                    f"effect {self.effect.name}: {parameter.name} for {len(given)} channels",
+                    f"effect {self.effect.name}: {parameter.name} for {len(value)} channels",
                     f"one number, or one for each of {channels} channels",
                     "correct the effect's values",
                 )
-            found[parameter.name] = np.broadcast_to(given, (channels,)) if parameter.per_channel else given
-        return Placed(self.effect, found)
+            sizes[parameter.name] = np.broadcast_to(value, (channels,)) if parameter.per_channel else value
+        return Placed(self.effect, sizes)
 
 
 def effects_of(path: Path) -> list[dict[str, Any]]:
@@ -241,32 +241,32 @@ def _refuse_meaningless(effect: Effect, origin: str) -> None:
         )
 
 
-def _value(parameter: Parameter, given: float | list[float], origin: str, effect: Effect) -> Value:
-    numbers = np.atleast_1d(np.asarray(given, dtype=float))
+def _value(parameter: Parameter, size: float | list[float], origin: str, effect: Effect) -> Value:
+    numbers = np.atleast_1d(np.asarray(size, dtype=float))
     where = f"{origin}: effect {effect.name}: {parameter.name}"
     if not (np.isfinite(numbers).all() and (parameter.low <= numbers).all() and (numbers <= parameter.high).all()):
         raise FormatError(
-            f"{where} = {given}", f"{parameter.low:g} to {parameter.high:g} {parameter.unit}", "correct it"
+            f"{where} = {size}", f"{parameter.low:g} to {parameter.high:g} {parameter.unit}", "correct it"
         )
-    if np.ndim(given) == 0:
+    if np.ndim(size) == 0:
         return float(numbers[0])
     if not parameter.per_channel and (len(numbers) != 2 or numbers[0] > numbers[1]):
-        raise FormatError(f"{where} = {given}", "a number, or [lowest, highest]", "correct it")
+        raise FormatError(f"{where} = {size}", "a number, or [lowest, highest]", "correct it")
     return tuple(numbers.tolist())
 
 
 def _from_verdict(entry: dict[str, Any]) -> dict[str, Any]:
-    known = {parameter.name: parameter for parameter in load(entry["effect"]).parameters}
+    parameters = {parameter.name: parameter for parameter in load(entry["effect"]).parameters}
     values: dict[str, Any] = {}
-    for name, found in entry["parameters"].items():
-        parameter = known[name]
-        values[name] = found["value"]
-        if "interval" in found and not parameter.per_channel:
-            values[name] = np.clip(found["interval"], parameter.low, parameter.high).tolist()
+    for name, estimate in entry["parameters"].items():
+        parameter = parameters[name]
+        values[name] = estimate["value"]
+        if "interval" in estimate and not parameter.per_channel:
+            values[name] = np.clip(estimate["interval"], parameter.low, parameter.high).tolist()
     return values
 
 
 def _reads_more_than_force(transducer: Transducer) -> bool:
-    some = np.full((1, transducer.taxels), 0.05)  # N, mm and mm^2 at once: a light touch
-    slopes = transducer.derivatives(Loads(some, some, some))
+    light = np.full((1, transducer.taxels), 0.05)  # N, mm and mm^2 at once: a light touch
+    slopes = transducer.derivatives(Loads(light, light, light))
     return bool(np.any(slopes.closure) or np.any(slopes.area))

@@ -1,4 +1,4 @@
-"""What a simulated board says: the transduction's readings with noise, drift and rounding."""
+"""Readings of a simulated board: the transduction's with noise, drift and rounding."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ def board_counts(
     """Return readings as a board sends them [counts], shape (n, taxels).
 
     Args:
-        counts: What the transduction makes of the loads [counts], shape (n, taxels).
+        counts: Readings of the transduction [counts], shape (n, taxels).
         time_ns: When each frame is sampled [ns], shape (n,), increasing.
-        noise: What is laid on top.
+        noise: Noise on top.
         full_scale: Largest reading [counts]; None for no limit.
         rng: Random generator.
     """
     seconds = np.sqrt(np.diff(time_ns, prepend=time_ns[:1]) / 1e9)[:, None]
     drift = noise.drift * np.cumsum(seconds * rng.standard_normal(counts.shape), axis=0)
-    found = counts + drift + noise.readings * rng.standard_normal(counts.shape)
+    readings = counts + drift + noise.readings * rng.standard_normal(counts.shape)
     if noise.quantum:
-        found = noise.quantum * np.round(found / noise.quantum)
-    return found if full_scale is None else np.clip(found, 0.0, full_scale)
+        readings = noise.quantum * np.round(readings / noise.quantum)
+    return readings if full_scale is None else np.clip(readings, 0.0, full_scale)

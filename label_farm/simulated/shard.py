@@ -1,4 +1,4 @@
-"""Solved presses of one batch in one compact file (NPZ): what episodes are made from, on any machine."""
+"""Solved presses of one batch in one compact file (NPZ): the source of episodes, on any machine."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Shard:
     failed: Mapping[int, str]
     """Number of the press -> the reason, in words."""
     identity: dict[str, Any]
-    """What decided the solutions: hashes of sensor, mesh, settings and code (`SkinModel.identity`)."""
+    """Everything that decided the solutions: hashes of sensor, mesh, settings and code (`SkinModel.identity`)."""
 
     @property
     def numbers(self) -> list[int]:
@@ -47,18 +47,18 @@ class Shard:
     def write(self, folder: Path) -> Path:
         """Write the file into a folder, so that a crash leaves all of it or nothing; return its path."""
         numbers = sorted(self.solutions)
-        known = [self.solutions[n] for n in numbers]
+        solutions = [self.solutions[n] for n in numbers]
         arrays: dict[str, np.ndarray] = {
             "number": np.array(numbers, dtype=np.int64),
-            "states": np.array([len(s.depth) for s in known], dtype=np.int64),
-            "depth": _joined([s.depth for s in known], float),
+            "states": np.array([len(s.depth) for s in solutions], dtype=np.int64),
+            "depth": _joined([s.depth for s in solutions], float),
             "about": np.array(json.dumps({"identity": self.identity, "failed": dict(self.failed)}, sort_keys=True)),
         }
         for name in _GRAINED:
-            grains = _joined([np.round(getattr(s, name) / GRAIN) for s in known], np.int32)
+            grains = _joined([np.round(getattr(s, name) / GRAIN) for s in solutions], np.int32)
             arrays[name] = grains.astype(np.int16) if np.abs(grains).max(initial=0) < 2**15 else grains
         for name in _SINGLE:
-            arrays[name] = _joined([getattr(s, name) for s in known], np.float32)
+            arrays[name] = _joined([getattr(s, name) for s in solutions], np.float32)
         buffer = io.BytesIO()
         np.savez_compressed(buffer, **arrays)  # ty: ignore[invalid-argument-type]
         path = folder / f"presses-{self.numbers[0]:07d}-{len(self.numbers):07d}.npz"
@@ -74,16 +74,16 @@ def shard_files(folder: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class ShardContents:
-    """What a file of solved presses holds, without its arrays."""
+    """Contents of a file of solved presses, without its arrays."""
 
     numbers: list[int]
     """Presses that it settles, sorted; all of one specimen."""
     identity: dict[str, Any]
-    """What decided the solutions."""
+    """Everything that decided the solutions."""
 
 
 def read_about(path: StrPath) -> ShardContents:
-    """Return what a file holds, without reading its arrays.
+    """Return the contents of a file, without reading its arrays.
 
     Raises:
         FormatError: If the file is damaged.
@@ -121,8 +121,8 @@ class StoredSolutions(Mapping[int, PathSolution]):
         """Hold a file's arrays.
 
         Args:
-            arrays: As `Shard.write` wrote them, without what is no array.
-            identity: What decided the solutions.
+            arrays: Arrays of `Shard.write`.
+            identity: Everything that decided the solutions.
         """
         self._identity = identity
         stops = np.cumsum(arrays["states"]).tolist()

@@ -1,4 +1,4 @@
-"""A folder of simulated presses: what it is drawn from, and which of its presses are solved."""
+"""A folder of simulated presses: its plan, and its solved presses."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tacdata.sensor import Sensor
 
 FILE = "simulation.json"
 _DRAWING = tuple(f"label_farm.simulated.{name}" for name in ("plan", "press_draw", "specimen"))
-"""Code that decides what is drawn; each file of presses states what solved it."""
+"""Code that decides the draw; each file of presses states the version of its solver."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Simulation:
     """The design; specimens are drawn around it."""
     seed: int
     mesh_error: bool = False
-    """Whether a coarser mesh says how far off each map is."""
+    """Whether a coarser mesh gives the error of each map."""
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -92,31 +92,31 @@ class Simulation:
         if not path.is_file():
             documents.write(path, self.document, "simulation")
             return
-        held = documents.read(path, "simulation")
-        asked = self.document
-        other = [k for k in ("sensor", "seed", "mesh_error", "code") if held[k] != asked[k]]
-        if _solved_by(held["plan"]) != _solved_by(asked["plan"]):
-            other.insert(0, "plan")
-        if other:
+        stored = documents.read(path, "simulation")
+        document = self.document
+        differing = [k for k in ("sensor", "seed", "mesh_error", "code") if stored[k] != document[k]]
+        if _solved_by(stored["plan"]) != _solved_by(document["plan"]):
+            differing.insert(0, "plan")
+        if differing:
             raise UsageError(
-                f"{self.folder} holds presses of another {' and '.join(other)}",
+                f"{self.folder} holds presses of another {' and '.join(differing)}",
                 "a new folder, or the same plan, sensor, seed and code",
                 f"name another folder, or remove {self.folder}",
             )
 
     @classmethod
     def read(cls, folder: StrPath) -> Simulation:
-        """Read what a folder of presses is drawn from.
+        """Read the plan of a folder of presses.
 
         Raises:
             UsageError: If there is no such folder.
             FormatError: If its file is damaged.
         """
         folder = Path(folder)
-        held = documents.read(folder / FILE, "simulation")
-        plan = SimulationPlan.from_document(held["plan"], str(folder / FILE))
-        sensor = Sensor.from_document(held["sensor"], str(folder / FILE))
-        return cls(folder, plan, sensor, held["seed"], held["mesh_error"])
+        stored = documents.read(folder / FILE, "simulation")
+        plan = SimulationPlan.from_document(stored["plan"], str(folder / FILE))
+        sensor = Sensor.from_document(stored["sensor"], str(folder / FILE))
+        return cls(folder, plan, sensor, stored["seed"], stored["mesh_error"])
 
     @cached_property
     def specimens(self) -> tuple[Sensor, ...]:
@@ -154,11 +154,11 @@ class Simulation:
 
     @cached_property
     def effects(self) -> tuple[tuple[Placed, ...], ...]:
-        """What is laid over the readings, for each specimen."""
+        """Effects on the readings, for each specimen."""
         return tuple(specimen_effects(self.plan, self.sensor, self.seed, n) for n in range(len(self.specimens)))
 
     def job(self, press: Press, model: str) -> Job:
-        """Return what is solved for a press, by a model of its specimen with this content hash."""
+        """Return the job of a press, for a model of its specimen with this content hash."""
         step, specimen = self.plan.load_step, self.specimen(press.index)
         ladder = Ladder(first_step=min(0.05, step), load_step=step, unload_step=3 * step, tolerance=None)
         return Job(
@@ -177,14 +177,14 @@ class Simulation:
     def missing(self, presses: int, size: int) -> Iterator[tuple[int, list[int]]]:
         """Yield (specimen, numbers of presses) to solve together, ``size`` at most.
 
-        The batches of a number of presses are always the same, but for what is settled already.
+        The batches of a number of presses are always the same, except for settled presses.
         """
         settled, count = self.settled, len(self.specimens)
         for start in range(0, presses, count * size):
             for specimen in range(count):
                 numbers = range(start + specimen, min(start + count * size, presses), count)
-                if wanted := [n for n in numbers if n not in settled]:
-                    yield specimen, wanted
+                if unsettled := [n for n in numbers if n not in settled]:
+                    yield specimen, unsettled
 
 
 def _solved_by(plan: dict[str, Any]) -> dict[str, Any]:

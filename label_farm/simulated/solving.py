@@ -42,7 +42,7 @@ def solve(
     """Solve the presses that are missing, and write each batch when it is done.
 
     Args:
-        simulation: What is drawn and solved.
+        simulation: The simulation.
         presses: How many presses are wanted in all.
         device: "cpu", or a GPU such as "cuda:0".
         share: The part that this process solves.
@@ -81,7 +81,7 @@ def _undisturbed(kind: str) -> Iterator[None]:
 
 
 def _freed(kind: str) -> None:
-    """Give a card's memory back that torch keeps: the next skin asks the card what is free."""
+    """Release GPU memory that torch keeps: the next skin asks the GPU for its free memory."""
     if kind == "cuda":
         import torch
 
@@ -99,10 +99,10 @@ def solve_batch(
     """Solve presses of one specimen together.
 
     Args:
-        simulation: What they are drawn from.
+        simulation: Their simulation.
         model: The specimen's skin.
         numbers: The presses.
-        device: What the model solves on.
+        device: Device of the model.
         settled: Called with each press's number, and why it was given up or "".
     """
     from tacdata.skin.press import PressRequest
@@ -137,12 +137,12 @@ def specimen_model(simulation: Simulation, specimen: int, device: str) -> SkinMo
     from tacdata.skin.mesh.coarser import companion_mesh
     from tacdata.skin.model import ModelSettings, SkinModel
 
-    design, own = simulation.sensor, simulation.specimens[specimen]
+    design, specimen_sensor = simulation.sensor, simulation.specimens[specimen]
     settings = ModelSettings(
         mesh=MeshSettings(**simulation.plan.document.get("mesh", {})), error_estimate=simulation.mesh_error
     )
     mesh = build_mesh(design, settings.mesh)
     coarse = companion_mesh(design, settings.mesh, mesh) if simulation.mesh_error else None
-    thick = design.skin.thickness, own.skin.thickness
+    thick = design.skin.thickness, specimen_sensor.skin.thickness
     meshes = [stretched(each, *thick) if each else None for each in (mesh, coarse)]
-    return SkinModel(own, settings, device, *meshes)
+    return SkinModel(specimen_sensor, settings, device, *meshes)

@@ -1,4 +1,4 @@
-"""Draws the specimens of one design: their skins, and what their boards read."""
+"""Draws the specimens of one design: their skins, and the parameters of their boards."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SKIN = {
 def draw_specimen(sensor: Sensor, spread: SpecimenSpread, seed: int, number: int) -> Sensor:
     """Return specimen ``number`` of a design: a sensor with values of its own, and no spread any more.
 
-    A skin's thickness, modulus, Poisson's ratio and friction are drawn as the sensor file's uncertainty says.
+    A skin's thickness, modulus, Poisson's ratio and friction are drawn by the sensor file's uncertainty.
     Registration is not drawn: places are random already, and labels are of the place that was pressed.
 
     Raises:
@@ -45,43 +45,47 @@ def draw_specimen(sensor: Sensor, spread: SpecimenSpread, seed: int, number: int
     document.pop("uncertainty", None)
     document["name"] = f"{sensor.name}-specimen-{number}"
     for name, (part, entry) in _SKIN.items():
-        drawn = _normal(rng)  # drawn in any case, so that what varies decides nothing of the rest
+        drawn = _normal(rng)  # drawn in any case, so that the other draws do not depend on which parameters vary
         if spread.skin and name in sensor.uncertainty:
             document[part][entry] = _kept(name, document[part][entry] + sensor.uncertainty[name] * drawn)
-    told = document["transduction"]
+    stated = document["transduction"]
     count = sensor.taxels.count
     shared = 1 + spread.shared_gain * _normal(rng)
-    told["gain"] = [round(v, 4) for v in (transducer.gain * shared * (1 + spread.gain * _normal(rng, count))).tolist()]
-    told["offset"] = [round(v, 2) for v in (transducer.offset + spread.offset * _normal(rng, count)).tolist()]
-    known = {**vars(transducer.principle), **told.get("parameters", {})}
+    stated["gain"] = [
+        round(v, 4) for v in (transducer.gain * shared * (1 + spread.gain * _normal(rng, count))).tolist()
+    ]
+    stated["offset"] = [round(v, 2) for v in (transducer.offset + spread.offset * _normal(rng, count)).tolist()]
+    values = {**vars(transducer.principle), **stated.get("parameters", {})}
     for name, share in sorted(spread.parameters.items()):
-        if name not in known:
+        if name not in values:
             raise FormatError(
                 f"specimens/parameters: {name}",
-                f"parameters of {told['principle']}: {', '.join(known)}",
+                f"parameters of {stated['principle']}: {', '.join(values)}",
                 "name one of these, or leave it out",
             )
-        value = np.asarray(known[name], dtype=float) * (1 + share * _normal(rng))
-        told.setdefault("parameters", {})[name] = value.round(6).tolist()
+        value = np.asarray(values[name], dtype=float) * (1 + share * _normal(rng))
+        stated.setdefault("parameters", {})[name] = value.round(6).tolist()
     return Sensor.from_document(document, document["name"])
 
 
-def stretched(mesh: SkinMesh, thickness: float, wanted: float) -> SkinMesh:
+def stretched(mesh: SkinMesh, thickness: float, target: float) -> SkinMesh:
     """Return the mesh of a slab as one of another thickness [mm]: heights above the protrusions are scaled.
 
-    A mesh made anew would differ at random, in more than the thickness.
+    A new mesh would differ at random, in more than the thickness.
     """
     nodes = mesh.nodes.copy()
     slab = nodes[:, 2] > 0
-    nodes[slab, 2] *= wanted / thickness
+    nodes[slab, 2] *= target / thickness
     return replace(mesh, nodes=nodes)
 
 
 def differences(specimen: Sensor, design: Sensor) -> dict[str, Any]:
-    """Return what a specimen has of its own, for its record."""
-    own, common = specimen.document, design.document
-    skin = {name: own[part][entry] for name, (part, entry) in _SKIN.items() if own[part][entry] != common[part][entry]}
-    return {"name": specimen.name, **skin, "transduction": own["transduction"]}
+    """Return the differences of a specimen from the design, for its record."""
+    varied, common = specimen.document, design.document
+    skin = {
+        name: varied[part][entry] for name, (part, entry) in _SKIN.items() if varied[part][entry] != common[part][entry]
+    }
+    return {"name": specimen.name, **skin, "transduction": varied["transduction"]}
 
 
 def _normal(rng: np.random.Generator, count: int | None = None) -> Any:

@@ -2,7 +2,7 @@
 
 Solvers before the check of passages (`tacdata.skin.contact.passage_check`) took it for an equilibrium when the skin had
 come out on the far side of a thin shape. A file of solved presses keeps no displacements. But it keeps the map, and no
-skin lies above the underside of what presses it.
+skin is above the underside of its indenter.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ if TYPE_CHECKING:
     from tacdata.skin.press import PressRequest
 
 _LEAST, _SHARE = 0.1, 0.25
-"""Height above the underside from which on skin has passed through [mm], and what is added of the depth [1].
+"""Height above the underside from which on skin has passed through [mm], and the share of the depth that is added [1].
 
 A mesh that is coarse under a sharp edge reaches a tenth of the depth into the shape."""
 
 _AROUND = 0.25
-"""How far around a pixel the highest underside is sought [mm]: beside an edge, maps are of whole elements."""
+"""How far around a pixel the highest underside is sought [mm]: next to an edge, maps are of whole elements."""
 
 _STEPS = 8
 """Fixed-point steps to the place of a leaning shape under a pixel; the lean is at most 30 degrees."""
 
 
 def swallowed_at(job: Job, sensor: Sensor, solution: PathSolution) -> float | None:
-    """Return the first depth [mm] at which the map lies above the shape; None if it does nowhere.
+    """Return the first depth [mm] at which the map is above the shape; None without one.
 
     Args:
         job: The press.
         sensor: The specimen that it presses. Skins whose surface is a file are not judged.
-        solution: What was solved.
+        solution: The solved path.
     """
     from tacdata.skin.press import PressRequest
 
@@ -54,14 +54,14 @@ def swallowed_at(job: Job, sensor: Sensor, solution: PathSolution) -> float | No
 
 
 def underside(request: PressRequest, sensor: Sensor) -> np.ndarray:
-    """Return how far a shape's underside lies above the press's depth [mm].
+    """Return the height of a shape's underside above the press's depth [mm].
 
     Args:
         request: The press.
-        sensor: What it presses.
+        sensor: The pressed sensor.
 
     Returns:
-        Of the map's pixels, shape (pixels_x, pixels_y); inf beside the shape.
+        Of the map's pixels, shape (pixels_x, pixels_y); inf outside the shape.
     """
     from tacdata.skin.contact.first_touch import rise, rotation
 
@@ -74,7 +74,7 @@ def underside(request: PressRequest, sensor: Sensor) -> np.ndarray:
 
 
 def _height(shape: Indenter, turn: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the height of a turned shape's underside over its origin at (x, y) [mm], ``inf`` beside it."""
+    """Return the height of a turned shape's underside over its origin at (x, y) [mm], ``inf`` outside it."""
     place = np.stack([x, y, np.zeros_like(x)])
     for _ in range(_STEPS):
         local = np.einsum("ji,jkl->ikl", turn, place)

@@ -43,18 +43,18 @@ def timeline(press: Press, sensor: Sensor, rng: np.random.Generator) -> Episode:
     period = 1e9 / sensor.taxels.rate
     start = float(rng.uniform(0.0, period))
     times, depths, phases = [np.array([0.0, start])], [np.array([-CLEARANCE] * 2)], []
-    now, at = start, -CLEARANCE
+    clock, at = start, -CLEARANCE
     for name, depth, pause, speed in moves:
         time, path = _motion(at, depth, pause, speed)
-        times.append(now + time)
+        times.append(clock + time)
         depths.append(path)
         if name:
-            phases.append(Phase(name, round(now if name != "rest" else 0.0), round(now + time[-1])))
-        now, at = now + time[-1], depth
+            phases.append(Phase(name, round(clock if name != "rest" else 0.0), round(clock + time[-1])))
+        clock, at = clock + time[-1], depth
     tip_ns, first = np.unique(np.concatenate(times).round().astype(np.int64), return_index=True)
     depth = np.concatenate(depths)[first]
     tip = np.column_stack([np.full(len(depth), press.x), np.full(len(depth), press.y), depth])
-    frames = int(now // period) + 1
+    frames = int(clock // period) + 1
     sample_ns = (np.arange(frames) * period).round().astype(np.int64)
     stream = TaxelStream(sample_ns, sample_ns, np.arange(frames), np.zeros((frames, sensor.taxels.count)))
     return Episode(

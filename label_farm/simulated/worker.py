@@ -12,10 +12,10 @@ from label_farm.simulated.solving import Share, solve
 
 
 def main() -> None:
-    """Solve; a line with its number, and why it was given up, says that a press is settled."""
+    """Solve; a line with its number, and perhaps its error, reports a settled press."""
     folder, presses, index, of = sys.argv[1:]
     tell = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # what libraries print must not mix with it
+    os.dup2(2, 1)  # output of libraries must not mix with it
     solve(
         Simulation.read(Path(folder)),
         int(presses),

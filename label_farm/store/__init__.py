@@ -1,1 +1,1 @@
-"""Solved presses, stored by the hash of what decides them."""
+"""Solved presses, stored by the hash of all their inputs."""

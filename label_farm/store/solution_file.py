@@ -91,11 +91,11 @@ def decode(data: bytes, origin: str) -> tuple[Job, PathSolution]:
 
 
 def _check_version(header: Any, origin: str) -> None:
-    found, known = str(header["version"]), schemas.version("path_solution")
-    if found.split(".")[0] != known.split(".")[0]:
+    version, supported = str(header["version"]), schemas.version("path_solution")
+    if version.split(".")[0] != supported.split(".")[0]:
         raise SolutionVersionError(
-            f"{origin}: result of format version {found}",
-            f"version {known}",
+            f"{origin}: result of format version {version}",
+            f"version {supported}",
             "use the tacdata release that wrote it, or name a new folder with --store",
         )
 

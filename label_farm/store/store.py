@@ -49,7 +49,7 @@ class Store:
         self._sweep()
 
     def _holds_something(self) -> bool:
-        """Return whether the folder is none, or holds what is no beginning of a store."""
+        """Return whether the folder is missing, or has content that is no part of a store."""
         begun = f".{MARK}."
         try:
             return any(p.name != WRITING and not p.name.startswith(begun) for p in self.folder.iterdir())
@@ -71,15 +71,15 @@ class Store:
 
     @property
     def ledger_path(self) -> Path:
-        """Where the queue of this store lies."""
+        """Path of this store's queue."""
         return self.folder / "ledger.sqlite"
 
     def path(self, key: str) -> Path:
-        """Return where the result of a key lies, or would lie."""
+        """Return the path of a key's result."""
         return self.folder / key[:2] / f"{key}.npz"
 
     def failure_path(self, key: str) -> Path:
-        """Return where the failure of a key lies, or would lie."""
+        """Return the path of a key's failure."""
         return self.folder / key[:2] / f"{key}.failure.json"
 
     def intact(self, job: Job) -> bool:
@@ -102,8 +102,8 @@ class Store:
         except FileNotFoundError:
             return None
         try:
-            found, solution = solution_file.decode(data, str(path))
-            if found.key == job.key:
+            stored_job, solution = solution_file.decode(data, str(path))
+            if stored_job.key == job.key:
                 return solution
         except solution_file.SolutionVersionError:
             raise
@@ -130,11 +130,11 @@ class Store:
 
     def keys(self) -> set[str]:
         """Return the keys of all results that lie here, whole or not; a million take seconds."""
-        found: set[str] = set()
+        keys: set[str] = set()
         for entry in os.scandir(self.folder):
             if len(entry.name) == 2 and entry.is_dir():
-                found.update(e.name[:-4] for e in os.scandir(entry.path) if e.name.endswith(".npz"))
-        return found
+                keys.update(e.name[:-4] for e in os.scandir(entry.path) if e.name.endswith(".npz"))
+        return keys
 
     def failure(self, key: str) -> Failure | None:
         """Return why a job failed, or None; an unreadable reason counts as none: the job is tried again."""
@@ -151,19 +151,19 @@ class Store:
         self.failure_path(key).unlink(missing_ok=True)
 
     def _write(self, path: Path, data: bytes) -> None:
-        beside = self.folder / WRITING
-        # Not settled: what a loss of power takes is solved again, and waiting for it was a third of a job's overhead.
+        writing = self.folder / WRITING
+        # No sync to disk: results lost by a power cut are solved again, and waiting took a third of a job's overhead.
         try:
-            with replacement(path, beside, settled=False) as stream:
+            with replacement(path, writing, settled=False) as stream:
                 stream.write(data)
         except FileNotFoundError:
             # Another's sweep took it for old: a clock that jumps ages a file by hours.
-            beside.mkdir(exist_ok=True)
-            with replacement(path, beside, settled=False) as stream:
+            writing.mkdir(exist_ok=True)
+            with replacement(path, writing, settled=False) as stream:
                 stream.write(data)
 
     def _sweep(self) -> None:
-        """Remove what killed writers left; a young file may belong to a living one."""
+        """Remove files of killed writers; a young file may belong to a living one."""
         for path in (self.folder / WRITING).glob("*"):
             try:
                 if time.time() - path.stat().st_mtime > STALE_SECONDS:

@@ -1,6 +1,6 @@
 """Solves jobs on a Dask cluster; ledger and store stay on this computer.
 
-What Dask lacks for this, being durable, the ledger and the store give: a task that is lost with its worker, or with the
+Dask is not durable; the ledger and the store are: a task that is lost with its worker, or with the
 whole cluster, is a claim that is given back. Dask's own messages are pickled: scheduler and workers belong on a network
 whose computers are trusted, or behind its TLS (``tls://``).
 """
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 RESOURCE = "press"
-"""What a worker has one of: it solves one batch at a time."""
+"""Resource of which a worker has one: it solves one batch at a time."""
 CONNECT_SECONDS = 10
 """How long a scheduler may take to answer."""
 ALONE_SECONDS = 30.0
-"""After how long without any worker that is said."""
+"""Time without any worker after which this is reported."""
 FETCH_SECONDS = 15.0
 """How long a finished result may take to come from its worker, which may have been cut off since."""
 LOOK_SECONDS = 1.0
@@ -70,8 +70,8 @@ def solve_there(factory: str, version: str, sensor: dict[str, Any], documents: l
         if isinstance(outcome, SolveError):
             settled.append((job.key, b"", str(outcome), seconds))
             continue
-        made = {"seconds": seconds, "code_version": provenance.code_version(), "worker": owner_name()}
-        outcome = replace(outcome, provenance={**made, **outcome.provenance})
+        stamp = {"seconds": seconds, "code_version": provenance.code_version(), "worker": owner_name()}
+        outcome = replace(outcome, provenance={**stamp, **outcome.provenance})
         settled.append((job.key, solution_file.encode(job, outcome), "", seconds))
     device, likes = os.environ.get(environment.DEVICE, "cpu"), batch_size(_models[version])
     return {"worker": owner_name(), "device": device, "batch": likes, "settled": settled}
@@ -105,12 +105,12 @@ class DaskPool(Engine):
         self.workers, self._address, self._factory = workers, address, factory
         self._roster, self._numbers = Roster(self._ledger), itertools.count()
         self._given: dict[str, list[_Task]] = {}
-        """Address of a worker -> its task. One at a time: a dying worker takes along what it has not handed over yet,
+        """Address of a worker -> its task. One at a time: a dying worker loses results that it has not handed over,
         and a press that does no harm would count as the deadly one."""
         self._refused: dict[str, str] = {}
         """Address of a worker -> why it gets no tasks."""
         self._likes: dict[str, int] = {}
-        """Address of a worker -> how many jobs its model likes at a time; one until it has said so."""
+        """Address of a worker -> how many jobs its model likes at a time; one until it has reported it."""
         self._names: dict[str, str] = {}
         """Address of a worker that is there -> its name on the roster."""
         self._seen: set[str] = set()
@@ -121,9 +121,9 @@ class DaskPool(Engine):
         self._beating = threading.Thread(target=self._beat, args=(lease_seconds,), daemon=True)
         self._beating.start()
 
-    def tend(self, wanted: int, settled: bool = False) -> None:
+    def tend(self, pending: int, settled: bool = False) -> None:
         """Collect finished jobs and submit more; as `Engine.tend`."""
-        if not wanted and not any(self._given.values()):
+        if not pending and not any(self._given.values()):
             return
         client = self._connected()
         for address, tasks in list(self._given.items()):
@@ -141,7 +141,7 @@ class DaskPool(Engine):
                 self._take_in(answer, task, address)
             for task in [task for task in tasks if task.future.status in ("error", "cancelled", "lost")]:
                 self._give_back(task, began=True)
-                # Nothing more goes there before the scheduler says that it is alive: it would be lost, and blamed.
+                # It gets no more jobs before the scheduler reports it alive: they would be lost, and blamed.
                 self._given.pop(address, None)
                 self._looked = time.monotonic()
         if time.monotonic() - self._looked > LOOK_SECONDS:
@@ -174,7 +174,7 @@ class DaskPool(Engine):
         from distributed import Client, LocalCluster
 
         if self._client is not None:
-            self.stop()  # the scheduler went away: what it had is given back
+            self.stop()  # the scheduler went away: its jobs are given back
         try:
             if self._address == "here":
                 # The ledger counts deaths and tries again; Dask need not.
@@ -196,20 +196,20 @@ class DaskPool(Engine):
             ) from None
 
     def _look(self, client: Client) -> None:
-        """See which workers are there, and give back what those that are gone had."""
+        """Update the list of workers, and give back the jobs of those that are gone."""
         self._looked = time.monotonic()
-        found = client.scheduler_info(n_workers=-1)["workers"]
-        there = {address for address, worker in found.items() if worker.get("resources", {}).get(RESOURCE)}
-        self._refused = {address: why for address, why in self._refused.items() if address in there}
-        self._names = {address: name for address, name in self._names.items() if address in there}
-        there -= self._refused.keys()
-        for address in self._given.keys() - there:
+        workers = client.scheduler_info(n_workers=-1)["workers"]
+        addresses = {address for address, worker in workers.items() if worker.get("resources", {}).get(RESOURCE)}
+        self._refused = {address: why for address, why in self._refused.items() if address in addresses}
+        self._names = {address: name for address, name in self._names.items() if address in addresses}
+        addresses -= self._refused.keys()
+        for address in self._given.keys() - addresses:
             for task in self._given.pop(address):
                 task.future.cancel(force=True)
                 self._give_back(task, address not in self._refused)
-        for address in there:
+        for address in addresses:
             self._given.setdefault(address, [])
-        if there:
+        if addresses:
             self._alone_since = self._looked
         elif self._looked - self._alone_since > ALONE_SECONDS:
             self._alone_since = self._looked
@@ -261,7 +261,7 @@ class DaskPool(Engine):
         )
 
     def _give_back(self, task: _Task, began: bool) -> None:
-        """Give back what a task did not settle; if it began and its worker died, that counts as a try."""
+        """Give back the unsettled jobs of a task; if it began and its worker died, that counts as a try."""
         from distributed.scheduler import KilledWorker
 
         error = task.future.exception() if task.future.status == "error" else None
@@ -357,11 +357,11 @@ def dask_engine(address: str) -> EngineMaker:
 def join(address: str, processes: int | None, devices: tuple[str, ...]) -> None:
     """Join a scheduler with worker processes of this computer, one a GPU or core, until interrupted."""
     environment.end_on_terminate()
-    chosen = environment.devices(devices)
-    count = processes or (environment.cores() if chosen == ("cpu",) else len(chosen))
+    names = environment.devices(devices)
+    count = processes or (environment.cores() if names == ("cpu",) else len(names))
     started = []
     for number in range(count):
-        device = chosen[number % len(chosen)]
+        device = names[number % len(names)]
         command = [
             *environment.python("distributed.cli.dask_worker"),
             address,

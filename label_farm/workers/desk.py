@@ -31,7 +31,7 @@ class Desk(Protocol):
         ...
 
     def has(self, job: Job) -> bool:
-        """Return whether a job's result lies there already, whole."""
+        """Return whether a job's complete result exists already."""
         ...
 
     def put(self, job: Job, solution: PathSolution) -> None:
@@ -72,7 +72,7 @@ class LocalDesk:
             owner: Under which name jobs are claimed.
             lease_seconds: For how long a claim holds without a sign of life [s].
             versions: Model versions to work for; None for all that are offered.
-            device: What the worker solves on, for the roster.
+            device: Device of the worker, for the roster.
         """
         self.store, self.owner, self._versions = Store(store), owner, versions
         self.ledger = Ledger(self.store.ledger_path, lease_seconds)
@@ -108,7 +108,7 @@ class LocalDesk:
         return self.ledger.claim(self.owner, version, count)
 
     def has(self, job: Job) -> bool:
-        """Return whether a job's result lies there already, whole."""
+        """Return whether a job's complete result exists already."""
         return self.store.intact(job)
 
     def put(self, job: Job, solution: PathSolution) -> None:

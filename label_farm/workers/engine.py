@@ -1,4 +1,4 @@
-"""The base of what runs jobs: the shared loop, and what each engine must do itself."""
+"""Base class of the engines that run jobs: the shared loop, and the methods that each must add."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ POLL_SECONDS = 0.1
 
 
 class StoreFull(UsageError):
-    """The store's disk is full or refuses; what is finished is kept, and the jobs are back in the queue."""
+    """The store's disk is full or refuses; finished results are kept, and the jobs are back in the queue."""
 
 
 class Engine(ABC):
@@ -52,7 +52,7 @@ class Engine(ABC):
             grow: Asked several times a second for further keys, in the ledger as well; None ends the asking.
 
         Returns:
-            Number of the last change that was told.
+            Number of the last reported change.
 
         Raises:
             UsageError: If the workers' code is of another version.
@@ -81,11 +81,11 @@ class Engine(ABC):
         return since
 
     @abstractmethod
-    def tend(self, wanted: int, settled: bool = False) -> None:
+    def tend(self, pending: int, settled: bool = False) -> None:
         """Keep workers busy; called several times a second.
 
         Args:
-            wanted: How many jobs wait.
+            pending: How many jobs wait.
             settled: Whether a job was settled since the last call.
 
         Raises:
@@ -106,7 +106,7 @@ class Engine(ABC):
 
 
 class EngineMaker(Protocol):
-    """What makes an engine: a class such as `pool.Pool`, or a function that knows what else it needs."""
+    """Factory of an engine: a class such as `pool.Pool`, or a function with its further arguments."""
 
     def __call__(
         self,

@@ -51,12 +51,12 @@ class Pool(Engine):
 
         Args:
             store: Where results and the ledger lie.
-            factory: Dotted path of what builds a model from a sensor.
+            factory: Dotted path of the function that builds a model of a sensor.
             sensors: Content hash of a model -> the sensor that it models; None to work for every model that the
                 ledger offers.
             workers: Number of processes.
             lease_seconds: How long a silent worker keeps its job [s].
-            devices: What the workers solve on, one after the other: "cpu" or GPUs such as "cuda:0".
+            devices: Devices of the workers, one after the other: "cpu" or GPUs such as "cuda:0".
         """
         super().__init__(store, sensors, lease_seconds)
         self.workers = workers
@@ -70,12 +70,12 @@ class Pool(Engine):
         """Process numbers of the workers that were started and not replaced."""
         return [slot.process.pid for slot in self._slots]
 
-    def tend(self, wanted: int, settled: bool = False) -> None:
+    def tend(self, pending: int, settled: bool = False) -> None:
         """Start workers as far as there are jobs, and replace those that died; as `Engine.tend`."""
         if settled:
             self._deaths = 0
         self._replace_dead()
-        while len(self._slots) < min(self.workers, wanted):
+        while len(self._slots) < min(self.workers, pending):
             self._slots.append(self._start(len(self._slots)))
 
     def stop(self) -> None:

@@ -1,4 +1,4 @@
-"""What a worker's process takes of its computer: time of the processor, memory."""
+"""A worker process's use of its computer: time of the processor, memory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Usage:
 
 
 def usage_of(process: int) -> Usage | None:
-    """Return what a process of this computer takes; None where it has ended or the system does not say (no /proc)."""
+    """Return the use of a process of this computer; None if it has ended or the system has no /proc."""
     try:
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
         pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])

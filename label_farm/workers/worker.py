@@ -34,7 +34,7 @@ IDLE_SECONDS = 0.1
 OTHER_CODE = 14
 """Exit code of a worker whose model has another version than the one that it was started for."""
 BROKEN = 15
-"""Exit code after an unexpected error: what the process holds is not trusted any more."""
+"""Exit code after an unexpected error: the state of the process is not trusted any more."""
 NO_ROOM = 16
 """Exit code when the disk is full or refuses: no press is to blame, and no other worker would do better."""
 
@@ -44,15 +44,15 @@ class Assignment:
     """The arguments of a worker, sent to its process as one line."""
 
     store: str
-    """Folder of the store; its ledger lies in it."""
+    """Folder of the store, which contains its ledger."""
     factory: str
-    """Dotted path of what builds the model."""
+    """Dotted path of the function that builds the model."""
     versions: list[str] | None
     """Model versions to work for; None for all that the ledger offers, passing over those of other code."""
     lease_seconds: float
     """For how long a claim holds without a sign of life [s]."""
     device: str = "cpu"
-    """What it solves on."""
+    """Its device."""
 
     def line(self) -> str:
         """Return the assignment as one line."""
@@ -80,7 +80,7 @@ class Worker:
 
         Args:
             desk: Where jobs come from.
-            factory: Dotted path of what builds a model from a sensor.
+            factory: Dotted path of the function that builds a model of a sensor.
             strict: Whether a model that cannot be had here ends the worker; else it is noted and passed over.
         """
         self.desk, self._factory, self._strict = desk, factory, strict
@@ -130,8 +130,8 @@ class Worker:
         try:
             if isinstance(outcome, SolveError):
                 raise outcome
-            made = {"seconds": seconds, "code_version": provenance.code_version(), "worker": owner_name()}
-            self.desk.put(lease.job, replace(outcome, provenance={**made, **outcome.provenance}))
+            stamp = {"seconds": seconds, "code_version": provenance.code_version(), "worker": owner_name()}
+            self.desk.put(lease.job, replace(outcome, provenance={**stamp, **outcome.provenance}))
         except SolveError as error:
             log = "".join(traceback.format_exception(error))
             self.desk.fail(lease.job, Failure("solve", str(error), log, lease.tries), seconds)
@@ -173,7 +173,7 @@ def beat(desk_of: Callable[[], Desk], lease_seconds: float) -> None:
 
 
 def work(worker: Worker, stopped: Callable[[], bool] = lambda: False) -> int:
-    """Take jobs until told to stop; return the exit code."""
+    """Take jobs until stopped; return the exit code."""
     try:
         while not stopped():
             if not worker.step():

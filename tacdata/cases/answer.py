@@ -1,4 +1,4 @@
-"""What the skin model answers to a case: states of one press, as a table of displacements and a document."""
+"""Result of the skin model for a case: states of one press, as a table of displacements and a document."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class CaseAnswer:
     """A solved case."""
 
     model: SkinModel
-    """What solved it."""
+    """The model that solved it."""
     request: PressRequest
     """The press."""
     states: list[Equilibrium]
@@ -49,7 +49,7 @@ class CaseAnswer:
 
     @cached_property
     def readings(self) -> TaxelReadings | None:
-        """What the taxels read; None if the skin stands on none or the sensor file does not describe them."""
+        """Readings of the taxels; None if the skin has none or the sensor file does not describe them."""
         sensor = self.model.sensor
         if sensor.transduction is None or not sensor.skin.protrusion_radius or not sensor.contact.board:
             return None
@@ -72,8 +72,8 @@ class CaseAnswer:
         }
         if blunt := fineness.remark(self.model.mesh, self.model.sensor, self.request):
             document["remarks"].append(blunt)
-        if beside := tip_aside(self.request.indenter):
-            document["remarks"].append(beside)
+        if aside := tip_aside(self.request.indenter):
+            document["remarks"].append(aside)
         if self.error is not None:
             document["error_seconds"] = round(self.error_seconds, 3)
             if self.error.remark:
@@ -110,15 +110,15 @@ class CaseAnswer:
         return result
 
     def write_table(self, path: Path, name: str) -> None:
-        """Write the displacements of the outer face's nodes as Parquet; beside, then renamed."""
+        """Write the displacements of the outer face's nodes as Parquet; first under a temporary name."""
         top = np.unique(self.model.mesh.outer)
         place, count = self.model.mesh.nodes[top], len(self.states)
-        moved = np.concatenate([state.displacement[top] for state in self.states])
+        displacements = np.concatenate([state.displacement[top] for state in self.states])
         columns: dict[str, Any] = {
             "case": pa.array([name] * (count * len(top))).dictionary_encode(),
             "depth": np.repeat(self.request.depths, len(top)),
             **{axis: np.tile(place[:, k], count) for k, axis in enumerate("xy")},
-            **{f"u{axis}": moved[:, k] for k, axis in enumerate("xyz")},
+            **{f"u{axis}": displacements[:, k] for k, axis in enumerate("xyz")},
         }
         stamp = provenance.stamp("tacdata solve", self.model.identity, {"settings": asdict(self.model.settings)})
         table = pa.table(columns).replace_schema_metadata({"tacdata": provenance.canonical(stamp)})

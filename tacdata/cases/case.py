@@ -43,13 +43,13 @@ def read_case(path: StrPath) -> Case:
     """
     path = Path(path)
     document = documents.read(path, "case")
-    given = document.get("sensor")
-    if given is None:
+    entry = document.get("sensor")
+    if entry is None:
         sensor = default_sensor()
-    elif isinstance(given, str):
-        sensor = read_sensor(path.parent / given)
+    elif isinstance(entry, str):
+        sensor = read_sensor(path.parent / entry)
     else:
-        sensor = Sensor.from_document(given, f"{path}: sensor", path.parent)
+        sensor = Sensor.from_document(entry, f"{path}: sensor", path.parent)
     request = PressRequest(
         from_document(document["indenter"], f"{path}: indenter", path.parent),
         float(document.get("x", 0.0)),
@@ -65,9 +65,9 @@ def read_case(path: StrPath) -> Case:
         check_touch(request.indenter, size, (request.x, request.y), request.yaw, deepest, str(path))
     mesh = mesh_for(sensor, request)
     if "mesh" in document:
-        given: dict[str, Any] = dict(document["mesh"])
-        given["focus"] = tuple(given["focus"]) if "focus" in given else None
-        mesh = MeshSettings(**given)
+        entry: dict[str, Any] = dict(document["mesh"])
+        entry["focus"] = tuple(entry["focus"]) if "focus" in entry else None
+        mesh = MeshSettings(**entry)
     # The estimate is made apart from the states, so that their times are their own.
     pointwise = document.get("volumes") == "points"
     settings = ModelSettings(mesh=mesh, error_estimate=False, averaged_from=0.5 if pointwise else 0.0)
@@ -80,7 +80,7 @@ def solve_case(
     """Solve a case and write ``<name>.parquet`` and ``<name>.json`` into ``out``, and ``<name>.png`` if wanted.
 
     Args:
-        case: What to solve.
+        case: The case.
         out: Folder for the results.
         done: Called with each depth [mm] that is solved.
         picture: Whether to draw the deepest state.
@@ -98,14 +98,14 @@ def solve_case(
             raise UsageError(
                 f"{path} exists", "a folder without it: results are never overwritten", "choose another --out"
             )
-    found: CaseAnswer = answer(case.sensor, case.request, case.settings, case.error_estimate, done)
+    result: CaseAnswer = answer(case.sensor, case.request, case.settings, case.error_estimate, done)
     out.mkdir(parents=True, exist_ok=True)
-    found.write_table(table, case.name)
-    document = {**found.document, "case": case.document, "displacements": table.name}
+    result.write_table(table, case.name)
+    document = {**result.document, "case": case.document, "displacements": table.name}
     if picture:
         from tacdata.cases.picture import draw
 
-        draw(drawing, case.name, found)
+        draw(drawing, case.name, result)
         document["picture"] = drawing.name
     documents.write(report, document, "case_result")
     return report

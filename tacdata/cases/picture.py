@@ -72,9 +72,15 @@ def _profile(axes: Any, answer: CaseAnswer, deepest: int) -> None:
         height = -answer.figures.surface[k, :, row]
         axes.plot(grid.x, height, color="tab:blue", alpha=shade, label=f"{answer.request.depths[k]:g} mm")
         if k == deepest and answer.error:
-            off = answer.error.surface[k, :, row]
+            error = answer.error.surface[k, :, row]
             axes.fill_between(
-                grid.x, height - off, height + off, color="tab:blue", alpha=0.3, linewidth=0, label="± numerical error"
+                grid.x,
+                height - error,
+                height + error,
+                color="tab:blue",
+                alpha=0.3,
+                linewidth=0,
+                label="± numerical error",
             )
     axes.axvline(answer.request.x, color="grey", linewidth=0.6, linestyle=":")
     axes.set(title=f"profile at y = {grid.y[row]:g} mm", xlabel="x [mm]", ylabel="height of the outer face [mm]")

@@ -1,4 +1,4 @@
-"""The forward chain: what was done and read, the response that it starts from, and the stages in between."""
+"""The forward chain: paths and readings, the response that it starts from, and the stages in between."""
 
 from tacdata.chain.course import Course, Tool
 from tacdata.chain.forward import Chain, Prediction, predict

@@ -1,4 +1,4 @@
-"""Readings without contact: whether there are any, and what gains they tell."""
+"""Readings without contact, and the gains that follow from them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from tacdata.chain.course import Course
 
 UNLIKE = 0.5
-"""A gain is told from drifting offsets where readings differ by so much, over their mean [1]."""
+"""Least spread of readings, over their mean, that distinguishes a gain from drifting offsets [1]."""
 BELOW, CLEARLY, ANSWERED, FEWEST = 0.5, 0.2, 0.3, 10
 """A path has no side without contact if it goes so far below zero, over its depth. Readings have to span so much of
 their range clearly below, that is, by such a share of the way, in so many rows."""
 AT_REST = 0.05
-"""It is told from a gain above idle where readings without contact are so large [largest rise]."""
+"""Least reading without contact that distinguishes it from a gain above idle [largest rise]."""
 
 
 def quiet_rows(course: Course) -> np.ndarray:
@@ -31,11 +31,11 @@ def told_at_rest(course: Course) -> tuple[np.ndarray | None, str]:
         course: The recordings; those with the rows read alone will do.
     """
     course = course.reduced if len(course.read) < course.rows else course
-    known = np.isfinite(course.readings).all(axis=1)
-    quiet = known & quiet_rows(course)
+    finite = np.isfinite(course.readings).all(axis=1)
+    quiet = finite & quiet_rows(course)
     if not quiet.any():
         return None, "nothing was read without contact"
-    values, idle = course.readings[known], np.median(course.readings[quiet], axis=0)
+    values, idle = course.readings[finite], np.median(course.readings[quiet], axis=0)
     if np.abs(idle).max() < AT_REST * np.abs(values - idle).max():
         return None, "readings without contact are about zero"
     if np.std(values) < UNLIKE * abs(float(np.mean(values))):
@@ -54,28 +54,28 @@ class ZeroSide:
     whole: np.ndarray
     """Range of each channel along the path [its unit], shape (channels,)."""
 
-    def answered(self, whole: np.ndarray) -> float:
-        """Return `low` if readings answer there as they do in the range ``whole``, else 0."""
+    def answered(self, ranges: np.ndarray) -> float:
+        """Return `low` if readings answer there as they do in the range ``ranges``, else 0."""
         # One channel alone may be one that nothing presses.
-        enough = np.linalg.norm(self.under) >= ANSWERED * max(np.linalg.norm(whole), 1e-300)
+        enough = np.linalg.norm(self.under) >= ANSWERED * max(np.linalg.norm(ranges), 1e-300)
         return self.low if enough else 0.0
 
 
 def zero_side(depth: np.ndarray, readings: np.ndarray) -> ZeroSide:
-    """Return how a path lies about zero.
+    """Return the part of a path on each side of zero.
 
     Args:
         depth: Along the path [mm], shape (n,).
         readings: At the same times [any unit], shape (n, channels).
     """
-    known = np.isfinite(depth) & np.isfinite(readings).any(axis=1)
-    depth, readings = depth[known], readings[known]
-    whole = _range(readings)
+    finite = np.isfinite(depth) & np.isfinite(readings).any(axis=1)
+    depth, readings = depth[finite], readings[finite]
+    ranges = _range(readings)
     low = -float(depth.min(initial=0.0))
-    under = depth < -CLEARLY * low
-    if depth.max(initial=0.0) <= 0 or low < BELOW * float(depth.max()) or under.sum() < FEWEST:
-        return ZeroSide(0.0, np.zeros_like(whole), whole)
-    return ZeroSide(low, _range(readings[under]), whole)
+    below = depth < -CLEARLY * low
+    if depth.max(initial=0.0) <= 0 or low < BELOW * float(depth.max()) or below.sum() < FEWEST:
+        return ZeroSide(0.0, np.zeros_like(ranges), ranges)
+    return ZeroSide(low, _range(readings[below]), ranges)
 
 
 def below_zero(sides: Sequence[ZeroSide]) -> float:
@@ -85,8 +85,8 @@ def below_zero(sides: Sequence[ZeroSide]) -> float:
     """
     if not sides:
         return 0.0
-    whole = np.max([side.whole for side in sides], axis=0)
-    each = [side.answered(whole) for side in sides]
+    ranges = np.max([side.whole for side in sides], axis=0)
+    each = [side.answered(ranges) for side in sides]
     return max(each) if np.count_nonzero(each) >= 0.5 * len(each) else 0.0
 
 
@@ -101,12 +101,12 @@ def always_touched(course: Course) -> float:
 def _range(readings: np.ndarray) -> np.ndarray:
     """Return the range of each channel without its outermost tenth and without noise, shape (channels,).
 
-    Noise is what successive readings differ by, in the median; normal noise spans 3.3 standard deviations.
+    Noise is the median difference of successive readings; normal noise spans 3.3 standard deviations.
     """
     result = np.zeros(readings.shape[1])
-    for channel, own in enumerate(readings.T):
-        known = own[np.isfinite(own)]
-        if len(known) > 1:
-            noise = 3.3 * 1.4826 * float(np.median(np.abs(np.diff(known)))) / np.sqrt(2)
-            result[channel] = np.sqrt(max(float(np.ptp(np.quantile(known, [0.05, 0.95]))) ** 2 - noise**2, 0.0))
+    for channel, column in enumerate(readings.T):
+        finite = column[np.isfinite(column)]
+        if len(finite) > 1:
+            noise = 3.3 * 1.4826 * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2)
+            result[channel] = np.sqrt(max(float(np.ptp(np.quantile(finite, [0.05, 0.95]))) ** 2 - noise**2, 0.0))
     return result

@@ -1,4 +1,4 @@
-"""What was done to a sensor and what it read, over whole sessions: the table that the chain works on."""
+"""Paths of an indenter and readings of a sensor, over whole sessions: the table that the chain works on."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ CORNERS = 0.1
 NUDGE = 0.005
 """A little deeper or higher [stroke]: steps of derivatives by depth."""
 ALTERNATES = -0.1
-"""Noise changes sides from row to row: the signs of what successive rows are off correlate by less than this [1].
+"""Noise changes sides from row to row: the signs of the deviations of successive rows correlate by less than this [1].
 
-White noise has -0.46, a random walk -0.33. A commanded path turns twice the same way where it stands between two
+White noise has -0.46, a random walk -0.33. A commanded path turns twice the same way where it rests between two
 moves, and more often in a ramp: it has 0 and more.
 """
 MIDDLE = 1.4826
-"""Standard deviation over the median of what is off without its sign [1]."""
+"""Standard deviation over the median absolute deviation [1]."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Course:
     temperature: np.ndarray | None = None
     """Measured temperature [degC], shape (n,)."""
     notes: tuple[str, ...] = ()
-    """What a person should know of these data, in words."""
+    """Remarks on these data for the user."""
     recording: np.ndarray | None = None
     """Recording that each episode is a stroke of, from 0, shape (episodes,), int64; None: each is its own."""
     numbers: tuple[int, ...] = ()
@@ -76,7 +76,7 @@ class Course:
     clipped: np.ndarray | None = None
     """Readings that a channel's range ends at: more would read the same, shape (n, channels), bool; None: none."""
     apart: bool = False
-    """Whether episodes are so far apart that nothing is remembered from one to the next, whatever the clock says."""
+    """Whether episodes are so far apart that no memory lasts from one to the next, regardless of the clock."""
 
     @property
     def rows(self) -> int:
@@ -90,7 +90,7 @@ class Course:
 
     @property
     def channel_names(self) -> tuple[str, ...]:
-        """What each channel is called, by its number in the recordings."""
+        """Name of each channel, by its number in the recordings."""
         return tuple(f"channel {k}" for k in self.numbers or range(self.channels))
 
     @property
@@ -109,7 +109,7 @@ class Course:
         rows = self.read
         if len(rows) == self.rows:
             return self
-        kept = {
+        columns = {
             name: value[rows]
             for name in (
                 "time",
@@ -125,7 +125,7 @@ class Course:
             )
             if (value := getattr(self, name)) is not None
         }
-        return replace(self, **kept)
+        return replace(self, **columns)
 
     @cached_property
     def step(self) -> np.ndarray:
@@ -158,7 +158,7 @@ class Course:
 
     @cached_property
     def dithers(self) -> np.ndarray:
-        """Noise of x, y and depth, as the standard deviation of what a row is off the line through its neighbours [mm].
+        """Noise of x, y and depth, as the standard deviation of a row from the line through its neighbours [mm].
 
         A commanded path is straight but for its corners: it has none. Rows laid between the path's own points are on
         the line and do not count. Neither do turns of a path that goes up and down. Shape (3,).
@@ -168,16 +168,16 @@ class Course:
             return np.zeros(3)
         gap = np.maximum(time[2:] - time[:-2], 1e-12)
         share = ((time[1:-1] - time[:-2]) / gap)[:, None]
-        off = tip[1:-1] - (1 - share) * tip[:-2] - share * tip[2:]
-        off = off / np.sqrt(1 + share**2 + (1 - share) ** 2)
+        deviation = tip[1:-1] - (1 - share) * tip[:-2] - share * tip[2:]
+        deviation = deviation / np.sqrt(1 + share**2 + (1 - share) ** 2)
         inner = self.episode[2:] == self.episode[:-2]
-        least = CORNERS * max(int(inner.sum()), 1)
-        found = np.zeros(3)
-        for k, axis in enumerate(off[inner].T):
-            moved = axis[np.abs(axis) > 1e-9]
-            if len(moved) > least and np.mean(np.sign(moved[1:] * moved[:-1])) < ALTERNATES:
-                found[k] = MIDDLE * float(np.median(np.abs(moved)))
-        return found
+        limit = CORNERS * max(int(inner.sum()), 1)
+        noise = np.zeros(3)
+        for k, axis in enumerate(deviation[inner].T):
+            steps = axis[np.abs(axis) > 1e-9]
+            if len(steps) > limit and np.mean(np.sign(steps[1:] * steps[:-1])) < ALTERNATES:
+                noise[k] = MIDDLE * float(np.median(np.abs(steps)))
+        return noise
 
     @property
     def dither(self) -> float:
@@ -207,6 +207,6 @@ class Course:
 
     def of(self, episodes: np.ndarray) -> np.ndarray:
         """Return which rows belong to some episodes, shape (n,), bool."""
-        chosen = np.zeros(self.episodes, dtype=bool)
-        chosen[episodes] = True
-        return chosen[self.episode]
+        mask = np.zeros(self.episodes, dtype=bool)
+        mask[episodes] = True
+        return mask[self.episode]

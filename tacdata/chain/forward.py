@@ -1,4 +1,4 @@
-"""From a course and an ordered list of effects to what the streams should read."""
+"""From a course and an ordered list of effects to the expected streams."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Acting(Protocol):
 
     @property
     def seen_by_tag(self) -> bool:
-        """Whether a tag on the carriage sees what a kinematic effect does."""
+        """Whether a tag on the carriage sees the kinematic effect."""
         ...
 
     def act(self, state: State) -> State:
@@ -44,7 +44,7 @@ class Prediction:
     tag: np.ndarray
     """x, y, depth that a tag sees [mm], shape (n, 3)."""
     pose: np.ndarray
-    """x, y, depth of the tip as it is [mm], shape (n, 3): what the label belongs to."""
+    """x, y, depth of the true tip [mm], shape (n, 3), to which the label belongs."""
 
 
 class Chain:
@@ -54,8 +54,8 @@ class Chain:
         """Run the chain.
 
         Args:
-            course: What was done; its readings are not looked at.
-            response: What it starts from; must stay as it is.
+            course: The paths; their readings are not used.
+            response: The response at the start; must not change.
             effects: In any order; they act by stage, within a stage in the order given.
         """
         empty = np.empty(0)
@@ -70,12 +70,12 @@ class Chain:
         return _said(self._runs[-1])
 
     def again(self, effects: Sequence[Acting]) -> Prediction:
-        """Return the prediction with other effects; only what comes after the first that differs is run."""
-        steps, known = _steps(effects), 0
-        while known < min(len(steps), len(self._steps)) and steps[known] is self._steps[known]:
-            known += 1
-        run = self._runs[known]
-        for step in steps[known:]:
+        """Return the prediction with other effects; only the stages from the first difference on are run."""
+        steps, common = _steps(effects), 0
+        while common < min(len(steps), len(self._steps)) and steps[common] is self._steps[common]:
+            common += 1
+        run = self._runs[common]
+        for step in steps[common:]:
             run = _after(run, step)
         return _said(run)
 
@@ -84,8 +84,8 @@ def predict(course: Course, response: Response, effects: Sequence[Acting]) -> Pr
     """Run the chain.
 
     Args:
-        course: What was done; its readings are not looked at.
-        response: What it starts from.
+        course: The paths; their readings are not used.
+        response: The response at the start.
         effects: In any order; they act by stage, within a stage in the order given.
     """
     return Chain(course, response, effects).prediction
@@ -93,7 +93,7 @@ def predict(course: Course, response: Response, effects: Sequence[Acting]) -> Pr
 
 @dataclass(frozen=True)
 class _Run:
-    """The state after a step, with what was put aside before."""
+    """The state after a step, with the parts kept from before."""
 
     state: State
     force: np.ndarray
@@ -103,7 +103,7 @@ _TAG, _LOAD, _SIGNAL = "the tag is seen", "the skin is loaded", "the load is rea
 
 
 def _steps(effects: Sequence[Acting]) -> list[Acting | str]:
-    """Return effects in the order in which they act, with what the response does between them."""
+    """Return effects in the order in which they act, with the steps of the response between them."""
     by_stage = {stage: [e for e in effects if e.stage == stage] for stage in STAGES}
     kinematic = by_stage["kinematics"]
     return [

@@ -1,4 +1,4 @@
-"""Operators with memory along a course: what effects of history are built from."""
+"""Operators with memory along a course: the building blocks of effects of history."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def low_passes(values: np.ndarray, step: np.ndarray, taus: np.ndarray, shares: n
 
 
 def low_pass_between(values: np.ndarray, step: np.ndarray, tau: float) -> np.ndarray:
-    """Return what `low_pass` does of an input that bends between rows, exact for a parabola.
+    """Return the part of `low_pass` due to the curvature of the input between rows, exact for a parabola.
 
-    A straight line lies above a load that grows ever faster.
+    A straight line is above a load that grows ever faster.
 
     Args:
         values: Input, shape (n, k).
@@ -70,67 +70,67 @@ def second_order(values: np.ndarray, step: np.ndarray, tau: float, damping: floa
         tau: How late y is behind a ramp [s], above 0.
         damping: D; 1 is critical, from there on y does not overshoot [1].
     """
-    apart = damping**2 - 1
-    apart = apart if abs(apart) > DOUBLE else -DOUBLE
-    if apart > 0:
-        taus = 0.5 * tau * (1 + np.array([1.0, -1.0]) * np.sqrt(apart) / damping)
+    discriminant = damping**2 - 1
+    discriminant = discriminant if abs(discriminant) > DOUBLE else -DOUBLE
+    if discriminant > 0:
+        taus = 0.5 * tau * (1 + np.array([1.0, -1.0]) * np.sqrt(discriminant) / damping)
         return low_passes(values, step, taus, taus * [1.0, -1.0] / (taus[0] - taus[1]))
-    pole = 0.5 * tau * (1 + 1j * np.sqrt(-apart) / damping)
+    pole = 0.5 * tau * (1 + 1j * np.sqrt(-discriminant) / damping)
     ratio = step / pole
     ratio = np.where(ratio.real > 700.0, 700.0, ratio)
     decay = np.exp(-ratio)
     small = np.abs(ratio) < 1e-8
     weight = np.where(small, 1.0, (1 - decay) / np.where(small, 1.0, ratio))
-    given = (1 - weight) * values + (weight - decay) * np.concatenate([[0.0], values[:-1]])
+    forcing = (1 - weight) * values + (weight - decay) * np.concatenate([[0.0], values[:-1]])
     # Turned along with the pole, only a real recursion is left of a complex one.
     turn = np.exp(-1j * np.cumsum(ratio.imag))
-    turned = given / turn
-    both = _recursion(np.stack([turned.real, turned.imag], axis=-1), np.abs(decay)) @ np.array([1.0, 1j])
-    return (pole * both * turn).imag / pole.imag
+    rotated = forcing / turn
+    parts = _recursion(np.stack([rotated.real, rotated.imag], axis=-1), np.abs(decay)) @ np.array([1.0, 1j])
+    return (pole * parts * turn).imag / pole.imag
 
 
-def _recursion(given: np.ndarray, decay: np.ndarray) -> np.ndarray:
-    """Return y_i = E_i y_{i-1} + b_i, y_0 = 0, for ``given`` b, shape (n, k), and ``decay`` E, shape (n,)."""
+def _recursion(forcing: np.ndarray, decay: np.ndarray) -> np.ndarray:
+    """Return y_i = E_i y_{i-1} + b_i, y_0 = 0, for ``forcing`` b, shape (n, k), and ``decay`` E, shape (n,)."""
     from tacdata.chain.memory_kernels import filtered
 
     fresh = np.maximum(1 - decay, 1e-300)[:, None]
-    return filtered(np.ascontiguousarray(given / fresh), decay[:, None], decay[:, None], np.ones(1))
+    return filtered(np.ascontiguousarray(forcing / fresh), decay[:, None], decay[:, None], np.ones(1))
 
 
 def bends(values: np.ndarray, step: np.ndarray) -> np.ndarray:
     """Return the second derivative of an input between each row and the one before [its unit / s^2], shape (n, k).
 
-    It is 0 beside rows that are spaced too unevenly to say.
+    It is 0 next to rows that are spaced too unevenly.
 
     Args:
         values: Input, shape (n, k).
         step: Time since the row before [s], shape (n,).
     """
-    before, after = step[1:-1], step[2:]
-    known = np.maximum(before, after) <= UNEVEN * np.minimum(before, after)
-    known &= np.minimum(before, after) > 0
-    width = np.where(known, 0.5 * (before + after), np.inf)[:, None]
+    step_before, step_after = step[1:-1], step[2:]
+    even = np.maximum(step_before, step_after) <= UNEVEN * np.minimum(step_before, step_after)
+    even &= np.minimum(step_before, step_after) > 0
+    width = np.where(even, 0.5 * (step_before + step_after), np.inf)[:, None]
     slope = np.diff(values, axis=0)
     slope /= np.maximum(step[1:], 1e-12)[:, None]
-    own = np.zeros(values.shape)
-    np.divide(np.diff(slope, axis=0), width, out=own[1:-1])
+    bend = np.zeros(values.shape)
+    np.divide(np.diff(slope, axis=0), width, out=bend[1:-1])
     count = np.zeros(len(values))
-    count[1:-1] = known
-    both = np.maximum(count[1:] + count[:-1], 1.0)[:, None]
+    count[1:-1] = even
+    rows_around = np.maximum(count[1:] + count[:-1], 1.0)[:, None]
     result = np.zeros(values.shape)
-    np.divide(own[1:] + own[:-1], both, out=result[1:])
+    np.divide(bend[1:] + bend[:-1], rows_around, out=result[1:])
     return result
 
 
 def play(values: np.ndarray, width: float, anew: np.ndarray | None = None) -> np.ndarray:
-    """Return the play operator: what follows an input through a dead band of +- ``width``, shape as the input.
+    """Return the play operator: the output that follows an input through a dead band of +- ``width``, of its shape.
 
     y_i = max(u_i - w, min(u_i + w, y_{i-1})); before the first row the input came from below.
 
     Args:
         values: Input, shape (n,) or (n, k).
         width: Half the dead band, in the input's unit.
-        anew: Rows at which it begins anew, come from below, shape (n,), bool; None for the first alone.
+        anew: Rows at which it is reset, from below, shape (n,), bool; None for the first alone.
     """
     from tacdata.chain.memory_kernels import played
 
@@ -139,9 +139,9 @@ def play(values: np.ndarray, width: float, anew: np.ndarray | None = None) -> np
 
 
 def dead_band(values: np.ndarray, width: float, noise: float) -> np.ndarray:
-    """Return by how much what follows a measured input through a dead band is off it, shape (n,).
+    """Return the deviation of the output of a dead band from its measured input, shape (n,).
 
-    Any dead band takes up the noise of what was measured: what that would change is not this one's doing.
+    Any dead band removes the noise of the measurement: that part of the change is not counted.
 
     Args:
         values: Input, shape (n,).
@@ -158,7 +158,7 @@ def slip_lags(values: np.ndarray, widths: np.ndarray, anew: np.ndarray) -> np.nd
     Args:
         values: Input, shape (n,).
         widths: Half the band of each element, in the input's unit, shape (elements,).
-        anew: Rows at which all elements begin anew, shape (n,), bool.
+        anew: Rows at which all elements are reset, shape (n,), bool.
     """
     return np.stack([play(values, width, anew) + width - values for width in widths.tolist()])
 
@@ -171,7 +171,7 @@ def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:
     Args:
         values: Input u, shape (n,).
         width: Of the turn, in the input's unit, above 0.
-        first: Rows at which z begins anew at -1, shape (n,), bool.
+        first: Rows at which z is reset to -1, shape (n,), bool.
     """
     from tacdata.chain.memory_kernels import filtered
 
@@ -208,15 +208,15 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
     """
     from tacdata.chain.memory_kernels import between
 
-    wanted = time - delay
+    instants = time - delay
     starts = np.searchsorted(episode, np.arange(episode[-1] + 1))
     ends = np.append(starts[1:], len(time))
     low, high = starts[episode], ends[episode] - 1
-    wanted = np.clip(wanted, time[low], time[high])
-    right = np.clip(np.searchsorted(time, wanted), low + 1, high)
+    instants = np.clip(instants, time[low], time[high])
+    right = np.clip(np.searchsorted(time, instants), low + 1, high)
     right = np.maximum(right, 1)
     gap = np.maximum(time[right] - time[right - 1], 1e-12)
-    share = np.clip((wanted - time[right - 1]) / gap, 0.0, 1.0)
+    share = np.clip((instants - time[right - 1]) / gap, 0.0, 1.0)
     result = between(_wide(values), right, share)
     step = np.diff(time, prepend=time[0])
     step[starts] = np.inf

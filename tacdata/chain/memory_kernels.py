@@ -15,16 +15,16 @@ def _filter(
     decay: wp.array2d(dtype=wp.float64),
     weight: wp.array2d(dtype=wp.float64),
     share: wp.array(dtype=wp.float64),
-    now: wp.array2d(dtype=Lanes),
+    state: wp.array2d(dtype=Lanes),
     result: wp.array2d(dtype=Lanes),
 ):
     for i in range(1, values.shape[0]):
         for j in range(values.shape[1]):
-            value, before, total = values[i, j], values[i - 1, j], Lanes()
+            value, previous, total = values[i, j], values[i - 1, j], Lanes()
             for t in range(share.shape[0]):
-                fade, kept = decay[i, t], weight[i, t]
-                y = fade * now[t, j] + (wp.float64(1.0) - kept) * value + (kept - fade) * before
-                now[t, j] = y
+                fade, gain = decay[i, t], weight[i, t]
+                y = fade * state[t, j] + (wp.float64(1.0) - gain) * value + (gain - fade) * previous
+                state[t, j] = y
                 total += share[t] * y
             result[i, j] = total
 
@@ -55,10 +55,10 @@ def _between(
     result: wp.array2d(dtype=wp.float64),
 ):
     i = wp.tid()
-    after, by = right[i], share[i]
+    upper, by = right[i], share[i]
     for j in range(values.shape[1]):
-        before = values[after - wp.int64(1), j]
-        result[i, j] = before + by * (values[after, j] - before)
+        lower = values[upper - wp.int64(1), j]
+        result[i, j] = lower + by * (values[upper, j] - lower)
 
 
 def between(values: np.ndarray, right: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -71,8 +71,8 @@ def between(values: np.ndarray, right: np.ndarray, share: np.ndarray) -> np.ndar
     """
     result = np.empty((len(right), values.shape[1]))
     if len(right):
-        after = wp.array(np.ascontiguousarray(right), dtype=wp.int64, device="cpu", copy=False)
-        wp.launch(_between, len(right), [_shared(values), after, _shared(share), _shared(result)], device="cpu")
+        upper = wp.array(np.ascontiguousarray(right), dtype=wp.int64, device="cpu", copy=False)
+        wp.launch(_between, len(right), [_shared(values), upper, _shared(share), _shared(result)], device="cpu")
     return result
 
 
@@ -86,21 +86,21 @@ def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray, share: n
         share: By which each is multiplied, shape (t,), float64.
     """
     columns, wide = values.shape[1], padded(values)
-    result, now = np.empty(wide.shape), np.zeros((len(share), wide.shape[1]))
+    result, state = np.empty(wide.shape), np.zeros((len(share), wide.shape[1]))
     if len(values):
         result[0] = 0.0
-        given = [in_lanes(wide), _shared(decay), _shared(weight), _shared(share), in_lanes(now), in_lanes(result)]
-        wp.launch(_filter, 1, given, device="cpu")
+        arguments = [in_lanes(wide), _shared(decay), _shared(weight), _shared(share), in_lanes(state), in_lanes(result)]
+        wp.launch(_filter, 1, arguments, device="cpu")
     return np.ascontiguousarray(result[:, :columns])
 
 
 def played(values: np.ndarray, width: float, anew: np.ndarray) -> np.ndarray:
-    """Return y_i = max(u_i - w, min(u_i + w, y_{i-1})), u_i - w at first and anew, shape (n, k), as u (float64).
+    """Return y_i = max(u_i - w, min(u_i + w, y_{i-1})), u_i - w at a reset, shape (n, k), as u (float64).
 
     Args:
         values: u, shape (n, k), float64.
         width: w, in the input's unit.
-        anew: Rows that forget those before, shape (n,), bool.
+        anew: Rows of a reset, shape (n,), bool.
     """
     result = np.zeros(values.shape)
     if len(values):

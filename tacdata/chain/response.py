@@ -1,4 +1,4 @@
-"""What a chain starts from: loads on the channels by the pose of the tip alone, without memory."""
+"""Start of a chain: loads on the channels by the pose of the tip alone, without memory."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ class Response(ABC):
     """A response without memory: pose to loads, loads to readings."""
 
     fitted = False
-    """Whether it was fitted to the recordings that are judged; then only what has memory can be judged."""
+    """Whether it was fitted to the recordings that are judged; then only effects with memory can be judged."""
     form_error = 0.0
-    """Share of what an effect explains that may be its equation's error through this response, root of squares [1]."""
+    """Share of an effect's contribution that may be model error through this response, root of squares [1]."""
 
     error = 0.0
     """Root mean square of its numerical error, over that of the loads [1]; 0 where none is stated."""

@@ -76,22 +76,22 @@ def rows_of(
     longest = BETWEEN * max(1.0, float(path[:, 2].max()))
     between = _between(mean_time, tip_at(mean_time), longest) if len(mean_time) > 1 else np.zeros(0)
     between = np.union1d(between, _corners(np.union1d(mean_time, between), path_time, path, BENT * longest))
-    every = np.concatenate([mean_time, between])
-    order = np.argsort(every, kind="stable")
+    times = np.concatenate([mean_time, between])
+    order = np.argsort(times, kind="stable")
     filled = np.concatenate([mean, np.full((len(between), values.shape[1]), np.nan)])[order]
     weight = np.concatenate([count, np.zeros(len(between))])[order]
     # The mean of readings is that at their mean tip: where the tip turns, it was elsewhere at their mean time.
     way = np.stack([_mean(group, column) for column in tip.T], axis=-1)
-    return Rows(every[order], np.concatenate([way, tip_at(between)])[order], filled, weight)
+    return Rows(times[order], np.concatenate([way, tip_at(between)])[order], filled, weight)
 
 
 def _mean(group: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Return the mean of what is known of each group; NaN where nothing is."""
-    known = np.isfinite(column)
-    if known.all():
+    """Return the mean of the finite values of each group; NaN without any."""
+    finite = np.isfinite(column)
+    if finite.all():
         return np.bincount(group, column) / np.bincount(group)
-    count = np.bincount(group, known)
-    total = np.bincount(group, np.where(known, column, 0.0))
+    count = np.bincount(group, finite)
+    total = np.bincount(group, np.where(finite, column, 0.0))
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
@@ -106,9 +106,9 @@ def _groups(time: np.ndarray, last: np.ndarray, tip: np.ndarray, slow: float) ->
     """
     result, number, begin = np.zeros(len(time), dtype=np.int64), 0, 0
     for i in range(1, len(time)):
-        rest = time[begin] - last[begin]
-        wide = max(rest, 0.0) * WIDEST
-        resting = rest >= SETTLED and last[i] == last[begin] and time[i] - time[begin] <= wide
+        pause = time[begin] - last[begin]
+        wide = max(pause, 0.0) * WIDEST
+        resting = pause >= SETTLED and last[i] == last[begin] and time[i] - time[begin] <= wide
         if not resting:
             near = slow >= 0 and time[i] - time[begin] <= BRIEF and np.abs(tip[i] - tip[begin]).max() <= slow
             if not near:
@@ -117,7 +117,7 @@ def _groups(time: np.ndarray, last: np.ndarray, tip: np.ndarray, slow: float) ->
     return result
 
 
-def _corners(time: np.ndarray, path_time: np.ndarray, path: np.ndarray, most: float) -> np.ndarray:
+def _corners(time: np.ndarray, path_time: np.ndarray, path: np.ndarray, tolerance: float) -> np.ndarray:
     """Return times at which the path is off the straight lines between rows.
 
     A corner that is cut looks like a delay or a filter.
@@ -126,23 +126,23 @@ def _corners(time: np.ndarray, path_time: np.ndarray, path: np.ndarray, most: fl
         time: Times of the rows [s], shape (n,), increasing.
         path_time: Times of the path [s], shape (p,).
         path: x, y, depth [mm], shape (p, 3).
-        most: How far off a straight line may be [mm].
+        tolerance: How far off a straight line may be [mm].
     """
     bent = np.diff(path, 2, axis=0)
     # Fewer points than readings are the corners of a command.
     measured = len(path) > len(time)
     noise = MIDDLE * np.median(np.abs(bent), axis=0) / np.sqrt(6) if measured and len(bent) else np.zeros(3)
     within = (path_time > time[0]) & (path_time < time[-1])
-    when, there = path_time[within], path[within]
+    when, corners = path_time[within], path[within]
     rows = time
     for _ in range(FEW_BETWEEN):
         straight = np.stack([np.interp(rows, path_time, path[:, axis]) for axis in range(3)], axis=-1)
-        off = np.stack([np.interp(when, rows, straight[:, axis]) for axis in range(3)], axis=-1) - there
-        off = (np.abs(off) - NOISE * noise).max(axis=1, initial=-np.inf)
+        deviation = np.stack([np.interp(when, rows, straight[:, axis]) for axis in range(3)], axis=-1) - corners
+        deviation = (np.abs(deviation) - NOISE * noise).max(axis=1, initial=-np.inf)
         gap = np.searchsorted(time, when)
-        order = np.lexsort((-off, gap))
+        order = np.lexsort((-deviation, gap))
         first = order[np.flatnonzero(np.diff(gap[order], prepend=-1))]
-        added = when[first[off[first] > most]]
+        added = when[first[deviation[first] > tolerance]]
         if not len(added):
             break
         rows = np.union1d(rows, added)
@@ -158,9 +158,9 @@ def _between(time: np.ndarray, tip: np.ndarray, longest: float) -> np.ndarray:
         float(speed.max(initial=0)), 1e-9
     )
     kink = change[:-1] | change[1:]
-    wanted = np.where(kink & (gap < 0.2) & (way > SHORT * longest), FEW_BETWEEN, np.ceil(way / longest) - 1)
+    counts = np.where(kink & (gap < 0.2) & (way > SHORT * longest), FEW_BETWEEN, np.ceil(way / longest) - 1)
     parts = []
-    for i in np.flatnonzero(wanted > 0):
-        count = int(min(wanted[i], FEW_BETWEEN))
+    for i in np.flatnonzero(counts > 0):
+        count = int(min(counts[i], FEW_BETWEEN))
         parts.append(time[i] + gap[i] * np.arange(1, count + 1) / (count + 1))
     return np.concatenate(parts) if parts else np.zeros(0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 FAR = 8.0
-"""A jump is so many standard deviations of what readings differ by from their neighbours' median [1]..."""
+"""Least size of a jump, in standard deviations of the readings from the median of their neighbours [1]..."""
 WIDE = 2.0
 """...and so many times the range of the four neighbours, so that the tip of a stroke is none [1]."""
 SELDOM = 0.1
@@ -24,20 +24,20 @@ def without_spikes(values: np.ndarray) -> np.ndarray:
         return values
     near = np.stack([np.roll(values, shift, axis=0) for shift in (-2, -1, 1, 2)])
     middle = np.median(near, axis=0)
-    off = np.abs(values - middle)
-    inner = off[2:-2]
-    known = np.isfinite(inner)
-    count = np.maximum(known.sum(axis=0), 1)
+    deviation = np.abs(values - middle)
+    inner = deviation[2:-2]
+    finite = np.isfinite(inner)
+    count = np.maximum(finite.sum(axis=0), 1)
     # A mean that single jumps do not move much; a median is 0 where readings are mostly the same.
-    held = np.where(known, np.minimum(inner, np.where(known, inner, 0.0).sum(axis=0) / count * 4), 0.0)
-    usual = 1.2533 * held.sum(axis=0) / count
-    jump = (off > FAR * usual) & (off > WIDE * (near.max(axis=0) - near.min(axis=0)))
+    bounded = np.where(finite, np.minimum(inner, np.where(finite, inner, 0.0).sum(axis=0) / count * 4), 0.0)
+    usual = 1.2533 * bounded.sum(axis=0) / count
+    jump = (deviation > FAR * usual) & (deviation > WIDE * (near.max(axis=0) - near.min(axis=0)))
     jump[:2] = jump[-2:] = False
     return np.where(jump, middle, values)
 
 
 def copies(values: np.ndarray) -> np.ndarray:
-    """Return which frames are copies of the one before, shape (n,), bool: all channels alike, and seldom so.
+    """Return which frames are copies of the one before, shape (n,), bool: equal in all channels, and rare.
 
     Args:
         values: One channel a column, shape (n, k).

@@ -127,14 +127,14 @@ def cubic(table: np.ndarray, place: np.ndarray, through_nodes: bool, columns: in
         )
         return result[:, :columns]
     # A press goes down and up at one place: 16 of the 64 nodes' weights are the same all along.
-    there = in_lanes(np.empty((len(begins) * deep, lanes)))
-    given = [_shared(place[begins]), nodes, wide, deep, through_nodes, there]
-    wp.launch(_at_places, len(begins), given, device="cpu")
+    nodes_between = in_lanes(np.empty((len(begins) * deep, lanes)))
+    arguments = [_shared(place[begins]), nodes, wide, deep, through_nodes, nodes_between]
+    wp.launch(_at_places, len(begins), arguments, device="cpu")
     run = np.zeros(len(place), dtype=np.int32)
     run[1:] = np.cumsum(moves)
     runs = wp.array(run, dtype=wp.int32, device="cpu", copy=False)
-    given = [_shared(place[:, 2]), runs, there, deep, through_nodes, in_lanes(result)]
-    wp.launch(_along_depth, len(place), given, device="cpu")
+    arguments = [_shared(place[:, 2]), runs, nodes_between, deep, through_nodes, in_lanes(result)]
+    wp.launch(_along_depth, len(place), arguments, device="cpu")
     return result[:, :columns]
 
 

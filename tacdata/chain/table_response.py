@@ -60,9 +60,9 @@ class TableResponse(Response):
         self._curve = _straight_beyond(curve_load, curve_signal)
         self.gain, self.offset = gain, offset
         self._rough = False
-        both = np.concatenate([load, force[..., None]], axis=-1)
-        self._splines = [_Table.of(_coefficients(each)) for each in both]
-        self._nodes = [_Table.of(_continued(each)) for each in both]
+        values = np.concatenate([load, force[..., None]], axis=-1)
+        self._splines = [_Table.of(_coefficients(each)) for each in values]
+        self._nodes = [_Table.of(_continued(each)) for each in values]
         self._channels = load.shape[-1]
         self._kept: dict[int, _Answer] = {}
         self._forces: dict[int, np.ndarray] = {}
@@ -74,9 +74,9 @@ class TableResponse(Response):
 
     def rougher(self) -> TableResponse:
         """Return the same table read by polynomials through four nodes: off the splines by about the splines' error."""
-        other = self._copied()
-        other._rough = True
-        return other
+        coarser = self._copied()
+        coarser._rough = True
+        return coarser
 
     @classmethod
     def read(cls, path: StrPath) -> TableResponse:
@@ -106,16 +106,16 @@ class TableResponse(Response):
 
     def idling_at(self, offset: np.ndarray) -> TableResponse:
         """Return the same response with other readings without load, shape (channels,)."""
-        other = self._copied()
-        other.offset = offset
-        return other
+        copied = self._copied()
+        copied.offset = offset
+        return copied
 
     def with_tools(self, order: list[int]) -> TableResponse:
         """Return the same response with its tools in another order, or fewer."""
-        other = self._copied()
-        other._splines, other._nodes = [self._splines[k] for k in order], [self._nodes[k] for k in order]
-        other.tools = tuple(self.tools[k] for k in order)
-        return other
+        copied = self._copied()
+        copied._splines, copied._nodes = [self._splines[k] for k in order], [self._nodes[k] for k in order]
+        copied.tools = tuple(self.tools[k] for k in order)
+        return copied
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return the load on each channel, shape (n, channels)."""
@@ -136,21 +136,21 @@ class TableResponse(Response):
 
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return readings, shape (n, channels); the curve is continued straight beyond its ends."""
-        known = next((answer for answer in self._kept.values() if answer.load is load), None)
-        if known is not None and known.signal is not None:
-            return known.signal
+        cached = next((answer for answer in self._kept.values() if answer.load is load), None)
+        if cached is not None and cached.signal is not None:
+            return cached.signal
         result = np.interp(load, *self._curve)
         result *= self.gain
         result += self.offset
-        if known is not None:
-            known.signal = _locked(result)
+        if cached is not None:
+            cached.signal = _locked(result)
         return result
 
     def _copied(self) -> TableResponse:
         """Return a response on the same table that remembers nothing."""
-        other = copy.copy(self)
-        other._kept, other._forces = {}, {}
-        return other
+        copied = copy.copy(self)
+        copied._kept, copied._forces = {}, {}
+        return copied
 
     def _both(self, pose: np.ndarray, tool: np.ndarray) -> _Answer:
         key = _key(pose, tool)
@@ -193,7 +193,7 @@ class _Answer:
 
 @dataclass(frozen=True)
 class _Table:
-    """One tool's coefficients or nodes, with what lies beyond the ends: the four nodes of a place always exist."""
+    """One tool's coefficients or nodes, with continuations beyond the ends: the four nodes of a place always exist."""
 
     both: np.ndarray
     """Loads, then the force, padded (`tacdata.chain.lanes`), shape (a, b, d, lanes)."""
@@ -252,10 +252,10 @@ def _key(pose: np.ndarray, tool: np.ndarray) -> int:
     return hash((pose.tobytes(), tool.tobytes()))
 
 
-def _make_room(kept: dict[int, Any]) -> None:
+def _make_room(cache: dict[int, Any]) -> None:
     """Forget the oldest answer where as many are kept as may be."""
-    if len(kept) >= KEPT:
-        kept.pop(next(iter(kept)))
+    if len(cache) >= KEPT:
+        cache.pop(next(iter(cache)))
 
 
 def _locked(values: np.ndarray) -> np.ndarray:

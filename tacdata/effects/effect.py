@@ -65,7 +65,7 @@ class Parameter:
     unit: str
     """Its unit; "1" for a pure number."""
     meaning: str
-    """What it is."""
+    """Meaning."""
     typical: float
     """Usual size (standard deviation of the prior), in its unit."""
     low: float

@@ -1,4 +1,4 @@
-"""Rigid indenters, one shape per file; see `indenter.py` for what a file must hold."""
+"""Rigid indenters, one shape per file; `indenter.py` states the contents of a file."""
 
 from tacdata.indenters.indenter import Indenter, from_document
 

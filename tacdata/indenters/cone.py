@@ -102,13 +102,15 @@ def wedge_distance() -> Function:
         zero = wp.float64(0.0)
         c = wp.cos(angle)
         s = wp.sin(angle)
-        across = r * c - h * s
-        along = r * s + h * c
-        beside = r - reach
-        past = along - wp.clamp(along, zero, reach / s)
+        normal_distance = r * c - h * s
+        flank_distance = r * s + h * c
+        shank_distance = r - reach
+        past = flank_distance - wp.clamp(flank_distance, zero, reach / s)
         below = wp.min(h - reach * c / s, zero)
-        outside = wp.min(wp.length(wp.vec2d(across, past)), wp.length(wp.vec2d(beside, below)))
-        return wp.where(wp.max(across, beside) <= zero, wp.max(across, beside), outside)
+        outside = wp.min(wp.length(wp.vec2d(normal_distance, past)), wp.length(wp.vec2d(shank_distance, below)))
+        return wp.where(
+            wp.max(normal_distance, shank_distance) <= zero, wp.max(normal_distance, shank_distance), outside
+        )
 
     return wedge
 
@@ -116,7 +118,7 @@ def wedge_distance() -> Function:
 def wedge_height(r: np.ndarray, angle: float, tip: np.ndarray | float, reach: np.ndarray | float) -> np.ndarray:
     """Return the lower height [mm] over r [mm] of a wedge rounded by ``tip`` [mm], as wide as ``reach`` [mm].
 
-    The lowest point lies at height 0; ``inf`` beyond the reach. Arrays are broadcast.
+    The lowest point has height 0; ``inf`` beyond the reach. Arrays are broadcast.
     """
     c, s = np.cos(angle), np.sin(angle)
     shoulder = reach - tip

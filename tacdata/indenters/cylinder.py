@@ -59,10 +59,10 @@ class Cylinder(Indenter):
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return R - sqrt(s^2 - y^2) [mm], s the section's radius at x: R, less in the fillets."""
         e = self.edge_radius
-        over = np.maximum(np.abs(x) - (self.length / 2 - e), 0.0)
-        section = self.radius - e + np.sqrt(np.maximum(e**2 - over**2, 0.0))
+        excess = np.maximum(np.abs(x) - (self.length / 2 - e), 0.0)
+        section = self.radius - e + np.sqrt(np.maximum(e**2 - excess**2, 0.0))
         inside = section**2 - y**2
-        return np.where((over <= e) & (inside >= 0), self.radius - np.sqrt(np.maximum(inside, 0.0)), np.inf)
+        return np.where((excess <= e) & (inside >= 0), self.radius - np.sqrt(np.maximum(inside, 0.0)), np.inf)
 
     @staticmethod
     @cache
@@ -91,5 +91,5 @@ class Cylinder(Indenter):
         points = np.stack(
             [np.broadcast_to(x, (96, len(x))), rho * np.sin(turn), self.radius - rho * np.cos(turn)], axis=-1
         )
-        whole = trimesh.convex.convex_hull(points.reshape(-1, 3))
-        return cut(whole, height)
+        hull = trimesh.convex.convex_hull(points.reshape(-1, 3))
+        return cut(hull, height)

@@ -56,7 +56,7 @@ class Ellipsoid(Indenter):
     def distance_function() -> Function:
         """Return the distance to the nearest point of the ellipsoid.
 
-        That point is s_i^2 p_i / (s_i^2 + t) with the multiplier t at which it lies on the surface
+        That point is s_i^2 p_i / (s_i^2 + t) with the multiplier t at which it is on the surface
         (Eberly, "Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid", Geometric
         Tools, 2013). The root is found by Newton's method on 1/|w| - 1, w_i = s_i p_i / (s_i^2 + t),
         which is nearly linear in t (the secular equation of Moré & Sorensen, SIAM J. Sci. Stat. Comput.
@@ -89,7 +89,7 @@ class Ellipsoid(Indenter):
         """Return the ellipsoid, cut off at ``height`` [mm]."""
         from trimesh.creation import icosphere
 
-        whole = icosphere(subdivisions=5)
-        whole.apply_scale([self.a, self.b, self.c])
-        whole.apply_translation([0.0, 0.0, self.c])
-        return cut(whole, height)
+        unit_sphere = icosphere(subdivisions=5)
+        unit_sphere.apply_scale([self.a, self.b, self.c])
+        unit_sphere.apply_translation([0.0, 0.0, self.c])
+        return cut(unit_sphere, height)

@@ -52,8 +52,8 @@ class FlatPunch(Indenter):
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return 0 under the flat and a quarter circle under the fillet [mm]."""
         e = self.edge_radius
-        over = np.maximum(np.hypot(x, y) - (self.radius - e), 0.0)
-        return np.where(over <= e, e - np.sqrt(np.maximum(e**2 - over**2, 0.0)), np.inf)
+        excess = np.maximum(np.hypot(x, y) - (self.radius - e), 0.0)
+        return np.where(excess <= e, e - np.sqrt(np.maximum(e**2 - excess**2, 0.0)), np.inf)
 
     @staticmethod
     @cache

@@ -10,7 +10,7 @@ Distance functions are Warp functions defined inside `Indenter.distance_function
 never imports Warp. Write ``wp = warp()`` in the function's body. That makes it a closure variable, by which Warp
 resolves the annotations (strings, under ``from __future__ import annotations``).
 
-Warp matches vector types by length and scalar, so ``wp.types.vector(8, wp.float64)`` may be written anew in every file.
+Warp matches vector types by length and scalar, so ``wp.types.vector(8, wp.float64)`` may be written in every file.
 Take lengths with ``wp.length``, not ``wp.sqrt``: its derivative at zero (points on the axis) is zero instead of NaN.
 Kernels over a distance function need ``@wp.kernel(module="unique")``; otherwise each shape recompiles the others.
 """
@@ -53,8 +53,8 @@ class Indenter(ABC):
 
     def _refuse(self, name: str, allowed: str) -> None:
         """Raise the error of a parameter that makes no solid of this shape."""
-        given = f"indenter {self.shape}: {name} = {getattr(self, name)!r}"
-        raise FormatError(given, allowed, f"correct {name} in the plan or case")
+        fault = f"indenter {self.shape}: {name} = {getattr(self, name)!r}"
+        raise FormatError(fault, allowed, f"correct {name} in the plan or case")
 
     @classmethod
     @abstractmethod
@@ -102,7 +102,7 @@ class Indenter(ABC):
         Args:
             values: Parameters as given.
             origin: Their source, for errors.
-            folder: Folder that file names are relative to; None where the document lies in no file.
+            folder: Folder that file names are relative to; None if the document is in no file.
         """
         return values
 
@@ -119,7 +119,7 @@ class Indenter(ABC):
 
     @abstractmethod
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the height [mm] of the lower surface over (x, y) [mm]; ``inf`` beside the solid."""
+        """Return the height [mm] of the lower surface over (x, y) [mm]; ``inf`` outside the solid."""
 
     @property
     @abstractmethod
@@ -186,7 +186,7 @@ def rounded_hull(corners: np.ndarray, radius: float, height: float) -> trimesh.T
 
     normals = np.asarray(trimesh.creation.icosphere(subdivisions=3).vertices)
     support = normals @ corners.T
-    # The sum's surface point with a given normal lies over the corner that is farthest along it.
+    # The sum's surface point with a given normal is over the corner that is farthest along it.
     normal, corner = np.nonzero(support > support.max(axis=1, keepdims=True) - 1e-9)
     return cut(trimesh.convex.convex_hull(corners[corner] + radius * normals[normal]), height)
 
@@ -232,14 +232,14 @@ def from_document(document: dict[str, Any], origin: str = "indenter", folder: Pa
     values = dict(document)
     shape = values.pop("shape", None)
     if not isinstance(shape, str):
-        known = ", ".join(registry.names(ROOM, BASE))
-        raise FormatError(f"{origin}: no shape given", known, "add shape: NAME")
+        shapes = ", ".join(registry.names(ROOM, BASE))
+        raise FormatError(f"{origin}: no shape given", shapes, "add shape: NAME")
     kind: type[Indenter] = registry.load(ROOM, BASE, shape, Indenter)
-    wanted = {f.name for f in fields(kind)}
+    names = {f.name for f in fields(kind)}
     needed = {f.name for f in fields(kind) if f.default is MISSING}
     values = kind.complete(values, origin, folder)
-    if not needed <= set(values) <= wanted:
-        optional = sorted(wanted - needed)
+    if not needed <= set(values) <= names:
+        optional = sorted(names - needed)
         raise FormatError(
             f"{origin}: {shape} with {', '.join(sorted(values)) or 'no parameters'}",
             f"exactly {', '.join(sorted(needed))} (lengths in mm, angles in deg)"

@@ -35,7 +35,7 @@ class Mesh(Indenter):
     """A closed solid as in its file: z is the press's axis; its lowest point is moved to z = 0."""
 
     file: str = field(compare=False)
-    """Name of the surface file, beside the plan or case that names it; its content matters, not its name."""
+    """Name of the surface file, in the folder of the plan or case that names it; its content matters, not its name."""
     sha256: str
     """SHA-256 of the file (hex); computed if a plan or case leaves it out."""
     scale: float = 1.0
@@ -63,24 +63,24 @@ class Mesh(Indenter):
             UsageError: If it is not found.
             FormatError: If it bounds no solid, has an impossible size, or is not the file of the hash given.
         """
-        file, wanted = values.get("file"), values.get("sha256")
-        if not isinstance(file, str) or (wanted and folder is None):
+        file, digest_given = values.get("file"), values.get("sha256")
+        if not isinstance(file, str) or (digest_given and folder is None):
             return values
         path = next((p for p in ((folder or Path()) / file, SHAPES / file) if p.is_file()), (folder or Path()) / file)
-        if wanted and not path.is_file():
+        if digest_given and not path.is_file():
             return values
         digest = provenance.file_hash(path) if path.is_file() else ""
-        if wanted and digest != wanted:
+        if digest_given and digest != digest_given:
             raise FormatError(
-                f"{origin}: {file} has changed: SHA-256 {digest[:12]}, {wanted[:12]} is named",
+                f"{origin}: {file} has changed: SHA-256 {digest[:12]}, {digest_given[:12]} is named",
                 "the file that was named",
                 "restore it, or remove sha256",
             )
-        found = cls(Path(file).name, digest or "0" * 64, values.get("scale", 1.0))
-        _check_size(solid(path, float(found.scale)), found, origin)
-        _check_axis(solid(path, float(found.scale)), found, origin)
+        mesh = cls(Path(file).name, digest or "0" * 64, values.get("scale", 1.0))
+        _check_size(solid(path, float(mesh.scale)), mesh, origin)
+        _check_axis(solid(path, float(mesh.scale)), mesh, origin)
         store.keep(path)
-        return {**values, "file": found.file, "sha256": digest}
+        return {**values, "file": mesh.file, "sha256": digest}
 
     @classmethod
     def example(cls) -> Self:
@@ -136,21 +136,21 @@ class Mesh(Indenter):
         grid, top = self.solid.grid, float(self.solid.mesh.bounds[1, 2])
         plan = np.stack([np.ravel(x), np.ravel(y)], axis=-1).astype(float)
         z = np.full(len(plan), -grid.spacing)
-        going, found = np.arange(len(plan)), np.zeros(len(plan), dtype=bool)
+        going, hits = np.arange(len(plan)), np.zeros(len(plan), dtype=bool)
         while len(going):
             d = grid.distance(np.column_stack([plan[going], z[going]]))
-            found[going[d < 0]] = True
+            hits[going[d < 0]] = True
             # No surface is nearer than the distance; a minimum step passes it where the line grazes it.
             z[going] += np.where(d < 0, 0.0, np.maximum(d, 0.25 * grid.spacing))
             going = going[(d >= 0) & (z[going] < min(top, grid.high[2]))]
-        high = z[found]
+        high = z[hits]
         low = high - 0.25 * grid.spacing
         for _ in range(40):
             middle = (low + high) / 2
-            within = grid.distance(np.column_stack([plan[found], middle])) < 0
+            within = grid.distance(np.column_stack([plan[hits], middle])) < 0
             low, high = np.where(within, low, middle), np.where(within, middle, high)
         height = np.full(len(plan), np.inf)
-        height[found] = (low + high) / 2
+        height[hits] = (low + high) / 2
         return height.reshape(np.shape(x))
 
     @staticmethod
@@ -192,14 +192,14 @@ class Mesh(Indenter):
                     for n in range(4):
                         line += e[n] * wp.float64(c[i - 1 + r, j - 1 + s, k - 1 + n])
                     d += a[r] * b[s] * line
-            beside = h * wp.length(wp.vec3d(wx - gx, wy - gy, wp.min(wz - gz, zero)))
-            if beside > zero:
+            outside = h * wp.length(wp.vec3d(wx - gx, wy - gy, wp.min(wz - gz, zero)))
+            if outside > zero:
                 # Two lower bounds: by way of the box of the grid, and the distance from the box of the solid.
                 inset = margin / h
                 sx = wx - wp.clamp(wx, two + inset, head[5] - three - inset)
                 sy = wy - wp.clamp(wy, two + inset, head[6] - three - inset)
                 sz = wp.min(wz - (two + inset), zero)
-                d = wp.max(wp.length(wp.vec2d(wp.max(d, zero), beside)), h * wp.length(wp.vec3d(sx, sy, sz)))
+                d = wp.max(wp.length(wp.vec2d(wp.max(d, zero), outside)), h * wp.length(wp.vec3d(sx, sy, sz)))
             return d
 
         return mesh_distance
@@ -208,12 +208,12 @@ class Mesh(Indenter):
         """Return the solid as tessellated, cut at ``height`` [mm]."""
         import trimesh
 
-        whole = self.solid.mesh
-        low, high = whole.bounds
+        body = self.solid.mesh
+        low, high = body.bounds
         if high[2] <= height:
-            return whole.copy()
+            return body.copy()
         below = trimesh.creation.box(bounds=[low - 1.0, [high[0] + 1.0, high[1] + 1.0, height]])
-        part = trimesh.boolean.intersection([whole, below], engine="manifold")
+        part = trimesh.boolean.intersection([body, below], engine="manifold")
         vertices = np.asarray(part.vertices).copy()
         # The intersection is computed in single precision.
         vertices[np.abs(vertices[:, 2] - height) < 1e-5, 2] = height
@@ -237,7 +237,7 @@ def _check_size(body: Solid, indenter: Mesh, origin: str) -> None:
 
 
 def _check_axis(body: Solid, indenter: Mesh, origin: str) -> None:
-    """Refuse a solid beside the axis along which it is pressed, as in a file of a whole build plate.
+    """Refuse a solid away from the axis along which it is pressed, as in a file of a whole build plate.
 
     The axis may pass between two tips of one holder. So it must meet the bounding box, not the solid.
     """

@@ -22,7 +22,7 @@ _MEMBERS = ("first", "second")
 
 @dataclass(frozen=True)
 class Pair(Indenter):
-    """Two solids whose lowest points lie at one height, beside each other along x; the press's yaw turns both.
+    """Two solids with their lowest points at the same height, side by side along x; the press's yaw turns both.
 
     Example:
         >>> from tacdata.indenters import from_document
@@ -61,13 +61,13 @@ class Pair(Indenter):
             UsageError: If one is of no known shape.
             FormatError: If one is none.
         """
-        found = dict(values)
+        complete = dict(values)
         for name in _MEMBERS:
             if isinstance(values.get(name), dict):
                 if values[name].get("shape") == "pair":
                     raise FormatError(f"{origin}: {name} is a pair", "a single solid", "name two solids, not more")
-                found[name] = from_document(values[name], f"{origin}: {name}", folder)
-        return found
+                complete[name] = from_document(values[name], f"{origin}: {name}", folder)
+        return complete
 
     @classmethod
     def example(cls) -> Self:
@@ -103,7 +103,7 @@ class Pair(Indenter):
 
     @property
     def extent(self) -> float:
-        """How far the solid that reaches farther lies from the holder's axis [mm]."""
+        """Distance of the farther solid from the holder's axis [mm]."""
         return self.distance / 2 + max(self.first.extent, self.second.extent)
 
     @property
@@ -161,8 +161,8 @@ def _on_device(pair: Pair, device: str) -> Any:
     rows = np.zeros((3, 8))
     rows[0, 0] = pair.distance / 2
     for k, member in enumerate((pair.first, pair.second), start=1):
-        own = member.device_parameters(device)
-        rows[0, k], rows[k, : len(own)] = _shapes().index(member.shape), own
+        parameters = member.device_parameters(device)
+        rows[0, k], rows[k, : len(parameters)] = _shapes().index(member.shape), parameters
     return wp.array(rows, dtype=wp.types.vector(8, wp.float64), device=device)
 
 
@@ -172,31 +172,31 @@ def _by_number() -> Any:
     chain: Any = None
     for number, name in reversed(list(enumerate(_shapes()))):
         kind: type[Indenter] = registry.load(ROOM, BASE, name, Indenter)
-        own = kind.distance_function()
+        function = kind.distance_function()
         # By a name of its own: Warp tells functions apart by their names.
-        chain = wp.func(_link(number, own, chain) if chain else _last(own), name=f"pair_{name}")
+        chain = wp.func(_link(number, function, chain) if chain else _last(function), name=f"pair_{name}")
     return chain
 
 
-def _link(number: int, own: Any, others: Any) -> Any:
+def _link(number: int, function: Any, following: Any) -> Any:
     wp = warp()
-    mine = wp.constant(wp.float64(number))
+    number_constant = wp.constant(wp.float64(number))
 
     def link(n: wp.float64, p: wp.vec3d, q: wp.types.vector(8, wp.float64)):
         d = wp.float64(0.0)
-        if n == mine:
-            d = own(p, q)
+        if n == number_constant:
+            d = function(p, q)
         else:
-            d = others(n, p, q)
+            d = following(n, p, q)
         return d
 
     return link
 
 
-def _last(own: Any) -> Any:
+def _last(function: Any) -> Any:
     wp = warp()
 
     def last(n: wp.float64, p: wp.vec3d, q: wp.types.vector(8, wp.float64)):
-        return wp.float64(own(p, q))
+        return wp.float64(function(p, q))
 
     return last

@@ -64,10 +64,10 @@ class Prism(Indenter):
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the lower height [mm]: in the rounded ends a smaller ball takes the edge radius' place."""
         angle, edge, length, half_width = self.parameters
-        over = np.maximum(np.abs(x) - (length / 2 - edge), 0.0)
-        ball = np.sqrt(np.maximum(edge**2 - over**2, 0.0))
+        excess = np.maximum(np.abs(x) - (length / 2 - edge), 0.0)
+        ball = np.sqrt(np.maximum(edge**2 - excess**2, 0.0))
         height = wedge_height(np.abs(y), angle, ball, half_width - edge + ball) + edge - ball
-        return np.where(over <= edge, height, np.inf)
+        return np.where(excess <= edge, height, np.inf)
 
     @staticmethod
     @cache

@@ -24,7 +24,7 @@ class Sphere(Indenter):
         >>> ball = Sphere(radius=4.0)
         >>> ball.document
         {'shape': 'sphere', 'radius': 4.0}
-        >>> round(float(ball.profile(1.0, 0.0)), 3)  # height of its surface 1 mm beside the axis, mm
+        >>> round(float(ball.profile(1.0, 0.0)), 3)  # height of its surface 1 mm off the axis, mm
         0.127
     """
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SquarePunch(Indenter):
-    """An upright square column, flat below, sides along x and y; lower and vertical edges rounded alike."""
+    """An upright square column, flat below, sides along x and y; lower and vertical edges rounded equally."""
 
     side: float
     """Width from face to face [mm]."""
@@ -52,8 +52,8 @@ class SquarePunch(Indenter):
     def profile(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return 0 under the flat and a circle under the rounded edges and corners [mm]."""
         e, flat = self.edge_radius, self.side / 2 - self.edge_radius
-        over = np.hypot(np.maximum(np.abs(x) - flat, 0.0), np.maximum(np.abs(y) - flat, 0.0))
-        return np.where(over <= e, e - np.sqrt(np.maximum(e**2 - over**2, 0.0)), np.inf)
+        excess = np.hypot(np.maximum(np.abs(x) - flat, 0.0), np.maximum(np.abs(y) - flat, 0.0))
+        return np.where(excess <= e, e - np.sqrt(np.maximum(e**2 - excess**2, 0.0)), np.inf)
 
     @staticmethod
     @cache

@@ -1,4 +1,4 @@
-"""Labels: what the simulation says of a press, frame by frame, with where it came from."""
+"""Labels: the simulated maps and forces of a press, frame by frame, with their provenance."""
 
 from tacdata.labels.label import Label, PathSolution
 from tacdata.labels.table import map_batches

@@ -1,4 +1,4 @@
-"""Names of label files: one file an episode, beside it the reason if there is none, all in the session's folder."""
+"""Names of label files: one file an episode, or the reason why there is none, all in the session's folder."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ def folder(session: Path) -> Path:
 
 
 def store(labels: Path) -> Path:
-    """Return where the solved presses behind these labels lie, unless a user says where."""
+    """Return the default folder of the solved presses of these labels."""
     return labels / "store"
 
 
 def label(labels: Path, episode: int | Path) -> Path:
-    """Return where the label of an episode lies, or would lie; the episode is given by its number or recording."""
+    """Return the path of an episode's label; the episode is given by its number or recording."""
     return labels / f"{_stem(episode)}{LABEL}"
 
 
 def failure(labels: Path, episode: int | Path) -> Path:
-    """Return where the reason lies if an episode has no label."""
+    """Return the path of the reason why an episode has no label."""
     return labels / f"{_stem(episode)}{FAILURE}"
 
 

@@ -44,7 +44,7 @@ class PathSolution(Displayed):
     penetration: Annotated[np.ndarray, Quantity("mm", "scalar")]
     """Largest penetration of the indenter, as a mean under the hat of a contact node [mm], shape (k,)."""
     provenance: dict[str, Any]
-    """What made it: key, sensor, material law, mesh, solver settings, code version, seconds."""
+    """Provenance: key, sensor, material law, mesh, solver settings, code version, seconds."""
     traction: Annotated[np.ndarray | None, Quantity("MPa", "vector map", sparse=True)] = None
     """Contact force on the indenter by area of the map, seen from above [MPa], shape (k, 3, pixels_x, pixels_y): z is
     pressure where the face is level, x and y are shear. Times a pixel's area it sums to ``force``. None in files of
@@ -69,7 +69,7 @@ class PathSolution(Displayed):
     """The same of ``taxel_closure`` [mm], shape (k, taxels)."""
 
     def description(self) -> Iterator[str]:
-        """Yield what it is: states, map, force, error."""
+        """Yield its description: states, map, force, error."""
         states, *pixels = self.surface.shape
         yield f"PathSolution: {states} states down to {self.depth.max():g} mm, maps of {pixels[0]} × {pixels[1]} pixels"
         deepest = int(np.argmax(self.depth))
@@ -112,14 +112,14 @@ class Label(Displayed):
     error_map: Annotated[np.ndarray, Quantity("mm", "map", "float16")]
     """Estimated numerical error of each pixel [mm], shape (n, pixels_x, pixels_y), float16: three digits suffice.
 
-    Root sum of squares of the bound on what is lost between states and of the error by the mesh; the spread of
+    Root sum of squares of the bound on the interpolation error and of the error by the mesh; the spread of
     material, thickness and registration is not in it: that is ``uncertainty``."""
     error: Annotated[np.ndarray, Quantity("mm", "scalar")]
     """Root mean square of ``error_map`` over the pixels [mm], shape (n,), float32."""
     force_error: Annotated[np.ndarray, Quantity("N", "scalar")]
-    """Estimated numerical error of ``force``, all components together [N], shape (n,), float32; made up alike."""
+    """Estimated numerical error of ``force``, all components together [N], shape (n,), float32, in the same way."""
     provenance: dict[str, Any]
-    """What made it: recording, path solution, sensor, code."""
+    """Provenance: recording, path solution, sensor, code."""
     traction: Annotated[np.ndarray | None, Quantity("MPa", "vector map", "float16")] = None
     """Contact force on the indenter by area of the map, seen from above [MPa], shape (n, 3, pixels_x, pixels_y),
     float16: z is pressure where the face is level, x and y are shear. None in labels of older releases."""
@@ -140,12 +140,12 @@ class Label(Displayed):
     """The same of ``taxel_closure`` [mm], shape (n, taxels), float32."""
     taxel_capacitance: Annotated[np.ndarray | None, Quantity("pF", "taxels", needs="transduction")] = None
     """Capacitance of each taxel that the sensor file's transduction makes of its loads [pF], shape (n, taxels),
-    float32; None if the file says nothing of it."""
+    float32; None without a transduction in the file."""
     taxel_counts: Annotated[np.ndarray | None, Quantity("counts", "taxels", needs="transduction")] = None
     """The readings that go with it [counts], shape (n, taxels), float32: neither rounded nor noisy, not tared."""
 
     def description(self) -> Iterator[str]:
-        """Yield what it is: frames, map, force, error."""
+        """Yield its description: frames, map, force, error."""
         frames, *pixels = self.signed.shape
         yield f"Label of episode {self.episode}: {frames} maps of {pixels[0]} × {pixels[1]} pixels"
         yield f"deepest pixel {self.signed.max():.3g} mm, largest normal force {self.force[:, 2].max():.3g} N"

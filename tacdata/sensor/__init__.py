@@ -1,4 +1,4 @@
-"""The sensor description: one versioned file says everything about a taxel skin."""
+"""The sensor description: one versioned file states everything about a taxel skin."""
 
 from tacdata.sensor.adhesion import Adhesion
 from tacdata.sensor.material import Material

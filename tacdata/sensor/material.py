@@ -33,7 +33,7 @@ class Material:
     def document(self) -> dict[str, Any]:
         """The material as its part of the sensor file.
 
-        What a file leaves out stays out, so that a sensor's hash survives additions to the format.
+        Omitted entries stay omitted, so that a sensor's hash survives additions to the format.
         """
         document: dict[str, Any] = {
             "law": self.law,

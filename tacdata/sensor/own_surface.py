@@ -28,21 +28,21 @@ class Selector:
     angle: float = 45.0
     """Largest angle between that direction and the face's normal [deg]."""
     low: tuple[float, float, float] | None = None
-    """Corner of a box in which the face's centre lies [mm]."""
+    """Corner of a box that contains the face's centre [mm]."""
     high: tuple[float, float, float] | None = None
     """The opposite corner [mm]."""
 
     def chosen(self, centers: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Return which faces are selected, shape (f,), from their centres [mm] and unit normals, both (f, 3)."""
-        held = np.ones(len(centers), dtype=bool)
+        mask = np.ones(len(centers), dtype=bool)
         if self.normal is not None:
             direction = np.array(self.normal) / np.linalg.norm(self.normal)
-            held &= normals @ direction >= np.cos(np.radians(self.angle)) - 1e-9
+            mask &= normals @ direction >= np.cos(np.radians(self.angle)) - 1e-9
         if self.low is not None:
-            held &= (centers >= self.low).all(axis=1)
+            mask &= (centers >= self.low).all(axis=1)
         if self.high is not None:
-            held &= (centers <= self.high).all(axis=1)
-        return held
+            mask &= (centers <= self.high).all(axis=1)
+        return mask
 
 
 _FAR, _ON = 1e6, 1e-3
@@ -60,7 +60,7 @@ class OwnSurface:
     """A closed surface in the sensor's frame, and rules for its parts."""
 
     file: str
-    """Name of the STL, OBJ or PLY file, beside the sensor file that names it."""
+    """Name of the STL, OBJ or PLY file, in the folder of the sensor file."""
     sha256: str
     """SHA-256 of the file (hex); computed if a sensor file leaves it out."""
     scale: float = 1.0
@@ -93,8 +93,8 @@ class OwnSurface:
             if name == "protrusions" and not protrusions:
                 continue
             rules = self.rules.get(name, USUAL[name])
-            chosen = np.any([rule.chosen(centers, normals) for rule in rules], axis=0)
-            part[chosen & (part < 0)] = number
+            mask = np.any([rule.chosen(centers, normals) for rule in rules], axis=0)
+            part[mask & (part < 0)] = number
         return part
 
 
@@ -105,20 +105,20 @@ def complete(document: dict[str, Any], origin: str, folder: Path | None) -> dict
         UsageError: If the file is not found.
         FormatError: If it bounds no solid, has other sizes than stated, or another hash than given.
     """
-    given = document["surface"]
-    path = (folder or Path()) / given["file"]
-    if "sha256" in given and not (folder and path.is_file()):
+    entry = document["surface"]
+    path = (folder or Path()) / entry["file"]
+    if "sha256" in entry and not (folder and path.is_file()):
         return document
-    mesh = read_closed(path, float(given.get("scale", 1.0)), f"{origin}: skin")
+    mesh = read_closed(path, float(entry.get("scale", 1.0)), f"{origin}: skin")
     digest = store.keep(path)
-    if given.get("sha256", digest) != digest:
+    if entry.get("sha256", digest) != digest:
         raise FormatError(
-            f"{origin}: skin surface {given['file']} is not the file that is named: SHA-256 {digest[:12]}",
+            f"{origin}: skin surface {entry['file']} is not the file that is named: SHA-256 {digest[:12]}",
             "the file that was named",
             "restore it, or remove skin/surface/sha256",
         )
     _check_sizes(np.asarray(mesh.bounds), document, origin)
-    return {**document, "surface": {**given, "file": path.name, "sha256": digest}}
+    return {**document, "surface": {**entry, "file": path.name, "sha256": digest}}
 
 
 def _check_sizes(bounds: np.ndarray, document: dict[str, Any], origin: str) -> None:
@@ -130,10 +130,10 @@ def _check_sizes(bounds: np.ndarray, document: dict[str, Any], origin: str) -> N
     ratio = float(np.median(np.ptp(stated, axis=0) / np.maximum(np.ptp(bounds, axis=0), 1e-12)))
     unit = next((f for f in (1000.0, 25.4, 10.0, 0.1, 1 / 25.4, 0.001) if abs(ratio / f - 1) < 0.05), None)
     spans = [" to ".join(f"{v:.4g}" for v in column) for column in bounds.T]
-    wanted = [" to ".join(f"{v:.4g}" for v in column) for column in stated.T]
+    sizes = [" to ".join(f"{v:.4g}" for v in column) for column in stated.T]
     raise FormatError(
         f"{origin}: skin surface {document['surface']['file']} spans x {spans[0]}, y {spans[1]}, z {spans[2]} mm",
-        f"as size_x, size_y, thickness and protrusions say: x {wanted[0]}, y {wanted[1]}, z {wanted[2]} mm",
+        f"as size_x, size_y, thickness and protrusions say: x {sizes[0]}, y {sizes[1]}, z {sizes[2]} mm",
         f"set skin/surface/scale: {unit * float(document['surface'].get('scale', 1.0)):g}"
         if unit
         else "move the surface to the sensor's frame (z = 0 under the slab), or correct the sizes",

@@ -22,7 +22,7 @@ from tacdata.sensor.transduction import Transduction
 
 @dataclass(frozen=True)
 class Taxels:
-    """The taxel array. Taxel k = i + columns * j lies at x = pitch_x (i - (columns-1)/2), y likewise with j."""
+    """The taxel array. Taxel k = i + columns * j is at x = pitch_x (i - (columns-1)/2), y likewise with j."""
 
     columns: int
     """Taxels along x."""

@@ -78,7 +78,7 @@ class Skin:
         Args:
             document: That part.
             origin: Names the file in errors.
-            folder: Folder that the name of a surface file is relative to; None where the document lies in no file.
+            folder: Folder that the name of a surface file is relative to; None if the document is in no file.
 
         Raises:
             UsageError: If a surface file is not found.
@@ -95,10 +95,10 @@ class Skin:
         rx, ry = self.curvature_radius_x, self.curvature_radius_y
         if rx and ry:
             return self.thickness - ry + np.sqrt(self._tube(x) ** 2 - y**2)
-        across, radius = (x, rx) if rx else (y, ry)
+        lateral, radius = (x, rx) if rx else (y, ry)
         if not radius:
             return np.full(np.broadcast(x, y).shape, self.thickness)
-        return self.thickness - radius + np.sqrt(radius**2 - across**2) + 0 * (x + y)
+        return self.thickness - radius + np.sqrt(radius**2 - lateral**2) + 0 * (x + y)
 
     def outer_normal(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the unit normal of the undeformed outer face [1], shape (n, 3), at (x, y) [mm], each (n,)."""
@@ -149,12 +149,12 @@ class Skin:
         rx, ry = self.curvature_radius_x, self.curvature_radius_y
         for axis, radius, half in (("x", rx, self.size_x / 2), ("y", ry, self.size_y / 2)):
             deepest = self.thickness + self.protrusion_tip if self.underside == "bent" else 0.0
-            least = max(1.05 * half, 1.25 * deepest)
-            if radius and radius < least:
+            limit = max(1.05 * half, 1.25 * deepest)
+            if radius and radius < limit:
                 raise FormatError(
                     f"{origin}: skin/curvature_radius_{axis} {radius:g} mm, the skin is {2 * half:g} mm wide and "
                     f"{self.thickness:g} mm thick",
-                    f"at least {least:g} mm, or 0 for straight",
+                    f"at least {limit:g} mm, or 0 for straight",
                     f"enlarge skin/curvature_radius_{axis}, or make the skin narrower or thinner",
                 )
         hx, hy = self.size_x / 2, self.size_y / 2
@@ -165,10 +165,11 @@ class Skin:
                 "larger radii or a smaller skin",
                 "enlarge skin/curvature_radius_x and _y",
             )
-        left = float(self.outer_height(hx, hy))
-        if self.underside == "flat" and left < _LEAST * self.thickness:
+        edge_height = float(self.outer_height(hx, hy))
+        if self.underside == "flat" and edge_height < _LEAST * self.thickness:
             raise FormatError(
-                f"{origin}: the outer face falls to z = {left:.2f} mm at the skin's corners, the underside is flat",
+                f"{origin}: the outer face falls to z = {edge_height:.2f} mm at the skin's corners, "
+                "the underside is flat",
                 f"at least {_LEAST * self.thickness:g} mm left",
                 "enlarge the radii or the thickness",
             )

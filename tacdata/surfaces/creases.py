@@ -42,7 +42,7 @@ class Creases:
             points: Positions [mm], shape (n, 3).
             reach: Largest distance to a crease or corner [mm].
         """
-        moved, found = points.copy(), np.zeros(len(points), dtype=bool)
+        places, hits = points.copy(), np.zeros(len(points), dtype=bool)
         for ends in (self.ends, np.stack([self.corners, self.corners], axis=1)):
             if len(ends) == 0:
                 continue
@@ -50,19 +50,19 @@ class Creases:
             for start in range(0, len(points), rows):
                 part = slice(start, start + rows)
                 place, away = _nearest(points[part], ends)
-                moved[part][away < reach] = place[away < reach]
-                found[part] |= away < reach
-        return moved, found
+                places[part][away < reach] = place[away < reach]
+                hits[part] |= away < reach
+        return places, hits
 
 
 def _nearest(points: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
-    square = np.maximum(np.einsum("ei,ei->e", along, along), 1e-300)
-    share = np.clip((points @ along.T - np.einsum("ei,ei->e", start, along)) / square, 0, 1)
+    start, direction = ends[:, 0], ends[:, 1] - ends[:, 0]
+    square = np.maximum(np.einsum("ei,ei->e", direction, direction), 1e-300)
+    share = np.clip((points @ direction.T - np.einsum("ei,ei->e", start, direction)) / square, 0, 1)
     # |p - s - t a|^2 without an array of pairs times three.
-    apart = np.zeros(share.shape)
+    squares = np.zeros(share.shape)
     for k in range(3):
-        apart += (points[:, k, None] - start[:, k] - share * along[:, k]) ** 2
-    best = apart.argmin(axis=1)
+        squares += (points[:, k, None] - start[:, k] - share * direction[:, k]) ** 2
+    best = squares.argmin(axis=1)
     rows = np.arange(len(points))
-    return start[best] + share[rows, best, None] * along[best], np.sqrt(apart[rows, best])
+    return start[best] + share[rows, best, None] * direction[best], np.sqrt(squares[rows, best])

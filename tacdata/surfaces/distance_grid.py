@@ -59,11 +59,11 @@ class DistanceGrid:
         """Return the signed distance [mm], shape (n,), at points (n, 3) [mm]; outside the box, a lower bound."""
         inside = np.clip(points, self.low, self.high)
         # Above the box the solid is taken to go on as a column.
-        beside = _length(points - inside)
+        outside = _length(points - inside)
         solid = _length(points - np.clip(points, self.low + MARGIN, self.high - MARGIN))
         place = ((inside - self.origin) / self.spacing).T
         d = map_coordinates(self.coefficients, place, order=3, prefilter=False, output=np.float64)
-        return np.where(beside > 0, np.maximum(np.hypot(np.maximum(d, 0.0), beside), solid), d)
+        return np.where(outside > 0, np.maximum(np.hypot(np.maximum(d, 0.0), outside), solid), d)
 
 
 def _length(offset: np.ndarray) -> np.ndarray:

@@ -19,10 +19,10 @@ def _query(
     side: wp.array(dtype=wp.float64),
 ):
     i = wp.tid()
-    found = wp.mesh_query_point_sign_normal(mesh, points[i], 1.0e6)
-    face[i] = found.face  # ty: ignore[missing-attribute]
-    place[i] = wp.vec2(found.u, found.v)  # ty: ignore[missing-attribute]
-    side[i] = wp.float64(found.sign)  # ty: ignore[missing-attribute]
+    query = wp.mesh_query_point_sign_normal(mesh, points[i], 1.0e6)
+    face[i] = query.face  # ty: ignore[missing-attribute]
+    place[i] = wp.vec2(query.u, query.v)  # ty: ignore[missing-attribute]
+    side[i] = wp.float64(query.sign)  # ty: ignore[missing-attribute]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The smooth surface behind a tessellation: quadratic edges from vertex normals, creases kept.
 
 CAD programs put vertices on the true surface and chords between them. Every edge that is no crease gets the arc of the
-parabola with the end normals' slopes (Nagata 2005). The smaller of the two ends' is used, so that a flat beside a
+parabola with the end normals' slopes (Nagata 2005). The smaller of the two ends' is used, so that a flat next to a
 fillet does not bulge. Triangles become quadratic and are divided until their chord error is small enough.
 """
 
@@ -101,12 +101,12 @@ def smooth(vertices: np.ndarray, faces: np.ndarray, crease: float = CREASE) -> S
     first, second = edges.corner.T
     # The edge runs from the first triangle's corner to the second's, where that one leaves in the other direction.
     start, end = faces.ravel()[first], faces.ravel()[second]
-    along = (vertices[end] - vertices[start]) / np.maximum(edges.length, 1e-300)[:, None]
+    direction = (vertices[end] - vertices[start]) / np.maximum(edges.length, 1e-300)[:, None]
     up = normals[first // 3] + normals[second // 3]
-    up -= np.einsum("ei,ei->e", up, along)[:, None] * along
+    up -= np.einsum("ei,ei->e", up, direction)[:, None] * direction
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-12)
-    rising = -_slope(tilt[first], along, up)
-    falling = _slope(tilt[second], along, up)
+    rising = -_slope(tilt[first], direction, up)
+    falling = _slope(tilt[second], direction, up)
     # A parabola with end slopes s rises by a quarter of s times its length.
     slope = np.where(rising * falling > 0, np.sign(rising) * np.minimum(np.abs(rising), np.abs(falling)), 0.0)
     rise = np.where(edges.soft, 0.25 * slope * edges.length, 0.0)
@@ -128,9 +128,9 @@ def _edges(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray, crease:
 
 def _angles(corners: np.ndarray) -> np.ndarray:
     """Return the angle at every corner of triangles (f, 3, 3) [rad], shape (3 f,)."""
-    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    across = np.linalg.norm(np.cross(ahead, back), axis=-1)
-    return np.arctan2(across, np.einsum("fki,fki->fk", ahead, back)).ravel()
+    forward, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    sine = np.linalg.norm(np.cross(forward, back), axis=-1)
+    return np.arctan2(sine, np.einsum("fki,fki->fk", forward, back)).ravel()
 
 
 def _corner_normals(normals: np.ndarray, angle: np.ndarray, flat: np.ndarray, edges: _Edges) -> np.ndarray:
@@ -140,8 +140,8 @@ def _corner_normals(normals: np.ndarray, angle: np.ndarray, flat: np.ndarray, ed
     1998). Flat parts impose theirs.
     """
     first, second = edges.corner[edges.soft].T
-    ahead = [corner - corner % 3 + (corner + 1) % 3 for corner in (first, second)]
-    links = np.concatenate([np.stack([first, ahead[1]]), np.stack([ahead[0], second])], axis=1)
+    forward = [corner - corner % 3 + (corner + 1) % 3 for corner in (first, second)]
+    links = np.concatenate([np.stack([first, forward[1]]), np.stack([forward[0], second])], axis=1)
     group = _components(3 * len(normals), links)
     weight = np.where(np.repeat(flat, 3), 1e12, 1.0) * angle
     total = np.zeros((group.max() + 1, 3))
@@ -159,9 +159,9 @@ def _flat(area: np.ndarray, edges: _Edges) -> np.ndarray:
     length = np.repeat(edges.length[~inner, None], 2, axis=1)
     width = 4 * np.bincount(region, area, count) / np.maximum(np.bincount(side.ravel(), length.ravel(), count), 1e-300)
     soft = edges.soft[~inner]
-    beside = np.bincount(side[soft].ravel(), (length * width[side[:, ::-1]])[soft].ravel(), count)
+    neighbours = np.bincount(side[soft].ravel(), (length * width[side[:, ::-1]])[soft].ravel(), count)
     shared = np.bincount(side[soft].ravel(), length[soft].ravel(), count)
-    return ((shared > 0) & (width * shared > _WIDE * beside))[region]
+    return ((shared > 0) & (width * shared > _WIDE * neighbours))[region]
 
 
 def _components(count: int, links: np.ndarray) -> np.ndarray:
@@ -170,6 +170,6 @@ def _components(count: int, links: np.ndarray) -> np.ndarray:
     return connected_components(graph, directed=False)[1]
 
 
-def _slope(normal: np.ndarray, along: np.ndarray, up: np.ndarray) -> np.ndarray:
+def _slope(normal: np.ndarray, direction: np.ndarray, up: np.ndarray) -> np.ndarray:
     """Return n . along / n . up of normals, shape (e,)."""
-    return np.einsum("ei,ei->e", normal, along) / np.maximum(np.einsum("ei,ei->e", normal, up), 0.1)
+    return np.einsum("ei,ei->e", normal, direction) / np.maximum(np.einsum("ei,ei->e", normal, up), 0.1)

@@ -42,8 +42,8 @@ class Solid:
 
         path = cache_folder() / "shapes" / f"{self.key}.npz"
         if path.is_file():
-            with np.load(path) as kept:
-                return DistanceGrid(kept["coefficients"], kept["origin"], float(kept["spacing"]))
+            with np.load(path) as arrays:
+                return DistanceGrid(arrays["coefficients"], arrays["origin"], float(arrays["spacing"]))
         grid = distance_grid(np.asarray(self.mesh.vertices, dtype=float), np.asarray(self.mesh.faces), TOP)
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.name}.{os.getpid()}.npz")

@@ -19,12 +19,12 @@ def cache_folder() -> Path:
 def keep(path: Path) -> str:
     """Store a copy of a surface file; return its SHA-256 (hex, 64 characters)."""
     digest = provenance.file_hash(path)
-    kept = _kept(digest, path.name)
-    if not kept.is_file():
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        temporary = kept.with_name(f".{kept.name}.{os.getpid()}")
+    copy = _kept(digest, path.name)
+    if not copy.is_file():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        temporary = copy.with_name(f".{copy.name}.{os.getpid()}")
         shutil.copyfile(path, temporary)
-        temporary.replace(kept)
+        temporary.replace(copy)
     return digest
 
 
@@ -35,9 +35,9 @@ def find(file: str, digest: str, what: str) -> Path:
         UsageError: If it is not found.
         FormatError: If a file of that name has another content.
     """
-    kept = _kept(digest, file)
-    if kept.is_file():
-        return kept
+    copy = _kept(digest, file)
+    if copy.is_file():
+        return copy
     for folder in filter(None, os.environ.get("TACDATA_SHAPES", "").split(os.pathsep)):
         path = Path(folder) / Path(file).name
         if path.is_file():

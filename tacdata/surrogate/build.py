@@ -1,4 +1,4 @@
-"""Builds a table of finite-element presses from what was pressed, and measures its interpolation error."""
+"""Builds a table of finite-element presses for the recorded presses, and measures its interpolation error."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class TableSettings:
     capacity: int = 1
     """Presses solved at the same time: 1 on a CPU, hundreds on a GPU."""
     left_out: int | None = None
-    """Presses solved beside the table, to measure its interpolation error. None: 3, or 0 where the table's own presses
+    """Further presses solved, to measure its interpolation error. None: 3, or 0 where the table's own presses
     ship.
     """
 
@@ -86,13 +86,13 @@ class Work:
     @cached_property
     def requests(self) -> list[tuple[int, tuple[int, int], PressRequest]]:
         """Tool, node and press of everything that is solved."""
-        depths, found = self.grid.depth[: self.grid.states], []
+        depths, presses = self.grid.depth[: self.grid.states], []
         for t, reach in enumerate(self.reaches):
             for i, j in self.grid.presses(reach):
                 press = request(reach, self.grid.x[i], self.grid.y[j], depths, self.sensor)
                 if press is not None:
-                    found.append((t, (i, j), press))
-        return found
+                    presses.append((t, (i, j), press))
+        return presses
 
     @property
     def presses(self) -> int:
@@ -102,11 +102,11 @@ class Work:
     @cached_property
     def probes(self) -> list[tuple[int, PressRequest]]:
         """Tool and press of those left out, at positions between nodes drawn with a fixed seed, not mirrored."""
-        rng, found, wanted = np.random.default_rng(0), [], self.settings.left_out
-        if wanted is None:
-            wanted = 0 if self._ships else LEFT_OUT
-        for k in range(50 * wanted):
-            if len(found) >= wanted:
+        rng, presses, count = np.random.default_rng(0), [], self.settings.left_out
+        if count is None:
+            count = 0 if self._ships else LEFT_OUT
+        for k in range(50 * count):
+            if len(presses) >= count:
                 break
             t = k % len(self.reaches)
             reach = self.reaches[t]
@@ -114,8 +114,8 @@ class Work:
             depths = np.linspace(0.0, reach.deepest, 4)
             press = request(reach, x, y, depths, self.sensor)
             if press is not None and len(press.depths) == len(depths):
-                found.append((t, press))
-        return found
+                presses.append((t, press))
+        return presses
 
     @cached_property
     def _ships(self) -> bool:
@@ -124,34 +124,36 @@ class Work:
     @property
     def missing(self) -> list[PressRequest]:
         """Presses that are not solved yet."""
-        asked = [press for _, _, press in self.requests] + [press for _, press in self.probes]
-        return [asked[k] for k in self.store.missing(asked)]
+        presses = [press for _, _, press in self.requests] + [press for _, press in self.probes]
+        return [presses[k] for k in self.store.missing(presses)]
 
     @property
     def expected_seconds(self) -> float:
         """Expected duration [s]."""
-        asked = [press for _, _, press in self.requests] + [press for _, press in self.probes]
-        return self.store.expected_seconds(asked)
+        presses = [press for _, _, press in self.requests] + [press for _, press in self.probes]
+        return self.store.expected_seconds(presses)
 
     def done(self, progress: Progress = lambda *_: None) -> tuple[LoadTable, LeftOut | None]:
-        """Solve what is missing and return the table with its error; after an interruption a second call continues.
+        """Solve missing presses and return the table with its error; after an interruption a second call continues.
 
         Raises:
             SolveError: If a press that is possible was not solved.
         """
-        asked, probes = self.requests, self.probes
-        answers = self.store.solve([p for _, _, p in asked] + [p for _, p in probes], self.settings.capacity, progress)
+        requests, probes = self.requests, self.probes
+        answers = self.store.solve(
+            [p for _, _, p in requests] + [p for _, p in probes], self.settings.capacity, progress
+        )
         presses: list[dict[tuple[int, int], Solved]] = [{} for _ in self.reaches]
-        for (t, node, _), answer in zip(asked, answers[: len(asked)], strict=True):
+        for (t, node, _), answer in zip(requests, answers[: len(requests)], strict=True):
             if isinstance(answer, SolveError):
                 raise answer
             presses[t][node] = answer
-        every = [s.loads for found in presses for s in found.values()]
-        all_loads = Loads(*(np.concatenate([getattr(v, n) for v in every]) for n in ("force", "closure", "area")))
+        loads = [s.loads for solutions in presses for s in solutions.values()]
+        all_loads = Loads(*(np.concatenate([getattr(v, n) for v in loads]) for n in ("force", "closure", "area")))
         reading = reading_of(self.sensor, all_loads)
         table = assembled(self.grid, presses, self.names, reading, self.sensor)
-        off = self._off(table, probes, answers[len(asked) :])
-        return replace(table, error=max(off.share if off else 0.0, LEAST_ERROR)), off
+        deviation = self._off(table, probes, answers[len(requests) :])
+        return replace(table, error=max(deviation.share if deviation else 0.0, LEAST_ERROR)), deviation
 
     def _off(
         self, table: LoadTable, probes: list[tuple[int, PressRequest]], answers: Sequence[Solved | SolveError]
@@ -192,12 +194,12 @@ def work(sensor: Sensor, reaches: dict[str, Reach], settings: TableSettings | No
     Raises:
         SolveError: If the sensor cannot be modelled.
     """
-    chosen = settings or TableSettings()
-    known = _work(sensor, reaches, chosen, chosen.mesh or MeshSettings(), chosen.spacing or FINE)
-    asked = [press for _, _, press in known.requests]
-    if (chosen.mesh and chosen.spacing) or not known.store.missing(asked):
-        return known
-    return _work(sensor, reaches, chosen, chosen.mesh or COARSE, chosen.spacing or WIDE)
+    resolved = settings or TableSettings()
+    estimate = _work(sensor, reaches, resolved, resolved.mesh or MeshSettings(), resolved.spacing or FINE)
+    presses = [press for _, _, press in estimate.requests]
+    if (resolved.mesh and resolved.spacing) or not estimate.store.missing(presses):
+        return estimate
+    return _work(sensor, reaches, resolved, resolved.mesh or COARSE, resolved.spacing or WIDE)
 
 
 def _work(

@@ -51,11 +51,11 @@ class Grid:
     """Nodes of one table."""
 
     x: np.ndarray
-    """[mm], shape (a,), equally spaced, `EDGE` of them at each end beyond what is solved."""
+    """[mm], shape (a,), equally spaced, `EDGE` of them at each end beyond the solved ones."""
     y: np.ndarray
     """The same along y [mm], shape (b,)."""
     depth: np.ndarray
-    """[mm], shape (d,), from 0, equally spaced in their root, `EDGE` of them beyond what is solved."""
+    """[mm], shape (d,), from 0, equally spaced in their root, `EDGE` of them beyond the solved ones."""
     folded: bool
     """Whether the sensor is symmetric, so that a quarter of the positions is solved."""
 
@@ -65,7 +65,7 @@ class Grid:
         return len(self.depth) - EDGE
 
     def presses(self, reach: Reach) -> list[tuple[int, int]]:
-        """Return the nodes to solve for a tool, by number along x and y: those around what it pressed."""
+        """Return the nodes to solve for a tool, by number along x and y: those around its presses."""
         i, j = (
             _near(axis, low, high, self.folded)
             for axis, low, high in zip((self.x, self.y), reach.low, reach.high, strict=True)
@@ -99,7 +99,7 @@ def _near(axis: np.ndarray, low: float, high: float, folded: bool) -> np.ndarray
     inner, room = np.arange(EDGE, len(axis) - EDGE), MARGIN + axis[1] - axis[0]
     if not folded:
         return inner[(axis[inner] >= low - room) & (axis[inner] <= high + room)]
-    # A stretch over the middle begins at 0; one on the far side lies as far out as its mirror image.
+    # A stretch over the middle begins at 0; one on the far side is as far out as its mirror image.
     near = 0.0 if low <= 0 <= high else min(abs(low), abs(high))
     far = max(abs(low), abs(high))
     return inner[(axis[inner] >= max(near - room, -1e-9)) & (axis[inner] <= far + room)]
@@ -113,7 +113,7 @@ def _axis(low: float, high: float, spacing: float) -> np.ndarray:
 def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor) -> PressRequest | None:
     """Return the press at one position, as deep as possible there; None if none is possible."""
     for count in range(len(depths), 1, -1):
-        wanted = PressRequest(
+        press = PressRequest(
             reach.indenter,
             round(float(x), 6),
             round(float(y), 6),
@@ -122,8 +122,8 @@ def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor
             *reach.tilt,
         )
         try:
-            check_press(wanted, sensor)
+            check_press(press, sensor)
         except SolveError:
             continue
-        return wanted
+        return press
     return None

@@ -32,25 +32,27 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--capacity", type=int, default=1)
-    chosen = parser.parse_args()
-    model = SkinModel(default_sensor(), ModelSettings(error_estimate=False), chosen.device)
+    arguments = parser.parse_args()
+    model = SkinModel(default_sensor(), ModelSettings(error_estimate=False), arguments.device)
     store = PressStore.of(model)
     for name, document in specimens(TOOLS).items():
         reach = Reach(from_document(document, name), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0)
         depths = UNIT * np.arange(STATES) ** 2
         places = [(SPACING * i, SPACING * j) for i in range(COLUMNS) for j in range(ROWS)]
-        asked = [p for x, y in places if (p := request(reach, x, y, depths, model.sensor)) is not None]
-        solved = store.solve(asked, chosen.capacity, lambda done, of, left: print(f"{done} of {of}, {left:.0f} s left"))
-        _write(model, name, asked, solved, depths)
+        presses = [p for x, y in places if (p := request(reach, x, y, depths, model.sensor)) is not None]
+        solved = store.solve(
+            presses, arguments.capacity, lambda done, of, left: print(f"{done} of {of}, {left:.0f} s left")
+        )
+        _write(model, name, presses, solved, depths)
 
 
 def _write(
-    model: SkinModel, name: str, asked: list[PressRequest], solved: list[Solved | SolveError], depths: np.ndarray
+    model: SkinModel, name: str, presses: list[PressRequest], solved: list[Solved | SolveError], depths: np.ndarray
 ) -> None:
     for answer in solved:
         if isinstance(answer, SolveError):
             raise answer
-    kept = [s for s in solved if isinstance(s, Solved)]
+    solutions = [s for s in solved if isinstance(s, Solved)]
 
     def padded(values: list[np.ndarray]) -> np.ndarray:
         result = np.zeros((len(values), len(depths), *values[0].shape[1:]), dtype=np.float32)
@@ -62,22 +64,22 @@ def _write(
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
-        places=np.array([(p.x, p.y, p.yaw) for p in asked]),
-        counts=np.array([len(s.depths) for s in kept]),
-        ended=np.array([s.ended for s in kept]),
+        places=np.array([(p.x, p.y, p.yaw) for p in presses]),
+        counts=np.array([len(s.depths) for s in solutions]),
+        ended=np.array([s.ended for s in solutions]),
         depths=depths,
-        force=padded([s.loads.force for s in kept]),
-        closure=padded([s.loads.closure for s in kept]),
-        area=padded([s.loads.area for s in kept]),
-        normal=padded([s.normal for s in kept]),
+        force=padded([s.loads.force for s in solutions]),
+        closure=padded([s.loads.closure for s in solutions]),
+        area=padded([s.loads.area for s in solutions]),
+        normal=padded([s.normal for s in solutions]),
         provenance=np.array(provenance.canonical(stamp)),
     )
     shipped = Shipped.of(model.sensor, model.settings.mesh)
-    path = shipped.path(asked[0].indenter.document)
+    path = shipped.path(presses[0].indenter.document)
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacement(path) as stream:
         stream.write(buffer.getvalue())
-    print(f"{name}: {len(kept)} presses in {path}")
+    print(f"{name}: {len(solutions)} presses in {path}")
 
 
 if __name__ == "__main__":

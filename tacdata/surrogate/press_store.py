@@ -61,16 +61,16 @@ class PressStore:
 
     def get(self, request: PressRequest) -> Solved | None:
         """Return a stored press that goes at least as deep; a damaged file counts as none."""
-        if (found := self.shipped.get(request)) is not None:
-            return found
+        if (shipped := self.shipped.get(request)) is not None:
+            return shipped
         try:
             with np.load(self.path(request), allow_pickle=False) as data:
                 depths = data["depths"]
                 force, closure, area, normal, seconds, ended = (data[name] for name in FIELDS)
         except (OSError, ValueError, KeyError, BadZipFile):
             return None
-        kept = Solved(depths, Loads(force, closure, area), normal, float(seconds), bool(ended))
-        return kept.down_to(request.depths)
+        solution = Solved(depths, Loads(force, closure, area), normal, float(seconds), bool(ended))
+        return solution.down_to(request.depths)
 
     def put(self, request: PressRequest, solved: Solved) -> None:
         """Store a press."""
@@ -95,10 +95,10 @@ class PressStore:
 
     def expected_seconds(self, requests: Sequence[PressRequest]) -> float:
         """Return the expected time for missing presses [s], from stored ones or from the mesh's size."""
-        found = [self.get(r) for r in requests]
-        known = [s.seconds / len(s.normal) for s in found if s is not None and s.seconds > 0]
-        each = float(np.median(known)) if known else SECONDS_EACH * len(self.model.mesh.nodes)
-        return each * sum(len(r.depths) for r, s in zip(requests, found, strict=True) if s is None)
+        stored = [self.get(r) for r in requests]
+        seconds = [s.seconds / len(s.normal) for s in stored if s is not None and s.seconds > 0]
+        each = float(np.median(seconds)) if seconds else SECONDS_EACH * len(self.model.mesh.nodes)
+        return each * sum(len(r.depths) for r, s in zip(requests, stored, strict=True) if s is None)
 
     def solve(
         self,
@@ -113,29 +113,29 @@ class PressStore:
             capacity: Presses solved at the same time (1 on a CPU, hundreds on a GPU).
             progress: Called with the presses done, their total, and about how many seconds are left.
         """
-        found: list[Solved | SolveError | None] = [self.get(r) for r in requests]
-        begin, before = time.perf_counter(), sum(f is not None for f in found)
-        progress(before, len(requests), self.expected_seconds(requests))
-        asked = {k: requests[k] for k, solved in enumerate(found) if solved is None}
-        done, count = 0, len(asked)
+        results: list[Solved | SolveError | None] = [self.get(r) for r in requests]
+        begin, stored = time.perf_counter(), sum(f is not None for f in results)
+        progress(stored, len(requests), self.expected_seconds(requests))
+        missing = {k: requests[k] for k, solved in enumerate(results) if solved is None}
+        done, count = 0, len(missing)
         for attempt in range(TRIES):
-            numbers, again = list(asked), {}
-            for index, answer in self.model.solve_many([asked[k] for k in numbers], capacity):
+            numbers, again = list(missing), {}
+            for index, answer in self.model.solve_many([missing[k] for k in numbers], capacity):
                 k = numbers[index]
-                if isinstance(answer, SolveError) and attempt + 1 < TRIES and len(asked[k].depths) > LEAST:
-                    again[k] = replace(asked[k], depths=asked[k].depths[:-1])
+                if isinstance(answer, SolveError) and attempt + 1 < TRIES and len(missing[k].depths) > LEAST:
+                    again[k] = replace(missing[k], depths=missing[k].depths[:-1])
                     continue
                 done += 1
                 passed = time.perf_counter() - begin
-                found[k] = (
+                results[k] = (
                     answer
                     if isinstance(answer, SolveError)
                     else self._kept(requests[k], answer, passed / done, attempt > 0)
                 )
-                progress(before + done, len(requests), passed / done * (count - done))
-            if not (asked := again):
+                progress(stored + done, len(requests), passed / done * (count - done))
+            if not (missing := again):
                 break
-        return [f for f in found if f is not None]
+        return [f for f in results if f is not None]
 
     def _kept(self, request: PressRequest, answer: PathSolution, seconds: float, ended: bool) -> Solved:
         loads = Loads(answer.taxel_force, answer.taxel_closure, answer.taxel_area)

@@ -1,4 +1,4 @@
-"""What recordings pressed: sensor, tools, positions and depths."""
+"""Sensor, tools, positions and depths of recorded presses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.surrogate.grid import Reach
 from tacdata.surrogate.symmetry import round_about_axis
 
 _DESCRIBED = ("sensor", "indenter", "contact")
-"""What an import must have been told, not assumed, if its presses are to be solved."""
+"""Facts that the user must have stated to an import, not assumed, before its presses are solved."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def unmodelled(episode: Episode) -> str:
 
 
 def pressed(paths: list[Path]) -> Pressed:
-    """Read what was pressed in recordings.
+    """Read the presses of recordings.
 
     Args:
         paths: Recordings, or folders of sessions.
@@ -48,7 +48,7 @@ def pressed(paths: list[Path]) -> Pressed:
         FormatError: If sensors differ, have no model, or one tool was mounted in several ways that matter.
     """
     sensor: Sensor | None = None
-    seen: dict[str, list[tuple[Episode, np.ndarray]]] = {}
+    episodes_of: dict[str, list[tuple[Episode, np.ndarray]]] = {}
     for file in (file for path in paths for file in _files(path)):
         episode = read_episode(file)
         if why := unmodelled(episode):
@@ -58,22 +58,26 @@ def pressed(paths: list[Path]) -> Pressed:
                 "start from a fitted response (no --fem), or import with sensor file, indenter and height of contact",
             )
         if sensor is not None and episode.sensor.content_hash != sensor.content_hash:
-            given = f"{file}: another sensor than the recordings before"
-            raise FormatError(given, "recordings of one sensor", "run it alone")
+            fault = f"{file}: another sensor than the recordings before"
+            raise FormatError(fault, "recordings of one sensor", "run it alone")
         sensor = episode.sensor
         touching = episode.tip[episode.tip[:, 2] > 0]
         if len(touching):
-            seen.setdefault(episode.press.indenter_name, []).append((episode, touching))
-    if sensor is None or not seen:
+            episodes_of.setdefault(episode.press.indenter_name, []).append((episode, touching))
+    if sensor is None or not episodes_of:
         raise UsageError("no recording touches the sensor", "presses with a depth above 0", "record presses")
-    places = tuple((name, t[np.argmax(t[:, 2]), :2], float(t[:, 2].max())) for name, e in seen.items() for _, t in e)
-    return Pressed(sensor, {name: _reach(name, found) for name, found in seen.items()}, places)
+    places = tuple(
+        (name, t[np.argmax(t[:, 2]), :2], float(t[:, 2].max())) for name, e in episodes_of.items() for _, t in e
+    )
+    return Pressed(sensor, {name: _reach(name, episodes) for name, episodes in episodes_of.items()}, places)
 
 
-def _reach(name: str, found: list[tuple[Episode, np.ndarray]]) -> Reach:
-    first = found[0][0].press
+def _reach(name: str, episodes: list[tuple[Episode, np.ndarray]]) -> Reach:
+    first = episodes[0][0].press
     round_one = round_about_axis(first.indenter)
-    ways = {(0.0 if round_one else round(p.yaw, 3), p.tilt_x, p.tilt_y): p.turned for p in (e.press for e, _ in found)}
+    ways = {
+        (0.0 if round_one else round(p.yaw, 3), p.tilt_x, p.tilt_y): p.turned for p in (e.press for e, _ in episodes)
+    }
     if len(ways) > 1:
         raise FormatError(
             f"{name} mounted at {'; '.join(ways[way] for way in sorted(ways))}",
@@ -81,7 +85,7 @@ def _reach(name: str, found: list[tuple[Episode, np.ndarray]]) -> Reach:
             "run them one at a time, or give each its own name in the plan",
         )
     [(yaw, *tilt)] = ways
-    tips = np.concatenate([t for _, t in found])
+    tips = np.concatenate([t for _, t in episodes])
     low, high = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
     return Reach(
         first.indenter,

@@ -52,16 +52,20 @@ def reading_of(sensor: Sensor, loads: Loads) -> ReadingCurve:
     weight = {
         name: float(np.abs(getattr(slopes, name) * getattr(loads, name)).max()) for name in ("force", "closure", "area")
     }
-    most = max(weight.values())
-    alone = [name for name, value in weight.items() if value > _NOTHING * most]
+    largest = max(weight.values())
+    dominant = [name for name, value in weight.items() if value > _NOTHING * largest]
     numbers = [np.ptp(np.atleast_1d(v)) for v in vars(transducer.principle).values()]
-    by = alone[0] if len(alone) == 1 and alone[0] in ("force", "closure") and not any(numbers) else "capacitance"
+    by = (
+        dominant[0]
+        if len(dominant) == 1 and dominant[0] in ("force", "closure") and not any(numbers)
+        else "capacitance"
+    )
     if by == "capacitance":
         top = float(np.abs(transducer.principle.capacitance(loads) - transducer.rest).max())
         at = np.array([0.0, max(top, 1e-9)])
         return ReadingCurve(by, at, at, transducer.gain, transducer.offset)
     at = np.linspace(0.0, 1.5 * float(getattr(loads, by).max()), POINTS)
     none = np.zeros((POINTS, transducer.taxels))
-    own = {"force": none, "closure": none, "area": none, by: np.repeat(at[:, None], transducer.taxels, axis=1)}
-    change = transducer.principle.capacitance(Loads(**own)) - transducer.rest
+    arrays = {"force": none, "closure": none, "area": none, by: np.repeat(at[:, None], transducer.taxels, axis=1)}
+    change = transducer.principle.capacitance(Loads(**arrays)) - transducer.rest
     return ReadingCurve(by, at, change[:, 0], transducer.gain, transducer.offset)

@@ -37,7 +37,7 @@ class Shipped:
 
     @classmethod
     def of(cls, sensor: Sensor, mesh: MeshSettings) -> Shipped:
-        """Return what there is; it may be empty."""
+        """Return the shipped presses; there may be none."""
         return cls(FOLDER / shelf(sensor, mesh))
 
     def path(self, indenter: dict) -> Path:
@@ -59,8 +59,8 @@ def _read(path: Path) -> dict[tuple[float, float, float], Solved]:
     with np.load(path, allow_pickle=False) as data:
         places, counts, depths, ended = data["places"], data["counts"], data["depths"], data["ended"]
         values = [data[name].astype(float) for name in ("force", "closure", "area", "normal")]
-    found = {}
+    presses = {}
     for k, (x, y, yaw) in enumerate(places.tolist()):
         force, closure, area, normal = (value[k, : counts[k]] for value in values)
-        found[(x, y, yaw)] = Solved(depths[: counts[k]], Loads(force, closure, area), normal, 0.0, bool(ended[k]))
-    return found
+        presses[(x, y, yaw)] = Solved(depths[: counts[k]], Loads(force, closure, area), normal, 0.0, bool(ended[k]))
+    return presses

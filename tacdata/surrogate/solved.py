@@ -28,12 +28,12 @@ class Solved:
     def down_to(self, depths: Sequence[float]) -> Solved | None:
         """Return the states at these depths [mm], from the first; None if they were not solved.
 
-        A press that ended early returns what it has.
+        A press that ended early returns its states so far.
         """
         count = min(len(depths), len(self.depths)) if self.ended else len(depths)
         if len(self.depths) < count or not np.allclose(self.depths[:count], depths[:count], atol=1e-6):
             return None
-        own = self.loads
-        cut = Loads(own.force[:count], own.closure[:count], own.area[:count])
+        loads = self.loads
+        cut = Loads(loads.force[:count], loads.closure[:count], loads.area[:count])
         share = count / len(self.depths)
         return Solved(self.depths[:count], cut, self.normal[:count], self.seconds * share, self.ended)

@@ -15,14 +15,14 @@ from tacdata.surrogate.table import LoadTable
 SPEC, TABLE = "spec.json", "response.npz"
 
 
-def written_spec(folder: Path, work: Work, table: LoadTable, off: LeftOut | None) -> Path:
+def written_spec(folder: Path, work: Work, table: LoadTable, deviation: LeftOut | None) -> Path:
     """Write the table and a model spec without effects that uses it; return the spec's path.
 
     Args:
         folder: A new or empty folder.
         work: The work that made the table.
         table: The table.
-        off: Its interpolation error.
+        deviation: Its interpolation error.
 
     Raises:
         UsageError: If the folder holds a spec or a table already.
@@ -34,7 +34,7 @@ def written_spec(folder: Path, work: Work, table: LoadTable, off: LeftOut | None
     parameters = {
         "mesh": asdict(work.model.settings.mesh),
         "spacing": float(work.grid.x[1] - work.grid.x[0]),
-        "left_out": asdict(off) if off else None,
+        "left_out": asdict(deviation) if deviation else None,
         "load": table.reading.by,
         "tools": {name: r.indenter.document for name, r in zip(work.names, work.reaches, strict=True)},
     }

@@ -49,5 +49,5 @@ def _turned(indenter: Indenter, x: np.ndarray, y: np.ndarray, yaw: float) -> np.
 
 
 def _same(a: np.ndarray, b: np.ndarray) -> bool:
-    both = np.isfinite(a) & np.isfinite(b)
-    return bool((np.isfinite(a) == np.isfinite(b)).all() and np.allclose(a[both], b[both], atol=_CLOSE))
+    finite = np.isfinite(a) & np.isfinite(b)
+    return bool((np.isfinite(a) == np.isfinite(b)).all() and np.allclose(a[finite], b[finite], atol=_CLOSE))

@@ -32,7 +32,7 @@ class LoadTable:
     tools: tuple[str, ...]
     """Name of each tool."""
     load: np.ndarray
-    """Of every taxel [N, mm or pF, as `ReadingCurve.by` says], shape (tools, a, b, d, channels)."""
+    """Of every taxel [N, mm or pF, by `ReadingCurve.by`], shape (tools, a, b, d, channels)."""
     normal: np.ndarray
     """Normal force on the indenter [N], shape (tools, a, b, d)."""
     solved: np.ndarray
@@ -125,21 +125,21 @@ def assembled(
     load = np.zeros((*shape, sensor.taxels.count))
     normal, solved = np.zeros(shape), np.zeros(shape, dtype=bool)
     transducer = Transducer.of(sensor)
-    for t, found in enumerate(presses):
-        if not found:
+    for t, solutions in enumerate(presses):
+        if not solutions:
             raise SolveError(
                 f"{tools[t]} can be pressed at none of the places",
                 "places where it stays inside a bonded rim",
                 "press elsewhere, or describe another bonding in the sensor file",
             )
-        _place(grid, found, reading, transducer, sensor, load[t], normal[t], solved[t])
+        _place(grid, solutions, reading, transducer, sensor, load[t], normal[t], solved[t])
         _continue(grid, load[t], normal[t], solved[t])
     return LoadTable(grid, tools, load, normal, solved, reading)
 
 
 def _place(
     grid: Grid,
-    found: dict[tuple[int, int], Solved],
+    solutions: dict[tuple[int, int], Solved],
     reading: ReadingCurve,
     transducer: Transducer,
     sensor: Sensor,
@@ -148,7 +148,7 @@ def _place(
     solved: np.ndarray,
 ) -> None:
     times = np.zeros(normal.shape)
-    for (i, j), press in found.items():
+    for (i, j), press in solutions.items():
         values, count = reading.load(press.loads, transducer), len(press.normal)
         sides = [(a, b) for a in (False, True) for b in (False, True)] if grid.folded else [(False, False)]
         for over_x, over_y in sides:
@@ -178,10 +178,10 @@ def _continue(grid: Grid, load: np.ndarray, normal: np.ndarray, solved: np.ndarr
                 load[i, j], normal[i, j] = load[a, b], normal[a, b]
     for values in (load, normal):
         for axis in (0, 1):
-            moved = np.moveaxis(values, axis, 0)
+            front = np.moveaxis(values, axis, 0)
             for k in range(EDGE - 1, -1, -1):
-                moved[k] = 3 * moved[k + 1] - 3 * moved[k + 2] + moved[k + 3]
-                moved[-1 - k] = 3 * moved[-2 - k] - 3 * moved[-3 - k] + moved[-4 - k]
+                front[k] = 3 * front[k + 1] - 3 * front[k + 2] + front[k + 3]
+                front[-1 - k] = 3 * front[-2 - k] - 3 * front[-3 - k] + front[-4 - k]
 
 
 def _deepen(depth: np.ndarray, load: np.ndarray, normal: np.ndarray, count: int) -> None:
@@ -190,10 +190,10 @@ def _deepen(depth: np.ndarray, load: np.ndarray, normal: np.ndarray, count: int)
         for values in (load, normal):
             values[count] = 4 * values[count - 1] - 6 * values[count - 2] + 4 * values[count - 3] - values[count - 4]
         count += 1
-    last, before = count - 1, max(count - 2, 1)
+    last, previous = count - 1, max(count - 2, 1)
     power = 1.5
-    if last > before and normal[last] > normal[before] > 0:
-        power = float(np.log(normal[last] / normal[before]) / np.log(depth[last] / depth[before]))
+    if last > previous and normal[last] > normal[previous] > 0:
+        power = float(np.log(normal[last] / normal[previous]) / np.log(depth[last] / depth[previous]))
     for k in range(count, len(depth)):
         factor = (depth[k] / depth[last]) ** min(power, _STEEPEST)
         load[k], normal[k] = load[last] * factor, normal[last] * factor

@@ -63,17 +63,19 @@ class Transducer:
             FormatError: If the file describes none, or has parameters that the principle refuses.
             UsageError: If no such principle is known.
         """
-        given = sensor.transduction
-        if given is None:
+        transduction = sensor.transduction
+        if transduction is None:
             raise FormatError(
                 f"sensor {sensor.name}: it has no section transduction",
                 f"transduction: {{principle: {' | '.join(registry.names(ROOM, BASE))}}}",
                 "add the section to the sensor file, as in tacdata/sensor/tacprint.yaml",
             )
-        kind: type[Principle] = registry.load(ROOM, BASE, given.principle, Principle)
+        kind: type[Principle] = registry.load(ROOM, BASE, transduction.principle, Principle)
         count = sensor.taxels.count
-        gain, offset = (np.broadcast_to(np.array(v, dtype=float), (count,)) for v in (given.gain, given.offset))
-        return cls(kind.from_numbers(given.parameters), gain, offset, given.full_scale)
+        gain, offset = (
+            np.broadcast_to(np.array(v, dtype=float), (count,)) for v in (transduction.gain, transduction.offset)
+        )
+        return cls(kind.from_numbers(transduction.parameters), gain, offset, transduction.full_scale)
 
     @property
     def taxels(self) -> int:
@@ -137,9 +139,9 @@ class Transducer:
             remedy = "a dead taxel has no inverse: leave it out"
             raise FormatError("a gain of 0 counts/pF", "gains other than 0", remedy)
         capacitance = self.rest + (counts - self.offset) / self.gain
-        found = self.principle.inverse(capacitance, np.zeros_like(counts) if area is None else area)
+        loads = self.principle.inverse(capacitance, np.zeros_like(counts) if area is None else area)
         low, high = self._clipped(counts, ends=True)
-        return Loads(*(np.where(low | high, np.nan, v) for v in (found.force, found.closure, found.area)))
+        return Loads(*(np.where(low | high, np.nan, v) for v in (loads.force, loads.closure, loads.area)))
 
     def _no_loads(self) -> Loads:
         none = np.zeros((1, self.taxels))

@@ -1,19 +1,12 @@
 """A frame gives way by what it says where the force is largest, and in balance with the force everywhere."""
 
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tacdata.chain import State
 from tacdata.effects import load
-
-
-@dataclass(frozen=True)
-class Pressed:
-    pose: np.ndarray
-    course: object
-    response: object
 
 
 def force(pose, tool):
@@ -25,7 +18,8 @@ def force(pose, tool):
 def test_deflection_is_what_was_asked_and_in_balance(name, deflection):
     depth = np.linspace(-0.2, 1.5, 60)
     pose = np.column_stack([0 * depth, 0 * depth, depth])
-    state = Pressed(pose, SimpleNamespace(tool=np.zeros(60, int)), SimpleNamespace(force=force))
+    course, response = SimpleNamespace(tool=np.zeros(60, int)), SimpleNamespace(force=force)
+    state = State(course, response, pose, np.empty((60, 0)), np.empty(0), np.empty((60, 0)))
     after = load(name).apply(state, {"c": np.array(deflection)}).pose
     given = depth - after[:, 2]
     assert given.max() == pytest.approx(deflection, rel=1e-9)

@@ -1,19 +1,18 @@
 """Load under a sphere that stays where it is relaxes as Hu et al. (2010) say, slower under a larger one."""
 
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from tacdata.chain import State
 from tacdata.effects import load
 
 
-@dataclass(frozen=True)
-class Held:
-    load: np.ndarray
-    force: np.ndarray
-    course: object
+def held(loads, force, course):
+    """A state of the mechanics alone."""
+    none = np.empty((len(force), 0))
+    return State(course, None, np.zeros((len(force), 3)), loads, force, none)
 
 
 @pytest.mark.parametrize(("tool", "slower"), [(0, 2 / 3), (1, 4 / 3)])
@@ -26,7 +25,7 @@ def test_a_held_load_relaxes_as_a_gel_under_a_sphere(tool, slower):
         tools=(SimpleNamespace(radius=2.0), SimpleNamespace(radius=4.0)),
     )
     after = load("poroelasticity").apply(
-        Held(one[:, None], 5 * one, course), {"f": np.array(0.3), "tau": np.array(4.0)}
+        held(one[:, None], 5 * one, course), {"f": np.array(0.3), "tau": np.array(4.0)}
     )
     root = np.sqrt(time / (4.0 * slower))
     wanted = 1 - 0.3 * (1 - 0.491 * np.exp(-0.908 * root) - 0.509 * np.exp(-1.679 * root**2))
@@ -44,13 +43,13 @@ def test_what_one_tool_pressed_out_comes_back_while_another_presses():
         tools = tuple(SimpleNamespace(radius=radius) for radius in radii)
         course = SimpleNamespace(tool=tool, step=np.diff(time, prepend=0.0), tools=tools)
         values = {"f": np.array(0.3), "tau": np.array(4.0)}
-        return load("poroelasticity").apply(Held(one[:, None], one, course), values).load[:, 0]
+        return load("poroelasticity").apply(held(one[:, None], one, course), values).load[:, 0]
 
     same, larger = after((2.0, 2.0)), after((2.0, 4.0))
     alone = (
         load("poroelasticity")
         .apply(
-            Held(
+            held(
                 one[:, None],
                 one,
                 SimpleNamespace(tool=0 * tool, step=np.diff(time, prepend=0.0), tools=(SimpleNamespace(radius=2.0),)),

@@ -28,7 +28,7 @@ class GapClosing(Principle):
     """Thickness that keeps the plates apart when they meet [mm]."""
 
     def complaint(self) -> str:
-        """Return what is wrong with the parameters."""
+        """Return the fault of the parameters."""
         if words := self.not_positive("electrode_area", "gap", "permittivity", "closure_share", "insulation"):
             return words
         if np.any(np.asarray(self.insulation) >= self.gap):
@@ -53,9 +53,9 @@ class GapClosing(Principle):
     def inverse(self, capacitance: np.ndarray, area: np.ndarray) -> Loads:
         """Return the closure; NaN where the plates have met or the parasitic capacitance alone is larger."""
         nothing = np.full(np.shape(capacitance), np.nan)
-        own = capacitance - self.parasitic
-        within = (own > 0) & (own * self.insulation < self._scale)
-        distance = np.divide(self._scale, own, out=nothing.copy(), where=within)
+        plates = capacitance - self.parasitic
+        within = (plates > 0) & (plates * self.insulation < self._scale)
+        distance = np.divide(self._scale, plates, out=nothing.copy(), where=within)
         return Loads(nothing, (self.gap - distance) / self.closure_share, nothing)
 
     @property

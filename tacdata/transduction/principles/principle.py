@@ -35,11 +35,11 @@ class Principle(ABC):
         Raises:
             FormatError: If one is unknown, not a number, or out of its range.
         """
-        known = {f.name for f in fields(cls)}
+        names = {f.name for f in fields(cls)}
         name = cls.__module__.rsplit(".", 1)[-1]
         remedy = "correct transduction/parameters; `tacdata list principles` names them"
-        if unknown := sorted(set(values) - known):
-            raise FormatError(f"transduction {name} with {', '.join(unknown)}", ", ".join(sorted(known)), remedy)
+        if unknown := sorted(set(values) - names):
+            raise FormatError(f"transduction {name} with {', '.join(unknown)}", ", ".join(sorted(names)), remedy)
         numbers: dict[str, Number] = {}
         for field, value in values.items():
             number = np.asarray(value)
@@ -52,7 +52,7 @@ class Principle(ABC):
         return result
 
     def complaint(self) -> str:
-        """Return what is wrong with the parameters, as a sentence; empty if nothing is."""
+        """Return the fault of the parameters, as a sentence; empty if there is none."""
         return ""
 
     def not_positive(self, *names: str) -> str:

@@ -39,7 +39,7 @@ class SoftDielectric(Principle):
     """Strain at which the layer is crushed and stops yielding [1]."""
 
     def complaint(self) -> str:
-        """Return what is wrong with the parameters."""
+        """Return the fault of the parameters."""
         if words := self.not_positive("electrode_area", "thickness", "permittivity", "modulus", "largest_strain"):
             return words
         if np.max(self.largest_strain) >= 1:
@@ -57,9 +57,9 @@ class SoftDielectric(Principle):
         """Return the derivatives; that of force is 0 where the layer is crushed."""
         _, slope = self._loaded(loads.area)
         strain, crushed = self._strain(loads), self.saturated(loads)
-        held = np.minimum(strain, self.largest_strain)
-        per_force = np.where(crushed, 0.0, self._scale / self.modulus / (1 - held) ** 2)
-        per_area = np.where(crushed, held / (1 - held), -((held / (1 - held)) ** 2)) * self._scale * slope
+        bounded = np.minimum(strain, self.largest_strain)
+        per_force = np.where(crushed, 0.0, self._scale / self.modulus / (1 - bounded) ** 2)
+        per_area = np.where(crushed, bounded / (1 - bounded), -((bounded / (1 - bounded)) ** 2)) * self._scale * slope
         return Loads(per_force, np.zeros(np.shape(loads.force)), per_area)
 
     def saturated(self, loads: Loads) -> np.ndarray:
@@ -90,5 +90,5 @@ class SoftDielectric(Principle):
         radius = np.sqrt(np.maximum(area, 1e-6) / np.pi)
         wide = np.pi * (radius + self.spread * self.thickness) ** 2
         slope = np.where(np.asarray(area) > 1e-6, (radius + self.spread * self.thickness) / radius, 0.0)
-        whole = wide >= self.electrode_area
-        return np.where(whole, self.electrode_area, wide), np.where(whole, 0.0, slope)
+        covered = wide >= self.electrode_area
+        return np.where(covered, self.electrode_area, wide), np.where(covered, 0.0, slope)
