@@ -75,6 +75,8 @@ class Course:
     """Each channel's number in the recordings; empty: none was left out."""
     clipped: np.ndarray | None = None
     """Readings that a channel's range ends at: more would read the same, shape (n, channels), bool; None: none."""
+    specimens: tuple[str, ...] = ()
+    """Name of what each episode pressed, by the source; empty: it names none."""
     apart: bool = False
     """Whether episodes are so far apart that no memory lasts from one to the next, regardless of the clock."""
 

@@ -24,6 +24,10 @@ def run(
         Path | None,
         typer.Option(help="Model spec (schemas/model_spec.schema.json); else a response fitted to the recordings."),
     ] = None,
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(help="Session of the same machine when healthy, as the model: what differs, with its size."),
+    ] = None,
     stop_after: Annotated[
         str, typer.Option(help="Last step: gate (is there a gap), locate (where), fit (what fits best), decide (all).")
     ] = "decide",
@@ -32,6 +36,9 @@ def run(
     ] = False,
 ) -> Result:
     """Find where recordings and a model disagree, and name the missing effect, or say why not."""
+    healthy = reference or _healthy(spec)
+    if healthy:
+        return _compared(recordings, healthy, out, spec if reference else None, fem)
     import tacdata as td
     import tacdata.warp_runtime
 
@@ -49,6 +56,8 @@ def run(
         verdict = td.judge(recordings, out, spec=spec, stop_after=stop_after, progress=show)
     print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
     print(verdict.text, end="")
+    if len(recordings) > 1:
+        print(_between(recordings))
     console.print(f"written: {verdict.folder}", markup=False, highlight=False, soft_wrap=True)
     return Result(verdict.document)
 
@@ -67,3 +76,47 @@ def _solved(recordings: list[Path], spec: Path | None, out: Path) -> Path:
     base = out.with_name(f"{out.name}-base")
     surrogate.run(recordings, base, None, False, None, "cpu", 1, False)
     return base / "spec.json"
+
+
+def _healthy(spec: Path | None) -> list[Path]:
+    """Return the healthy machine's sessions that a spec names as its response; none for other specs."""
+    from tacdata.discrepancy.model.spec import read_spec
+
+    response = read_spec(spec).document["response"]
+    if spec is None or response["kind"] != "recordings":
+        return []
+    return [spec.parent / name for name in response["sessions"]]
+
+
+def _compared(recordings: list[Path], healthy: list[Path], out: Path, spec: Path | None, fem: bool) -> Result:
+    """Compare with a healthy machine, print and write it."""
+    from tacdata.errors import UsageError
+    from tacdata.reference.run import compare, write
+
+    if spec is not None or fem:
+        raise UsageError(
+            "--reference with --fem" if fem else f"--reference with --spec {spec}", "one model", "leave one of them out"
+        )
+    if out.exists():
+        raise UsageError(f"{out} exists", "a new folder", "choose another --out")
+    with progress.console().status("comparing with the healthy machine"):
+        compared = compare(recordings, healthy)
+    print(compared.text, end="")
+    write(compared, out)
+    print(f"written: {out}")
+    return Result(compared.document)
+
+
+def _between(recordings: list[Path]) -> str:
+    """Return in a sentence whether the first session differs from the others."""
+    from tacdata.errors import TacdataError
+    from tacdata.reference.report import sentence
+    from tacdata.reference.run import compare
+
+    others, first = recordings[1:], recordings[0]
+    named = f"sessions: {', '.join(map(str, others))} with {first} as the reference"
+    try:
+        compared = compare(others, [first])
+    except TacdataError as error:
+        return f"{named}: not compared, {error.given}"
+    return f"{named}: {sentence(compared.found, compared.heading.unit)}"

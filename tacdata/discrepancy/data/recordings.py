@@ -240,7 +240,7 @@ def _joined(
     values = np.concatenate([p.rows.values for p in parts])
     channels = len(kept)
     centers = example.sensor.taxels.centers
-    numbers = {s: k for k, s in enumerate(dict.fromkeys(p.session for p in parts))}
+    numbers = {s: k for k, s in enumerate(sorted({p.session for p in parts}))}
     time, read = np.concatenate(clock), values[:, :channels]
     clipped = (read <= least) | (read >= most)
     site, told = _sites(parts, channels)
@@ -264,6 +264,7 @@ def _joined(
         recording=recording if recording.max() + 1 < len(parts) else None,
         numbers=tuple(int(k) for k in kept),
         clipped=clipped if clipped.any() else None,
+        specimens=tuple(p.specimen for p in parts) if any(p.specimen for p in parts) else (),
     )
 
 

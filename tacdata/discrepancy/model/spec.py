@@ -67,6 +67,12 @@ class Spec:
         given = self.document["response"]
         if given["kind"] == "fitted":
             return FittedResponse(course)
+        if given["kind"] == "recordings":
+            raise FormatError(
+                "model spec: response of kind recordings, a healthy machine's sessions",
+                "fitted or table",
+                "compare with them by `tacdata discrepancy SESSION --spec SPEC --out DIR`",
+            )
         table = TableResponse.read(self.folder / given.get("file", ""))
         if len(table.gain) != course.channels:
             raise FormatError(

@@ -1,0 +1,183 @@
+"""Presses of the same kind in both sessions, laid on one clock: the same place, depth, pace and indenter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.chain import Course
+
+SAME_DEPTH = 0.05
+"""Presses whose depths differ by less are of one kind [1]."""
+SAME_PACE = 0.12
+"""Presses whose durations above half of their depth differ by less are of one kind [1]."""
+FEWEST = 3
+"""Presses of a kind that each session needs: their scatter is the noise."""
+POINTS = 120
+"""Points of a press on its clock."""
+HALF = 0.5
+"""Share of the depth at which clocks are set: the path is steep there [1]."""
+
+
+@dataclass(frozen=True)
+class PressKind:
+    """All presses of one kind, on one clock."""
+
+    name: str
+    """What distinguishes it: its specimen or place, its depth, its speed."""
+    time: np.ndarray
+    """Since the start of the press [s], shape (t,)."""
+    depth: np.ndarray
+    """Mean depth of the healthy presses [mm], shape (t,)."""
+    healthy: np.ndarray
+    """Readings of the healthy presses in the order of time [the source's unit], shape (h, t, channels)."""
+    measured: np.ndarray
+    """Readings of the other presses [the source's unit], shape (m, t, channels)."""
+
+    @property
+    def base(self) -> np.ndarray:
+        """Mean of the healthy presses at the same point of the path [the source's unit], shape (t, channels)."""
+        return self.healthy.mean(axis=0)
+
+    @property
+    def difference(self) -> np.ndarray:
+        """Mean of the other presses minus the base [the source's unit], shape (t, channels)."""
+        return self.measured.mean(axis=0) - self.base
+
+    @property
+    def range(self) -> np.ndarray:
+        """Range of the base [the source's unit], shape (channels,)."""
+        return np.ptp(self.base, axis=0)
+
+    def split(self, first: np.ndarray) -> PressKind:
+        """Return the healthy presses alone: some as the reference of the others, for a control."""
+        return replace(self, healthy=self.healthy[first], measured=self.healthy[~first])
+
+
+@dataclass(frozen=True)
+class Matched:
+    """The conditions that both sessions hold."""
+
+    conditions: tuple[PressKind, ...]
+    unmatched: int
+    """Presses without enough counterparts."""
+    channels: tuple[str, ...]
+
+
+def matched(course: Course, names: Sequence[str], measured: np.ndarray) -> Matched:
+    """Return the conditions of a course that holds both sessions.
+
+    Args:
+        course: Healthy and other recordings, read together.
+        names: What the source calls each episode's specimen; empty where it names none.
+        measured: Whether an episode is of the other machine, shape (episodes,), bool.
+    """
+    rows = [np.flatnonzero((course.episode == e) & (course.averaged > 0)) for e in range(course.episodes)]
+    spans = [_span(course, r) for r in rows]
+    groups: list[list[int]] = []
+    for e in range(course.episodes):
+        same = next((g for g in groups if _same(course, names, spans, g[0], e)), None)
+        groups.append([e]) if same is None else same.append(e)
+    conditions, count = [], 0
+    for group in groups:
+        chosen = np.array(group)
+        enough = min(measured[chosen].sum(), (~measured[chosen]).sum()) >= FEWEST
+        if not enough:
+            count += len(group)
+            continue
+        conditions.append(_on_one_clock(course, rows, spans, chosen, measured, names))
+    return Matched(_distinct(conditions), count, course.channel_names)
+
+
+@dataclass(frozen=True)
+class _Span:
+    """Size and pace of a press."""
+
+    depth: float
+    """[mm]"""
+    start: float
+    """When it passes half of its depth on the way in [s]."""
+    pace: float
+    """Time above half of its depth [s]."""
+
+
+def _span(course: Course, rows: np.ndarray) -> _Span:
+    time, depth = course.time[rows], course.tip[rows, 2]
+    low, high = float(depth.min()), float(depth.max())
+    above = np.flatnonzero(depth >= low + HALF * (high - low))
+    first, last = int(above[0]), int(above[-1])
+    start, end = float(time[first]), float(time[last])
+    level = low + HALF * (high - low)
+    if first > 0 and depth[first] > depth[first - 1]:
+        start -= (depth[first] - level) / (depth[first] - depth[first - 1]) * (time[first] - time[first - 1])
+    return _Span(high - low, float(start), end - start)
+
+
+def _same(course: Course, names: Sequence[str], spans: list[_Span], a: int, b: int) -> bool:
+    one, other = spans[a], spans[b]
+    place = np.array([course.tip[course.episode == e][0, :2] for e in (a, b)])
+    tool = [course.tool[np.searchsorted(course.episode, e)] for e in (a, b)]
+    return (
+        names[a] == names[b]
+        and tool[0] == tool[1]
+        and float(np.linalg.norm(place[0] - place[1])) < PLACE
+        and abs(one.depth - other.depth) <= SAME_DEPTH * max(one.depth, other.depth)
+        and abs(one.pace - other.pace) <= SAME_PACE * max(one.pace, other.pace)
+    )
+
+
+PLACE = 0.15
+"""Presses no farther apart are at one place [mm]."""
+
+
+def _on_one_clock(
+    course: Course,
+    rows: list[np.ndarray],
+    spans: list[_Span],
+    group: np.ndarray,
+    measured: np.ndarray,
+    names: Sequence[str],
+) -> PressKind:
+    """Return presses resampled to common times; each point is the mean of the readings around it."""
+    before = min(spans[e].start - course.time[rows[e][0]] for e in group)
+    after = min(course.time[rows[e][-1]] - spans[e].start for e in group)
+    count = int(min(POINTS, np.median([len(rows[e]) for e in group])))
+    edges = np.linspace(-before, after, count + 1)
+    values = {e: _means(course.time[rows[e]] - spans[e].start, course.readings[rows[e]], edges) for e in group}
+    depths = [
+        _means(course.time[rows[e]] - spans[e].start, course.tip[rows[e], 2:], edges)[:, 0]
+        for e in group
+        if not measured[e]
+    ]
+    sides = [np.stack([values[e] for e in group if measured[e] == side]) for side in (False, True)]
+    speed = np.abs(np.diff(np.mean(depths, axis=0)) / np.diff(edges[:-1]))
+    at = course.tip[rows[group[0]][0], :2]
+    name = names[group[0]] or f"x {at[0]:.2g}, y {at[1]:.2g} mm"
+    told = f"{name}, {spans[group[0]].depth:.3g} mm deep at {np.quantile(speed, 0.75):.2g} mm/s"
+    return PressKind(told, 0.5 * (edges[1:] + edges[:-1]) + before, np.mean(depths, axis=0), *sides)
+
+
+def _means(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return the mean of the line through values between edges, shape (edges - 1, columns)."""
+    found = []
+    for column in values.T:
+        seen = np.isfinite(column)
+        if seen.sum() < 2:
+            found.append(np.full(len(edges) - 1, np.nan))
+            continue
+        at, value = time[seen], column[seen]
+        integral = np.concatenate([[0.0], np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(at))])
+        # Between its points the integral is a parabola; readings are dense enough for straight pieces.
+        fine = np.interp(edges, at, integral)
+        found.append(np.diff(fine) / np.diff(edges))
+    return np.column_stack(found)
+
+
+def _distinct(conditions: list[PressKind]) -> tuple[PressKind, ...]:
+    """Return conditions under the shortest names that still distinguish them."""
+    short = [c.name.partition(", ")[0] if not c.name.startswith("x ") else c.name for c in conditions]
+    if len(set(short)) == len(short):
+        return tuple(replace(c, name=s) for c, s in zip(conditions, short, strict=True))
+    return tuple(conditions)

@@ -1,0 +1,226 @@
+"""A difference in words and as a document."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import schemas
+from tacdata import provenance
+from tacdata.effects import load
+from tacdata.reference.difference import NAMED, ZERO, Difference, Mechanism, Size
+
+NEGLIGIBLE = 0.3
+"""A bound below this share of the changed sizes counts as nothing there [1]."""
+SIMILAR = 0.25
+"""Sizes that spread by less about their mean are given as one [1]."""
+LISTED = 4
+"""Conditions that a sentence lists; of more, only their number is given."""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What was compared."""
+
+    measured: tuple[str, ...]
+    """Folders of the machine that is judged."""
+    healthy: tuple[str, ...]
+    """Folders of the healthy machine."""
+    recorded: str
+    """When the judged machine was recorded, as far as the recordings state it."""
+    unit: str
+    """Unit of the readings."""
+
+
+def word(mechanism: str) -> str:
+    """Return a mechanism as a person calls it."""
+    return "zero of the readings" if mechanism == ZERO else load(mechanism).spoken
+
+
+def sentence(found: Difference, unit: str) -> str:
+    """Return the answer in one sentence, with sizes, units and the conditions without a change."""
+    if found.status == "none":
+        least = max((s.bound for m in found.mechanisms for s in m.sizes), default=0.0)
+        bound = f": no named effect above {least:.2g} {unit}" if least else ""
+        return f"The readings do not differ from the healthy machine beyond its own scatter{bound}."
+    if not found.named:
+        return (
+            f"The readings differ from the healthy machine by up to {found.largest:.2g} {unit} ({found.where}), and no "
+            "known effect explains it."
+        )
+    parts = "; ".join(_sized(found, m, unit) for m in found.named)
+    more = "; something else differs, too" if found.status == "named, incomplete" else ""
+    return f"Compared with the healthy machine: {parts}{more}."
+
+
+def _sized(found: Difference, mechanism: Mechanism, unit: str) -> str:
+    """Return one mechanism with its sizes where it is a change, and the bounds where it is none."""
+    changed = mechanism.changed
+    channels = {s.channel for s in changed}
+    rival = f" (or {word(mechanism.rival)})" if mechanism.rival else ""
+    sizes = f"{word(mechanism.name)}{rival} {_amount(changed, unit)}"
+    if len(found.channels) > 1:
+        sizes += f" in {len(channels)} of {len(found.channels)} channels"
+    if len(found.conditions) == 1:
+        return sizes
+    places = list(dict.fromkeys(s.condition for s in changed))
+    sizes += (
+        f" at {_listed(places)}" if len(places) <= LISTED else f" in {len(places)} of {len(found.conditions)} kinds"
+    )
+    typical = sum(abs(s.peak) for s in changed) / len(changed)
+    others = [s for s in mechanism.sizes if s.condition not in places and s.channel in channels]
+    nothing = [s for s in others if s.bound < NEGLIGIBLE * typical]
+    unsure = [s for s in others if s.bound >= NEGLIGIBLE * typical]
+    if nothing:
+        at = list(dict.fromkeys(s.condition for s in nothing))
+        sizes += f", nothing at {_listed(at)} (less than {max(s.bound for s in nothing):.2g} {unit})"
+    if unsure:
+        at = list(dict.fromkeys(s.condition for s in unsure))
+        sizes += f", open at {_listed(at)}"
+    return sizes
+
+
+def _amount(sizes: Sequence[Size], unit: str) -> str:
+    """Return sizes in the readings' unit and as a share of the reading, one figure or a range."""
+    peaks, shares = [s.peak for s in sizes], [100 * s.share for s in sizes]
+    mean = sum(peaks) / len(peaks)
+    if max(abs(p - mean) for p in peaks) <= SIMILAR * abs(mean):
+        return f"{mean:+.2g} {unit} ({sum(shares) / len(shares):+.0f} %)"
+    return f"{min(peaks):+.2g} to {max(peaks):+.2g} {unit} ({min(shares):+.0f} to {max(shares):+.0f} %)"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def table(found: Difference, unit: str) -> list[tuple[str, ...]]:
+    """Return a row for each size: mechanism, condition, channel, size with its 90 % interval, share, change or not."""
+    rows = []
+    for m in found.mechanisms:
+        for s in m.sizes:
+            low, high = s.peak - 1.645 * s.peak_error, s.peak + 1.645 * s.peak_error
+            shown = f"{s.peak:+.3g} {unit} ({low:+.3g} to {high:+.3g})"
+            if m.unit != "reading":
+                shown += f", from {s.value:.3g} {'' if m.unit == '1' else m.unit}".rstrip()
+            told = "yes" if s.changed else "no"
+            rows.append((word(m.name), s.condition, found.channels[s.channel], shown, f"{100 * s.share:+.1f} %", told))
+    return rows
+
+
+def controls(found: Difference, unit: str) -> list[str]:
+    """Return the control in words: the healthy machine compared with itself."""
+    if not found.controls:
+        return ["control: too few healthy presses to compare the machine with itself; record six or more of each kind"]
+    return [
+        f"control, {c.split} of the healthy machine: "
+        + ("quiet" if c.quiet else "NOT QUIET, so no name is given")
+        + (f", largest size {c.largest:.2g} {unit}" if c.largest else "")
+        for c in found.controls
+    ]
+
+
+def remarks(found: Difference) -> list[str]:
+    """Return what limits the answer."""
+    lines = []
+    if any(m.name == "dry_friction" for m in found.named):
+        lines.append("friction: presses of one speed do not distinguish dry from viscous friction")
+    if found.named:
+        lines.append(f"the named effects explain {100 * found.explained:.0f} % of the difference where they act")
+    sized = {m.name for m in found.mechanisms}
+    if small := [word(n) for n, p in found.probabilities.items() if p >= NAMED and n not in sized]:
+        lines.append(f"{', '.join(small)}: probable where the speed changes, too small to count")
+    if found.unmatched:
+        lines.append(f"{found.unmatched} presses have too few counterparts in the other session and were left out")
+    return lines
+
+
+def text(found: Difference, heading: Heading) -> str:
+    """Return everything for reading in a terminal."""
+    lines = [f"{found.status.upper()}: {sentence(found, heading.unit)}", ""]
+    lines.append(
+        f"machine: {', '.join(heading.measured)}{f', recorded {heading.recorded}' if heading.recorded else ''}"
+    )
+    lines.append(f"healthy: {', '.join(heading.healthy)}")
+    lines.append(f"version: tacdata {provenance.code_version()}")
+    lines += ["", *controls(found, heading.unit)]
+    rows = table(found, heading.unit)
+    if rows:
+        lines += [
+            "",
+            "sizes (largest change of the readings, 90 % interval, share of the reading, change beyond scatter):",
+        ]
+        widths = [max(len(r[k]) for r in rows) for k in range(6)]
+        lines += ["  " + "  ".join(v.ljust(w) for v, w in zip(r, widths, strict=True)).rstrip() for r in rows]
+    likely = [(m.name, m.probability) for m in found.mechanisms if m.name != ZERO]
+    if likely:
+        lines += ["", "probability: " + ", ".join(f"{word(n)} {p:.2f}" for n, p in likely)]
+    return "\n".join([*lines, *(f"- {line}" for line in remarks(found))]) + "\n"
+
+
+def document(found: Difference, heading: Heading, parents: dict[str, str]) -> dict[str, Any]:
+    """Return the difference (`schemas/difference.schema.json`).
+
+    Args:
+        found: The difference.
+        heading: What was compared.
+        parents: Name to content hash of the sessions.
+    """
+    return {
+        "version": schemas.version("difference"),
+        "status": found.status,
+        "sentence": sentence(found, heading.unit),
+        "heading": {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(heading).items()},
+        "differs": found.differs,
+        "largest": found.largest,
+        "explained": found.explained,
+        "probabilities": found.probabilities,
+        "mechanisms": [
+            {
+                "mechanism": m.name,
+                "form": m.form,
+                "unit": heading.unit if m.unit == "reading" else m.unit,
+                "probability": m.probability,
+                "rival": m.rival,
+                "named": m in found.named,
+                "sizes": [
+                    {**asdict(s), "channel": found.channels[s.channel], "interval": _interval(s)} for s in m.sizes
+                ],
+            }
+            for m in found.mechanisms
+        ],
+        "controls": [asdict(c) for c in found.controls],
+        "conditions": [
+            {"name": c.name, "healthy": len(c.healthy), "measured": len(c.measured)} for c in found.conditions
+        ],
+        "unmatched": found.unmatched,
+        "remarks": remarks(found),
+        "provenance": provenance.stamp("tacdata discrepancy --reference", parents, {}),
+    }
+
+
+def _interval(size: Size) -> list[float]:
+    return [size.value - 1.645 * size.error, size.value + 1.645 * size.error]
+
+
+def unit_of(path: Path) -> tuple[str, str]:
+    """Return the unit of a session's readings, and when its first recording was made; empty where it is not stated."""
+    from datetime import UTC, datetime
+
+    from tacdata.recording import read_session
+    from tacdata.recording.files.reader import read_recording
+    from tacdata.recording.session import FILE
+
+    file = path if path.is_file() else None
+    if file is None:
+        file = read_session(path).episodes[0] if (path / FILE).is_file() else min(path.glob("*.mcap"))
+    recording = read_recording(file)
+    began = int(recording.episode.taxels.sample_ns[0]) * 1e-9
+    # Imported clocks may begin at zero: that is no date.
+    date = datetime.fromtimestamp(began, UTC).strftime("%Y-%m-%d %H:%M") if began > YEAR_2000 else ""
+    return str(recording.board.get("unit") or "counts"), date
+
+
+YEAR_2000 = 946684800
+"""Seconds since 1970."""

@@ -1,0 +1,129 @@
+"""Shapes by which a faulty machine differs from a healthy one, each a curve over the press in the readings' unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tacdata.reference.conditions import PressKind
+
+STILL = 0.08
+"""Below this share of the fastest speed a tip counts as still [1]."""
+TURN = 0.25
+"""At this share of the fastest speed friction is nearly all there [1]."""
+SMOOTH = 1
+"""Points on either side over which speeds and slopes are averaged."""
+MEMORIES, FILTERS, DELAYS = (0.15, 0.5), (0.01, 0.03), (0.003, 0.01, 0.03)
+"""Time constants of memory and of filters, and delays, as shares of the press [1]."""
+FLAT = 0.02
+"""A curve that spans less than this share of the base's range is no shape [1]."""
+TYPICAL, TYPICAL_LAG, TYPICAL_SHIFT = 0.3, 0.02, 0.03
+"""Sizes that would not surprise: shares of the base's range, of the press's duration, of its depth [1]."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One curve of a mechanism."""
+
+    mechanism: str
+    """A mechanism's name, as in `tacdata.effects`."""
+    form: str
+    """Which form of it."""
+    unit: str
+    """Unit of its size; "reading" stands for the readings' unit."""
+    curves: np.ndarray
+    """Change of the readings for a size of 1 [the source's unit], shape (t, channels)."""
+    typical: np.ndarray
+    """Size that would not surprise, as a standard deviation [its unit], shape (channels,)."""
+
+
+def shapes(condition: PressKind) -> list[Shape]:
+    """Return all shapes of a condition; those that it does not excite are 0."""
+    time, base = condition.time, condition.base
+    speed = _smooth(np.gradient(condition.depth, time))
+    fastest = max(float(np.abs(speed).max()), 1e-12)
+    way = np.tanh(speed / (TURN * fastest))
+    moving = np.tanh((speed / (TURN * fastest)) ** 2)
+    last = _last_way(speed / fastest)
+    # A press begins where the one before ended.
+    ones = np.ones(base.shape[1])
+    slope = _slope(condition.depth, base, speed / fastest)
+    rest = base[np.argsort(condition.depth, kind="stable")[: max(len(time) // 20, 1)]].mean(axis=0)
+    span, size = float(time[-1] - time[0]), condition.range
+    typical = {
+        "reading": TYPICAL * size,
+        "1": TYPICAL * ones,
+        "s": TYPICAL_LAG * span * ones,
+        "mm": TYPICAL_SHIFT * float(np.ptp(condition.depth)) * ones,
+    }
+    found: list[tuple[str, str, str, np.ndarray]] = [
+        ("dry_friction", "held at rest", "reading", last[:, None] * ones),
+        ("dry_friction", "while it moves, against the motion", "reading", way[:, None] * ones),
+        ("dry_friction", "while it moves, either way", "reading", moving[:, None] * ones),
+        ("gain", "of the readings", "1", base - rest),
+        ("z_offset", "of the depth", "mm", slope),
+        ("backlash", "of the drive", "mm", slope * (last < 0)[:, None]),
+    ]
+    for share in MEMORIES:
+        found.append(("relaxation", f"over {share * span:.2g} s", "1", base - _lagged(base, time, share * span)))
+    for share in FILTERS:
+        late = (_lagged(base, time, share * span) - base) / (share * span)
+        found.append(("low_pass_filter", f"near {share * span:.2g} s", "s", late))
+    for share in DELAYS:
+        late = np.stack([np.interp(time - share * span, time, column) for column in base.T], axis=1)
+        found.append(("latency", f"near {share * span:.2g} s", "s", (late - base) / (share * span)))
+    return [_excited(Shape(*entry, typical[entry[2]]), size) for entry in found]
+
+
+def _excited(shape: Shape, size: np.ndarray) -> Shape:
+    """Return a shape without the channels in which a typical size would not show."""
+    seen = np.ptp(shape.curves, axis=0) * shape.typical > FLAT * size
+    return replace(shape, curves=np.where(seen, shape.curves, 0.0))
+
+
+def _smooth(values: np.ndarray) -> np.ndarray:
+    width = 2 * SMOOTH + 1
+    padded = np.pad(values, SMOOTH, mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+
+
+def _last_way(speed: np.ndarray) -> np.ndarray:
+    """Return the direction of the last motion, 1 on the way in, shape (t,); at first that of the press before."""
+    found, last = np.empty(len(speed)), -1.0
+    for k, value in enumerate(speed.tolist()):
+        if abs(value) > STILL:
+            last = float(np.sign(value))
+        found[k] = last
+    return found
+
+
+def _slope(depth: np.ndarray, base: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Return the change of the base with depth [the source's unit/mm], shape (t, channels): way in and out apart.
+
+    At rest it is the mean of both ways there; a parabola for each way follows no overshoot of the speed's changes.
+    """
+    found, depths = np.zeros_like(base), depth - depth.min()
+    for side in (speed > STILL, speed < -STILL):
+        rows = np.flatnonzero(side)
+        if len(rows) < 6:
+            continue
+        inner = rows[len(rows) // 10 : len(rows) - len(rows) // 10]
+        for k in range(base.shape[1]):
+            fit = np.polynomial.Polynomial.fit(depths[inner], base[inner, k], 3)
+            slope = fit.deriv()(np.clip(depths, depths[inner].min(), depths[inner].max()))
+            found[side, k] = slope[side]
+            still = np.abs(speed) <= STILL
+            found[still, k] += 0.5 * slope[still]
+    return found
+
+
+def _lagged(base: np.ndarray, time: np.ndarray, constant: float) -> np.ndarray:
+    """Return the base through a first-order lag; the press repeats, so it begins with its own end."""
+    step = np.diff(time, prepend=2 * time[0] - time[1])
+    value, found = base[0].copy(), np.empty_like(base)
+    for _ in range(2):
+        for k in range(len(base)):
+            value = value + (base[k] - value) * (1 - np.exp(-step[k] / constant))
+            found[k] = value
+    return found

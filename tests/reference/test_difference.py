@@ -1,0 +1,109 @@
+"""A machine beside its healthy self: seeded faults get their names and sizes, healthy halves stay quiet."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tacdata import documents
+from tacdata.chain import Course, Tool
+from tacdata.errors import FormatError
+from tacdata.reference.difference import difference
+from tacdata.reference.report import Heading, document, sentence, text
+
+TIME = np.linspace(0.0, 10.0, 251)
+DEPTH = np.interp(TIME, [0, 0.5, 4.0, 6.0, 9.5, 10.0], [0.0, 0.0, 70.0, 70.0, 0.0, 0.0])
+WAY = np.sign(np.gradient(DEPTH, TIME)) * (np.abs(np.gradient(DEPTH, TIME)) > 2)
+HEADING = Heading(("after",), ("before",), "", "A")
+
+
+def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01):
+    """Compare presses of a motor with load, friction and wander; a change acts in the second half of each load."""
+    rng = np.random.default_rng(seed)
+    readings, names, measured = [], [], []
+    for load in loads:
+        for k in range(presses):
+            base = 0.4 + 0.2 * np.abs(WAY) + 0.002 * float(load) * WAY + 0.006 * DEPTH
+            base = base + wander * rng.normal() * np.abs(WAY) + 0.02 * rng.normal(size=len(TIME))
+            readings.append(change(load, base) if k >= presses // 2 else base)
+            names.append(load)
+            measured.append(k >= presses // 2)
+    episodes = len(readings)
+    rows = np.repeat(np.arange(episodes), len(TIME))
+    tip = np.tile(np.column_stack([np.zeros((len(TIME), 2)), DEPTH]), (episodes, 1))
+    course = Course(
+        time=np.concatenate([TIME + 12 * k for k in range(episodes)]),
+        episode=rows,
+        tip=tip,
+        tool=np.zeros(len(rows), dtype=np.int64),
+        readings=np.concatenate(readings)[:, None],
+        averaged=np.ones(len(rows)),
+        session=np.array(measured, dtype=np.int64),
+        site=np.zeros(episodes, dtype=np.int64),
+        tools=(Tool("unknown", "unknown", np.nan),),
+        names=tuple(f"press {k}" for k in range(episodes)),
+        specimens=tuple(names),
+    )
+    return difference(course, course.specimens, np.array(measured))
+
+
+def late(by):
+    return lambda load, base: np.interp(TIME - by, TIME, base)
+
+
+FAULTS = {
+    "friction either way": (lambda load, base: base + 0.12 * np.abs(WAY), "dry_friction", 0.12),
+    "friction against the motion": (lambda load, base: base + 0.08 * WAY, "dry_friction", 0.08),
+    "less friction": (lambda load, base: base - 0.1 * np.abs(WAY), "dry_friction", -0.1),
+    "delay": (late(0.12), "latency", 0.12),
+    "zero": (lambda load, base: base + 0.1, "zero", 0.1),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_seeded_fault_is_named_with_its_signed_size(fault):
+    change, name, size = FAULTS[fault]
+    found = machine(change)
+    assert [m.name for m in found.named] == [name]
+    for s in found.named[0].changed:
+        assert s.value == pytest.approx(size, rel=0.2)
+    assert found.named[0].changed
+
+
+def test_a_fault_at_one_load_is_said_with_the_bound_at_the_other():
+    found = machine(lambda load, base: base + 0.12 * np.abs(WAY) * (load == "20"), wander=0.002)
+    words = sentence(found, "A")
+    assert [m.name for m in found.named] == ["dry_friction"]
+    assert "dry friction +0.12 A" in words and "at 20" in words and "nothing at 40 (less than" in words
+    assert len(words.split()) <= 30
+
+
+def test_healthy_halves_are_quiet_at_many_seeds():
+    quiet = [machine(lambda load, base: base, seed=seed).status == "none" for seed in range(8)]
+    assert all(quiet)
+
+
+def test_what_no_shape_explains_stays_without_a_name():
+    bump = 0.15 * np.exp(-0.5 * ((TIME - 2.2) / 0.3) ** 2)
+    found = machine(lambda load, base: base + bump)
+    assert found.status == "unknown" and found.differs
+    assert "no known effect" in sentence(found, "A")
+
+
+def test_the_control_is_drawn_and_printed():
+    found = machine(FAULTS["friction either way"][0], presses=16)
+    assert [c.quiet for c in found.controls] == [True, True]
+    words = text(found, HEADING)
+    assert "control, first half and second half of the healthy machine: quiet" in words
+    documents.check(document(found, HEADING, {}), "difference", "test")
+
+
+def test_a_machine_that_differs_from_itself_gives_no_name():
+    found = machine(FAULTS["friction either way"][0], presses=16)
+    loud = replace(found.controls[0], quiet=False)
+    assert "NOT QUIET" in text(replace(found, controls=(loud,)), HEADING)
+
+
+def test_presses_without_counterparts_are_refused_in_words():
+    with pytest.raises(FormatError, match="no press of the same place"):
+        machine(lambda load, base: base, presses=4)
