@@ -16,9 +16,11 @@ from judge import course_of, guard, spec_of
 from tacdata.discrepancy.judge import judge
 from tacdata.plans import Plan
 from tacdata.recording.motion.trapezoid import AxisLimits
+from tacdata.revision.additions import of_verdict, placed_of
 from tacdata.revision.comparison import Comparison
+from tacdata.revision.next_presses.machine import MachineLimits
 from tacdata.revision.next_presses.plan import choose, plan_of
-from tacdata.revision.next_presses.rivals import named, rivals
+from tacdata.revision.next_presses.rivals import rivals
 
 TRAVEL = 6.0
 """What the guide does at most [mm/s]."""
@@ -44,9 +46,9 @@ def plan_for(course):
 
 def recommended(course, spec, verdict, count):
     """Return the presses that the workflow recommends next, in their order, with the pairs that they tell apart."""
-    held, plan = Comparison(course, spec, tuple(named(verdict))), plan_for(course)
+    held, plan = Comparison(course, spec, tuple(placed_of(of_verdict(verdict)))), plan_for(course)
     found = rivals(held, verdict)
-    chosen = choose(held, found, plan, limits=LIMITS) if len(found) > 1 else []
+    chosen = choose(held, found, MachineLimits.of_plan(plan, LIMITS)) if len(found) > 1 else []
     if not chosen:
         return []
     tools = [t.name for t in course.tools]

@@ -26,6 +26,12 @@ def run(
     confirm: Annotated[
         int, typer.Option(min=0, help="Presses to solve by finite elements where the effect matters most.")
     ] = 0,
+    suspected: Annotated[
+        bool, typer.Option("--suspected", help="Add the best explanation, too, where nothing is named; marked so.")
+    ] = False,
+    corrected: Annotated[
+        bool, typer.Option("--corrected", help="Write the recordings without the effects: corrected.csv.")
+    ] = False,
     presses: Annotated[int, typer.Option(min=1, help="Different presses of the next plan.")] = 4,
     retrain: Annotated[
         bool, typer.Option("--retrain", help="Train a network on the data before and one on those after; score both.")
@@ -50,7 +56,8 @@ def run(
     console = progress.console()
     farm = FarmSettings(factory=factory or FACTORY, uncertainty=uncertainty) if relabel else None
     with console.status("reading") as status:
-        wishes = RevisionOptions(farm, store, confirm, presses, Recipe(epochs, network) if retrain else None, truth)
+        recipe = Recipe(epochs, network) if retrain else None
+        wishes = RevisionOptions(farm, store, confirm, suspected, corrected, presses, recipe, truth)
         done = revise(verdict, recordings, read_spec(spec), out, wishes, status.update)
         if done.shown:
             status.update("Rerun file")
@@ -96,7 +103,15 @@ def run(
     for words in (document["next"]["remark"], *document["next"]["presses"]):
         if words:
             say(f"next: {words}")
-    if document["next"]["plan"]:
+    for remark in document["remarks"]:
+        print(remark)
+    if document["suspected"]:
+        print(f"not added, as they are only suspected: {', '.join(document['suspected'])}")
+    for what, change in (document["corrected"] or {}).items():
+        print(f"corrected {what}: {change if what != 'file' else out / change}")
+    if (document["next"]["plan"] or "").endswith(".csv"):
+        say(f"next: press as in {out / document['next']['plan']}, and import the new files")
+    elif document["next"]["plan"]:
         suggest("record --rig RIG --plan", out / document["next"]["plan"], "--out SESSION")
     print(f"card: {out / CARD}")
     return Result(document)

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from tacdata.chain import Course, Response, predict
-from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.noise.null_model import NullModel, null_model
@@ -20,6 +19,8 @@ from tacdata.revision.episodes import part
 
 STEPS = 2
 """Gauss-Newton steps of a fit to some of the episodes, from the parameters of all of them."""
+LEAST_WHITE = 0.02
+"""Least share of a reading's variance that is not predicted by the reading before [1]."""
 
 
 @dataclass(frozen=True)
@@ -47,31 +48,36 @@ class Comparison:
         """The model without further effects."""
         return refine(self.setting, [], self.null)
 
-    @cached_property
-    def values(self) -> np.ndarray:
-        """Whitened values of each episode [1], shape (episodes,)."""
-        rows = np.bincount(self.course.reduced.episode, minlength=self.course.episodes)
-        return np.maximum(rows * Streams.of(self.course).count, 1).astype(float)
+    @property
+    def noise(self) -> np.ndarray:
+        """Standard deviation of a reading's noise [the source's unit], shape (channels,)."""
+        noise = self.null.noise
+        return noise.scale[: self.course.channels] / np.sqrt(max(1 - noise.memory**2, LEAST_WHITE))
 
     def after(self, placed: Sequence[Placed]) -> Refined:
-        """Return the model with effects of fixed parameters; a fitted response takes up the rest."""
+        """Return the model with effects of fixed parameters; a fitted response takes up the remainder."""
         return refine(self.setting, placed, self.null, steps=0)
 
-    def fitted_without(self, placed: Sequence[Placed], left_out: np.ndarray) -> tuple[Placed, ...]:
+    def without(self, episodes: np.ndarray) -> Comparison:
+        """Return the comparison without the readings of some episodes; their motion stays, as it shaped the skin."""
+        return Comparison(without_readings(self.course, episodes), self.spec, self.answer)
+
+    def covered(self, episodes: np.ndarray) -> bool:
+        """Return whether the other episodes hold every place and tool of some episodes."""
+        others = np.setdiff1d(np.arange(self.course.episodes), episodes)
+        return set(self._contexts[episodes]) <= set(self._contexts[others])
+
+    def fitted_without(self, placed: Sequence[Placed], episodes: np.ndarray) -> tuple[Placed, ...]:
         """Return effects with parameters fitted to all episodes except some.
 
-        The motion of the excluded episodes stays in the course, since it shaped the skin's state; only their readings
-        are removed. If a place or tool occurs in no other episode, they are removed altogether.
+        If a place or tool occurs in no other episode, the episodes are removed altogether.
         """
-        kept = np.setdiff1d(np.arange(self.course.episodes), left_out)
-        if set(self._contexts[left_out]) <= set(self._contexts[kept]):
-            course = without_readings(self.course, left_out)
-        else:
-            course = part(self.course, kept)
+        others = np.setdiff1d(np.arange(self.course.episodes), episodes)
+        covered = self.covered(episodes)
+        course = without_readings(self.course, episodes) if covered else part(self.course, others)
         setting = Comparison(course, self.spec).setting
-        rows = ~np.isin(self.course.reduced.episode, left_out)
-        left = None if course.episodes == self.course.episodes else kept
-        return refine(setting, placed, _frame_of(self.null, course, rows, left), STEPS).placed
+        rows = ~np.isin(self.course.reduced.episode, episodes)
+        return refine(setting, placed, _frame_of(self.null, course, rows, None if covered else others), STEPS).placed
 
     @cached_property
     def _contexts(self) -> np.ndarray:
@@ -79,35 +85,51 @@ class Comparison:
         first = np.searchsorted(course.episode, np.arange(course.episodes))
         return course.site * len(course.tools) + course.tool[first]
 
-    def mean_square(self, model: Refined, episodes: np.ndarray) -> float:
-        """Return the mean square of the whitened residual over some episodes [1]; 1 is the noise floor."""
-        return float(2 * model.energy[episodes].sum() / self.values[episodes].sum())
-
     def predicted(self, response: Response, placed: Sequence[Placed]) -> np.ndarray:
         """Return a model's predicted readings, shape (rows, channels)."""
         return predict(self.course, response, [*self.setting.given, *placed]).signal
 
+    def squares(self, model: Refined, scale: np.ndarray) -> np.ndarray:
+        """Return squared residuals over the noise, each episode's median subtracted [1], shape (m, channels).
 
-def _frame_of(whole: NullModel, course: Course, rows: np.ndarray, episodes: np.ndarray | None) -> NullModel:
+        Args:
+            model: A response with its effects.
+            scale: Noise of a reading [the source's unit], shape (channels,).
+        """
+        course = self.course.reduced
+        residual = (course.readings - self.predicted(model.response, model.placed)[self.course.read]) / scale
+        for number in np.unique(course.episode):
+            rows = course.episode == number
+            seen = np.isfinite(residual[rows]).any(axis=0)
+            residual[np.ix_(rows, seen)] -= np.nanmedian(residual[rows][:, seen], axis=0)
+        return np.square(residual)
+
+    def mean_squares(self, model: Refined, episodes: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Return the mean of `squares` over each of some episodes [1], shape (k,)."""
+        squares, number = self.squares(model, scale), self.course.reduced.episode
+        return np.array([float(np.nanmean(squares[number == e])) for e in episodes])
+
+
+def _frame_of(null: NullModel, course: Course, rows: np.ndarray, episodes: np.ndarray | None) -> NullModel:
     """Return the null model restricted to some rows.
 
     Their weights are still estimated from all rows; their readings are not used.
 
     Args:
-        whole: The null model of all rows.
+        null: The null model of all rows.
         course: With the rows that are kept.
         rows: Rows that are kept, shape (m,), bool.
         episodes: The remaining episodes, if they are renumbered.
     """
     return NullModel.of(
         course.reduced,
-        whole.context[rows],
-        None if whole.features is None else whole.features[rows],
-        whole.errors[rows],
-        whole.ridge,
-        whole.beside[rows],
-        whole.noise.of(rows, episodes),
-        whole.folds,
-        sizes=whole.sizes,
-        spread=whole.spread,
+        null.context[rows],
+        None if null.features is None else null.features[rows],
+        null.errors[rows],
+        null.ridge,
+        null.beside[rows],
+        null.noise.of(rows, episodes),
+        null.folds,
+        sizes=null.sizes,
+        spread=null.spread,
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.verdict.sealed import chosen
+from tacdata.discrepancy.verdict.sealed import DEEPER, chosen
 
 SHARE = 0.25
 """Share of the episodes that is sealed if the verdict sealed none [1]."""
@@ -30,15 +30,34 @@ class Sealed:
 def sealed(course: Course, verdict: dict[str, Any]) -> Sealed:
     """Return the episodes that the verdict sealed; if it sealed none, a share chosen by the hash of their names.
 
+    Of a share, no episode is the only one of its place and indenter, or the deepest: a fitted response needs another.
+
     Args:
         course: The course of the verdict.
         verdict: The verdict's document.
     """
-    own = chosen(course)
-    if len(own) and len(own) == verdict.get("sealed", {}).get("episodes"):
-        return Sealed(own, True)
+    unseen = chosen(course)
+    if len(unseen) and len(unseen) == verdict.get("sealed", {}).get("episodes"):
+        return Sealed(unseen, True)
     order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(f"{k} {course.names[k]}".encode()).digest())
-    return Sealed(np.sort(np.array(order[: max(int(np.ceil(SHARE * course.episodes)), 1)])), False)
+    count = max(int(np.ceil(SHARE * course.episodes)), 1)
+    picked = _replaceable(course, order, count) or order[:count]
+    return Sealed(np.sort(np.array(picked)), False)
+
+
+def _replaceable(course: Course, order: list[int], count: int) -> list[int]:
+    """Return the first episodes of an order whose place and indenter keep one that goes as deep."""
+    first = np.searchsorted(course.episode, np.arange(course.episodes))
+    context = course.site * len(course.tools) + course.tool[first]
+    depth = np.array([course.tip[course.episode == k, 2].max() for k in range(course.episodes)])
+    picked: list[int] = []
+    for k in order:
+        others = [j for j in np.flatnonzero(context == context[k]).tolist() if j != k and j not in picked]
+        if others and depth[others].max() >= (1 - DEEPER) * depth[k]:
+            picked.append(k)
+        if len(picked) == count:
+            break
+    return picked
 
 
 def part(course: Course, numbers: np.ndarray) -> Course:
@@ -55,6 +74,7 @@ def part(course: Course, numbers: np.ndarray) -> Course:
         recording=None if course.recording is None else np.unique(course.recording[keep], return_inverse=True)[1],  # ty: ignore[invalid-argument-type]
         site=course.site[keep],  # ty: ignore[invalid-argument-type]
         names=tuple(course.names[k] for k in keep),
+        specimens=tuple(course.specimens[k] for k in keep) if course.specimens else (),
     )
 
 

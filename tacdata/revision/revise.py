@@ -15,37 +15,35 @@ from tacdata import documents, provenance
 from tacdata.discrepancy.data.recordings import course_of
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.run import VERDICT, recording_hash
-from tacdata.discrepancy.verdict.document import REVISE
 from tacdata.effects import Placed
 from tacdata.errors import UsageError
-from tacdata.plans import Plan
-from tacdata.recording import read_session
 from tacdata.recording.session import FILE
+from tacdata.revision.additions import Addition, additions, of_verdict, placed_of, suspects
 from tacdata.revision.comparison import Comparison
-from tacdata.revision.episodes import sealed
+from tacdata.revision.corrected import write_corrected
+from tacdata.revision.episodes import Sealed, sealed
 from tacdata.revision.evidence import table
 from tacdata.revision.evidence.card import card
 from tacdata.revision.evidence.curves import EpisodeCurves, curves
-from tacdata.revision.evidence.gap import GapReduction, ResidualChange, gap
+from tacdata.revision.evidence.gap import GapReduction, ResidualChange, gap, noise_of
 from tacdata.revision.evidence.picture import draw
 from tacdata.revision.evidence.worst_slice import sealed_slices
 from tacdata.revision.labels.confirm import Confirmed, confirm, touches_fem
 from tacdata.revision.labels.realised import TipError, tip_error
 from tacdata.revision.labels.relabel import Moved, moves_labels, paths_moved, relabelled
 from tacdata.revision.labels.retrain import Recipe, Retrained, retrained
-from tacdata.revision.next_presses.plan import choose, left_open, plan_of, standard_errors
-from tacdata.revision.next_presses.rivals import named, rivals
+from tacdata.revision.next_presses.recommend import recommend
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.pressed import pressed
 
-REVISION, SPEC, CARD, PICTURE, TABLE, CSV, PLAN, LABELS = (
+REVISION, SPEC, CARD, PICTURE, TABLE, CSV, CORRECTED, LABELS = (
     "revision.json",
     "spec.json",
     "card.html",
     "gap.png",
     "gap.md",
     "gap.csv",
-    "next.yaml",
+    "corrected.csv",
     "labels",
 )
 """Names of the folder's files."""
@@ -67,6 +65,10 @@ class RevisionOptions:
     """Store of solved paths; by default each session's own."""
     confirm: int = 0
     """Presses to solve by finite elements where the revision moves the loads most."""
+    suspected: bool = False
+    """Whether effects that are not named are added, too."""
+    corrected: bool = False
+    """Whether to write the recordings as corrected by the effects."""
     presses: int = 4
     """Different presses of the next plan."""
     retrain: Recipe | None = None
@@ -113,46 +115,70 @@ def revise(
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
     verdict = documents.read(judged / VERDICT, "verdict")
     _same(verdict, spec, judged, recordings)
-    answer, status = named(verdict), verdict["status"]
-    if asked.retrain is not None and asked.relabel is None and moves_labels(answer) and status == "named":
+    status, moving = verdict["status"], moves_labels(placed_of(additions(verdict)))
+    if asked.retrain is not None and asked.relabel is None and moving:
         raise UsageError(
             "--retrain without --relabel: the effect moves labels, and a network needs the new ones",
             "both",
             "add --relabel",
         )
     note("reading")
+    added = of_verdict(verdict) if asked.suspected else additions(verdict)
+    answer = placed_of(added or of_verdict(verdict))
     held = Comparison(course_of(recordings), spec, tuple(answer))
     out.mkdir(parents=True)
-    note("gap, with the numbers fitted without the sealed episodes")
+    note("gap, with the parameters fitted without the sealed episodes")
     # The gap uses parameters fitted without the sealed episodes; the model that is written has the verdict's own.
-    found = gap(held, answer, sealed(held.course, verdict), note) if answer else None
-    slices = sealed_slices(held, found.fitted, sealed(held.course, verdict).numbers) if found else []
-    moved = _labels(recordings, answer, out, asked, note) if status == "named" else []
-    tips = _tips(recordings, answer, asked, note)
-    confirmed = _confirmed(recordings, held, answer, asked, note) if status == "named" else []
-    after = _added(verdict, judged, spec, answer, out) if status == "named" else None
-    trained = _retrained(recordings, held, answer, out, asked, note) if status == "named" else None
-    following = _next(recordings, held, verdict, asked, out, note)
+    chosen = sealed(held.course, verdict)
+    change = gap(held, answer, chosen, noise_of(verdict, held), note) if answer else None
+    slices = sealed_slices(held, change, chosen.numbers) if change else []
+    after = _added(verdict, judged, spec, added, out) if added else None
+    corrected = write_corrected(held, held.after(answer), out / CORRECTED) if asked.corrected and added else None
     parents = {"verdict": provenance.content_hash(verdict), "spec": spec.content_hash}
     document = {
         "version": schemas.version("revision"),
         "verdict": parents["verdict"],
         "status": status,
-        "added": [e.effect.name for e in answer] if after else [],
+        "added": [a.placed.effect.name for a in added],
+        "suspected": [] if asked.suspected else [a.placed.effect.name for a in suspects(verdict)],
+        "remarks": [a.remark for a in added if a.remark],
         "spec": {"before": spec.content_hash, "after": after},
-        "gap": _gap(found, slices),
+        "gap": _gap(change, slices),
+        "labels": [],
+        "tips": [],
+        "retrained": None,
+        "confirmed": [],
+        "corrected": None if corrected is None else {"file": CORRECTED, **corrected},
+        "next": {"plan": None, "presses": [], "remark": ""},
+        "provenance": provenance.stamp("tacdata revise", parents, {"confirm": asked.confirm}),
+    }
+    shown = _pictures(document, verdict, held, answer, change, chosen, out, note)
+    _write(document, verdict, out)
+    if added:
+        document |= _about_labels(recordings, held, answer, out, asked, note)
+    document["tips"] = [{"session": s, **asdict(t)} for s, t in _tips(recordings, answer, asked, note)]
+    _write(document, verdict, out)
+    document["next"] = recommend(recordings, held, verdict, out, asked.presses, note)
+    if document["retrained"]:  # the picture shows the networks, too
+        shown = _pictures(document, verdict, held, answer, change, chosen, out, note)
+    _write(document, verdict, out)
+    return Revised(document, out, shown)
+
+
+def _about_labels(
+    recordings: list[Path], held: Comparison, answer: list[Placed], out: Path, asked: RevisionOptions, note: Note
+) -> dict[str, Any]:
+    """Return what the effects do to labels, to networks, and beside finite elements."""
+    moved = _labels(recordings, answer, out, asked, note)
+    confirmed = _confirmed(recordings, held, answer, asked, note)
+    trained = _retrained(recordings, held, answer, out, asked, note)
+    return {
         "labels": [
             {"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}} for s, m in moved
         ],
-        "tips": [{"session": s, **asdict(t)} for s, t in tips],
         "retrained": None if trained is None else {**asdict(trained), "metrics": list(trained.metrics)},
         "confirmed": [{**_finite(asdict(c)), "place": list(c.place)} for c in confirmed],
-        "next": following,
-        "provenance": provenance.stamp("tacdata revise", parents, {"confirm": asked.confirm}),
     }
-    shown = _show(document, verdict, held, answer, found, out, note)
-    documents.write(out / REVISION, document, "revision")
-    return Revised(document, out, shown)
 
 
 def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Path]) -> None:
@@ -167,7 +193,10 @@ def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Pa
             "name them, or run `tacdata discrepancy` with the ones that there are",
         )
     known = verdict["provenance"].get("parents", {}).get("spec")
-    if known is not None and known != spec.content_hash:
+    major, minor = schemas.version("model_spec").split(".")
+    versions = [f"{major}.{k}" for k in range(int(minor) + 1)]
+    same = {provenance.content_hash({**spec.document, "version": version}) for version in versions}
+    if known is not None and known not in same | {spec.content_hash}:
         raise UsageError(
             f"{judged} was reached from another model ({known[:12]}… instead of {spec.content_hash[:12]}…)",
             "the model spec that `tacdata discrepancy` was given",
@@ -248,15 +277,14 @@ def _mesh(path: Path) -> MeshSettings:
     return MeshSettings(**values)
 
 
-def _added(verdict: dict[str, Any], judged: Path, spec: Spec, answer: list[Placed], out: Path) -> str:
+def _added(verdict: dict[str, Any], judged: Path, spec: Spec, added: list[Addition], out: Path) -> str:
     """Write the new version of the model, with its evidence; return its hash."""
     errors = [
-        {name: float(p["error"]) for name, p in e["parameters"].items() if p["error"] is not None}
-        for e in verdict["effects"]
+        {name: float(p["error"]) for name, p in a.entry["parameters"].items() if p["error"] is not None} for a in added
     ]
     names = [n for n in verdict["provenance"].get("parents", {}) if n != "spec"]
     evidence = f"{judged.name}/{VERDICT} sha256 {provenance.content_hash(verdict)}, from {', '.join(names)}"
-    document = spec.with_effects(answer, errors, evidence)
+    document = spec.with_effects(placed_of(added), errors, evidence)
     given = document["response"]
     if "file" in given:
         import os
@@ -266,51 +294,18 @@ def _added(verdict: dict[str, Any], judged: Path, spec: Spec, answer: list[Place
     return provenance.content_hash(document)
 
 
-def _next(
-    recordings: list[Path], held: Comparison, verdict: dict[str, Any], asked: RevisionOptions, out: Path, note: Note
-) -> dict[str, Any]:
-    status = verdict["status"]
-    if status not in ("ambiguous", "unknown", "named, incomplete"):
-        return {"plan": None, "presses": [], "remark": ""}
-    sessions = _sessions(recordings)
-    # Without a plan the verdict's own words hold, but those that send one here.
-    others = [words for words in verdict["next"] if REVISE not in words]
-    found = rivals(held, verdict, note=note)
-    if len(found) < 2 or not sessions:
-        why = "no session with a plan" if not sessions else "the rivals do not come out differently in these recordings"
-        return {"plan": None, "presses": others, "remark": f"no plan: {why}"}
-    note("next presses")
-    plan = read_session(sessions[-1]).plan
-    chosen = choose(held, found, plan, asked.presses)
-    if not chosen:
-        names = ", ".join(r.mechanism for r in found)
-        remark = f"no press at these places tells {names} apart beyond the noise: another kind of measurement is needed"
-        return {"plan": None, "presses": others, "remark": remark}
-    document = plan_of(chosen, held, plan, f"{plan.name}, next")
-    documents.write(out / PLAN, document, "plan")
-    Plan.from_document(document, PLAN).check_against(read_session(sessions[-1]).sensor)
-    told = []
-    for c in chosen:
-        apart = standard_errors(c.nats[c.best])
-        told.append(
-            f"{c.trial.in_words(held.course.tools[c.trial.tool].name)}: one press tells {c.best[0]} from {c.best[1]} "
-            f"by {apart:.1f} standard errors"
-        )
-    remarks = ["judge the new session together with those there are", left_open(chosen)]
-    return {"plan": PLAN, "presses": told, "remark": "; ".join(r for r in remarks if r)}
-
-
-def _gap(found: GapReduction | None, slices: list[ResidualChange]) -> dict[str, Any] | None:
-    if found is None:
+def _gap(change: GapReduction | None, slices: list[ResidualChange]) -> dict[str, Any] | None:
+    if change is None:
         return None
-    changes = {"sealed": found.whole, "worst": found.worst}
+    changes = {"sealed": change.total, "worst": change.worst}
     return {
-        "unseen": found.unseen,
+        "unseen": change.unseen,
+        "predicted": change.predicted,
         **{n: asdict(c) for n, c in changes.items()},
-        "closed": _or_none(found.whole.closed),
-        "interval": [_or_none(v) for v in found.interval],
+        "closed": _or_none(change.total.closed),
+        "interval": [_or_none(v) for v in change.interval],
         "floor": 1.0,
-        "elsewhere": [asdict(c) for c in found.elsewhere],
+        "elsewhere": [asdict(c) for c in change.elsewhere],
         "slices": [asdict(c) for c in slices],
     }
 
@@ -323,24 +318,31 @@ def _finite(values: dict[str, Any]) -> dict[str, Any]:
     return {k: _or_none(v) if isinstance(v, float) else v for k, v in values.items()}
 
 
-def _show(
+def _pictures(
     document: dict[str, Any],
     verdict: dict[str, Any],
     held: Comparison,
     answer: list[Placed],
-    found: GapReduction | None,
+    change: GapReduction | None,
+    chosen: Sealed,
     out: Path,
     note: Note,
 ) -> tuple[EpisodeCurves, ...]:
-    note("picture, table, card")
-    drawn, shown = None, []
-    if found is not None:
-        shown = curves(held, answer, sealed(held.course, verdict).numbers)
-        names = " and ".join(p.effect.title.lower() for p in answer)
-        drawn = out / PICTURE
-        networks = (document["retrained"] or {}).get("metrics", ())
-        draw(f"{verdict['status']}: {names}", shown, found, drawn, networks)
+    if change is None:
+        return ()
+    note("picture, table")
+    shown = curves(held, change, chosen.numbers)
+    names = " and ".join(p.effect.title.lower() for p in answer)
+    networks = (document["retrained"] or {}).get("metrics", ())
+    draw(f"{verdict['status']}: {names}", shown, change, out / PICTURE, networks)
+    return tuple(shown)
+
+
+def _write(document: dict[str, Any], verdict: dict[str, Any], out: Path) -> None:
+    """Write the document, the tables and the card."""
+    documents.write(out / REVISION, document, "revision")
+    if document["gap"]:
         documents.write_text(out / TABLE, table.markdown(document))
         documents.write_text(out / CSV, table.as_csv(document))
-    documents.write_text(out / CARD, card(document, verdict, drawn))
-    return tuple(shown)
+    picture = out / PICTURE
+    documents.write_text(out / CARD, card(document, verdict, picture if picture.is_file() else None))

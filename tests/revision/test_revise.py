@@ -11,8 +11,7 @@ from tacdata import documents
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.verdict.document import REVISE
 from tacdata.errors import UsageError
-from tacdata.plans.plan import read_plan
-from tacdata.revision.revise import revise
+from tacdata.revision.revise import RevisionOptions, revise
 
 
 @pytest.fixture(scope="module")
@@ -78,9 +77,41 @@ def test_an_undecided_verdict_adds_nothing_and_plans_presses_that_decide(loose, 
     made = revise(judged, [loose], read_spec(None), tmp_path / "revision")
     assert made.document["added"] == [] and made.document["spec"]["after"] is None
     assert not (made.folder / "spec.json").exists()
-    plan = read_plan(made.folder / made.document["next"]["plan"])
-    assert any(abs(p.speed - 1.3) > 0.5 or p.overshoot for p in plan.presses), "another rate, or from below"
-    assert all("tells" in p.purpose for p in plan.presses) and len(made.document["next"]["presses"]) >= 1
+    rows = list(csv.DictReader((made.folder / made.document["next"]["plan"]).read_text().splitlines()))
+    assert any(abs(float(r["speed_mm_s"]) - 1.3) > 0.5 or float(r["overshoot_mm"]) for r in rows), "another rate"
+    assert all(float(r["speed_mm_s"]) <= 2.7 for r in rows), "no faster than the machine was seen to go"
+    assert all(0 < float(r["depth_mm"]) + float(r["overshoot_mm"]) <= 1.0 for r in rows), "nowhere deeper"
+    assert all("distinguishes" in r["purpose"] for r in rows) and len(made.document["next"]["presses"]) >= 1
+
+
+def test_a_name_beside_a_remainder_and_a_family_are_added_and_the_readings_are_given_back(late, tmp_path):
+    judged = verdict(tmp_path / "verdict", "latency", {"L": 0.08}, "named, incomplete", session=late)
+    told = documents.read(judged / "verdict.json", "verdict")
+    family = {**told["effects"][0], "level": "family", "family": "delay and filtering"}
+    guess = {**told["effects"][0], "status": "suspected", "effect": "creep", "mechanism": "creep"}
+    guess["parameters"] = {n: {"value": v, "unit": "u", "error": None} for n, v in (("f", 0.1), ("tau", 1.0))}
+    documents.write(judged / "verdict.json", told | {"effects": [family, guess]}, "verdict")
+    made = revise(judged, [late], read_spec(None), tmp_path / "revision", RevisionOptions(corrected=True))
+    assert made.document["added"] == ["latency"] and made.document["suspected"] == ["creep"]
+    assert "best form" in made.document["remarks"][0]
+    assert made.document["gap"]["closed"] > 0.95
+    assert [e["effect"] for e in documents.read(made.folder / "spec.json", "model_spec")["effects"]] == ["latency"]
+    rows = list(csv.DictReader((made.folder / made.document["corrected"]["file"]).read_text().splitlines()))
+    assert float(rows[9]["time_corrected_s"]) == pytest.approx(float(rows[9]["time_s"]) - 0.08, abs=1e-6)
+    assert "0.08 s" in made.document["corrected"]["times"]
+
+
+def test_a_plan_that_fails_takes_nothing_down(loose, tmp_path, monkeypatch):
+    from tacdata.revision.next_presses import recommend as module
+
+    def fails(*_, **__):
+        raise ValueError("Knots should not have nans or infs")
+
+    monkeypatch.setattr(module, "rivals", fails)
+    judged = verdict(tmp_path / "verdict", "backlash", {"b": 0.06}, "named, incomplete", session=loose)
+    made = revise(judged, [loose], read_spec(None), tmp_path / "revision")
+    assert made.document["added"] == ["backlash"] and (made.folder / "card.html").is_file()
+    assert made.document["next"]["plan"] is None and "Knots" in made.document["next"]["remark"]
 
 
 def test_without_a_plan_nobody_is_sent_to_where_they_are(loose, tmp_path):

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.effects import Placed
 from tacdata.revision.comparison import Comparison
+from tacdata.revision.evidence.gap import GapReduction
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class EpisodeCurves:
     measured: np.ndarray
     """Measured readings [the source's unit], shape (n, channels)."""
     before: np.ndarray
-    """Predicted readings, shifted by a constant to the episode's measured mean [the source's unit], shape (n,
+    """Predicted readings, shifted by a constant to the episode's measured median [the source's unit], shape (n,
     channels).
     """
     after: np.ndarray
@@ -45,26 +44,30 @@ class EpisodeCurves:
 
     def rms_error(self, predicted: np.ndarray) -> float:
         """Return the root mean square difference from the measurement [the source's unit]."""
-        return float(np.sqrt(np.mean(np.square(predicted - self.measured))))
+        return float(np.sqrt(np.nanmean(np.square(predicted - self.measured))))
 
 
-def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, most: int = 3) -> list[EpisodeCurves]:
-    """Return the episodes in which the effects change most, largest change first."""
-    after = held.after(placed)
-    predicted_before = held.predicted(held.before.response, [])
-    predicted_after = held.predicted(after.response, after.placed)
-    course, scale = held.course, held.null.noise.scale[: held.course.channels]
-    change = np.square((predicted_after - predicted_before) / scale).mean(axis=1)
-    order = sorted(episodes.tolist(), key=lambda e: -float(change[course.episode == e].mean()))[:most]
+def curves(held: Comparison, change: GapReduction, episodes: np.ndarray, count: int = 3) -> list[EpisodeCurves]:
+    """Return the episodes in which the effects change most, largest change first.
+
+    Args:
+        held: Recordings and the model before.
+        change: The gap, with the models before and after: figures and pictures are of the same models.
+        episodes: Those to choose from.
+        count: Number of episodes at most.
+    """
+    course, scale = held.course, change.scale
+    before, after = (held.predicted(model.response, model.placed) for model in (change.before, change.after))
+    size = np.square((after - before) / scale).mean(axis=1)
+    order = sorted(episodes.tolist(), key=lambda e: -float(size[course.episode == e].mean()))[:count]
     found = []
     for e in order:
         rows = np.flatnonzero((course.episode == e) & (course.averaged > 0))
         measured = course.readings[rows]
 
-        # A constant per episode belongs to the calibration: both predictions are shifted to the measured mean.
+        # A constant per episode belongs to the calibration: both predictions are shifted to the measured median.
         def level(predicted: np.ndarray, rows: np.ndarray = rows, measured: np.ndarray = measured) -> np.ndarray:
-            own = predicted[rows]
-            return own + (measured - own).mean(axis=0)
+            return predicted[rows] + np.nanmedian(measured - predicted[rows], axis=0)
 
         time = course.time[rows] - course.time[rows[0]]
         found.append(
@@ -73,8 +76,8 @@ def curves(held: Comparison, placed: Sequence[Placed], episodes: np.ndarray, mos
                 time,
                 course.tip[rows, 2],
                 measured,
-                level(predicted_before),
-                level(predicted_after),
+                level(before),
+                level(after),
                 scale,
                 course.channel_names,
             )

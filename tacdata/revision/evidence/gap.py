@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from tacdata.discrepancy.search.gauss_newton import Refined
 from tacdata.effects import Placed
-from tacdata.revision.comparison import Comparison
+from tacdata.revision.comparison import LEAST_WHITE, Comparison
 from tacdata.revision.episodes import Sealed, groups
 
 DRAWS = 2000
@@ -23,7 +25,7 @@ class ResidualChange:
     episodes: int
     """Number of episodes."""
     before: float
-    """Mean square of the whitened residual [1]; 1 is the noise floor."""
+    """Mean square of the residual over the noise [1]; 1 is noise alone."""
     after: float
     """The same with the effects."""
 
@@ -38,55 +40,79 @@ class ResidualChange:
 class GapReduction:
     """How much smaller the gap is, overall and by group."""
 
-    whole: ResidualChange
+    total: ResidualChange
     """Gap of the sealed episodes."""
     interval: tuple[float, float]
     """90 % bootstrap interval of the share closed, over sealed episodes [1]."""
     unseen: bool
     """Whether the verdict itself was reached without the sealed episodes."""
+    predicted: bool
+    """Whether the response was fitted without their readings; not where no other episode has their place."""
     worst: ResidualChange
     """The sealed episode with the largest gap after."""
     elsewhere: tuple[ResidualChange, ...]
     """Groups that the effects' parameters were not fitted to: another rate, depth, indenter."""
-    fitted: tuple[Placed, ...]
-    """The effects with parameters fitted without the sealed episodes."""
+    before: Refined
+    """The model without the effects."""
+    after: Refined
+    """The model with them, its parameters fitted without the sealed episodes."""
+    scale: np.ndarray
+    """Noise of a reading [the source's unit], shape (channels,)."""
 
 
 def gap(
-    held: Comparison, placed: Sequence[Placed], chosen: Sealed, note: Callable[[str], None] = lambda text: None
+    held: Comparison,
+    placed: Sequence[Placed],
+    chosen: Sealed,
+    scale: np.ndarray,
+    note: Callable[[str], None] = lambda text: None,
 ) -> GapReduction:
-    """Measure the gap.
+    """Measure the gap on the verdict's scale: mean squares over the noise, each episode's median subtracted.
 
     Args:
         held: Recordings and the model before.
         placed: The effects to add.
         chosen: Episodes that the effects' parameters are not fitted to.
+        scale: Noise of a reading [the source's unit], shape (channels,).
         note: Called with a line for each group that is left out.
     """
     numbers = chosen.numbers
-    fitted = held.fitted_without(placed, numbers)
-    before, after = held.before, held.after(fitted)
-    whole = ResidualChange(
-        "sealed episodes", len(numbers), held.mean_square(before, numbers), held.mean_square(after, numbers)
-    )
-    ratio = [2 * after.energy[n] / held.values[n] for n in numbers]
-    at = int(numbers[int(np.argmax(ratio))])
-    worst = ResidualChange(
-        held.course.names[at], 1, held.mean_square(before, np.array([at])), held.mean_square(after, np.array([at]))
-    )
+    predicted = held.covered(numbers)
+    others = held.without(numbers) if predicted else held
+    fitted = tuple(placed) if chosen.unseen else held.fitted_without(placed, numbers)
+    before, after = others.before, others.after(fitted)
+    pair = np.array([held.mean_squares(model, numbers, scale) for model in (before, after)])
+    at = int(np.argmax(pair[1]))
+    total = ResidualChange("sealed episodes", len(numbers), *(float(v) for v in pair.mean(axis=1)))
+    worst = ResidualChange(held.course.names[numbers[at]], 1, *(float(v) for v in pair[:, at]))
     elsewhere = []
-    for name, own in groups(held.course):
+    for name, group in groups(held.course):
         note(f"gap, fitted without: {name}")
-        there = held.after(held.fitted_without(placed, own))
-        elsewhere.append(ResidualChange(name, len(own), held.mean_square(before, own), held.mean_square(there, own)))
-    pair = np.array([before.energy[numbers], after.energy[numbers]])
-    return GapReduction(whole, _interval(pair, held.values[numbers]), chosen.unseen, worst, tuple(elsewhere), fitted)
+        there = held.after(held.fitted_without(placed, group))
+        sizes = (float(held.mean_squares(model, group, scale).mean()) for model in (held.before, there))
+        elsewhere.append(ResidualChange(name, len(group), *sizes))
+    return GapReduction(total, _interval(pair), chosen.unseen, predicted, worst, tuple(elsewhere), before, after, scale)
 
 
-def _interval(energy: np.ndarray, values: np.ndarray) -> tuple[float, float]:
+def noise_of(verdict: dict[str, Any], held: Comparison) -> np.ndarray:
+    """Return the noise by which the verdict divides residuals [the source's unit], shape (channels,).
+
+    Args:
+        verdict: The verdict's document.
+        held: Recordings and model; their own noise is used if the verdict states none for these channels.
+    """
+    stated = verdict.get("gate", {})
+    scale, memory = np.array(stated.get("noise", ()), dtype=float), float(stated.get("memory", 0.0))
+    channels = held.course.channels
+    if len(scale) < channels or not (scale[:channels] > 0).all():
+        return held.noise
+    return scale[:channels] / np.sqrt(max(1 - memory**2, LEAST_WHITE))
+
+
+def _interval(pair: np.ndarray) -> tuple[float, float]:
     rng = np.random.default_rng(0)
-    draws = rng.integers(0, len(values), (DRAWS, len(values)))
-    first, last = (2 * e[draws].sum(axis=1) / values[draws].sum(axis=1) for e in energy)
+    draws = rng.integers(0, pair.shape[1], (DRAWS, pair.shape[1]))
+    first, last = (values[draws].mean(axis=1) for values in pair)
     closed = (first - last) / np.where(np.abs(first - 1) > 1e-3, first - 1, np.nan)
     if not np.isfinite(closed).any():
         return float("nan"), float("nan")

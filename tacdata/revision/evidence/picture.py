@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,9 @@ from tacdata.revision.evidence.gap import GapReduction, ResidualChange
 
 BEFORE, AFTER, MEASURED = "#d55e00", "#0072b2", "#000000"
 """Okabe and Ito's vermilion and blue, which colour-blind people can tell apart."""
+
+TITLE = 130
+"""Characters of a line of the title."""
 
 
 def draw(
@@ -37,7 +41,7 @@ def draw(
     with rc_context(STYLE):
         figure = Figure(figsize=(13.0, 7.6), layout="constrained")
         FigureCanvasAgg(figure)
-        figure.suptitle(title, fontsize=13)
+        figure.suptitle("\n".join(textwrap.wrap(title, TITLE)), fontsize=12)
         halves: Any = figure.subfigures(2, 1)
         upper, lower = halves
         top: Any = np.atleast_1d(upper.subplots(1, max(len(shown), 1)))
@@ -76,7 +80,7 @@ def _residuals(axis: Any, shown: Sequence[EpisodeCurves]) -> None:
 
 
 def _groups(axis: Any, found: GapReduction) -> None:
-    rows: list[ResidualChange] = [found.whole, *found.elsewhere]
+    rows: list[ResidualChange] = [found.total, *found.elsewhere]
     where = np.arange(len(rows))
     axis.barh(where - 0.2, [c.before for c in rows], 0.38, color=BEFORE, label="before")
     axis.barh(where + 0.2, [c.after for c in rows], 0.38, color=AFTER, label="after")
@@ -89,7 +93,7 @@ def _groups(axis: Any, found: GapReduction) -> None:
         xscale="log",
         xlim=(0.8 * low, None),
         xlabel="mean square of the residual; 1 is the noise floor",
-        title="the gap, where the numbers were not fitted",
+        title="the gap, where the parameters were not fitted",
     )
     axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=8)  # above every bar
 

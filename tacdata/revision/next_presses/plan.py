@@ -11,6 +11,8 @@ every pair gets its press.
 
 from __future__ import annotations
 
+import csv
+import io
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,9 +21,8 @@ import numpy as np
 import schemas
 from tacdata.chain import Course, predict
 from tacdata.plans import Plan
-from tacdata.recording.motion.plan_time import USUAL_LIMITS
-from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.revision.comparison import Comparison
+from tacdata.revision.next_presses.machine import MachineLimits
 from tacdata.revision.next_presses.rivals import Rival
 from tacdata.revision.next_presses.trial import CandidatePress, elsewhere, laid_out, predicted_readings, trials
 
@@ -58,9 +59,7 @@ class Choice:
         return max(self.nats, key=lambda pair: self.nats[pair])
 
 
-def choose(
-    held: Comparison, found: list[Rival], plan: Plan, presses: int = PRESSES, limits: AxisLimits = USUAL_LIMITS
-) -> list[Choice]:
+def choose(held: Comparison, found: list[Rival], machine: MachineLimits, presses: int = PRESSES) -> list[Choice]:
     """Return the most informative presses, the best first; fewer if no press tells the rivals apart.
 
     Pairs that `PLANS` plans of the best press would leave open earn nothing.
@@ -68,11 +67,10 @@ def choose(
     Args:
         held: Recordings and model.
         found: The rivals, fitted.
-        plan: The plan of one of the sessions.
+        machine: Limits of the machine that pressed.
         presses: Number of different presses.
-        limits: What the guide accelerates by.
     """
-    scored = [Choice(t, _distances(held, found, t, limits)) for t in trials(held.course, plan)]
+    scored = [Choice(t, _distances(held, found, t, machine)) for t in trials(held.course, machine)]
     weight = _probabilities(found)
     pairs = [(a, b) for i, a in enumerate(found) for b in found[i + 1 :]]
     have = {(a.mechanism, b.mechanism): 0.0 for a, b in pairs}
@@ -152,6 +150,29 @@ def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repea
     }
 
 
+def table_of(chosen: list[Choice], held: Comparison, repeats: int = REPEATS) -> str:
+    """Return presses of a foreign machine as CSV, a row each: place, depth, speed, hold, strokes, purpose.
+
+    Args:
+        chosen: The presses.
+        held: Recordings and model.
+        repeats: Repeats of each press.
+    """
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    head = "x_mm y_mm depth_mm speed_mm_s hold_s recovery_s overshoot_mm strokes stroke_mm".split()
+    writer.writerow(["press", "repeat", "specimen", *head, "purpose"])
+    for repeat in range(repeats):
+        for k, c in enumerate(chosen):
+            t = c.trial
+            first = int(np.flatnonzero(held.course.site == t.site)[0])
+            like = f"as in {held.course.names[first]}"
+            values = (t.x, t.y, t.depth, t.speed, t.hold, t.recovery, t.overshoot, t.strokes, t.stroke)
+            purpose = f"distinguishes {c.best[0]} from {c.best[1]}"
+            writer.writerow([k, repeat, like, *(f"{v:.4g}" for v in values), purpose])
+    return buffer.getvalue()
+
+
 def _probabilities(found: list[Rival]) -> dict[str, float]:
     """Return each rival's probability, flattened so that none is excluded: they are rivals because none is."""
     energy = np.array([r.model.energy.sum() for r in found])
@@ -159,9 +180,11 @@ def _probabilities(found: list[Rival]) -> dict[str, float]:
     return {r.mechanism: float(w) for r, w in zip(found, weight / weight.sum(), strict=True)}
 
 
-def _distances(held: Comparison, found: list[Rival], trial: CandidatePress, limits: AxisLimits) -> dict[Pair, float]:
+def _distances(
+    held: Comparison, found: list[Rival], trial: CandidatePress, machine: MachineLimits
+) -> dict[Pair, float]:
     course, noise = held.course, held.null.noise
-    given, own = list(held.setting.given), laid_out(course, trial, limits)
+    given, own = list(held.setting.given), laid_out(course, trial, machine)
     predicted = [
         predicted_readings(course, r.model.response, [*given, *r.placed], trial, own) / noise.scale[: course.channels]
         for r in found

@@ -13,7 +13,11 @@ from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.problem import prepare
 from tacdata.effects import Placed, library, load
+from tacdata.revision.additions import of_verdict, placed_of
 from tacdata.revision.comparison import Comparison
+
+NEAREST = 2
+"""Rivals of an effect that has no alternative."""
 
 
 @dataclass(frozen=True)
@@ -25,43 +29,47 @@ class Rival:
     model: Refined
 
 
-def named(verdict: dict[str, Any]) -> list[Placed]:
-    """Return the effects of a verdict with their parameters."""
-    return [
-        Placed(load(e["effect"]), {n: np.array(p["value"], dtype=float) for n, p in e["parameters"].items()})
-        for e in verdict["effects"]
-    ]
-
-
 def rivals(
-    held: Comparison, verdict: dict[str, Any], most: int = 6, note: Callable[[str], None] = lambda text: None
+    held: Comparison, verdict: dict[str, Any], count: int = 6, note: Callable[[str], None] = lambda text: None
 ) -> list[Rival]:
     """Return the verdict's own answer, and the alternatives to its first undecided effect.
 
+    An answer without alternatives is compared with its nearest rivals: the next presses make it surer.
+
     Args:
         held: Recordings and model.
-        verdict: An ambiguous verdict.
-        most: Largest number of rivals.
+        verdict: The verdict.
+        count: Largest number of rivals.
         note: Called with the rival that is fitted.
     """
-    own = named(verdict)
-    at = next((k for k, e in enumerate(verdict["effects"]) if e["alternatives"]), None)
-    if at is None or not own:
+    effects = of_verdict(verdict)
+    if not effects:
         return []
-    kept = [p for k, p in enumerate(own) if k != at]
-    found = [Rival(verdict["effects"][at]["mechanism"], tuple(own), refine(held.setting, own, held.null))]
-    wanted = list(verdict["effects"][at]["alternatives"])[: most - 1]
-    known = [e for e in library() if e.called in wanted]
-    setting = Setting(held.course, held.setting.response, known, held.setting.nuisance, held.setting.given)
-    bare = prepare(setting, held.null, kept)
+    at = next((k for k, a in enumerate(effects) if a.entry["alternatives"]), 0)
+    undecided = effects[at].entry
+    wanted = (list(undecided["alternatives"]) or _nearest(undecided))[: count - 1]
+    library_of = [e for e in library() if e.called in wanted and e.called != undecided["mechanism"]]
+    if not library_of:
+        return []
+    placed = placed_of(effects)
+    others = [p for k, p in enumerate(placed) if k != at]
+    answer = Rival(undecided["mechanism"], tuple(placed), refine(held.setting, placed, held.null))
+    setting = Setting(held.course, held.setting.response, library_of, held.setting.nuisance, held.setting.given)
+    bare = prepare(setting, held.null, others)
     everything = np.arange(len(bare.folds))
     best: dict[str, Rival] = {}
     for candidate in best_shapes(bare).values():
         note(f"next presses: {candidate.effect.name} fitted")
         _, values = fitted(bare, [candidate], everything)
         first = candidate.placed(values[: len(candidate.columns)], held.course.channels)
-        model = refine(setting, [*kept, first], held.null)
+        model = refine(setting, [*others, first], held.null)
         called = candidate.effect.called
         if called not in best or model.energy.sum() < best[called].model.energy.sum():
             best[called] = Rival(called, model.placed, model)
-    return [*found, *best.values()]
+    return [answer, *best.values()]
+
+
+def _nearest(entry: dict[str, Any]) -> list[str]:
+    """Return the mechanisms of the rivals that fit an effect's place least badly."""
+    margins = sorted(entry.get("margins", {}).items(), key=lambda item: item[1])
+    return list(dict.fromkeys(load(name).called for name, _ in margins))[:NEAREST]

@@ -12,13 +12,11 @@ import numpy as np
 from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.effects import Placed
-from tacdata.plans import Plan
-from tacdata.recording.motion.plan_time import USUAL_LIMITS
 from tacdata.recording.motion.press_steps import SHORTEST_PAUSE
-from tacdata.recording.motion.trapezoid import AxisLimits
+from tacdata.revision.next_presses.machine import MachineLimits
 
-RATES, HOLDS = (0.15, 0.5, 2.0, 6.0), (0.0, 2.0, 20.0)
-"""Speeds [mm/s] and times at full depth [s] to choose from."""
+HOLDS = (0.0, 2.0, 20.0)
+"""Times at full depth to choose from [s]."""
 DEPTHS, OVERSHOOT = (0.5, 1.0), 0.8
 """Depths as shares of the deepest recorded press; presses with overshoot go to its full depth and stay at this share.
 """
@@ -31,8 +29,6 @@ RECOVERY = 10.0
 """Time after the release that may be recorded [s]."""
 FRAME = 1 / 30
 """Time between readings if it is unknown [s]."""
-CLEAR = 0.3
-"""Height from which the guide goes down, and to which it comes back [mm]."""
 PLACES = 2
 """Places tried for each tool, the most informative first."""
 
@@ -97,15 +93,13 @@ class CandidatePress:
         return found
 
 
-def trials(course: Course, plan: Plan) -> list[CandidatePress]:
-    """Return presses within what was recorded: its places, tools and depths, no faster than the guide travels.
+def trials(course: Course, machine: MachineLimits) -> list[CandidatePress]:
+    """Return presses within what was recorded: its places, tools and depths, at speeds of the machine.
 
     Args:
         course: The recordings.
-        plan: The plan of one of its sessions: its travel speed is the guide's.
+        machine: Its limits.
     """
-    top = plan.motion.travel_speed
-    rates = [r for r in RATES if r <= top]
     found = []
     for tool in range(len(course.tools)):
         own = np.unique(course.episode[course.tool == tool])
@@ -116,7 +110,7 @@ def trials(course: Course, plan: Plan) -> list[CandidatePress]:
             deepest = float(at[2])
             if deepest <= 0:
                 continue
-            for share, speed, hold in product(DEPTHS, rates, HOLDS):
+            for share, speed, hold in product(DEPTHS, machine.rates, HOLDS):
                 common = (tool, int(site), float(at[0]), float(at[1]))
                 found.append(CandidatePress(*common, share * deepest, speed, hold, 0.0, 0.0))
                 if share == DEPTHS[-1] and hold == HOLDS[-1]:
@@ -142,15 +136,15 @@ def _most_variable(course: Course, episodes: np.ndarray) -> list[int]:
     return sorted(spread, key=lambda s: -spread[s])
 
 
-def laid_out(course: Course, trial: CandidatePress, limits: AxisLimits = USUAL_LIMITS) -> Course:
+def laid_out(course: Course, trial: CandidatePress, machine: MachineLimits) -> Course:
     """Return the course of one press that was not recorded; its readings are 0.
 
     Args:
         course: The recordings: readings come as often.
         trial: The press.
-        limits: What the guide accelerates by: it rounds the corners of the path.
+        machine: Its limits: acceleration rounds the corners of the path.
     """
-    at, depth = _path(trial, limits)
+    at, depth = _path(trial, machine)
     inside = course.reduced.step[~course.reduced.first]
     frame = float(np.clip(np.median(inside), 1e-3, 0.1)) if len(inside) else FRAME
     at, frames = np.round(at, 9), np.round(np.arange(0.0, at[-1], frame), 9)
@@ -175,9 +169,9 @@ def laid_out(course: Course, trial: CandidatePress, limits: AxisLimits = USUAL_L
     )
 
 
-def _path(trial: CandidatePress, limits: AxisLimits) -> tuple[np.ndarray, np.ndarray]:
+def _path(trial: CandidatePress, machine: MachineLimits) -> tuple[np.ndarray, np.ndarray]:
     """Return times [s] and depths [mm] of a press, straight in between."""
-    times, depths = [np.zeros(1)], [np.array([-CLEAR])]
+    times, depths = [np.zeros(1)], [np.array([machine.lowest])]
 
     def stay(seconds: float) -> None:
         times.append(times[-1][-1:] + seconds)  # ty: ignore[invalid-argument-type]
@@ -185,7 +179,7 @@ def _path(trial: CandidatePress, limits: AxisLimits) -> tuple[np.ndarray, np.nda
 
     def go(depth: float) -> None:
         begin = np.array([0.0, 0.0, float(depths[-1][-1])])
-        at, places = limits.straight_move(begin, np.array([0.0, 0.0, depth]), trial.speed).knots()
+        at, places = machine.limits.straight_move(begin, np.array([0.0, 0.0, depth]), trial.speed).knots()
         times.append(times[-1][-1] + at)
         depths.append(places[:, 2])
 
@@ -198,7 +192,7 @@ def _path(trial: CandidatePress, limits: AxisLimits) -> tuple[np.ndarray, np.nda
             stay(SHORTEST_PAUSE)
             go(depth)
     stay(trial.hold)
-    go(-CLEAR)
+    go(machine.lowest)
     stay(0.5 + trial.recovery)
     return np.concatenate(times), np.concatenate(depths)
 
