@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.effects import load
 from viewers.scene.scene import Bars, Curves, Page, Scene
 
 GATE = 0.01
@@ -16,6 +17,8 @@ WIDE = 20.0
 """Ratio from which bars are drawn on a logarithmic axis."""
 SURELY = 2.33
 """Standard errors by which a name must be better than another (`tacdata.discrepancy`)."""
+RIVALS = 3
+"""Rivals that are listed, the nearest first."""
 
 
 def verdict_scene(
@@ -73,6 +76,19 @@ def _scene(title: str, words: str, bars: tuple[Bars, ...], curves: tuple[Curves,
     return Scene(title, words, time, np.arange(len(time)), curves=curves, bars=bars, kind="verdict")
 
 
+def _distinguished(effect: dict[str, Any]) -> list[str]:
+    """Return the nearest rivals by these recordings' own margins; the experiment only where a rival is open."""
+    margins = sorted(effect.get("margins", {}).items(), key=lambda item: item[1])
+    open_to = {*effect["alternatives"], effect["mechanism"]}
+    excluded = [f"{name} by {by:.1f}" for name, by in margins if load(name).called not in open_to][:RIVALS]
+    lines = []
+    if excluded:
+        lines.append(f"- distinguished in these recordings from: {', '.join(excluded)} standard errors")
+    if effect["alternatives"]:
+        lines.append(f"- an experiment that would distinguish them: {effect['experiment']}")
+    return lines
+
+
 def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> str:
     """Return the verdict as Markdown: the conclusion, the evidence, the next step."""
     lines = [f"# {title}: {verdict['status']}", "", verdict["why"] + ".", ""]
@@ -85,7 +101,7 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
             lines.append(f"- {name} = {shown}{spread}" + (f" {p['unit']}" if p["unit"] != "1" else ""))
         if effect["alternatives"]:
             lines.append(f"- could also be: {', '.join(effect['alternatives'])}")
-        lines.append(f"- told apart by: {effect['experiment']}")
+        lines += _distinguished(effect)
         if effect.get("confidence") is not None:
             lines.append(f"- probability that the name is right: {effect['confidence']:.0%}")
     gate, left = verdict["gate"], verdict["left"]
