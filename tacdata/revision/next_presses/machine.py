@@ -15,8 +15,8 @@ RATES = (0.15, 0.5, 2.0, 6.0)
 """Speeds of a rig of our own to choose from [mm/s]."""
 SHARES = (0.03, 0.1, 0.3, 1.0)
 """Speeds of a foreign machine to choose from, as shares of the fastest that it showed [1]."""
-FASTEST = 0.99
-"""Quantile of the recorded speeds that counts as the fastest: single rows may jump [1]."""
+INNER = (0.2, 0.8)
+"""Shares of a stroke between which its speed is taken: single rows of a measured path jump [1]."""
 CLEAR = 0.3
 """Height from which the guide goes down, and to which it comes back [mm]."""
 
@@ -43,9 +43,24 @@ class MachineLimits:
 
         A sine of amplitude A and peak speed v turns with v^2 / A; a ramp turns at least as sharply.
         """
-        moving = np.abs(course.speed[np.abs(course.speed) > 0])
-        fastest = float(np.quantile(moving, FASTEST)) if len(moving) else RATES[0]
+        fastest = max((_pace(course, e) for e in range(course.episodes)), default=0.0) or RATES[0]
         sharpest = 2 * fastest**2 / course.stroke
         rates = tuple(float(f"{share * fastest:.2g}") for share in SHARES)
         limits = AxisLimits(np.full(3, sharpest), np.full(3, fastest))
         return cls(rates, max(-CLEAR, float(course.tip[:, 2].min())), limits)
+
+
+def _pace(course: Course, episode: int) -> float:
+    """Return the faster of a stroke's ways in and out [mm/s]; 0 if it holds no way."""
+    rows = np.flatnonzero(course.episode == episode)
+    time, depth = course.time[rows], course.tip[rows, 2]
+    top, found = int(np.argmax(depth)), 0.0
+    # Above the skin a path may wait; in contact it moves.
+    for bottom in {float(depth.min()), max(float(depth.min()), 0.0)}:
+        low, high = (bottom + share * (float(depth[top]) - bottom) for share in INNER)
+        for way in (slice(0, top + 1), slice(top, None)):
+            inside = np.flatnonzero((depth[way] >= low) & (depth[way] <= high))
+            if len(inside) > 2:
+                span = float(np.ptp(time[way][inside]))
+                found = max(found, float(np.ptp(depth[way][inside])) / max(span, 1e-9))
+    return found
