@@ -9,6 +9,7 @@ import ast
 import re
 from pathlib import Path
 
+import griffe
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,6 +25,15 @@ DIRECTIVE = "\n::: "
 """Begins the name of an object whose docstring mkdocstrings puts in place."""
 LONGEST_SUMMARY = 160
 """Characters of a page's line in llms.txt."""
+
+
+class Examples(griffe.Extension):
+    """Docstrings begin their examples with `Example:`; griffe knows `Examples:`."""
+
+    def on_object(self, *, obj, **_):
+        """Write it as griffe knows it."""
+        if obj.docstring is not None:
+            obj.docstring.value = re.sub(r"^Example:$", "Examples:", obj.docstring.value, flags=re.MULTILINE)
 
 
 def pages():

@@ -29,7 +29,10 @@ def blocks(page, language):
     return [body for kind, body in BLOCK.findall(page.read_text()) if kind == language and ELSEWHERE not in body]
 
 
+NOTEBOOKS = ROOT / "docs" / "notebooks"
+"""Their code runs in the long part (tests/examples/test_notebooks.py)."""
 GUIDES = [page for page in PAGES if page.parent == ROOT or page.is_relative_to(ROOT / "docs")]
+GUIDES = [page for page in GUIDES if not page.is_relative_to(NOTEBOOKS)]
 PYTHON = [page for page in GUIDES if blocks(page, "python")]
 OF_ROOMS = [page for page in PAGES if page not in GUIDES and blocks(page, "python")]
 

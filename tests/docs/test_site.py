@@ -42,3 +42,10 @@ def test_every_line_for_language_models_has_a_summary(site):
 )
 def test_lists_begin_behind_an_empty_line(site, text, spaced):
     assert site.on_page_markdown(text) == spaced
+
+
+def test_the_page_of_the_python_interface_has_every_public_name():
+    import tacdata
+
+    text = (ROOT / "docs" / "reference" / "python.md").read_text()
+    assert {line.split("td.")[1] for line in text.splitlines() if "heading: td." in line} == set(tacdata._NAMES)
