@@ -50,6 +50,17 @@ class Response(ABC):
         """
         return float(np.abs(signal - self.signal(np.zeros_like(signal[:1]))).max())
 
+    def swing(self, signal: np.ndarray) -> np.ndarray:
+        """Return the range of each channel's readings: the unit of a friction that no elastic load comes with.
+
+        Args:
+            signal: Readings of all rows, shape (n, channels).
+
+        Returns:
+            Of each row's place, in the readings' unit, shape (n, channels), or (1, channels) where all are alike.
+        """
+        return np.ptp(signal, axis=0, keepdims=True)
+
     def rougher(self) -> Response | None:
         """Return the same response with a coarser interpolation, by which numerics are judged; None without one."""
         return None

@@ -20,3 +20,8 @@ class BaselineTracking(Effect):
             return state
         rise = state.rise
         return state.with_signal(state.idle + rise - low_pass(rise, state.course.step, 1 / rate))
+
+    def time_constant(self, values: Values) -> float:
+        """Return the time by which it follows, one over its rate [s]."""
+        rate = float(values["r"])
+        return 1 / rate if rate > 0 else 0.0

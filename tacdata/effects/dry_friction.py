@@ -4,8 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tacdata.chain.memory import slipping
-from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, State, Values
+from tacdata.chain.memory import play, slipping
+from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values
+
+FEW = 4
+"""Most channels with a friction of their own size; more share the pattern of a load."""
 
 
 class DryFriction(Effect):
@@ -39,6 +42,85 @@ class DryFriction(Effect):
         return replace(
             state, load=state.load + turn[:, None] * state.load[top], force=state.force + turn * state.force[top]
         )
+
+
+class SealFriction(DryFriction):
+    """Dry friction with a size of its own, where no elastic load comes with it: a seal, a guide, a brake."""
+
+    stage = "readout"
+    moves = ("signal",)
+    by_channel = True
+    equation = (
+        "s = s_e + F R z, z = (u - play_w(u)) / w from -1 to 1, -1 at first, u the depth; R: the range of the readings "
+        "of a place"
+    )
+    source = "Coulomb, behind an elastic way (Jenkins, J. Appl. Mech. 29, 1962, 457)"
+    parameters = (
+        Parameter("F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
+        Parameter("w", "1", "way by which it turns, over half the stroke", 0.02, 0.001, 0.3, grid=(0.005, 0.02, 0.08)),
+    )
+
+    def apply(self, state: State, values: Values) -> State:
+        return _rubbed(state, values["F"], self.turn(state, values))
+
+    def turn(self, state: State, values: Values) -> np.ndarray:
+        """Return the friction over its largest value [1], shape (n,)."""
+        way = max(float(values["w"]) * 0.5 * state.course.stroke, 1e-9)
+        # A stroke begins where the one before has ended: it came from above.
+        return (state.depth + play(-state.depth, way, state.course.first)) / way
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        return "many channels share the pattern of a load" if course.channels > FEW else ""
+
+
+class FrictionClearance(SealFriction):
+    """Dry friction behind a clearance: after a reversal nothing rubs until the clearance is crossed."""
+
+    equation = (
+        "s = s_e + F R sgn(g) min(max(|g| - b/2, 0) / w, 1), g = u - play_{b/2 + w}(u), u the depth; R: the range of "
+        "the readings of a place"
+    )
+    source = "Jenkins element with a gap; Coble et al., Dataset Friction Damper with Backlash (2022)"
+    experiment = "strokes to three depths: after each reversal the force is zero over the same way"
+    parameters = (
+        Parameter("F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
+        Parameter("b", "1", "clearance over half the stroke", 0.1, 0.005, 1.0, grid=(0.05, 0.14, 0.35)),
+        Parameter("w", "1", "way by which it rises, over half the stroke", 0.03, 0.001, 0.3, grid=(0.015, 0.05)),
+    )
+
+    def turn(self, state: State, values: Values) -> np.ndarray:
+        """Return the friction over its largest value [1], shape (n,)."""
+        half = 0.5 * state.course.stroke
+        gap, way = 0.5 * float(values["b"]) * half, max(float(values["w"]) * half, 1e-9)
+        off = state.depth + play(-state.depth, gap + way, state.course.first)
+        return np.sign(off) * np.clip((np.abs(off) - gap) / way, 0.0, 1.0)
+
+
+class EffortFriction(SealFriction):
+    """Dry friction in an effort, as a motor's current or a piston's pressure: only while the drive moves."""
+
+    equation = (
+        "s = s_e + F R v / (|v| + c V), v the rate of depth, V its largest; R: the range of the readings of a place"
+    )
+    source = "Coulomb; the regulator of the position asks for the effort"
+    experiment = "strokes at three rates with stops: the step at each start is the same, and over at each stop"
+    parameters = (
+        Parameter("F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
+        Parameter("c", "1", "rate by which it turns, over the largest", 0.05, 0.001, 1.0, grid=(0.02,)),
+    )
+
+    def turn(self, state: State, values: Values) -> np.ndarray:
+        """Return the friction over its largest value [1], shape (n,)."""
+        rate = state.course.speed
+        return rate / (np.abs(rate) + float(values["c"]) * max(float(np.abs(rate).max()), 1e-9))
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        return super().unjudgeable(course, response) or ("" if np.any(course.speed) else "the tip never moves")
+
+
+def _rubbed(state: State, share: np.ndarray, turn: np.ndarray) -> State:
+    """Return the state with a friction of a share of the readings' range."""
+    return state.with_signal(state.signal + turn[:, None] * (share * state.response.swing(state.signal)))
 
 
 def _deepest(course: Course, depth: np.ndarray) -> np.ndarray:

@@ -7,6 +7,9 @@ from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Re
 UNIT_RATE = 1.0
 """Rate at which the share is given [mm/s]."""
 
+FEW = 4
+"""Most channels with a drag of their own size; more share the pattern of a load."""
+
 
 class Viscosity(Effect):
     stage = "mechanics"
@@ -29,3 +32,29 @@ class Viscosity(Effect):
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         return "the tip never moves" if not np.any(course.speed) else ""
+
+
+class Drag(Viscosity):
+    """Drag with a size of its own, where no elastic load comes with it: it grows with the rate alone."""
+
+    stage = "readout"
+    moves = ("signal",)
+    by_channel = True
+    equation = (
+        "s = s_e + D R sgn(v) |v / V|^n, v the rate of depth, V its largest; R: the range of the readings of a place"
+    )
+    source = "n = 1: a dashpot; n = 2: a fluid through an orifice"
+    experiment = "strokes at three rates over a decade: the loop's height grows with the rate, and a stop ends it"
+    parameters = (
+        Parameter("D", "1", "drag at full rate over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
+        Parameter("n", "1", "power of the rate", 1.0, 0.5, 2.0, grid=(1.0, 2.0)),
+    )
+
+    def apply(self, state: State, values: Values) -> State:
+        rate = state.course.speed
+        turn = np.sign(rate) * np.abs(rate / max(float(np.abs(rate).max()), 1e-9)) ** float(values["n"])
+        return state.with_signal(state.signal + turn[:, None] * (values["D"] * state.response.swing(state.signal)))
+
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        many = "many channels share the pattern of a load" if course.channels > FEW else ""
+        return super().unjudgeable(course, response) or many

@@ -39,6 +39,8 @@ MOST_SMOOTHING = 1e9
 SLOPES = 10.0
 """REML: noise is taken for so many times its variance. What moves the tip shows by slopes, which need more smoothing
 than values do. What a smoother response misses of the values is projected out [1]."""
+INNER = (0.02, 0.98)
+"""Quantiles of readings between which their range is taken: a few odd ones do not count [1]."""
 CACHED = 6
 """Evaluations remembered: most effects leave the pose alone."""
 FORM_ERROR = 0.15
@@ -65,6 +67,9 @@ class FittedResponse(Response):
         self.idle = np.median(reduced.readings[quiet], axis=0)
         self.context = contexts(course)
         self._rows = [np.flatnonzero(self.context == k) for k in range(int(self.context.max()) + 1)]
+        each = [reduced.readings[self._within(k)] for k in range(len(self._rows))]
+        none = np.zeros(course.channels)
+        self._swings = np.stack([np.ptp(np.quantile(own, INNER, axis=0), axis=0) if len(own) else none for own in each])
         streams = reduced.readings - self.idle
         self._has_force = course.force is not None
         if reduced.force is not None:
@@ -96,6 +101,7 @@ class FittedResponse(Response):
         """Return it for another course, all of it at one of its places and tools."""
         other = copy.copy(self)
         other._bases, other._weights = [self._bases[context]], [self._weights[context]]
+        other._swings = self._swings[context : context + 1]
         other._air = [self._air[context]]
         vars(other).pop("air", None)  # that of all places
         other.context, other._rows = np.zeros(course.rows, dtype=np.int64), [np.arange(course.rows)]  # ty: ignore[invalid-assignment]
@@ -114,6 +120,10 @@ class FittedResponse(Response):
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return readings, shape (n, channels)."""
         return self.idle + load
+
+    def swing(self, signal: np.ndarray) -> np.ndarray:
+        """Return the range of each channel's readings at each row's place, whatever the splines hold of it."""
+        return self._swings[self.context]
 
     def features(self, course: Course) -> np.ndarray:
         """Return the splines at the course's rows, shape (n, most splines of a place)."""
