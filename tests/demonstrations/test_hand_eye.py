@@ -110,8 +110,10 @@ def test_a_board_on_the_table_gives_the_camera():
     with pytest.raises(FormatError, match=r"image 2 of 3: 280 mm"):
         board_world("c", "board", [poses[0], moved, poses[2]], rms, spread)
     nudged = poses[1].copy()
-    nudged[:3, 3] += [0.0, 0.004, 0.0]
+    nudged[:3, 3] += [0.0, 0.003, 0.0]
     shaken = board_world("c", "board", [poses[0], nudged, poses[2]], rms, spread)
+    (words,) = shaken.remarks
+    assert words.startswith("the board in image 2 of 3 stands 3.") and "was pushed" in words
     assert found.spread and shaken.spread and shaken.spread[0] > 0.001 > 2 * found.spread[0]
     with pytest.raises(UsageError, match="no image shows the board"):
         board_poses([("empty", np.full((480, 640), 90, np.uint8))], board, intrinsics)

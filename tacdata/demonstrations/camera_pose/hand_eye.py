@@ -22,6 +22,8 @@ LEAST_TURN = np.radians(15.0)
 """Minimum rotation of the gripper about two axes [rad]; with less the solution is not determined."""
 MOVED, TURNED = 0.02, float(np.radians(3.0))
 """Largest difference between images of a board at rest: share of the camera's distance [1], and angle [rad]."""
+NUDGED = 0.003
+"""Difference between images of a board from which it is reported, as a share of the camera's distance [1]."""
 OUTLYING = 5.0
 """A pair is an outlier if its residual is this many times the median [1]."""
 
@@ -101,6 +103,11 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
             "leave that image out if the board was put elsewhere, or take the images again",
         )
     remarks = () if turns.max() < 0.01 else (f"the images differ by up to {np.degrees(turns.max()):.1f} deg: it moved",)
+    if apart.max() > max(NUDGED * distance, OUTLYING * float(np.median(apart))):
+        remarks += (
+            f"the board in image {int(np.argmax(apart)) + 1} of {len(poses)} stands {1000 * apart.max():.1f} mm from "
+            "where it stands in the others: it or the camera was pushed; leave that image out, or take the images again",
+        )
     # What the images differ by is as much of the uncertainty as what one image tells.
     once = max(spread, float(np.sqrt((apart**2).mean())))
     known = once / np.sqrt(len(poses)), max(once / distance, float(np.sqrt((turns**2).mean()))) / np.sqrt(len(poses))
