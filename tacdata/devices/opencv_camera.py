@@ -16,7 +16,7 @@ import numpy as np
 from tacdata.clock import Clock
 from tacdata.devices.device import Camera, ImageFrame, StreamCounts
 from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.image_stream import ImageStream
+from tacdata.wire.image_stream import stamped_stream
 
 FIRST_IMAGE = 5.0
 """Timeout for the first image [s, real time]."""
@@ -280,14 +280,8 @@ class OpencvCamera(Camera):
 
     def _open_stamped(self) -> tuple[Grab, Callable[[], None]] | None:
         """Open a stream over HTTP whose images carry the time of their exposure; None for any other source."""
-        if not str(self.source).startswith("http"):
-            return None
-        try:
-            stream = ImageStream(str(self.source), FIRST_IMAGE)
-        except OSError:
-            return None
-        if not stream.stamped:
-            stream.close()
+        stream = stamped_stream(str(self.source), FIRST_IMAGE) if str(self.source).startswith("http") else None
+        if stream is None:
             return None
 
         def grab() -> _Grabbed | None:

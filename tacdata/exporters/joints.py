@@ -36,7 +36,7 @@ class Joints(Exporter):
         """Solve and write a new folder; return what cannot be reached, as sentences."""
         if self.robot is None:
             raise UsageError("no robot", "a robot file", "name it with --robot")
-        robot, said = read_robot(self.robot), []
+        robot, sentences = read_robot(self.robot), []
         solved = [follow(robot, targets)[0] for targets in episodes]
         new_folder(out)
         if solved:
@@ -45,7 +45,7 @@ class Joints(Exporter):
             self.tables.append(use_table(path, targets))
         for targets, path in zip(episodes, solved, strict=True):
             stem = Path(targets.recording).stem
-            said += [f"{stem}: {words}" for words in in_words(path, targets, robot.tolerance[1] is not None)]
+            sentences += [f"{stem}: {words}" for words in in_words(path, targets, robot.tolerance[1] is not None)]
             columns = to_columns(targets)
             header = _header(targets, path, robot, columns)
             documents.check(header, "joint_trajectory", stem)
@@ -53,7 +53,7 @@ class Joints(Exporter):
             table = pa.table(whole).replace_schema_metadata({HEADER: json.dumps(header)})
             with replacement(out / f"{stem}.joints.parquet") as stream:
                 pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
-        return said
+        return sentences
 
     def read(self, out: Path) -> list[FingertipTargets]:
         """Return the targets of a folder; `read_joints` gives the joint values."""
@@ -77,31 +77,35 @@ def read_joints(out: Path) -> list[tuple[FingertipTargets, dict[str, np.ndarray]
 def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) -> list[str]:
     """Describe what the robot cannot do, with times; orientations too, where they are prescribed."""
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
-    said = []
+    sentences = []
     for name, rows in path.unreached.items():
         chosen = list(rows), targets.fingers.index(name)
         worst = 1000 * path.position_error[chosen].max(), np.degrees(path.rotation_error[chosen].max())
         share = f"{len(rows)} of {len(seconds)} targets ({_when(rows, seconds)})"
-        off = f"{worst[0]:.1f} mm" + (f", {worst[1]:.0f} deg" if turned else "")
-        said.append(f"{name} does not reach {share}, off by up to {off}")
+        error_words = f"{worst[0]:.1f} mm" + (f", {worst[1]:.0f} deg" if turned else "")
+        sentences.append(f"{name} does not reach {share}, off by up to {error_words}")
     if path.uncoupled:
         share = f"{len(path.uncoupled)} of {len(seconds)} targets ({_when(path.uncoupled, seconds)})"
-        said.append(f"{share} would need mimic joints ({', '.join(path.mimics)}) to part from those that they follow")
+        sentences.append(
+            f"{share} would need mimic joints ({', '.join(path.mimics)}) to part from those that they follow"
+        )
     if path.other_posture:
         share = f"{len(path.other_posture)} of {len(seconds)} targets ({_when(path.other_posture, seconds)})"
-        said.append(f"{share} are left out: only another posture reaches them, which the joints cannot take up in time")
+        sentences.append(
+            f"{share} are left out: only another posture reaches them, which the joints cannot take up in time"
+        )
     for name, rows in path.outside_workspace.items():
-        said.append(f"{name}: {len(rows)} targets lie outside the workspace ({_when(rows, seconds)})")
+        sentences.append(f"{name}: {len(rows)} targets lie outside the workspace ({_when(rows, seconds)})")
     for name, rows in path.too_fast.items():
         when = _when(rows, seconds)
-        said.append(f"joint {name} would have to be faster than its limit at {len(rows)} times ({when})")
+        sentences.append(f"joint {name} would have to be faster than its limit at {len(rows)} times ({when})")
     for (first, second), rows in path.collisions.pairs.items():
         when = _when(rows, seconds)
-        said.append(f"links {first} and {second} run into each other at {len(rows)} times ({when})")
+        sentences.append(f"links {first} and {second} run into each other at {len(rows)} times ({when})")
     for name, rows in path.too_abrupt.items():
         when = _when(rows, seconds)
-        said.append(f"joint {name} would have to accelerate more than its limit at {len(rows)} times ({when})")
-    return said
+        sentences.append(f"joint {name} would have to accelerate more than its limit at {len(rows)} times ({when})")
+    return sentences
 
 
 def use_table(path: JointPath, targets: FingertipTargets) -> str:
@@ -139,15 +143,17 @@ def _largest(values: np.ndarray) -> float:
 
 def _unchecked(path: JointPath) -> list[str]:
     """Describe which speeds and accelerations were not held against a limit, as none is known."""
-    said = []
+    sentences = []
     if path.collisions.reason:
-        said.append(f"whether links touch each other was not checked: {path.collisions.reason}")
+        sentences.append(f"whether links touch each other was not checked: {path.collisions.reason}")
     for what, known in (("velocity", "speed"), ("acceleration", "acceleration")):
         free = [joint.name for joint in path.joints if getattr(joint, what) is None]
         if free:
             which = "any joint" if len(free) == len(path.joints) else f"joint {', '.join(free)}"
-            said.append(f"no limit of the {known} of {which} is known, so none was checked ({what} in the robot file)")
-    return said
+            sentences.append(
+                f"no limit of the {known} of {which} is known, so none was checked ({what} in the robot file)"
+            )
+    return sentences
 
 
 def _when(rows: tuple[int, ...], seconds: np.ndarray) -> str:

@@ -84,18 +84,20 @@ def _lifting(grip: Grip) -> dict[str, float]:
 
 def lines(found: dict[str, Any]) -> list[str]:
     """Return a study's result as lines of text, beside the paper's figures."""
-    said = [
+    sentences = [
         f"{'':<13} {'held':>7}  {'Wilson 95 %':<14} {'paper':>6} | at the edge                   | moves where held"
     ]
-    for name, own in found["rates"].items():
+    for name, strategy_rates in found["rates"].items():
         row = f"{name:<13}"
         for part in ("overall", "edge"):
-            share, (low, high) = own[part], own[part]["wilson_95"]
+            share, (low, high) = strategy_rates[part], strategy_rates[part]["wilson_95"]
             held, of = found["published"][part].get(name, (0, 0))
             paper = f"{held / of:.1%}" if of else "-"
             row += f" {share['held']:>3}/{share['of']:<3}  {f'{low:.0%} to {high:.0%}':<14} {paper:>6} |"
-        said.append(row + f" {_moves(own['adjustments'])}, edge {_moves(own['edge_adjustments'])}")
-    return [*said, *_gap_lines(found), *_bias_lines(found), *_lifting_lines(found)]
+        sentences.append(
+            row + f" {_moves(strategy_rates['adjustments'])}, edge {_moves(strategy_rates['edge_adjustments'])}"
+        )
+    return [*sentences, *_gap_lines(found), *_bias_lines(found), *_lifting_lines(found)]
 
 
 def _gap_lines(found: dict[str, Any]) -> list[str]:
@@ -107,7 +109,7 @@ def _gap_lines(found: dict[str, Any]) -> list[str]:
     raw, dense = (held[name] for name in GAP)
     if set(raw) != set(dense) or not raw:
         return []
-    said = []
+    sentences = []
     for where, places in (("overall", None), ("edge", found["setup"]["edge"])):
         chosen = [key for key in raw if places is None or key[0] in places]
         difference = paired([dense[key] for key in chosen], [raw[key] for key in chosen])
@@ -115,8 +117,10 @@ def _gap_lines(found: dict[str, Any]) -> list[str]:
         (raw_held, of), (dense_held, of_dense) = (found["published"][where][name] for name in GAP)
         paper = dense_held / of_dense - raw_held / of
         verdict = "reproduced" if low > 0 and low <= paper <= high else "not reproduced"
-        said.append(f"dense depth less raw taxels, {where}: {difference.text}; the paper's {paper:+.0%} is {verdict}")
-    return said
+        sentences.append(
+            f"dense depth less raw taxels, {where}: {difference.text}; the paper's {paper:+.0%} is {verdict}"
+        )
+    return sentences
 
 
 def _moves(moves: dict[str, Any]) -> str:
@@ -124,22 +128,28 @@ def _moves(moves: dict[str, Any]) -> str:
 
 
 def _bias_lines(found: dict[str, Any]) -> list[str]:
-    own, band = found["bias"], found["setup"]["protocol"]["band"]
-    said = []
+    measured, band = found["bias"], found["setup"]["protocol"]["band"]
+    sentences = []
     known = {"raw_taxel": "taxels", "dense_depth": "network's map", "solved_map": "solved map"}
-    for name, inside in own["toward_interior"].items():
+    for name, inside in measured["toward_interior"].items():
         words = known.get(name, name)
-        off = ", ".join(f"{at} mm: {'none' if value is None else f'{value:+.2f}'}" for at, value in inside.items())
-        to = own["accepted_to"][name]
-        said.append(f"centre by {words}: too far inside at {off}; the {band:g} mm band accepts to {to:.2f} mm")
-    return said
+        deviation = ", ".join(
+            f"{at} mm: {'none' if value is None else f'{value:+.2f}'}" for at, value in inside.items()
+        )
+        to = measured["accepted_to"][name]
+        sentences.append(
+            f"centre by {words}: too far inside at {deviation}; the {band:g} mm band accepts to {to:.2f} mm"
+        )
+    return sentences
 
 
 def _lifting_lines(found: dict[str, Any]) -> list[str]:
-    own = found["lifting"]
-    said = [f"the lift (fingertips {own['squeeze']:.2f} mm closer than touching) holds to {own['holds_to']:g} mm"]
+    lifting = found["lifting"]
+    sentences = [
+        f"the lift (fingertips {lifting['squeeze']:.2f} mm closer than touching) holds to {lifting['holds_to']:g} mm"
+    ]
     for other in found["other_lifting"]:
-        shares = {name: own["overall"] for name, own in other["rates"].items()}
+        shares = {name: lifting["overall"] for name, lifting in other["rates"].items()}
         held = ", ".join(f"{name} {share['held']}/{share['of']}" for name, share in shares.items())
-        said.append(f"  one that holds to {other['holds_to']:g} mm: {held}")
-    return said
+        sentences.append(f"  one that holds to {other['holds_to']:g} mm: {held}")
+    return sentences

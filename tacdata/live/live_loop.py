@@ -72,7 +72,7 @@ class LiveLoop:
         Raises:
             DeviceError: If the board breaks.
         """
-        begun = said = time.monotonic()
+        begun = sentences = time.monotonic()
         while not self._stopped and (seconds is None or time.monotonic() - begun < seconds):
             if self._tare_wanted:
                 self._tare_wanted = False
@@ -87,9 +87,9 @@ class LiveLoop:
                 made = self._stream.push(frame, wanted)
                 if made is not None:
                     self._hand_out(made)
-                is_time = time.monotonic() - said >= SAID_EVERY
+                is_time = time.monotonic() - sentences >= SAID_EVERY
                 if is_time and (words := self._words(made) if made else self._stream.waiting_for_rest):
-                    said = time.monotonic()
+                    sentences = time.monotonic()
                     say(words if made else f"{self._source.name}: {words}; waiting until nothing moves the skin")
 
     def _hand_out(self, made: Estimate) -> None:

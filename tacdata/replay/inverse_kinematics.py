@@ -72,11 +72,11 @@ def follow(robot: Robot, targets: FingertipTargets) -> tuple[JointPath, Kinemati
     turns = inverse[:3, :3] @ Rotation.from_quat(targets.quaternion.reshape(-1, 4)).as_matrix()
     turns = turns.reshape(*places.shape[:2], 3, 3)
     search = KinematicSearch(model)
-    values, errors, angles, off = _search(search, places, turns)
+    values, errors, angles, coupling_error = _search(search, places, turns)
     far = np.asarray(errors > robot.tolerance[0])
     if robot.tolerance[1] is not None:
         far |= angles > robot.tolerance[1]
-    uncoupled = off > COUPLED
+    uncoupled = coupling_error > COUPLED
     reached = ~far.any(axis=1) & ~uncoupled
     values, served = without_jumps(
         search,
@@ -142,8 +142,8 @@ def _search(
 
 def _reached(search: KinematicSearch, values: np.ndarray) -> bool:
     place, angle = search.model.robot.tolerance
-    far, turned, off = search.errors(values)
-    return bool((far <= place).all() and off <= COUPLED and (angle is None or (turned <= angle).all()))
+    far, turned, coupling_error = search.errors(values)
+    return bool((far <= place).all() and coupling_error <= COUPLED and (angle is None or (turned <= angle).all()))
 
 
 def _rows(found: np.ndarray, fingers: tuple[str, ...]) -> dict[str, tuple[int, ...]]:

@@ -79,8 +79,8 @@ class KinematicSearch:
         """Return the errors of joint values: targets [m] and [rad], shapes (f,), and mimic joints [rad or m]."""
         self._state.update(values)
         left = np.array([task.compute_error(self._state) for task in self._tips])
-        off = 0.0 if self._coupled is None else float(np.abs(self._coupled.compute_error(self._state)).max())
-        return np.linalg.norm(left[:, :3], axis=1), np.linalg.norm(left[:, 3:], axis=1), off
+        coupling_error = 0.0 if self._coupled is None else float(np.abs(self._coupled.compute_error(self._state)).max())
+        return np.linalg.norm(left[:, :3], axis=1), np.linalg.norm(left[:, 3:], axis=1), coupling_error
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
         """Return random joint values within the limits, or half a turn, shape (joints,).

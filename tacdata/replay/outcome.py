@@ -170,11 +170,11 @@ def _behind(fingers: np.ndarray, centre: np.ndarray, first: int, wiping: np.ndar
         first: Row from which it is counted.
         wiping: Rows of the strokes, whose main direction counts; None for a lift, whose height counts.
     """
-    apart = centre - centre[first] - (fingers - fingers[first])
+    distance = centre - centre[first] - (fingers - fingers[first])
     if wiping is None:
-        behind = -apart[:, 2]
+        behind = -distance[:, 2]
     else:
         moved = fingers[wiping] - fingers[wiping].mean(axis=0)
-        behind = np.abs(apart @ np.linalg.svd(moved, full_matrices=False)[2][0])
+        behind = np.abs(distance @ np.linalg.svd(moved, full_matrices=False)[2][0])
     behind[:first] = 0.0
     return behind

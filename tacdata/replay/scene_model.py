@@ -179,8 +179,8 @@ class SceneModel:
         a, b, c = data.xmat[self._object].reshape(3, 3) @ data.qvel[3:6]  # MuJoCo gives it about the body's axes
         arm, normal = data.contact.pos[contacts] - data.xpos[self._object], data.contact.frame[contacts, :3]
         turning = arm @ np.array([[0, c, -b], [-c, 0, a], [b, -a, 0]])
-        apart = data.qvel[:3] + turning - data.qvel[6:].reshape(-1, 3)[pads]
-        return apart - (apart * normal).sum(axis=1, keepdims=True) * normal
+        distance = data.qvel[:3] + turning - data.qvel[6:].reshape(-1, 3)[pads]
+        return distance - (distance * normal).sum(axis=1, keepdims=True) * normal
 
     def _press(self, contacts: np.ndarray, pads: np.ndarray, force: np.ndarray, depth: np.ndarray) -> None:
         """Write the normal force [N] and the depth [m] of each pad on the object, shapes (f,)."""

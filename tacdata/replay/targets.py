@@ -74,46 +74,48 @@ class FingertipTargets:
         }
 
 
-def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Iterable[str] = ()) -> FingertipTargets:
+def targets_of(
+    demonstration: Demonstration, gains: dict[str, float] | None, fingers: Iterable[str] = ()
+) -> FingertipTargets:
     """Return a demonstration's targets, over the times at which every finger's pose is known.
 
     Args:
-        made: The demonstration.
+        demonstration: The demonstration.
         gains: Finger -> gain [m/mm] of compensated targets; None for direct ones.
         fingers: Fingers in their order; by default all.
 
     Raises:
         UsageError: If a finger has no path or no gain, no time has all of them, or there is no predicted depth.
     """
-    names = tuple(fingers) or tuple(made.tracks)
+    names = tuple(fingers) or tuple(demonstration.tracks)
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise UsageError(f"finger {twice} is named twice", "each finger once", "name every finger once with --finger")
-    for what, known in (("path", made.tracks), *((("gain", gains),) if gains is not None else ())):
+    for what, known in (("path", demonstration.tracks), *((("gain", gains),) if gains is not None else ())):
         missing = [name for name in names if name not in known]
         if missing:
             given = f"no {what} for {', '.join(missing)}"
             remedy = "name other fingers with --finger" + (", or give them a gain" if what == "gain" else "")
             raise UsageError(given, ", ".join(known), remedy)
-    tracks = [made.tracks[name] for name in names]
+    tracks = [demonstration.tracks[name] for name in names]
     known = np.all([np.isfinite(track.position).all(axis=1) for track in tracks], axis=0)
     if not known.any():
         raise UsageError(f"no time at which {', '.join(names)} are all seen", "one or more", "choose fewer fingers")
     first, last = np.flatnonzero(known)[[0, -1]]
-    rows, remarks = slice(int(first), int(last) + 1), list(made.remarks)
-    depths = [_depth(track.depth, len(made.time_ns)) for track in tracks]
-    seen = np.stack([track.position for track in tracks], axis=1)
-    position = seen.copy()
+    rows, remarks = slice(int(first), int(last) + 1), list(demonstration.remarks)
+    depths = [_depth(track.depth, len(demonstration.time_ns)) for track in tracks]
+    observed = np.stack([track.position for track in tracks], axis=1)
+    position = observed.copy()
     if gains is not None:
-        if made.network is None:
+        if demonstration.network is None:
             raise UsageError(
                 "compensated targets without predicted depth",
                 "demonstrations tracked with a network",
                 "run tacdata track with --network, or export --direct",
             )
         for k, (name, track) in enumerate(zip(names, tracks, strict=True)):
-            position[:, k] = compensate(seen[:, k], track.normal, depths[k], gains[name])
-            away = float(np.nanmax(np.linalg.norm(position[rows, k] - seen[rows, k], axis=1)))
+            position[:, k] = compensate(observed[:, k], track.normal, depths[k], gains[name])
+            away = float(np.nanmax(np.linalg.norm(position[rows, k] - observed[rows, k], axis=1)))
             if away > FAR:
                 meant = f"is the gain of {gains[name]:g} m/mm meant?"
                 remarks.append(f"{name}: moved by up to {1000 * away:.0f} mm: {meant}")
@@ -122,28 +124,28 @@ def targets_of(made: Demonstration, gains: dict[str, float] | None, fingers: Ite
                 count = rows.stop - rows.start
                 remarks.append(f"{name}: not moved at {blind} of {count} times, as no depth is predicted there")
     used = {name: float(gains[name]) for name in names} if gains is not None else {}
-    kind, parents = "direct" if gains is None else "compensated", {"recording": made.recording_hash}
-    if made.network:
-        parents["checkpoint"] = made.network["hash"]
+    kind, parents = "direct" if gains is None else "compensated", {"recording": demonstration.recording_hash}
+    if demonstration.network:
+        parents["checkpoint"] = demonstration.network["hash"]
     return FingertipTargets(
-        made.recording,
-        made.recording_hash,
-        made.task,
-        made.frame,
-        made.rate,
+        demonstration.recording,
+        demonstration.recording_hash,
+        demonstration.task,
+        demonstration.frame,
+        demonstration.rate,
         names,
         kind,
         used,
-        made.time_ns[rows],
+        demonstration.time_ns[rows],
         position[rows],
         np.stack([t.quaternion for t in tracks], axis=1)[rows],
-        seen[rows],
+        observed[rows],
         np.stack(depths, axis=1)[rows],
         np.stack([t.gap for t in tracks], axis=1)[rows],
-        made.network,
+        demonstration.network,
         tuple(remarks),
         provenance.stamp("tacdata export", parents, {"kind": kind, "gains": used}),
-        made,
+        demonstration,
         rows,
     )
 

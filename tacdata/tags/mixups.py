@@ -79,11 +79,11 @@ def exchanged(before: dict[str, CubePose], now: dict[str, CubePose]) -> tuple[st
     """
     remarks = []
     for one, other in combinations(sorted(set(before) & set(now)), 2):
-        apart = np.linalg.norm(before[one].position - before[other].position)
+        distance = np.linalg.norm(before[one].position - before[other].position)
         jumps = (
             np.linalg.norm(now[one].position - before[other].position),
             np.linalg.norm(now[other].position - before[one].position),
         )
-        if max(jumps) < NEARER * apart:
+        if max(jumps) < NEARER * distance:
             remarks.append(f"{one} and {other} have changed places between two images: their tags' numbers are swapped")
     return tuple(remarks)

@@ -75,6 +75,18 @@ class ImageStream:
         return ImagePart(data, _stamp(head)) if data and len(data) == length else None
 
 
+def stamped_stream(url: str, timeout: float) -> ImageStream | None:
+    """Return an open stream whose images carry time stamps; None where there is none at that address."""
+    try:
+        stream = ImageStream(url, timeout)
+    except OSError:
+        return None
+    if not stream.stamped:
+        stream.close()
+        return None
+    return stream
+
+
 def _head(stream: BinaryIO, mark: bytes) -> dict[str, str]:
     """Return the lines before the next image, by their names in lower case; none at the stream's end."""
     found: dict[str, str] = {}

@@ -56,12 +56,12 @@ def board_poses(
             continue
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = exponential(turn.ravel()), shift.ravel()
-        off = _pixels(places, pose, camera) - view.corners
+        deviation = _pixels(places, pose, camera) - view.corners
         poses.append(pose)
         # A pixel in metres at the board's distance.
         metre = float(shift[2, 0]) / camera.matrix[0, 0]
-        squares.append(float((off**2).sum(axis=1).mean()) * metre**2)
-        variance = float((off**2).sum()) / max(2 * len(off) - 6, 1)
+        squares.append(float((deviation**2).sum(axis=1).mean()) * metre**2)
+        variance = float((deviation**2).sum()) / max(2 * len(deviation) - 6, 1)
         spreads.append(_camera_spread(places, pose, camera, variance))
     if not poses:
         why = mismatch(empty, board)

@@ -50,8 +50,8 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
     # Outliers are left out and the fit is repeated, until the set of pairs no longer changes.
     for _ in range(3):
         base, held = _refined(*_begun(grippers[kept], cubes[kept]), grippers[kept], cubes[kept])
-        off = np.linalg.norm(_residuals(base, held, grippers, cubes).reshape(-1, 6), axis=1)
-        good = off <= OUTLYING * max(float(np.median(off)), 1.0)
+        deviation = np.linalg.norm(_residuals(base, held, grippers, cubes).reshape(-1, 6), axis=1)
+        good = deviation <= OUTLYING * max(float(np.median(deviation)), 1.0)
         if good.sum() < 3 or np.array_equal(good, kept):
             break
         kept = good
@@ -106,7 +106,7 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
     if apart.max() > max(NUDGED * distance, OUTLYING * float(np.median(apart))):
         remarks += (
             f"the board in image {int(np.argmax(apart)) + 1} of {len(poses)} stands {1000 * apart.max():.1f} mm from "
-            "where it stands in the others: it or the camera was pushed; leave that image out, or take the images again",
+            "where it stands in the others: it or the camera was pushed; leave that image out, or take them all again",
         )
     # What the images differ by is as much of the uncertainty as what one image tells.
     once = max(spread, float(np.sqrt((apart**2).mean())))

@@ -28,36 +28,36 @@ SUSPECT = 3
 """Largest number of sightings between a gap and a run that may be the wrong ones."""
 
 
-def acquire(seen: Sightings, times_ns: np.ndarray, wander: ProcessNoise) -> Smoothed:
+def acquire(sightings: Sightings, times_ns: np.ndarray, wander: ProcessNoise) -> Smoothed:
     """Return a finger's smoothed path, as `smooth` does, with its track resumed where it was lost.
 
     Args:
-        seen: At least two sightings.
+        sightings: At least two sightings.
         times_ns: Times [ns], shape (n,), ascending.
         wander: Process noise.
     """
     nothing = np.zeros(0, np.int64)
     taken: list[int] = []
     wrong: list[int] = []
-    wander = unseen_noise(seen, wander)
-    best = smooth(seen, nothing, wander, back=False)
+    wander = unseen_noise(sightings, wander)
+    best = smooth(sightings, nothing, wander, back=False)
     refused: set[int] = set()
     while len(taken) + len(wrong) < MOST:
         run = next((r for r in _runs(best.accepted) if r[0] not in refused), None)
         if run is None:
             break
         refused.add(run[0])
-        if not _agree(seen, run, wander):
+        if not _agree(sightings, run, wander):
             continue
         tries = [([*taken, run[0]], wrong)]
-        suspects = _first_after_gap(seen, np.flatnonzero(best.accepted[: run[0]]))
+        suspects = _first_after_gap(sightings, np.flatnonzero(best.accepted[: run[0]]))
         if suspects:
             tries.append((taken, [*wrong, *suspects]))
         for resumed, doubted in tries:
-            tried = smooth(seen, nothing, wander, back=False, reacquired=resumed, left_out=doubted)
+            tried = smooth(sightings, nothing, wander, back=False, reacquired=resumed, left_out=doubted)
             if tried.log_likelihood > best.log_likelihood + PRIOR:
                 taken, wrong, best = resumed, doubted, tried
-    return smooth(seen, times_ns, wander, reacquired=taken, left_out=wrong)
+    return smooth(sightings, times_ns, wander, reacquired=taken, left_out=wrong)
 
 
 def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
@@ -76,21 +76,21 @@ def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
     return [run for run in runs if (~accepted[run[0] : run[1]]).sum() >= LEAST_RUN]
 
 
-def _first_after_gap(seen: Sightings, accepted: np.ndarray) -> list[int]:
+def _first_after_gap(sightings: Sightings, accepted: np.ndarray) -> list[int]:
     """Return the last accepted sightings, if a gap is right before them and they are few; else none.
 
     Args:
-        seen: The finger's sightings.
+        sightings: The finger's sightings.
         accepted: Those that were accepted before a run of rejections, ascending.
     """
-    breaks = np.flatnonzero(np.diff(seen.time_ns[accepted]) > GAP / NS) + 1
+    breaks = np.flatnonzero(np.diff(sightings.time_ns[accepted]) > GAP / NS) + 1
     last = accepted[breaks[-1] :] if len(breaks) else accepted[:0]
     return last.tolist() if len(last) <= SUSPECT else []
 
 
-def _agree(seen: Sightings, run: tuple[int, int], wander: ProcessNoise) -> bool:
+def _agree(sightings: Sightings, run: tuple[int, int], wander: ProcessNoise) -> bool:
     """Return whether the sightings of a run fit one motion."""
-    kept = np.zeros(len(seen), bool)
+    kept = np.zeros(len(sightings), bool)
     kept[run[0] : min(run[1], run[0] + LOOKED_AT)] = True
-    part = seen.where(kept)
+    part = sightings.where(kept)
     return float(smooth(part, np.zeros(0, np.int64), wander, back=False).accepted.mean()) >= AGREEING

@@ -60,26 +60,26 @@ class _Look:
 
 
 def without_bumps(
-    seen: Mapping[str, Sightings], recording: DemoRecording, delays: Mapping[str, float]
+    sightings: Mapping[str, Sightings], recording: DemoRecording, delays: Mapping[str, float]
 ) -> tuple[dict[str, Sightings], list[str]]:
     """Return sightings in which a camera that was moved is another one from then on, and sentences about it.
 
     The background decides between two cameras where the fingers' motion does not.
 
     Args:
-        seen: Finger -> its sightings.
+        sightings: Finger -> its sightings.
         recording: The demonstration.
         delays: Camera -> by how much its images were moved back in time [s]; missing for 0.
     """
     behind = shifts(recording, delays)
-    between = jumps({name: timely(found) for name, found in seen.items()}, recording.span_ns[0])
+    between = jumps({name: timely(found) for name, found in sightings.items()}, recording.span_ns[0])
     if behind:
         shown = {bump.camera for bump in behind}
         rivals = {bump.begin_ns: {b.camera for b in between if b.begin_ns == bump.begin_ns} for bump in between}
         # What the background shows itself needs no second sentence, and acquits the other camera of the pair.
         between = [bump for bump in between if not rivals[bump.begin_ns] & shown]
     bumps = sorted([*behind, *between], key=lambda bump: bump.begin_ns)
-    return split(seen, bumps), [bump.words for bump in bumps]
+    return split(sightings, bumps), [bump.words for bump in bumps]
 
 
 def shifts(recording: DemoRecording, delays: Mapping[str, float]) -> list[Bump]:
@@ -118,7 +118,7 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
     corners = _corners(first)
     if len(corners) < FEWEST:
         return []
-    made, most = [_Look(images[0][0], 0.0)], COVERED * _cells(corners[:, 0], first.shape)
+    looks, most = [_Look(images[0][0], 0.0)], COVERED * _cells(corners[:, 0], first.shape)
     lk: dict[str, Any] = {"winSize": (21, 21), "maxLevel": 4}
     for time, image in images[1:]:
         if image.shape != first.shape:
@@ -127,8 +127,8 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
         back, back_too, _ = cv2.calcOpticalFlowPyrLK(image, first, there, None, **lk)  # ty: ignore[no-matching-overload]
         kept = (there_too.ravel() > 0) & (back_too.ravel() > 0)
         kept &= np.linalg.norm((back - corners)[:, 0], axis=1) < RETURNED
-        made.append(_Look(time, _shift(corners[kept, 0], there[kept, 0], most, first.shape)))
-    return made
+        looks.append(_Look(time, _shift(corners[kept, 0], there[kept, 0], most, first.shape)))
+    return looks
 
 
 def _corners(image: np.ndarray) -> np.ndarray:

@@ -25,22 +25,22 @@ MIDDLE = 192.0
 """
 
 
-def unseen_noise(seen: Sightings, wander: ProcessNoise) -> ProcessNoise:
+def unseen_noise(sightings: Sightings, wander: ProcessNoise) -> ProcessNoise:
     """Return process noise with the one over gaps; unchanged without a gap.
 
     Args:
-        seen: At least two sightings.
+        sightings: At least two sightings.
         wander: Process noise of the whole recording.
     """
-    breaks = np.diff(seen.time_ns)
+    breaks = np.diff(sightings.time_ns)
     gaps = breaks[breaks > GAP / NS] * NS
     if not len(gaps):
         return wander
-    times = np.arange(seen.time_ns[0], seen.time_ns[-1], round(STEP / NS), dtype=np.int64)
-    path = smooth(seen, times, wander)
+    times = np.arange(sightings.time_ns[0], sightings.time_ns[-1], round(STEP / NS), dtype=np.int64)
+    path = smooth(sightings, times, wander)
     hidden = np.array(~np.isfinite(path.position).all(axis=1), bool)
     for k in np.flatnonzero(breaks > GAP / NS):
-        hidden[(times > seen.time_ns[k]) & (times < seen.time_ns[k + 1])] = True
+        hidden[(times > sightings.time_ns[k]) & (times < sightings.time_ns[k + 1])] = True
     velocity, turning = _densities(path, hidden, float(gaps.max()))
     unseen = ProcessNoise(max(wander.velocity, velocity), max(wander.turning, turning))
     return replace(wander, unseen=unseen)
@@ -53,19 +53,19 @@ def _densities(path: Smoothed, hidden: np.ndarray, longest: float) -> tuple[floa
         begins = _begins(hidden, rows)
         if len(begins) < FEWEST:
             continue
-        off, turned = _errors(path, begins, rows)
+        deviation, turned = _errors(path, begins, rows)
         factor = MIDDLE / (rows * STEP) ** 3 / SPREADS**2
-        largest = max(largest[0], factor * off**2), max(largest[1], factor * turned**2)
+        largest = max(largest[0], factor * deviation**2), max(largest[1], factor * turned**2)
     return largest
 
 
 def _lengths(longest: float) -> list[int]:
     """Return even numbers of rows, from the shortest gap to the longest, by factors of about 1.5."""
-    made, seconds = [], max(longest, GAP)
+    lengths, seconds = [], max(longest, GAP)
     while seconds >= GAP:
-        made.append(2 * round(seconds / STEP / 2))
+        lengths.append(2 * round(seconds / STEP / 2))
         seconds /= 1.5
-    return made
+    return lengths
 
 
 def _begins(hidden: np.ndarray, rows: int) -> np.ndarray:
@@ -82,10 +82,10 @@ def _errors(path: Smoothed, begins: np.ndarray, rows: int) -> tuple[float, float
     ends, middles = begins + rows, begins + rows // 2
     bent = rows * STEP / 8 * (path.velocity[begins] - path.velocity[ends])
     middle = (path.position[begins] + path.position[ends]) / 2 + bent
-    off = np.abs(path.position[middles] - middle).max()
+    deviation = np.abs(path.position[middles] - middle).max()
     turned = 0.0
     for a, m, b in zip(begins[::3], middles[::3], ends[::3], strict=True):
         first, second, last, before = (logarithm(path.rotation[k] @ path.rotation[m].T) for k in (a, a + 1, b, b - 1))
         bridge = (first + last) / 2 + rows / 8 * ((second - first) - (last - before))
         turned = max(turned, float(np.abs(bridge).max()))
-    return float(off), turned
+    return float(deviation), turned

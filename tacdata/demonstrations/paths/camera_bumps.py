@@ -71,101 +71,101 @@ class Bump:
         return most, WIDE[1] * most / WIDE[0]
 
 
-def jumps(seen: Mapping[str, Sightings], begin_ns: int) -> list[Bump]:
+def jumps(sightings: Mapping[str, Sightings], begin_ns: int) -> list[Bump]:
     """Return the bumps that show between cameras, by their time.
 
     Args:
-        seen: Finger -> its sightings.
+        sightings: Finger -> its sightings.
         begin_ns: Beginning of the demonstration [ns], for words.
     """
     found: list[Bump] = []
-    cameras = sorted({camera for one in seen.values() for camera in one.camera})
+    cameras = sorted({camera for one in sightings.values() for camera in one.camera})
     for one, other in combinations(cameras, 2):
-        steps = _steps(_apart(seen, one, other))
+        steps = _steps(_apart(sightings, one, other))
         for k, (moment, size) in enumerate(steps):
             # Another bump close by must not stand for this one.
-            first = max([_before(seen, (one, other), moment), *(t for t, _ in steps[:k])])
+            first = max([_before(sightings, (one, other), moment), *(t for t, _ in steps[:k])])
             last = min([moment + WINDOW * 1e9, *(t for t, _ in steps[k + 1 :])])
-            which, at, gain = _which(seen, (one, other), moment, (first, last))
+            which, at, gain = _which(sightings, (one, other), moment, (first, last))
             if gain < EVIDENT:
                 continue
             if any(b.camera in which and abs(b.sure_ns - at) < 1e9 for b in found):
                 continue  # a third camera shows the same bump
             seconds, jump = (at - begin_ns) * 1e-9, f"{1000 * size:.1f} mm apart where they agreed before"
             if len(which) == 1:
-                rest = other if which[0] == one else one
-                words = f"it shows the fingers {jump}, against camera {rest}"
+                opposite = other if which[0] == one else one
+                words = f"it shows the fingers {jump}, against camera {opposite}"
             else:
                 words = f"it and camera {{}} show the fingers {jump}, and the motion does not tell which of them moved"
             for name in which:
-                rest = other if name == one else one
+                opposite = other if name == one else one
                 start = f"camera {name} was moved {seconds:.1f} s after the beginning: "
                 room = ROOM[len(which) - 1]
-                found.append(Bump(name, at - MARGIN, at + MARGIN, None, size, start + words.format(rest), room))
+                found.append(Bump(name, at - MARGIN, at + MARGIN, None, size, start + words.format(opposite), room))
     return sorted(found, key=lambda bump: bump.begin_ns)
 
 
-def split(seen: Mapping[str, Sightings], bumps: Sequence[Bump]) -> dict[str, Sightings]:
+def split(sightings: Mapping[str, Sightings], bumps: Sequence[Bump]) -> dict[str, Sightings]:
     """Return sightings in which a camera that was moved is another camera, whose place is hardly known.
 
     Sightings of the moment itself are left out: where the camera stood then is not known.
     """
-    made = dict(seen)
+    divided = dict(sightings)
     for number, bump in enumerate(bumps):
         name = f"{bump.camera} (moved, {number + 1})"
-        for finger, found in made.items():
+        for finger, found in divided.items():
             moment = (found.time_ns >= bump.begin_ns) & (found.time_ns < bump.sure_ns)
             found = found.where(~(moment & _of(found, bump.camera)))
-            made[finger] = found
+            divided[finger] = found
             moved = _of(found, bump.camera) & (found.time_ns >= bump.sure_ns)
             if bump.end_ns is not None:
                 moved &= found.time_ns < bump.end_ns
             if moved.any():
-                made[finger] = _renamed(found, moved, bump, name)
-    return made
+                divided[finger] = _renamed(found, moved, bump, name)
+    return divided
 
 
-def unmoved(seen: Sightings) -> np.ndarray:
+def unmoved(sightings: Sightings) -> np.ndarray:
     """Return which sightings are of cameras that stand where their files say, shape (p,), bool."""
-    return np.array([" (moved" not in camera for camera in seen.camera], bool)
+    return np.array([" (moved" not in camera for camera in sightings.camera], bool)
 
 
-def _before(seen: Mapping[str, Sightings], cameras: tuple[str, str], moment: int) -> float:
+def _before(sightings: Mapping[str, Sightings], cameras: tuple[str, str], moment: int) -> float:
     """Return from when on sightings before a moment tell the place before it [ns]: earlier if fingers were hidden."""
     first = [moment - WINDOW * 1e9]
     for camera in cameras:
-        times = np.sort(np.concatenate([found.time_ns[_of(found, camera)] for found in seen.values()]))
+        times = np.sort(np.concatenate([found.time_ns[_of(found, camera)] for found in sightings.values()]))
         times = times[times < moment]
-        first += [float(times[-min(len(times), LOCAL * len(seen))])] if len(times) else []
+        first += [float(times[-min(len(times), LOCAL * len(sightings))])] if len(times) else []
     return min(first)
 
 
-def _of(seen: Sightings, camera: str) -> np.ndarray:
+def _of(sightings: Sightings, camera: str) -> np.ndarray:
     """Return which sightings are of a camera, moved or not, shape (p,), bool."""
-    return np.array([name.partition(" (moved")[0] == camera for name in seen.camera], bool)
+    return np.array([name.partition(" (moved")[0] == camera for name in sightings.camera], bool)
 
 
-def _renamed(seen: Sightings, moved: np.ndarray, bump: Bump, name: str) -> Sightings:
-    cameras = tuple(name if hit else camera for hit, camera in zip(moved, seen.camera, strict=True))
-    known = seen.cameras.get(bump.camera)
+def _renamed(sightings: Sightings, moved: np.ndarray, bump: Bump, name: str) -> Sightings:
+    cameras = tuple(name if hit else camera for hit, camera in zip(moved, sightings.camera, strict=True))
+    known = sightings.cameras.get(bump.camera)
     # Without a stated error the camera's place is not known here; a turn about the fingers themselves does as well.
-    place = seen.position[moved].mean(axis=0) if known is None else known.place
-    return replace(seen, camera=cameras, cameras={**seen.cameras, name: CameraError(place, bump.spread)})
+    place = sightings.position[moved].mean(axis=0) if known is None else known.place
+    return replace(sightings, camera=cameras, cameras={**sightings.cameras, name: CameraError(place, bump.spread)})
 
 
-def _apart(seen: Mapping[str, Sightings], one: str, other: str) -> list[tuple[np.ndarray, np.ndarray]]:
+def _apart(sightings: Mapping[str, Sightings], one: str, other: str) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return, for each finger, times [ns] at which one camera saw it and its distance from the other's path [m]."""
     pairs = []
-    for found in seen.values():
-        own, rest = (np.array([camera == name for camera in found.camera], bool) for name in (one, other))
-        if min(own.sum(), rest.sum()) < 2:
+    for found in sightings.values():
+        rows, rest = (np.array([camera == name for camera in found.camera], bool) for name in (one, other))
+        if min(rows.sum(), rest.sum()) < 2:
             continue
-        times, path, at = found.time_ns[rest], found.position[rest], found.time_ns[own]
+        times, path, at = found.time_ns[rest], found.position[rest], found.time_ns[rows]
         after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
         near = (at >= times[0]) & (at <= times[-1]) & (times[after] - times[after - 1] <= SPACED * 1e9)
         begin = times[0]
         there = np.stack([np.interp(at[near] - begin, times - begin, path[:, k]) for k in range(3)], axis=1)
-        pairs.append((at[near], found.position[own][near] - there))
+        pairs.append((at[near], found.position[rows][near] - there))
     return pairs
 
 
@@ -227,11 +227,11 @@ def _cost(pairs: list[tuple[np.ndarray, np.ndarray]], moment: float) -> float:
 
 
 def _which(
-    seen: Mapping[str, Sightings], cameras: tuple[str, str], moment: int, span: tuple[float, float]
+    sightings: Mapping[str, Sightings], cameras: tuple[str, str], moment: int, span: tuple[float, float]
 ) -> tuple[tuple[str, ...], int, float]:
     """Return which of two cameras moved, both if the motion does not tell, when [ns], and what it gains [nats]."""
     near = {}
-    for finger, found in seen.items():
+    for finger, found in sightings.items():
         kept = (found.time_ns > span[0]) & (found.time_ns < span[1])
         kept &= np.array([camera in cameras for camera in found.camera], bool)
         if kept.sum() >= LOCAL:
@@ -240,34 +240,34 @@ def _which(
         return cameras, moment, 0.0
     scores: dict[tuple[str, int], float] = {}
     without: dict[str, float] = {}
-    for name, rest in (cameras, cameras[::-1]):
-        noise = {finger: _noise(found, rest) for finger, found in near.items()}
+    for name, opposite in (cameras, cameras[::-1]):
+        noise = {finger: _noise(found, opposite) for finger, found in near.items()}
         times = np.unique(
             np.concatenate([found.time_ns[[camera == name for camera in found.camera]] for found in near.values()])
         )
         middle = int(np.searchsorted(times, moment))
         # Before the bump, too, the camera's place may be a little off: only the change counts.
-        whole = Bump(name, 0, 0, None, 0.0, "")
-        without[name] = _likelihood(split(near, (whole,)), noise)
+        always = Bump(name, 0, 0, None, 0.0, "")
+        without[name] = _likelihood(split(near, (always,)), noise)
         for at in times[max(middle - CANDIDATES, 0) : middle + CANDIDATES + 1]:
             bump = Bump(name, int(at), int(at), None, 0.0, "")
-            scores[name, int(at)] = _likelihood(split(near, (replace(whole, end_ns=int(at)), bump)), noise)
+            scores[name, int(at)] = _likelihood(split(near, (replace(always, end_ns=int(at)), bump)), noise)
     best = max(scores, key=lambda key: scores[key])
-    rest = cameras[1] if best[0] == cameras[0] else cameras[0]
-    rival = max((score for (name, _), score in scores.items() if name == rest), default=-np.inf)
+    opposite = cameras[1] if best[0] == cameras[0] else cameras[0]
+    rival = max((score for (name, _), score in scores.items() if name == opposite), default=-np.inf)
     gain = scores[best] - without[best[0]]
     if scores[best] - rival < DECISIVE:
         return cameras, moment, gain
     return (best[0],), best[1], gain
 
 
-def _likelihood(seen: Mapping[str, Sightings], noise: Mapping[str, ProcessNoise]) -> float:
+def _likelihood(sightings: Mapping[str, Sightings], noise: Mapping[str, ProcessNoise]) -> float:
     """Return the log-likelihood of all fingers' sightings [nats]."""
     none = np.zeros(0, np.int64)
-    return sum(smooth(found, none, noise[finger], back=False).log_likelihood for finger, found in seen.items())
+    return sum(smooth(found, none, noise[finger], back=False).log_likelihood for finger, found in sightings.items())
 
 
-def _noise(seen: Sightings, camera: str) -> ProcessNoise:
+def _noise(sightings: Sightings, camera: str) -> ProcessNoise:
     """Return the process noise that one camera alone saw: a bump of the other is no motion."""
-    own = np.array([name == camera for name in seen.camera], bool)
-    return choose(seen.where(own) if own.sum() >= LOCAL else seen)
+    own = np.array([name == camera for name in sightings.camera], bool)
+    return choose(sightings.where(own) if own.sum() >= LOCAL else sightings)

@@ -17,12 +17,12 @@ BLOCKS, BLOCK = 8, 100
 """Number of stretches of a long recording that are used, and sightings in each: a hand rests and moves fast in turn."""
 
 
-def choose(seen: Sightings) -> ProcessNoise:
+def choose(sightings: Sightings) -> ProcessNoise:
     """Return the densities, out of `VELOCITIES` and `TURNINGS`, with the largest likelihood.
 
     Stretches from the whole recording count. The beginning alone would give too small a noise for fast motion later.
     """
-    parts, nothing = _stretches(seen), np.zeros(0, np.int64)
+    parts, nothing = _stretches(sightings), np.zeros(0, np.int64)
 
     def likelihood(velocity: float, turning: float) -> float:
         noise = ProcessNoise(velocity, turning)
@@ -32,16 +32,16 @@ def choose(seen: Sightings) -> ProcessNoise:
     return ProcessNoise(velocity, _climb(TURNINGS, lambda value: likelihood(velocity, value)))
 
 
-def _stretches(seen: Sightings) -> list[Sightings]:
+def _stretches(sightings: Sightings) -> list[Sightings]:
     """Return stretches of sightings spread evenly over all, or all of a short recording."""
-    if len(seen) <= BLOCKS * BLOCK:
-        return [seen]
-    made = []
-    for begin in np.linspace(0, len(seen) - BLOCK, BLOCKS).astype(int):
-        kept = np.zeros(len(seen), bool)
+    if len(sightings) <= BLOCKS * BLOCK:
+        return [sightings]
+    stretches = []
+    for begin in np.linspace(0, len(sightings) - BLOCK, BLOCKS).astype(int):
+        kept = np.zeros(len(sightings), bool)
         kept[begin : begin + BLOCK] = True
-        made.append(seen.where(kept))
-    return made
+        stretches.append(sightings.where(kept))
+    return stretches
 
 
 def _climb(values: Sequence[float], worth: Callable[[float], float]) -> float:

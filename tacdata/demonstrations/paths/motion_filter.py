@@ -108,7 +108,7 @@ class _State:
 
 
 def smooth(
-    seen: Sightings,
+    sightings: Sightings,
     times_ns: np.ndarray,
     wander: ProcessNoise,
     back: bool = True,
@@ -118,7 +118,7 @@ def smooth(
     """Return the pose at given times.
 
     Args:
-        seen: At least two sightings.
+        sightings: At least two sightings.
         times_ns: Times [ns], shape (n,), ascending; poses outside the sightings' span are NaN.
         wander: Process noise: how freely the finger moves.
         back: Whether to smooth backward; without it poses depend on the past only.
@@ -129,21 +129,21 @@ def smooth(
         Poses, and which sightings were used.
     """
     again, wrong = set(reacquired), set(left_out)
-    first = _beginning(seen)
-    inside = (times_ns >= seen.time_ns[first]) & (times_ns <= seen.time_ns[-1])
-    moments = np.concatenate([seen.time_ns[first:], times_ns[inside]])
-    which = np.concatenate([np.arange(first, len(seen)), np.full(int(inside.sum()), -1)])
+    first = _beginning(sightings)
+    inside = (times_ns >= sightings.time_ns[first]) & (times_ns <= sightings.time_ns[-1])
+    moments = np.concatenate([sightings.time_ns[first:], times_ns[inside]])
+    which = np.concatenate([np.arange(first, len(sightings)), np.full(int(inside.sum()), -1)])
     order = np.lexsort((which < 0, moments))
-    accepted, distance, likelihood, nodes = np.zeros(len(seen), bool), np.full(len(seen), np.nan), 0.0, []
-    state, known, now = _first(seen, first)
-    unseen = _over_gaps(seen, moments)
+    accepted, distance, likelihood, nodes = np.zeros(len(sightings), bool), np.full(len(sightings), np.nan), 0.0, []
+    state, known, now = _first(sightings, first)
+    unseen = _over_gaps(sightings, moments)
     for k in order:
         freely = MANOEUVRE if int(which[k]) in again else (wander.unseen or wander) if unseen[k] else wander
         expected, spread, step = _predicted(state, known, float(moments[k] - now) * NS, freely)
         state, known, now = expected, spread, moments[k]
         if which[k] >= 0:
             n = int(which[k])
-            state, known, distance[n], gained = _updated(expected, spread, seen, n, n in wrong)
+            state, known, distance[n], gained = _updated(expected, spread, sightings, n, n in wrong)
             accepted[n] = distance[n] < GATE and n not in wrong
             likelihood += gained
         nodes.append(_Node(expected, spread, step, state, known))
@@ -153,10 +153,10 @@ def smooth(
     return _collected(poses, inside, accepted, distance, likelihood)
 
 
-def _over_gaps(seen: Sightings, moments: np.ndarray) -> np.ndarray:
+def _over_gaps(sightings: Sightings, moments: np.ndarray) -> np.ndarray:
     """Return which moments [ns] lie in a gap between sightings, or at its end, shape (n,), bool."""
-    after = np.clip(np.searchsorted(seen.time_ns, moments), 1, len(seen) - 1)
-    return seen.time_ns[after] - seen.time_ns[after - 1] > GAP / NS
+    after = np.clip(np.searchsorted(sightings.time_ns, moments), 1, len(sightings) - 1)
+    return sightings.time_ns[after] - sightings.time_ns[after - 1] > GAP / NS
 
 
 def _collected(
@@ -175,12 +175,12 @@ def _collected(
     return Smoothed(**result, accepted=accepted, distance=distance, log_likelihood=likelihood)
 
 
-def _beginning(seen: Sightings) -> int:
+def _beginning(sightings: Sightings) -> int:
     """Return the first sighting that the next two do not contradict: a path must not begin with a mirrored pose."""
-    for k in range(min(len(seen) - 2, 20)):
+    for k in range(min(len(sightings) - 2, 20)):
         near = [
-            np.linalg.norm(logarithm(seen.rotation[k] @ seen.rotation[j].T)) < 0.5
-            and np.linalg.norm(seen.position[k] - seen.position[j]) < 0.05
+            np.linalg.norm(logarithm(sightings.rotation[k] @ sightings.rotation[j].T)) < 0.5
+            and np.linalg.norm(sightings.position[k] - sightings.position[j]) < 0.05
             for j in (k + 1, k + 2)
         ]
         if all(near):
@@ -188,11 +188,11 @@ def _beginning(seen: Sightings) -> int:
     return 0
 
 
-def _first(seen: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
-    errors = [error.spread for error in seen.cameras.values()]
+def _first(sightings: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
+    errors = [error.spread for error in sightings.cameras.values()]
     size = MOTION + 6 * len(errors)
     known = np.zeros((size, size))
-    known[:6, :6] = 100 * seen.covariance[k]  # its own sighting comes next and must not count twice
+    known[:6, :6] = 100 * sightings.covariance[k]  # its own sighting comes next and must not count twice
     known[6:9, 6:9], known[9:MOTION, 9:MOTION] = FIRST_SPEED[1] ** 2 * _EYE, FIRST_SPEED[0] ** 2 * _EYE
     for number, (position, rotation) in enumerate(errors):
         at = MOTION + 6 * number
@@ -200,8 +200,8 @@ def _first(seen: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
         known[at + 3 : at + 6, at + 3 : at + 6] = position**2 * _EYE
         # The first pose errs with the camera that saw it.
         known[:6, :6] += np.diag([rotation**2] * 3 + [position**2] * 3)
-    first = _State(seen.rotation[k], seen.position[k], np.zeros(3), np.zeros(3), np.zeros(size - MOTION))
-    return first, known, int(seen.time_ns[k])
+    first = _State(sightings.rotation[k], sightings.position[k], np.zeros(3), np.zeros(3), np.zeros(size - MOTION))
+    return first, known, int(sightings.time_ns[k])
 
 
 def _predicted(
@@ -229,18 +229,20 @@ def _noise_parts(size: int, turning: float, velocity: float) -> tuple[np.ndarray
 
 
 def _updated(
-    expected: _State, spread: np.ndarray, seen: Sightings, n: int, wrong: bool
+    expected: _State, spread: np.ndarray, sightings: Sightings, n: int, wrong: bool
 ) -> tuple[_State, np.ndarray, float, float]:
     """Return state and covariance after a sighting, its squared distance and likelihood; an outlier changes neither."""
-    surprise = np.concatenate([logarithm(seen.rotation[n] @ expected.rotation.T), seen.position[n] - expected.position])
-    if seen.cameras:
-        seen_as = _observed(expected, seen, n)
+    surprise = np.concatenate(
+        [logarithm(sightings.rotation[n] @ expected.rotation.T), sightings.position[n] - expected.position]
+    )
+    if sightings.cameras:
+        seen_as = _observed(expected, sightings, n)
         surprise = surprise - seen_as[:, MOTION:] @ expected.cameras
         across = spread @ seen_as.T
-        total = seen_as @ across + seen.covariance[n]
+        total = seen_as @ across + sightings.covariance[n]
     else:  # a sighting shows the pose itself
         across = spread[:, :6]
-        total = across[:6] + seen.covariance[n]
+        total = across[:6] + sightings.covariance[n]
     inverse = np.linalg.inv(total)
     distance = float(surprise @ inverse @ surprise)
     gained = -0.5 * ((GATE if wrong else min(distance, GATE)) + np.linalg.slogdet(total)[1])
@@ -251,13 +253,13 @@ def _updated(
     return expected.plus(gain @ surprise), (known + known.T) / 2, distance, gained
 
 
-def _observed(expected: _State, seen: Sightings, n: int) -> np.ndarray:
+def _observed(expected: _State, sightings: Sightings, n: int) -> np.ndarray:
     """Return the derivatives of a sighting's rotation and position by the state's errors, shape (6, 12 + 6 k)."""
-    result = np.zeros((6, MOTION + 6 * len(seen.cameras)))
+    result = np.zeros((6, MOTION + 6 * len(sightings.cameras)))
     result[:, :6] = _EYE6
-    if seen.camera[n] in seen.cameras:
-        at = MOTION + 6 * list(seen.cameras).index(seen.camera[n])
-        x, y, z = expected.position - seen.cameras[seen.camera[n]].place
+    if sightings.camera[n] in sightings.cameras:
+        at = MOTION + 6 * list(sightings.cameras).index(sightings.camera[n])
+        x, y, z = expected.position - sightings.cameras[sightings.camera[n]].place
         result[:, at : at + 6] = _EYE6
         # A turn of the camera by e moves what it sees by e x r.
         result[3:, at : at + 3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]

@@ -40,28 +40,28 @@ def gaps(time_ns: np.ndarray, begin_ns: int, end_ns: int) -> list[tuple[int, int
     return [(int(a), int(b)) for a, b in pairwise(edges) if b - a > GAP * 1e9]
 
 
-def turn_against(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> np.ndarray:
+def turn_against(sightings: Sightings, path: Smoothed, times_ns: np.ndarray) -> np.ndarray:
     """Return the angle between each sighting and the path at the nearest grid time [rad], shape (p,); NaN outside."""
-    nearest, angles = _nearest(times_ns, seen.time_ns), np.full(len(seen), np.nan)
-    for k, (own, there) in enumerate(zip(seen.rotation, path.rotation[nearest], strict=True)):
+    nearest, angles = _nearest(times_ns, sightings.time_ns), np.full(len(sightings), np.nan)
+    for k, (rotation, there) in enumerate(zip(sightings.rotation, path.rotation[nearest], strict=True)):
         if np.isfinite(there).all():
-            angles[k] = np.linalg.norm(logarithm(own @ there.T))
+            angles[k] = np.linalg.norm(logarithm(rotation @ there.T))
     return angles
 
 
-def wrong_tags(seen: Sightings, path: Smoothed, times_ns: np.ndarray) -> tuple[dict[int, float], tuple[int, ...]]:
+def wrong_tags(sightings: Sightings, path: Smoothed, times_ns: np.ndarray) -> tuple[dict[int, float], tuple[int, ...]]:
     """Return the tags that, seen alone, contradict the other tags, and by which angle [rad]: turned, or misnumbered.
 
     The path may rest on the wrong tag, if that one is seen most. So tags are grouped by their angle to the path, and
     the largest group is right. Of two equally large groups the more frequent one is right. Then only frequency speaks
     for it, and its tags are returned too; otherwise no tags are.
     """
-    nearest = _nearest(times_ns, seen.time_ns)
+    nearest = _nearest(times_ns, sightings.time_ns)
     turns: dict[int, list[np.ndarray]] = {}
-    for k, ids in enumerate(seen.ids):
+    for k, ids in enumerate(sightings.ids):
         there = path.rotation[nearest[k]]
         if len(ids) == 1 and np.isfinite(there).all():
-            turns.setdefault(ids[0], []).append(there.T @ seen.rotation[k])
+            turns.setdefault(ids[0], []).append(there.T @ sightings.rotation[k])
     means = {tag: _mean(found) for tag, found in turns.items() if len(found) >= LEAST}
     groups = [[b for b in means if _angle(means[a], means[b]) < TURNED] for a in means]
     if not groups:
@@ -88,25 +88,29 @@ def _mean(rotations: list[np.ndarray]) -> np.ndarray:
     return few[int(np.argmin([sum(_angle(a, b) for b in few) for a in few]))]
 
 
-def flips(seen: Sightings, accepted: np.ndarray, angle: np.ndarray, name: str) -> list[str]:
+def flips(sightings: Sightings, accepted: np.ndarray, angle: np.ndarray, name: str) -> list[str]:
     """Describe how many sightings were flipped against the path, and by how much."""
     turned = ~accepted & (angle > TURNED)
     if not turned.any():
         return []
     low, high = np.degrees(np.nanquantile(angle[turned], [0.1, 0.9]))
-    tags = Counter(t for ids, bad in zip(seen.ids, turned, strict=True) if bad for t in ids)
+    tags = Counter(t for ids, bad in zip(sightings.ids, turned, strict=True) if bad for t in ids)
     which = ", ".join(f"tag {tag} in {count}" for tag, count in tags.most_common(3))
     return [
-        f"{name}: {int(turned.sum())} of {len(seen)} sightings are turned by {low:.0f} to {high:.0f} deg against the "
-        f"path and were left out ({which}): a mirrored pose of a single face, or a tag glued on turned"
+        f"{name}: {int(turned.sum())} of {len(sightings)} sightings are turned by {low:.0f} to {high:.0f} deg against "
+        f"the path and were left out ({which}): a mirrored pose of a single face, or a tag glued on turned"
     ]
 
 
-def exchanges(seen: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: np.ndarray, begin_ns: int) -> list[str]:
+def exchanges(
+    sightings: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: np.ndarray, begin_ns: int
+) -> list[str]:
     """Describe where sightings of two fingers lie on each other's path: their numbers are exchanged."""
     remarks = []
-    for one, other in combinations(seen, 2):
-        found = [_on_the_others_path(seen[a], paths[a], paths[b], times_ns) for a, b in ((one, other), (other, one))]
+    for one, other in combinations(sightings, 2):
+        found = [
+            _on_the_others_path(sightings[a], paths[a], paths[b], times_ns) for a, b in ((one, other), (other, one))
+        ]
         if all(len(times) >= 2 for times in found):
             both = np.sort(np.concatenate(found))
             first, last = (both[[0, -1]] - begin_ns) * 1e-9  # ty: ignore[unsupported-operator]
@@ -117,27 +121,34 @@ def exchanges(seen: dict[str, Sightings], paths: dict[str, Smoothed], times_ns: 
     return remarks
 
 
-def _on_the_others_path(seen: Sightings, own: Smoothed, other: Smoothed, times_ns: np.ndarray) -> np.ndarray:
+def _on_the_others_path(sightings: Sightings, own: Smoothed, other: Smoothed, times_ns: np.ndarray) -> np.ndarray:
     """Return the times [ns] of outliers that lie much nearer to another finger's path than to their own."""
-    refused = ~own.accepted & (seen.time_ns >= times_ns[0]) & (seen.time_ns <= times_ns[-1]) & (seen.timing <= TIMELY)
-    times = seen.time_ns[refused]
+    refused = (
+        ~own.accepted
+        & (sightings.time_ns >= times_ns[0])
+        & (sightings.time_ns <= times_ns[-1])
+        & (sightings.timing <= TIMELY)
+    )
+    times = sightings.time_ns[refused]
     here, there = (
         np.stack([np.interp(times, times_ns, path.position[:, k]) for k in range(3)], -1) for path in (own, other)
     )
-    apart = np.linalg.norm(here - there, axis=1)
-    off = np.linalg.norm(seen.position[refused] - there, axis=1)
-    return times[off < NEAR * apart]
+    distance = np.linalg.norm(here - there, axis=1)
+    deviation = np.linalg.norm(sightings.position[refused] - there, axis=1)
+    return times[deviation < NEAR * distance]
 
 
 def other_hand(paths: dict[str, Smoothed], fingers: dict[str, Finger], rate: float) -> list[str]:
     """Name the hand whose index and middle finger are arranged, along the whole path, as those of the other hand."""
     remarks = []
     for hand in ("left", "right"):
-        own = {n: replace(f, tip=np.eye(4)) for n, f in fingers.items() if f.hand == hand and n in paths}
-        if not {"index", "middle"} <= {f.kind for f in own.values()}:
+        hand_fingers = {n: replace(f, tip=np.eye(4)) for n, f in fingers.items() if f.hand == hand and n in paths}
+        if not {"index", "middle"} <= {f.kind for f in hand_fingers.values()}:
             continue
         step = max(round(rate / 10), 1)
-        found = Counter(_stands(own, paths, k) for k in range(0, len(next(iter(paths.values())).position), step))
+        found = Counter(
+            _stands(hand_fingers, paths, k) for k in range(0, len(next(iter(paths.values())).position), step)
+        )
         wrong = found["left" if hand == "right" else "right"]
         if wrong > STANDING * max(wrong + found[hand], 1):
             remarks.append(
@@ -158,19 +169,19 @@ def _stands(fingers: dict[str, Finger], paths: dict[str, Smoothed], k: int) -> s
     return handedness(fingers, cubes)
 
 
-def contradictions(seen: Sightings, path: Smoothed, begin_ns: int) -> list[str]:
+def contradictions(sightings: Sightings, path: Smoothed, begin_ns: int) -> list[str]:
     """Say how many sightings contradict the path, and of which camera, where they are more than `CONTRADICTING`."""
     # An image at a wrong time contradicts the others, whatever camera and tags do.
-    left_out = ~path.accepted & (seen.timing <= TIMELY)
+    left_out = ~path.accepted & (sightings.timing <= TIMELY)
     if left_out.mean() <= CONTRADICTING:
         return []
-    each = {name: np.array([camera == name for camera in seen.camera]) for name in dict.fromkeys(seen.camera)}
+    each = {name: np.array([camera == name for camera in sightings.camera]) for name in dict.fromkeys(sightings.camera)}
     shares = {name: left_out[rows].mean() for name, rows in each.items()}
     worst = max(shares, key=lambda name: shares[name])
     rows = np.flatnonzero(left_out & each[worst])
-    first, last = ((int(seen.time_ns[row]) - begin_ns) * 1e-9 for row in (rows[0], rows[-1]))
+    first, last = ((int(sightings.time_ns[row]) - begin_ns) * 1e-9 for row in (rows[0], rows[-1]))
     which = f", {shares[worst]:.0%} of those of camera {worst}" if len(each) > 1 else ""
     return [
-        f"{seen.finger}: {left_out.mean():.0%} of its sightings contradict the others and are left out{which}, from "
-        f"{first:.1f} to {last:.1f} s: was a camera moved, or is a pose in the rig file old?"
+        f"{sightings.finger}: {left_out.mean():.0%} of its sightings contradict the others and are left out{which}, "
+        f"from {first:.1f} to {last:.1f} s: was a camera moved, or is a pose in the rig file old?"
     ]

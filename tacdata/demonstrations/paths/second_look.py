@@ -41,7 +41,7 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
         if "intrinsics" in entry
     }
     image_topics = {topics.image(name): name for name in trackers}
-    seen: dict[str, list[dict[str, TipPose]]] = {name: [] for name in trackers}
+    sightings: dict[str, list[dict[str, TipPose]]] = {name: [] for name in trackers}
     remarks: list[str] = []
 
     def search(topic: str, message: bytes | memoryview) -> None:
@@ -49,13 +49,13 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
             return
         name, image = image_topics[topic], _image(bytes(message))
         view = None if image is None else trackers[name].update(image)
-        seen[name].append(view.tips if view else {})
+        sightings[name].append(view.tips if view else {})
         remarks.extend(f"camera {name}: {words}" for words in (view.remarks if view else ()))
-        progress(sum(map(len, seen.values())))
+        progress(sum(map(len, sightings.values())))
 
     records = read_records(recording.path, images=False, digests=False, seen=search)
     views: list[TagStream] = []
-    for name, found in seen.items():
+    for name, found in sightings.items():
         clock = clock_of(records, name, recording.rig.cameras[name].get("rate"))
         stamps = image_times(records, name, clock)
         own = None
@@ -63,7 +63,7 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
             own = clock.uncertainties(stamps.device_ns if clock.axis == "device_ns" else stamps.sequence)
         views += [_stream(name, finger, stamps.sample_ns, found, own) for finger in recording.rig.fingers]
     notes = tuple(note for note in recording.notes if not note.startswith("camera ") or "failed" in note)
-    searched = f"all {sum(map(len, seen.values()))} images"
+    searched = f"all {sum(map(len, sightings.values()))} images"
     return replace(recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched)
 
 
@@ -101,13 +101,13 @@ def sampled(recording: DemoRecording, count: int) -> dict[str, list[tuple[int, n
             kept[name] = {k: own for k, own in kept[name].items() if k % stride[name] == 0}
 
     records = read_records(recording.path, images=False, digests=False, seen=keep)
-    made: dict[str, list[tuple[int, np.ndarray]]] = {}
+    images: dict[str, list[tuple[int, np.ndarray]]] = {}
     for name, messages in kept.items():
         times = image_times(records, name, clock_of(records, name, recording.rig.cameras[name].get("rate"))).sample_ns
         chosen = [k for k in list(messages)[:: -(-len(messages) // count) or 1] if k < len(times)]
         opened = ((int(times[k]), _image(messages[k])) for k in chosen)
-        made[name] = [(time, image) for time, image in opened if image is not None]
-    return made
+        images[name] = [(time, image) for time, image in opened if image is not None]
+    return images
 
 
 def _image(message: bytes) -> np.ndarray | None:

@@ -138,55 +138,63 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     from scipy.spatial.transform import Rotation
 
     pose = rig.camera_pose(view.camera)
-    seen = np.isfinite(view.position).all(axis=1) & (view.faces > 0)
+    sightings = np.isfinite(view.position).all(axis=1) & (view.faces > 0)
     # A rotation of no length or no number is no pose: one damaged message must not end the whole path.
-    seen &= np.abs(np.linalg.norm(view.quaternion, axis=1) - 1) < UNIT
+    sightings &= np.abs(np.linalg.norm(view.quaternion, axis=1) - 1) < UNIT
     if pose is None:
-        seen[:] = False
+        sightings[:] = False
         pose = np.eye(4)
-    chosen, turn = np.flatnonzero(seen), pose[:3, :3]
+    chosen, turn = np.flatnonzero(sightings), pose[:3, :3]
     count = len(chosen)
-    covariance = np.full((count, 6, 6), np.nan) if view.covariance is None else view.covariance[seen].copy()
+    covariance = np.full((count, 6, 6), np.nan) if view.covariance is None else view.covariance[sightings].copy()
     both = np.kron(np.eye(2), turn)
     covariance = both @ np.where(np.isfinite(covariance), covariance, np.nan) @ both.T
     lost = ~np.isfinite(covariance).all(axis=(1, 2))
     covariance[lost] = _diagonal(*UNKNOWN)
     covariance[np.linalg.eigvalsh(covariance)[:, 0] < -ROUNDING] = _diagonal(*UNKNOWN)
-    sigma = np.hypot(timing, np.zeros(count) if view.timing is None else view.timing[seen])
-    # Beyond a second a finger has moved as far as it ever does.
-    per_second = motion(view.sample_ns[seen], view.position[seen] @ turn.T)
-    covariance = covariance + np.minimum(sigma, LONGEST)[:, None, None] ** 2 * per_second
-    ambiguous = np.zeros(len(seen), bool) if view.ambiguous is None else view.ambiguous
-    ids: list[tuple[int, ...]] = list(view.ids) if view.ids else [()] * len(seen)
-    matrices = Rotation.from_quat(view.quaternion[seen]).as_matrix() if count else np.zeros((0, 3, 3))
+    sigma = np.hypot(timing, np.zeros(count) if view.timing is None else view.timing[sightings])
+    stamps = view.sample_ns[sightings]
+    covariance[:, 3:, 3:] += displaced(stamps, view.position[sightings] @ turn.T, stamps, sigma)
+    ambiguous = np.zeros(len(sightings), bool) if view.ambiguous is None else view.ambiguous
+    ids: list[tuple[int, ...]] = list(view.ids) if view.ids else [()] * len(sightings)
+    matrices = Rotation.from_quat(view.quaternion[sightings]).as_matrix() if count else np.zeros((0, 3, 3))
     return Sightings(
         view.finger,
-        view.sample_ns[seen],
-        view.position[seen] @ turn.T + pose[:3, 3],
+        view.sample_ns[sightings],
+        view.position[sightings] @ turn.T + pose[:3, 3],
         turn @ matrices,
         covariance + _diagonal(*FLOOR),
-        ambiguous[seen],
+        ambiguous[sightings],
         (view.camera,) * count,
         tuple(ids[k] for k in chosen),
         sigma,
     )
 
 
-def motion(time_ns: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Return v v^T of a path [m^2/s^2] in the lower right of (p, 6, 6): the covariance per squared second of timing
-    error.
+def displaced(time_ns: np.ndarray, position: np.ndarray, at_ns: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Return the covariance [m^2] that an uncertainty of time causes in a place, shape (n, 3, 3).
 
-    The velocity is that of a straight line through five neighbours, so that noise hardly counts as motion.
+    It is the largest distance that a finger goes in once or twice that time, before or after. At a turning point its
+    speed is 0 and that distance is not.
+
+    Args:
+        time_ns: Times of a finger's sightings by one camera [ns], shape (p,), ascending.
+        position: Its places [m], shape (p, 3).
+        at_ns: Times [ns], shape (n,).
+        sigma: Standard uncertainty of each [s], shape (n,).
     """
-    result, count = np.zeros((len(position), 6, 6)), len(position)
-    for k in range(count):
-        rows = slice(max(k - 2, 0), min(k + 3, count))
-        t = (time_ns[rows] - time_ns[k]) * 1e-9
-        t = t - t.mean()
-        if t @ t > 0:
-            velocity = t @ position[rows] / (t @ t)
-            result[k, 3:, 3:] = np.outer(velocity, velocity)
-    return result
+    if len(time_ns) < 2:
+        return np.zeros((len(at_ns), 3, 3))
+    seconds, at = (time_ns - time_ns[0]) * 1e-9, (at_ns - time_ns[0]) * 1e-9
+
+    def place(moments: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(moments, seconds, position[:, k]) for k in range(3)], axis=1)
+
+    reach = np.minimum(sigma, LONGEST)
+    away = np.stack([(place(at + s * reach) - place(at)) / abs(s) for s in (-2.0, -1.0, 1.0, 2.0)])
+    squares = (away**2).sum(axis=2)
+    outer = np.einsum("sni,snj->nij", away, away)
+    return outer * (squares.max(axis=0) / np.maximum(squares.sum(axis=0), 1e-30))[:, None, None]
 
 
 def _diagonal(position: float, rotation: float) -> np.ndarray:

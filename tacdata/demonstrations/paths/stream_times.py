@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from tacdata.demonstrations.paths.motion_filter import Smoothed, logarithm
-from tacdata.demonstrations.paths.sightings import LONGEST, Sightings, motion
+from tacdata.demonstrations.paths.sightings import LONGEST, Sightings, displaced
 from tacdata.demonstrations.recording.reader import TIMELY, DemoRecording
 from tacdata.errors import FormatError
 
@@ -79,30 +79,30 @@ def check_together(recording: DemoRecording) -> None:
         if not others:
             continue
         begin, end = min(span[0] for span in others), max(span[1] for span in others)
-        apart = max(first - end, begin - last) * 1e-9
-        if apart > ASTRAY:
+        distance = max(first - end, begin - last) * 1e-9
+        if distance > ASTRAY:
             side = "after" if first > end else "before"
             raise FormatError(
-                f"{recording.path}: {device} lies {apart:.0f} s {side} all other streams",
+                f"{recording.path}: {device} lies {distance:.0f} s {side} all other streams",
                 "streams of one time",
                 "its clock or its latency is wrong: correct the rig file, and record again",
             )
 
 
 def in_step(
-    recording: DemoRecording, seen: Mapping[str, Sightings]
+    recording: DemoRecording, sightings: Mapping[str, Sightings]
 ) -> tuple[DemoRecording, dict[str, float], list[str]]:
     """Move images of a camera that is later than another; return the recording, camera -> by how much [s], and words.
 
     Args:
         recording: The recording.
-        seen: Finger -> its sightings.
+        sightings: Finger -> its sightings.
     """
-    cameras = sorted({camera for found in seen.values() for camera in found.camera})
+    cameras = sorted({camera for found in sightings.values() for camera in found.camera})
     moved: dict[str, float] = {}
     words = []
     for one, other in combinations(cameras, 2):
-        lag = _lag(seen, one, other)
+        lag = _lag(sightings, one, other)
         if lag is None or one in moved or other in moved:
             continue
         late, early = (other, one) if lag > 0 else (one, other)
@@ -118,53 +118,53 @@ def in_step(
     return replace(recording, views=views, timing=timing) if moved else recording, moved, words
 
 
-def late_stretches(seen: Mapping[str, Sightings], begin_ns: int) -> tuple[dict[str, Sightings], list[str]]:
+def late_stretches(sightings: Mapping[str, Sightings], begin_ns: int) -> tuple[dict[str, Sightings], list[str]]:
     """Return sightings with the uncertainty of times that two cameras' motion shows, and words about it.
 
     In a stretch in which the images of one camera are later than those of another, that lag is the uncertainty of its
     times. Two cameras that are late alike do not show it.
 
     Args:
-        seen: Finger -> its sightings.
+        sightings: Finger -> its sightings.
         begin_ns: Beginning of the demonstration [ns], for words.
     """
-    cameras = sorted({camera for found in seen.values() for camera in found.camera})
+    cameras = sorted({camera for found in sightings.values() for camera in found.camera})
     spans: dict[str, list[tuple[float, float, float]]] = {}
-    times = np.concatenate([np.zeros(0, np.int64), *(found.time_ns for found in seen.values())])
+    times = np.concatenate([np.zeros(0, np.int64), *(found.time_ns for found in sightings.values())])
     if len(cameras) < 2 or not len(times):
-        return dict(seen), []
+        return dict(sightings), []
     moments = np.arange(times.min(), times.max(), round(WINDOW / 2 * 1e9), dtype=np.int64)
     for one, other in combinations(cameras, 2):
         for first in moments:
             last = first + round(WINDOW * 1e9)
-            part = {n: f.where((f.time_ns >= first) & (f.time_ns < last)) for n, f in seen.items()}
+            part = {n: f.where((f.time_ns >= first) & (f.time_ns < last)) for n, f in sightings.items()}
             lag = _lag(part, one, other, NEAR_LAGS, FEW)
             late = other if (lag or 0.0) > 0 else one
             known = [sigma for f in part.values() for sigma in f.timing[_by(f, late)]]
             if lag is not None and known and abs(lag) > CLEARLY * float(np.median(known)):
                 spans.setdefault(late, []).append((float(first), float(last), abs(lag)))
-    made, words = dict(seen), []
+    judged, words = dict(sightings), []
     for camera, late in spans.items():
-        for name, found in made.items():
+        for name, found in judged.items():
             timing = found.timing.copy()
             for first, last, lag in late:
                 rows = _by(found, camera) & (found.time_ns >= first) & (found.time_ns < last)
                 timing[rows] = np.maximum(timing[rows], lag)
-            made[name] = replace(found, timing=timing, covariance=found.covariance + _more(found, timing))
+            judged[name] = replace(found, timing=timing, covariance=found.covariance + _more(found, timing))
         ends = (min(span[0] for span in late) - begin_ns) * 1e-9, (max(span[1] for span in late) - begin_ns) * 1e-9
         words.append(
             f"the images of camera {camera} are up to {max(span[2] for span in late):.2f} s later than those of "
             f"another between {ends[0]:.1f} and {ends[1]:.1f} s: the host did not keep up, and they hardly count there"
         )
-    return made, words
+    return judged, words
 
 
-def timely(seen: Sightings) -> Sightings:
+def timely(sightings: Sightings) -> Sightings:
     """Return the sightings whose times are known well enough to judge cameras and tags by them."""
-    return seen.where(seen.timing <= TIMELY)
+    return sightings.where(sightings.timing <= TIMELY)
 
 
-def carried_through(path: Smoothed, seen: Sightings, times_ns: np.ndarray) -> Smoothed:
+def carried_through(path: Smoothed, sightings: Sightings, times_ns: np.ndarray) -> Smoothed:
     """Return a path whose covariance holds the error of the images' times.
 
     Neighbouring images are late alike. So this error does not average out, as the noise of single images does. It is
@@ -172,12 +172,12 @@ def carried_through(path: Smoothed, seen: Sightings, times_ns: np.ndarray) -> Sm
 
     Args:
         path: A smoothed path.
-        seen: Its sightings.
+        sightings: Its sightings.
         times_ns: The path's times [ns], shape (n,), ascending.
     """
-    sigma, covariance = known_to(seen, times_ns), path.covariance.copy()
+    sigma, covariance = known_to(sightings, times_ns), path.covariance.copy()
     seconds, last = (times_ns - times_ns[0]) * 1e-9, len(times_ns) - 1
-    moved = _displacements(seen, times_ns, sigma)
+    moved = _displacements(sightings, times_ns, sigma)
     for k in np.flatnonzero(np.isfinite(path.position).all(axis=1)):
         a, b = max(k - 1, 0), min(k + 1, last)
         turn = path.rotation[b] @ path.rotation[a].T
@@ -188,35 +188,35 @@ def carried_through(path: Smoothed, seen: Sightings, times_ns: np.ndarray) -> Sm
     return replace(path, covariance=covariance)
 
 
-def known_to(seen: Sightings, times_ns: np.ndarray) -> np.ndarray:
+def known_to(sightings: Sightings, times_ns: np.ndarray) -> np.ndarray:
     """Return the standard uncertainty of time by the surest camera that sees the finger [s], shape (n,).
 
     Args:
-        seen: A finger's sightings.
+        sightings: A finger's sightings.
         times_ns: Times [ns], shape (n,), ascending.
     """
     best = np.full(len(times_ns), np.inf)
-    for camera in dict.fromkeys(seen.camera):
-        rows = _by(seen, camera)
-        times, sigma = seen.time_ns[rows], np.minimum(seen.timing[rows], LONGEST)
+    for camera in dict.fromkeys(sightings.camera):
+        rows = _by(sightings, camera)
+        times, sigma = sightings.time_ns[rows], np.minimum(sightings.timing[rows], LONGEST)
         after = np.clip(np.searchsorted(times, times_ns), 1, max(len(times) - 1, 1))
         ends = [np.clip(after - 1, 0, len(times) - 1), np.clip(after, 0, len(times) - 1)]
         away = np.min([np.abs(times[k] - times_ns) for k in ends], axis=0)
         near = away <= SPACED * 1e9
         best[near] = np.minimum(best, np.max([sigma[k] for k in ends], axis=0))[near]
-    if len(seen):
-        nearest = np.clip(np.searchsorted(seen.time_ns, times_ns), 1, max(len(seen) - 1, 1))
-        ends = np.maximum(seen.timing[nearest - 1], seen.timing[np.minimum(nearest, len(seen) - 1)])
+    if len(sightings):
+        nearest = np.clip(np.searchsorted(sightings.time_ns, times_ns), 1, max(len(sightings) - 1, 1))
+        ends = np.maximum(sightings.timing[nearest - 1], sightings.timing[np.minimum(nearest, len(sightings) - 1)])
         best = np.where(np.isfinite(best), best, np.minimum(ends, LONGEST))
     return best
 
 
-def late_words(seen: Mapping[str, Sightings], begin_ns: int) -> list[str]:
+def late_words(sightings: Mapping[str, Sightings], begin_ns: int) -> list[str]:
     """Describe which cameras' image times are known badly, when, and what that means for moving fingers."""
     words = []
-    for camera in sorted({camera.partition(" (")[0] for found in seen.values() for camera in found.camera}):
+    for camera in sorted({camera.partition(" (")[0] for found in sightings.values() for camera in found.camera}):
         times, sigma, fastest = [], [], 0.0
-        for found in seen.values():
+        for found in sightings.values():
             rows = np.array([name.partition(" (")[0] == camera for name in found.camera], bool)
             if rows.sum() > 1:
                 times, sigma = [*times, *found.time_ns[rows]], [*sigma, *found.timing[rows]]
@@ -236,59 +236,49 @@ def late_words(seen: Mapping[str, Sightings], begin_ns: int) -> list[str]:
     return words
 
 
-def _by(seen: Sightings, camera: str) -> np.ndarray:
+def _by(sightings: Sightings, camera: str) -> np.ndarray:
     """Return which sightings are of a camera, shape (p,), bool."""
-    return np.array([name == camera for name in seen.camera], bool)
+    return np.array([name == camera for name in sightings.camera], bool)
 
 
-def _more(seen: Sightings, timing: np.ndarray) -> np.ndarray:
+def _more(sightings: Sightings, timing: np.ndarray) -> np.ndarray:
     """Return the covariance that larger uncertainties of times add to sightings [m^2], shape (p, 6, 6)."""
-    added = np.zeros((len(seen), 6, 6))
-    grown = np.minimum(timing, LONGEST) ** 2 - np.minimum(seen.timing, LONGEST) ** 2
-    for camera in dict.fromkeys(seen.camera):
-        rows = _by(seen, camera)
-        added[rows] = grown[rows, None, None] * motion(seen.time_ns[rows], seen.position[rows])
+    added = np.zeros((len(sightings), 6, 6))
+    for camera in dict.fromkeys(sightings.camera):
+        rows = _by(sightings, camera)
+        times, places = sightings.time_ns[rows], sightings.position[rows]
+        added[rows, 3:, 3:] = (
+            displaced(times, places, times, timing[rows])
+            * (timing[rows] > sightings.timing[rows]).astype(float)[:, None, None]
+        )
     return added
 
 
-def _displacements(seen: Sightings, times_ns: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+def _displacements(sightings: Sightings, times_ns: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Return the covariance [m^2] of a finger's place that its sightings' times cause, shape (n, 3, 3)."""
-    made = np.zeros((len(times_ns), 3, 3))
-    for camera in dict.fromkeys(seen.camera):
-        rows = _by(seen, camera)
-        if rows.sum() < 2:
-            continue
-        seconds = (seen.time_ns[rows] - times_ns[0]) * 1e-9
-        at = (times_ns - times_ns[0]) * 1e-9
-
-        def place(moments: np.ndarray, seconds: np.ndarray = seconds, rows: np.ndarray = rows) -> np.ndarray:
-            return np.stack([np.interp(moments, seconds, seen.position[rows, k]) for k in range(3)], axis=1)
-
-        middle = place(at)
-        away = np.stack([(place(at + s * sigma) - middle) / abs(s) for s in (-2.0, -1.0, 1.0, 2.0)])
-        squares = (away**2).sum(axis=2)
-        outer = np.einsum("sni,snj->nij", away, away)
-        total = np.maximum(squares.sum(axis=0), 1e-30)
-        scaled = outer * (squares.max(axis=0) / total)[:, None, None]
-        larger = np.trace(scaled, axis1=1, axis2=2) > np.trace(made, axis1=1, axis2=2)
-        made[larger] = scaled[larger]
-    return made
+    covariance = np.zeros((len(times_ns), 3, 3))
+    for camera in dict.fromkeys(sightings.camera):
+        rows = _by(sightings, camera)
+        of_camera = displaced(sightings.time_ns[rows], sightings.position[rows], times_ns, sigma)
+        larger = np.trace(of_camera, axis1=1, axis2=2) > np.trace(covariance, axis1=1, axis2=2)
+        covariance[larger] = of_camera[larger]
+    return covariance
 
 
 def _lag(
-    seen: Mapping[str, Sightings], one: str, other: str, lags: np.ndarray = LAGS, fewest: int = FEWEST
+    sightings: Mapping[str, Sightings], one: str, other: str, lags: np.ndarray = LAGS, fewest: int = FEWEST
 ) -> float | None:
     """Return how much later the images of another camera are than those of one [s]; None if they are not.
 
     Args:
-        seen: Finger -> its sightings.
+        sightings: Finger -> its sightings.
         one: A camera.
         other: Another.
         lags: Lags that are tried [s], shape (m,).
         fewest: Smallest number of sightings of one that must fall on the other's path.
     """
     pairs = []
-    for found in seen.values():
+    for found in sightings.values():
         of = [np.array([camera == name for camera in found.camera]) for name in (one, other)]
         if all(rows.sum() >= fewest for rows in of):
             pairs.append([((found.time_ns[rows] - found.time_ns[0]) * 1e-9, found.position[rows]) for rows in of])
@@ -305,18 +295,18 @@ def _lag(
 
 def _difference(pairs: list[list[tuple[np.ndarray, np.ndarray]]], lag: float, fewest: int) -> float:
     """Return the trimmed mean square of the distance between two cameras' paths at a lag [m^2]."""
-    squares, count, whole = [], 0, 0
+    squares, count, total = [], 0, 0
     for (times, path), (other_times, other_path) in pairs:
         at = other_times - lag
         after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
         inside = (at >= times[0]) & (at <= times[-1]) & (times[after] - times[after - 1] <= SPACED)
-        count, whole = count + int(inside.sum()), whole + min(len(at), len(times))
+        count, total = count + int(inside.sum()), total + min(len(at), len(times))
         if inside.sum() < 2:
             continue
         there = np.stack([np.interp(at[inside], times, path[:, k]) for k in range(3)], axis=1)
-        off = other_path[inside] - there
-        squares.append(((off - np.median(off, axis=0)) ** 2).sum(axis=1))
-    if count < max(fewest, OVERLAP * whole):
+        deviation = other_path[inside] - there
+        squares.append(((deviation - np.median(deviation, axis=0)) ** 2).sum(axis=1))
+    if count < max(fewest, OVERLAP * total):
         return np.inf
     every = np.sort(np.concatenate(squares))
     return float(every[: max(int(KEPT * len(every)), 1)].mean())

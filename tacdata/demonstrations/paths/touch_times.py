@@ -39,15 +39,15 @@ def touch_lag(tracks: Mapping[str, FingerTrack], seconds: np.ndarray) -> float |
     """
     total, count = np.zeros(len(LAGS)), 0
     for name, track in tracks.items():
-        apart = _apart(name, tracks)
-        if track.signals is None or apart is None:
+        distance = _apart(name, tracks)
+        if track.signals is None or distance is None:
             continue
         reading = np.nansum(np.abs(track.signals), axis=1)
         reading = reading - np.quantile(reading, 0.1)
         largest = float(np.quantile(reading, 0.95))
         if largest < LEAST_COUNTS:
             continue
-        squares = _residuals(reading / largest, apart, seconds, ~track.gap)
+        squares = _residuals(reading / largest, distance, seconds, ~track.gap)
         if squares is not None:
             total, count = total + squares, count + 1
     if not count:
@@ -59,26 +59,28 @@ def touch_lag(tracks: Mapping[str, FingerTrack], seconds: np.ndarray) -> float |
 
 def _apart(name: str, tracks: Mapping[str, FingerTrack]) -> np.ndarray | None:
     """Return a finger's distance from the opposite one [m], shape (n,): the one whose pad faces it most."""
-    own = tracks[name]
+    rows = tracks[name]
     facing = {
-        other: float(np.nanmean((own.normal * track.normal).sum(axis=1)))
+        other: float(np.nanmean((rows.normal * track.normal).sum(axis=1)))
         for other, track in tracks.items()
         if other != name
     }
     opposite = min(facing, key=lambda other: facing[other], default=None)
     if opposite is None or facing[opposite] > 0:
         return None
-    return np.linalg.norm(own.position - tracks[opposite].position, axis=1)
+    return np.linalg.norm(rows.position - tracks[opposite].position, axis=1)
 
 
-def _residuals(reading: np.ndarray, apart: np.ndarray, seconds: np.ndarray, seen: np.ndarray) -> np.ndarray | None:
+def _residuals(
+    reading: np.ndarray, distance: np.ndarray, seconds: np.ndarray, visible: np.ndarray
+) -> np.ndarray | None:
     """Return the sum of squared residuals at each lag [1], shape (m,); None where too little is pressed.
 
     Args:
         reading: Share of the largest reading [1], shape (n,).
-        apart: Distance of the two fingers [m], shape (n,).
+        distance: Distance of the two fingers [m], shape (n,).
         seconds: Times [s], shape (n,).
-        seen: Where the finger was seen, shape (n,), bool.
+        visible: Where the finger was seen, shape (n,), bool.
     """
     from scipy.optimize import isotonic_regression
 
@@ -90,12 +92,12 @@ def _residuals(reading: np.ndarray, apart: np.ndarray, seconds: np.ndarray, seen
         abs(seconds - changing[nearest - 1]), abs(seconds - changing[np.minimum(nearest, len(changing) - 1)])
     )
     inside = (seconds > seconds[0] + LAGS[-1]) & (seconds < seconds[-1] - LAGS[-1])
-    rows = (away < AROUND) & seen & np.isfinite(apart) & inside
+    rows = (away < AROUND) & visible & np.isfinite(distance) & inside
     if rows.sum() < FEWEST:
         return None
-    order = np.flatnonzero(rows)[np.argsort(apart[rows])]
-    made = []
+    order = np.flatnonzero(rows)[np.argsort(distance[rows])]
+    residuals = []
     for lag in LAGS:
         felt = np.interp(seconds[order] - lag, seconds, reading)
-        made.append(float(((felt - isotonic_regression(felt, increasing=False).x) ** 2).sum()))
-    return np.array(made)
+        residuals.append(float(((felt - isotonic_regression(felt, increasing=False).x) ** 2).sum()))
+    return np.array(residuals)

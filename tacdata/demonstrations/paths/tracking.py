@@ -62,49 +62,49 @@ def track(
         raise UsageError(f"a grid of {rate:g} Hz", "1 to 1000 Hz", "choose another rate")
     check_together(recording)
     rig = recording.rig
-    seen = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
-    recording, delays, moved = in_step(recording, seen)
+    sightings = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
+    recording, delays, moved = in_step(recording, sightings)
     if moved:
-        seen = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
+        sightings = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
     begin, end = recording.span_ns
     # A fault of time looks like a fault of cameras or tags, so it comes first.
-    seen, late = late_stretches(seen, begin)
-    whole = seen
-    seen, bumps = without_bumps(seen, recording, delays)
+    sightings, late = late_stretches(sightings, begin)
+    whole = sightings
+    sightings, bumps = without_bumps(sightings, recording, delays)
     times = begin + np.rint(np.arange(int((end - begin) * 1e-9 * rate) + 1) * (1e9 / rate)).astype(np.int64)
     remarks = [*moved, *late, *bumps, *(f"while recording: {note}" for note in recording.notes)]
-    remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in seen.items() if len(s) < FEWEST]
-    seen = {name: found for name, found in seen.items() if len(found) >= FEWEST}
-    if not seen or len(times) < 2:
+    remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in sightings.items() if len(s) < FEWEST]
+    sightings = {name: found for name, found in sightings.items() if len(found) >= FEWEST}
+    if not sightings or len(times) < 2:
         raise _nothing_seen(recording)
     paths, settings = {}, {}
     # A finger can only be missing where an image was searched: these are the images' times.
     looked = np.unique(np.concatenate([view.sample_ns for view in recording.views]))
     unsearched: set[tuple[float, float]] = set()
-    for name, found in seen.items():
-        seen[name], paths[name], settings[name], words = _path(found, times)
+    for name, found in sightings.items():
+        sightings[name], paths[name], settings[name], words = _path(found, times)
         remarks += words
-        remarks += path_faults.contradictions(seen[name], paths[name], begin)
-        paths[name] = carried_through(paths[name], seen[name], times)
+        remarks += path_faults.contradictions(sightings[name], paths[name], begin)
+        paths[name] = carried_through(paths[name], sightings[name], times)
         # The sentence about a bump says why its moment is left out.
         doubted = np.setdiff1d(whole[name].time_ns, found.time_ns)
-        words, passed_over = _gaps(seen[name], paths[name], times, looked, doubted)
+        words, passed_over = _gaps(sightings[name], paths[name], times, looked, doubted)
         remarks += words
         unsearched |= passed_over
-    remarks += late_words(seen, begin)
+    remarks += late_words(sightings, begin)
     remarks += _unsearched_words(sorted(unsearched))
     if not recording.searched.startswith("all") and unsearched:
         remarks.append("all images are stored: tacdata track --every-image searches those that were passed over")
     # These faults show between fingers, so all paths must be known first.
-    remarks += path_faults.exchanges(seen, paths, times, begin)
+    remarks += path_faults.exchanges(sightings, paths, times, begin)
     remarks += path_faults.other_hand(paths, recording.rig.fingers, rate)
     for name, stream in recording.taxels.items():
         remarks += touch.faults(name, stream, begin, end)
     tracks, estimators = {}, by_finger(estimator, tuple(recording.taxels))
     for name, path in paths.items():
-        tracks[name], words = _track(name, path, seen[name], recording, times, estimators.get(name))
+        tracks[name], words = _track(name, path, sightings[name], recording, times, estimators.get(name))
         remarks += words
-    tracks, words = _against_touch(tracks, paths, seen, times)
+    tracks, words = _against_touch(tracks, paths, sightings, times)
     remarks += words
     parents = {"recording": provenance.file_hash(recording.path)}
     network = identity_of(estimators)
@@ -135,7 +135,7 @@ def track(
 
 
 def _against_touch(
-    tracks: dict[str, FingerTrack], paths: dict[str, Smoothed], seen: dict[str, Sightings], times: np.ndarray
+    tracks: dict[str, FingerTrack], paths: dict[str, Smoothed], sightings: dict[str, Sightings], times: np.ndarray
 ) -> tuple[dict[str, FingerTrack], list[str]]:
     """Return tracks as uncertain as touch shows their times to be, and words about it."""
     lag = touch_lag(tracks, (times - times[0]) * 1e-9)
@@ -146,12 +146,12 @@ def _against_touch(
             f"the readings are {-lag:.2f} s later than the images, by when the fingers close: depth belongs to earlier "
             "places than it stands at; record again on a host that keeps up, or correct the boards' latency"
         ]
-    late = {name: replace(found, timing=np.maximum(found.timing, lag)) for name, found in seen.items()}
-    made = {
+    late = {name: replace(found, timing=np.maximum(found.timing, lag)) for name, found in sightings.items()}
+    judged = {
         name: replace(track, covariance=carried_through(paths[name], late[name], times).covariance)
         for name, track in tracks.items()
     }
-    return made, [
+    return judged, [
         f"the images are {lag:.2f} s later than the readings, by when the fingers close: the paths are known no better "
         "than that; record again on a host that keeps up, or correct the cameras' latency in the demo rig"
     ]
@@ -174,47 +174,49 @@ def _nothing_seen(recording: DemoRecording) -> FormatError:
     )
 
 
-def _path(seen: Sightings, times: np.ndarray) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
+def _path(sightings: Sightings, times: np.ndarray) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
     """Smooth one finger; return its sightings, path, settings, and what is wrong.
 
     A tag that contradicts the others whenever it is seen alone is left out and named.
     """
     words: list[str] = []
-    wander = choose(seen)
-    path = acquire(seen, times, wander)
-    wrong, rivals = path_faults.wrong_tags(seen, path, times)
+    wander = choose(sightings)
+    path = acquire(sightings, times, wander)
+    wrong, rivals = path_faults.wrong_tags(sightings, path, times)
     if wrong:
-        words += _wrong_words(seen, wrong, rivals)
-        kept = np.array([not (len(ids) == 1 and ids[0] in wrong) for ids in seen.ids])
+        words += _wrong_words(sightings, wrong, rivals)
+        kept = np.array([not (len(ids) == 1 and ids[0] in wrong) for ids in sightings.ids])
         if kept.sum() >= FEWEST:
-            seen = seen.where(kept)
-            wander = choose(seen)
-            path = acquire(seen, times, wander)
-    angle = path_faults.turn_against(seen, path, times)
-    words += path_faults.flips(seen, path.accepted, angle, seen.finger)
+            sightings = sightings.where(kept)
+            wander = choose(sightings)
+            path = acquire(sightings, times, wander)
+    angle = path_faults.turn_against(sightings, path, times)
+    words += path_faults.flips(sightings, path.accepted, angle, sightings.finger)
     chosen = {"velocity_density": wander.velocity, "turning_density": wander.turning}
-    return seen, path, {**chosen, "left_out_tags": list(wrong)}, words
+    return sightings, path, {**chosen, "left_out_tags": list(wrong)}, words
 
 
 def _gaps(
-    seen: Sightings, path: Smoothed, times: np.ndarray, looked: np.ndarray, doubted: np.ndarray
+    sightings: Sightings, path: Smoothed, times: np.ndarray, looked: np.ndarray, doubted: np.ndarray
 ) -> tuple[list[str], set[tuple[float, float]]]:
     """Describe a finger's gaps; return those in which no image was searched apart, as begin and end [s].
 
     Args:
-        seen: Its sightings.
+        sightings: Its sightings.
         path: Its path.
         times: The grid [ns], shape (n,).
         looked: Times of all searched images [ns], shape (p,).
         doubted: Times of sightings that are left out as a camera was just being moved [ns], shape (m,).
     """
     words, unsearched, begin = [], set(), int(times[0])
-    for a, b in path_faults.gaps(seen.time_ns[path.accepted], begin, int(times[-1])):
+    for a, b in path_faults.gaps(sightings.time_ns[path.accepted], begin, int(times[-1])):
         if ((doubted > a) & (doubted < b)).any():
             continue
         first, last = (a - begin) * 1e-9, (b - begin) * 1e-9
         if ((looked > a) & (looked < b)).any():
-            words.append(f"{seen.finger}: no tag that fits from {first:.1f} to {last:.1f} s ({last - first:.1f} s)")
+            words.append(
+                f"{sightings.finger}: no tag that fits from {first:.1f} to {last:.1f} s ({last - first:.1f} s)"
+            )
         else:  # the recording person need not look for a hidden tag
             unsearched.add((round(first, 1), round(last, 1)))
     return words, unsearched
@@ -233,40 +235,45 @@ def _unsearched_words(stretches: list[tuple[float, float]]) -> list[str]:
     ]
 
 
-def _wrong_words(seen: Sightings, wrong: dict[int, float], rivals: tuple[int, ...]) -> list[str]:
+def _wrong_words(sightings: Sightings, wrong: dict[int, float], rivals: tuple[int, ...]) -> list[str]:
     """Describe which tags are left out, and whether the others may be wrong instead."""
     words = []
     for tag, angle in wrong.items():
-        count, off = seen.ids.count((tag,)), f"{np.degrees(angle):.0f} deg"
+        count, deviation = sightings.ids.count((tag,)), f"{np.degrees(angle):.0f} deg"
         if rivals:
             others = " and ".join(map(str, rivals))
             words.append(
-                f"{seen.finger}: tags {tag} and {others}, each seen alone, contradict each other: one of them "
+                f"{sightings.finger}: tags {tag} and {others}, each seen alone, contradict each other: one of them "
                 f"is glued on turned, or is another cube's, and the images do not tell which; tag {tag}, seen less "
                 f"often ({count} images), is left out where it is alone: look at both"
             )
         else:
             words.append(
-                f"{seen.finger}: tag {tag}, seen alone in {count} images, contradicts the others by {off}: it is glued "
-                "on turned, or is another cube's; left out where it is alone"
+                f"{sightings.finger}: tag {tag}, seen alone in {count} images, contradicts the others by {deviation}: "
+                "it is glued on turned, or is another cube's; left out where it is alone"
             )
     return words
 
 
-def _misplaced(seen: Sightings, path: Smoothed, times: np.ndarray) -> np.ndarray:
+def _misplaced(sightings: Sightings, path: Smoothed, times: np.ndarray) -> np.ndarray:
     """Return where only cameras that were moved saw the finger, and its place is a guess, shape (n,), bool."""
-    steady = unmoved(seen)
+    steady = unmoved(sightings)
     if steady.all():
         return np.zeros(len(times), bool)
     lost = np.zeros(len(times), bool)
-    for a, b in path_faults.gaps(seen.time_ns[path.accepted & steady], int(times[0]), int(times[-1])):
+    for a, b in path_faults.gaps(sightings.time_ns[path.accepted & steady], int(times[0]), int(times[-1])):
         lost |= (times > a) & (times < b)
     spread = np.sqrt(np.max(np.diagonal(path.covariance[:, 3:, 3:], axis1=1, axis2=2), axis=1))
     return lost & ~(spread <= GUESS)
 
 
 def _track(
-    name: str, path: Smoothed, seen: Sightings, recording: DemoRecording, times: np.ndarray, estimator: Estimator | None
+    name: str,
+    path: Smoothed,
+    sightings: Sightings,
+    recording: DemoRecording,
+    times: np.ndarray,
+    estimator: Estimator | None,
 ) -> tuple[FingerTrack, list[str]]:
     from scipy.spatial.transform import Rotation
 
@@ -275,9 +282,9 @@ def _track(
     quaternion[inside] = Rotation.from_matrix(path.rotation[inside]).as_quat()
     # The smoother also gives poses inside a gap; they are marked as interpolated.
     gap = np.logical_not(inside)
-    for a, b in path_faults.gaps(seen.time_ns[path.accepted], int(times[0]), int(times[-1])):
+    for a, b in path_faults.gaps(sightings.time_ns[path.accepted], int(times[0]), int(times[-1])):
         gap = gap | np.asarray((times > a) & (times < b))
-    gap = gap | _misplaced(seen, path, times)
+    gap = gap | _misplaced(sightings, path, times)
     signals, depth, novelty, words = None, None, None, []
     stream = recording.taxels.get(name)
     if stream is not None and len(stream.counts) > 1:
@@ -292,7 +299,7 @@ def _track(
             unfelt = int(np.isnan(signals[:, 0]).sum())
             if unfelt:
                 words.append(f"{name}: no reading, so no predicted depth, at {unfelt} of {len(times)} times")
-    made = FingerTrack(
+    track = FingerTrack(
         name,
         finger.hand,
         finger.kind,
@@ -306,4 +313,4 @@ def _track(
         depth,
         novelty,
     )
-    return made, words
+    return track, words

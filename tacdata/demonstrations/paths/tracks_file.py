@@ -39,15 +39,15 @@ def path_of(recording: Path) -> Path:
     return recording.with_name(recording.name.removesuffix(".mcap") + ENDING)
 
 
-def write_tracks(path: Path, made: Demonstration) -> None:
+def write_tracks(path: Path, demonstration: Demonstration) -> None:
     """Write a processed demonstration; a crash leaves the old file or the new one.
 
     Raises:
         FormatError: If it contradicts the schema.
         DeviceError: If the disk refuses it.
     """
-    columns: dict[str, Any] = {"time_ns": pa.array(made.time_ns)}
-    for name, track in made.tracks.items():
+    columns: dict[str, Any] = {"time_ns": pa.array(demonstration.time_ns)}
+    for name, track in demonstration.tracks.items():
         for column, values in _columns(track).items():
             flat = values.reshape(len(values), -1)
             columns[f"{name}.{column}"] = (
@@ -57,14 +57,16 @@ def write_tracks(path: Path, made: Demonstration) -> None:
             )
     header = {
         "version": schemas.version("finger_tracks"),
-        **{k: getattr(made, k) for k in ("recording", "recording_hash", "task", "frame", "rate", "smoothing")},
-        "frames": len(made.time_ns),
-        "fingers": {name: _described(track, made.sensors.get(name)) for name, track in made.tracks.items()},
+        **{k: getattr(demonstration, k) for k in ("recording", "recording_hash", "task", "frame", "rate", "smoothing")},
+        "frames": len(demonstration.time_ns),
+        "fingers": {
+            name: _described(track, demonstration.sensors.get(name)) for name, track in demonstration.tracks.items()
+        },
         "units": {"time_ns": "ns", **UNITS},
         "columns": list(columns),
-        "network": made.network,
-        "remarks": list(made.remarks),
-        "provenance": made.provenance,
+        "network": demonstration.network,
+        "remarks": list(demonstration.remarks),
+        "provenance": demonstration.provenance,
     }
     documents.check(header, "finger_tracks", str(path))
     table = pa.table(columns).replace_schema_metadata({HEADER: json.dumps(header)})

@@ -78,13 +78,15 @@ def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
             cameras[name]["world"] = where
     known = fingers_of(fingers, f"{origin}: fingers")
     sensors = {name: skins.get(name) or default_sensor() for name in document["boards"]}
-    whole = {**document, "fingers": fingers, "cameras": cameras}
-    whole["sensors"] = {name: sensor.document for name, sensor in sensors.items()}
+    document_with_files = {**document, "fingers": fingers, "cameras": cameras}
+    document_with_files["sensors"] = {name: sensor.document for name, sensor in sensors.items()}
     _agree(document, known, worlds, origin)
     clock = Clock(**document["clock"]) if "clock" in document else Clock.start()
     devices = {name: {k: v for k, v in entry.items() if k != "world"} for name, entry in cameras.items()}
     delays = {name: StreamLatency.from_document(entry) for name, entry in document.get("latencies", {}).items()}
-    return DemoRig(document["name"], document["boards"], sensors, devices, worlds, known, delays, clock, whole)
+    return DemoRig(
+        document["name"], document["boards"], sensors, devices, worlds, known, delays, clock, document_with_files
+    )
 
 
 def read_demo_rig(path: StrPath) -> DemoRig:

@@ -39,8 +39,8 @@ def _shifted(by: float) -> Callable[[ReplayScene, np.random.Generator], ReplaySc
 
 def _cameras(spread: float) -> Callable[[ReplayScene, np.random.Generator], ReplayScene]:
     def change(scene: ReplayScene, rng: np.random.Generator) -> ReplayScene:
-        off = rng.normal(0, spread / np.sqrt(3), (len(scene.bias), 3)) + np.array(scene.bias)
-        return replace(scene, bias=tuple((a, b, c) for a, b, c in off.tolist()))
+        deviation = rng.normal(0, spread / np.sqrt(3), (len(scene.bias), 3)) + np.array(scene.bias)
+        return replace(scene, bias=tuple((a, b, c) for a, b, c in deviation.tolist()))
 
     return change
 

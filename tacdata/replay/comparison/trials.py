@@ -35,22 +35,24 @@ STIFFNESSES = 150.0, 300.0, 1000.0, 3000.0
 class Trials:
     """The first grasp or wipe of a demonstration, ready for trials."""
 
-    def __init__(self, made: Demonstration, gains: dict[str, dict[str, float]], scene: ReplayScene) -> None:
+    def __init__(self, demonstration: Demonstration, gains: dict[str, dict[str, float]], scene: ReplayScene) -> None:
         """Cut it out and find where the object was.
 
         Args:
-            made: A demonstration with predicted depth.
+            demonstration: A demonstration with predicted depth.
             gains: Kind of replay ("compensated", "chosen") -> finger -> gain [m/mm]; "direct" is added.
             scene: The undisturbed scene.
 
         Raises:
             UsageError: If it holds no grasp, or fingers lack predicted depth or gains.
         """
-        self.made, self._scene = made, scene
-        whole = targets_of(made, next(iter(gains.values())) if gains else dict.fromkeys(made.tracks, 0.0))
-        self._span = first_grasp(whole)
-        self.seen = cut(whole, self._span[0], self._span[2])
-        self._centre = object_centre(whole, self._span[1], scene.reach)
+        self.made, self._scene = demonstration, scene
+        targets = targets_of(
+            demonstration, next(iter(gains.values())) if gains else dict.fromkeys(demonstration.tracks, 0.0)
+        )
+        self._span = first_grasp(targets)
+        self.seen = cut(targets, self._span[0], self._span[2])
+        self._centre = object_centre(targets, self._span[1], scene.reach)
         self.paths = {DIRECT: self._cut(None)}
         if DEPTH in gains:
             moved = self._cut(gains[DEPTH])
@@ -183,8 +185,13 @@ def result(
     }
 
 
-def _chosen(made: Demonstration, found: FoundGain, gains: dict[str, float]) -> dict[str, Any]:
-    return {"recording": made.recording, "hash": made.recording_hash, "gains": gains, **found.document}
+def _chosen(demonstration: Demonstration, found: FoundGain, gains: dict[str, float]) -> dict[str, Any]:
+    return {
+        "recording": demonstration.recording,
+        "hash": demonstration.recording_hash,
+        "gains": gains,
+        **found.document,
+    }
 
 
 def rate(held: Sequence[bool]) -> dict[str, Any]:

@@ -96,9 +96,9 @@ def read_urdf(path: StrPath) -> Urdf:
     for joint in joints:
         _check_place(joint, path)
         if joint.get("type") in MOVING:
-            speed, said = _checked_limits(joint, path)
+            speed, sentences = _checked_limits(joint, path)
             velocity |= speed
-            for words in said:
+            for words in sentences:
                 remarks.setdefault(words, []).append(_name(joint))
     _check_mimics(joints, path)
     for parent in root.iter():

@@ -144,15 +144,15 @@ def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model
 
 def _without_strays(views: list[BoardView], fit: _Fit) -> tuple[list[BoardView], list[str]]:
     """Return the views without outlier corners, and a remark on how many those were."""
-    off = [np.linalg.norm(each, axis=1) for each in fit.residuals]
-    limit = max(STRAY * float(np.median(np.concatenate(off))), LEAST_STRAY)
+    deviation = [np.linalg.norm(each, axis=1) for each in fit.residuals]
+    limit = max(STRAY * float(np.median(np.concatenate(deviation))), LEAST_STRAY)
     kept, count = [], 0
-    for view, far in zip(views, off, strict=True):
+    for view, far in zip(views, deviation, strict=True):
         good = far <= limit
         few = (~good).sum() <= MOST_STRAYS * len(good)
         count += int((~good).sum()) if few else 0
         kept.append(replace(view, ids=view.ids[good], corners=view.corners[good]) if few else view)
-    every = sum(len(each) for each in off)
+    every = sum(len(each) for each in deviation)
     return kept, [f"{count} of {every} corners left out, found more than {limit:.1f} px away"] if count else []
 
 
