@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
@@ -43,7 +46,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
     Raises:
         UsageError: If there is no such file or the target exists.
         NothingRecovered: If it is no MCAP file, or not one message can be read.
-        DeviceError: If the disk refuses the copy.
+        DeviceError: If the disk refuses the copy, or the copy does not read back.
     """
     path = Path(path)
     if path.is_dir():
@@ -70,6 +73,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
             _Copy(Writer(stream, compression=CompressionType.ZSTD), found).run(path)
         if not found.messages:
             raise _nothing(path, found)
+        _read_back(found)
     except OSError as error:
         target.unlink(missing_ok=True)
         raise _refused(target, error) from error
@@ -134,6 +138,26 @@ class _Copy:
                 self.episode = record.metadata
             case Metadata():
                 self.writer.add_metadata(record.name, record.metadata)
+
+
+def _read_back(found: Recovered) -> None:
+    """Read the copy as any MCAP reader does.
+
+    Raises:
+        DeviceError: If it does not hold every message that was written.
+    """
+    try:
+        with found.path.open("rb") as stream:
+            count = sum(1 for _ in SeekingReader(stream, validate_crcs=True).iter_messages())
+        wrong = "" if count == found.messages else f"{count} of {found.messages} messages"
+    except (McapError, struct.error, ValueError) as error:
+        wrong = str(error)
+    if wrong:
+        raise DeviceError(
+            f"{found.path} was written and does not read back: {wrong}",
+            "a disk that keeps what it was given",
+            "use another disk with --out; the damaged recording is unchanged",
+        )
 
 
 def _nothing(path: Path, found: Recovered) -> NothingRecovered:

@@ -11,10 +11,11 @@ from mcap.reader import make_reader
 from recording_examples import SENSOR, T0, Press, header
 
 from tacdata.clock import Clock
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.recording import read_episode
 from tacdata.recording.clocks import envelope_fit
 from tacdata.recording.files import file_names
+from tacdata.recording.files import recover as recovery
 from tacdata.recording.files.mcap_records import read_records
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.files.recover import recover
@@ -303,3 +304,35 @@ def test_a_damaged_length_costs_its_record_only(press, tmp_path):
     records = read_records(path)
     assert whole - 3 <= len(records.messages) < whole
     assert any("unreadable bytes" in damage for damage in records.damage)
+
+
+def test_recover_saves_every_whole_chunk_behind_a_damaged_one(press, tmp_path):
+    path = tmp_path / "episode-000000.mcap"
+    writer = EpisodeWriter(path, press.header, Clock(T0, 0, 1.0), ("side",))
+    writer._file._chunk_seconds = 0.0
+    press.feed(writer)
+    writer.close(True)
+    data, whole = bytearray(path.read_bytes()), len(read_records(path).messages)
+    chunks = [end for end in record_ends(data)[60:] if data[end] == 6]
+    data[chunks[0] + 60] ^= 0xFF
+    path.write_bytes(data)
+    found = recover(path)
+    assert whole - 3 <= found.messages < whole
+    with found.path.open("rb") as stream:
+        assert sum(1 for _ in make_reader(stream).iter_messages()) == found.messages
+
+
+def test_a_copy_that_does_not_read_back_is_no_success(press, tmp_path, monkeypatch):
+    path = press.write(tmp_path / "episode-000000.mcap")
+    plain = recovery._read_back
+
+    def damaged(found):
+        data = bytearray(found.path.read_bytes())
+        data[len(data) // 3] ^= 0xFF
+        found.path.write_bytes(data)
+        plain(found)
+
+    monkeypatch.setattr(recovery, "_read_back", damaged)
+    with pytest.raises(DeviceError, match="does not read back"):
+        recover(path)
+    assert not (tmp_path / "episode-000000.recovered.mcap").exists()
