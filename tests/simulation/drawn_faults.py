@@ -2,6 +2,7 @@
 
 import linecache
 import random
+import re
 import signal
 import sys
 
@@ -12,6 +13,8 @@ LIVED = 3.0
 """Time after which the recorder has seen readings that live [s]."""
 SILENT = 3.0
 """Time after which a silent camera is a fault [s]."""
+OVERRIDDEN = 6.0
+"""Time within which a report must have stated a foreign override [s]: one in 20 states overrides, of 8 a second."""
 COURSE = 19.0
 """About how long a run without faults takes [s]."""
 
@@ -22,6 +25,8 @@ class Faults:
     def __init__(self, world, seed, only=()):
         """Draw and plan them; ``only`` names kinds to draw from."""
         self.world, self.random = world, random.Random(f"faults {seed}")
+        self.fatal, self.stalls = [], []
+        """Times [s] at which a fault must have ended the run, if it goes on until then."""
         self.names, self.visible, self.over = [], [], False
         """(time [ns] from which the recorder can see it, its name)."""
         self.deaf = False
@@ -34,12 +39,17 @@ class Faults:
         for _ in range(number):
             name = self.random.choice(kinds)
             self.names.append(name)
-            self.at(self.random.uniform(0.0, COURSE), lambda act={**KINDS, **MORE}[name]: act(self))
+            self.at(self.random.uniform(0.0, COURSE), lambda act={**KINDS, **MORE, **LATEST}[name]: act(self))
         later = random.Random(f"more faults {seed}")  # of its own, so that seeds keep what they drew before
         if not only and later.random() < 0.25:
             name = later.choice(tuple(MORE))
             self.names.append(name)
             self.at(later.uniform(0.0, COURSE), lambda: MORE[name](self))
+        latest = random.Random(f"latest faults {seed}")
+        if not only and latest.random() < 0.1:
+            newest = latest.choice(tuple(LATEST))
+            self.names.append(newest)
+            self.at(latest.uniform(0.0, COURSE), lambda: LATEST[newest](self))
         if self.random.random() < 0.3:
             world.computer.lateness = ((0.02, self.random.choice((0.02, 0.1, 0.4))),)
             self.names.append(f"busy computer {world.computer.lateness}")
@@ -62,6 +72,20 @@ class Faults:
     def see(self, name, seconds=0.0):
         """Note that the recorder can see it from now on, or so much later [s]."""
         self.visible.append((self.world.schedule.now_ns + round(seconds * SECOND), name))
+
+    def must_end(self, seconds):
+        """Note that the run must end within so many seconds from now [s], once it is under way."""
+        if self.world.schedule.now > LIVED:
+            self.fatal.append(self.world.schedule.now + seconds)
+
+    def stalled(self, seconds):
+        """Note a stall of the computer that must end the run if the guide moves."""
+        self.stalls.append((self.world.schedule.now, seconds))
+
+    def due(self):
+        """Return the first time at which a fault must have ended the run [s]; None on a late computer."""
+        computer = self.world.computer
+        return None if not self.fatal or computer.stalls or computer.lateness else min(self.fatal)
 
     def seen(self):
         """Return when the recorder could first see one of them [s], or None."""
@@ -240,14 +264,17 @@ def controller_mute(faults):
 
 
 def alarm(faults):
+    faults.must_end(2.0)
     faults.world.controller.inject_alarm(faults.random.choice((1, 2, 3)))
 
 
 def brown_out(faults):
+    faults.must_end(2.0)
     faults.world.controller.inject_brown_out()
 
 
 def foreign_hold(faults):
+    faults.must_end(2.0)
     faults.world.controller.inject_byte(0x21)
 
 
@@ -263,12 +290,15 @@ def door(faults):
 
 def pendant(faults):
     faults.deaf = True
+    faults.must_end(2.0)
     faults.world.controller.inject_pendant()
 
 
 def computer_stalls(faults):
     schedule = faults.world.schedule
     seconds = faults.random.choice((0.1, 0.5, 2.0, 2.9, 3.1, 6.0, 20.0))
+    if seconds > 3.5:
+        faults.stalled(seconds)
     faults.world.computer.stalls.append((schedule.now_ns, schedule.now_ns + round(seconds * SECOND)))
 
 
@@ -365,12 +395,14 @@ def controller_garbage(faults):
 
 
 def foreign_override(faults):
+    faults.must_end(OVERRIDDEN)
     faults.world.controller.inject_byte(faults.random.choice((0x91, 0x92)))
 
 
 def pendant_for_a_moment(faults):
     """Let a pendant take control and give it back."""
-    pendant(faults)
+    faults.deaf = True
+    faults.world.controller.inject_pendant()
     clear = lambda: faults.world.controller.inject_wire(lambda line: line, lambda text: text)  # noqa: E731
     faults.after(faults.random.uniform(0.1, 4.0), clear)
 
@@ -380,3 +412,36 @@ MORE = {
     for act in (camera_hangs, camera_unplugged, controller_garbage, foreign_override, pendant_for_a_moment)
 }
 """Kinds that came later: a seed draws one of them beside those that it has drawn."""
+
+
+def damaged_lift(faults):
+    """Unplug the board, and change a digit of the line by which the tip is lifted."""
+    _change_one(faults, LIFT)
+    board_unplugged(faults)
+
+
+def damaged_press(faults):
+    """Change a digit of the next line that goes into the skin or out of it."""
+    faults.moved_otherwise = True
+    _change_one(faults, PRESS)
+
+
+def _change_one(faults, pattern):
+    """Let the next line that matches lead a millimetre deeper."""
+    damaged = []
+
+    def wire(line):
+        if damaged or not pattern.search(line):
+            return line
+        damaged.append(line)
+        return pattern.sub(lambda match: f"{match[1]}{int(match[2]) + 1}", line)
+
+    faults.world.controller.inject_wire(to_controller=wire)
+
+
+LIFT = re.compile(r"(G1Z-\d)(\d)")
+"""A line of a lift: it names no x and y."""
+PRESS = re.compile(r"(Y\S+Z-3)(8)")
+"""A line of motion to a place in the skin."""
+LATEST = {"damaged_lift": damaged_lift, "damaged_press": damaged_press}
+"""Kinds that came later still."""

@@ -94,6 +94,8 @@ class World:
         self._noise = np.random.default_rng([seed, 1])
         self.path = []
         """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
+        self.stops = []
+        """Times at which the recorder stopped the motion [s]."""
         self.camera = CameraDevice() if camera else None
         self.asked, self.answer, self.said = [], lambda question: False, []
         self.controller.start()
@@ -137,6 +139,8 @@ class World:
                     confirmed=confirmed,
                     prove=prove,
                 )
+                stop = recorder._motion.stop
+                recorder._motion.stop = lambda: (self.stops.append(self.schedule.now), stop())
                 return recorder.run(lambda summary: True)
 
         return self.computer.run(work)
@@ -155,15 +159,19 @@ class World:
         clock = Clock(EPOCH + START, START, 1.0, self.computer)
         return replace(from_document(document, "simulated"), clock=clock)
 
-    def repair(self, lost):
-        """Do what a person does: plug in, close the door, make room; and switch the controller off and on if its
-        position is ``lost`` or it does not answer. Return that nothing is wrong any more.
+    def repair(self, lost, unlocks=False):
+        """Do what a person does: plug in, close the door, make room; return that nothing is wrong any more.
+
+        If the position is ``lost`` the controller is switched off and on, or only unlocked ($X).
         """
         for line in (self.cnc_line, self.board_line):
             line.plug_in()
         self.controller.inject_wire(lambda line: line, lambda text: text)
         self.controller.inject_door(False)
-        if lost:
+        if lost and unlocks:
+            self.controller.machine.reset(self.clock.now_ns())
+            self.controller.machine.alarm = None
+        elif lost:
             self.controller.inject_brown_out()
         self.mend_board()
         if self.camera:

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from drawn_faults import Faults
 from schedule import Hung
-from simulated_host import EPOCH
-from simulated_rig import CLEARANCE, ENVELOPE, ORIGIN, World
+from simulated_host import EPOCH, START
+from simulated_rig import CLEARANCE, ORIGIN, World
 
 from tacdata.errors import TacdataError
 from tacdata.recording.files import file_names
@@ -26,6 +26,24 @@ BRAKING = 0.2
 """Longest braking [s]: 30 mm/s at 150 mm/s^2."""
 HALTING = {"alarm", "brown_out"}
 """Faults after which a controller moves nothing, and says so."""
+OFF = 0.06
+"""Distance between the true path and the plan in a file that is complete [mm]: steps, reports, the judge's interval."""
+LIFTABLE = {
+    "board_freezes",
+    "board_saturates",
+    "board_unplugged",
+    "board_stalls",
+    "damaged_frame",
+    "disk_full",
+    "disk_slow",
+    "foreign_hold",
+    "foreign_override",
+    "camera_hangs",
+    "camera_unplugged",
+    "computer_stalls",
+    "damaged_lift",
+}
+"""Faults that leave a controller able to lift the tip."""
 OUTSIDE = 1.0
 """Time that the tip may be outside the envelope [s]: the interval of two reports, their way, the hold, the braking."""
 
@@ -70,6 +88,7 @@ def broken(run, faults):
     yield from _motion(run, faults)
     if not run.killed:
         yield from _words(run, faults)
+        yield from _lifted(run, faults)
     yield from _files(run, faults)
 
 
@@ -90,7 +109,10 @@ def _motion(run, faults):
     times, places, _ = run.path
     if not len(times):
         return
-    outside = np.any((places < np.array(ENVELOPE["min"]) - NEAR) | (places > np.array(ENVELOPE["max"]) + NEAR), axis=1)
+    outside = np.any(
+        (places < np.array(run.world.envelope["min"]) - NEAR) | (places > np.array(run.world.envelope["max"]) + NEAR),
+        axis=1,
+    )
     moving = outside & np.concatenate([[False], np.any(np.diff(places, axis=0) != 0, axis=1)])
     if moving.sum() * 0.01 > OUTSIDE and not faults.deaf:
         yield f"moved outside the envelope for {moving.sum() * 0.01:.2f} s, to {places[outside].min(axis=0)}"
@@ -107,6 +129,22 @@ def _motion(run, faults):
         goes = np.flatnonzero(late & ((sideways > NEAR / 10) | (down > NEAR / 10)))
         if len(goes):
             yield f"a fault could be seen at {seen:.2f} s; it still went on at {times[goes[0]]:.2f} s"
+
+
+def _lifted(run, faults):
+    """Yield what is wrong with a tip that could have been lifted, and with a fault that had to end the run."""
+    if (
+        run.error is not None
+        and faults.names
+        and set(faults.names) <= LIFTABLE | {name for name in faults.names if "busy" in name}
+    ):
+        if run.here[2] < ORIGIN[2] + CLEARANCE - NEAR:
+            yield f"the tip could be lifted and is at {run.here}; the words are:\n{run.words}"
+    if (due := faults.due()) and due < run.end and not any(run.begin <= stop <= due for stop in run.world.stops):
+        yield f"a fault had to be noticed by {due:.2f} s; the motion was stopped at {run.world.stops}"
+    for begin, seconds in faults.stalls if run.error is None else ():
+        if any(abs(row[0] - begin) < 0.05 and row[4] for row in run.world.path):
+            yield f"this computer stood still for {seconds} s from {begin:.2f} s on in mid-move; it ended well"
 
 
 def _words(run, faults):
@@ -130,7 +168,7 @@ def _words(run, faults):
     lifted = re.search(r"straight up from (\S+) to (\S+) mm", words)
     if lifted and abs(float(lifted[2]) - run.here[2]) > NEAR and not faults.deaf:
         yield f"the tip is at {run.here}, and the words are:\n{words}"
-    if skin and "not lifted" not in words:
+    if skin and "not lifted" not in words and "nothing was moved" not in words:
         yield f"the tip is in the skin, at {run.here}, and the words are:\n{words}"
     if match := re.search(r"motion: (?:stopped|at rest) at \((\S+), (\S+), (\S+)\)", words):
         stated = np.array([float(value) for value in match.groups()])
@@ -177,6 +215,8 @@ def _frames(run, faults, path):
     whole = run.killed and path.name.endswith(file_names.PARTIAL)  # killed before it got its name: --resume gives it
     if is_final != episode.complete and not whole:
         yield f"{path.name} says complete: {episode.complete}"
+    if episode.complete:
+        yield from _true_path(run, episode)
     counter = episode.taxels.counter
     touched = {"damaged_frame", "board_stalls", "board_unplugged"} & set(faults.names)
     if not touched and len(counter) and np.any(np.diff(counter) != 1):
@@ -185,9 +225,24 @@ def _frames(run, faults, path):
         if not {"camera_hangs", "camera_unplugged"} & set(faults.names) and np.any(np.diff(view.sequence) != 1):
             yield f"{path.name} lacks images: {np.flatnonzero(np.diff(view.sequence) != 1)}"
     if run.killed and path.name.endswith(file_names.PARTIAL) and not touched and not run.world.computer.stalls:
-        last = (episode.taxels.arrival_ns[-1] - EPOCH) * 1e-9 if len(counter) else run.begin
+        last = (episode.taxels.arrival_ns[-1] - EPOCH - START) * 1e-9 if len(counter) else run.begin
         if run.end - last > 1.2 and len(counter) and not run.world.computer.disk.slow:
             yield f"{path.name} ends {run.end - last:.2f} s before the kill"
+
+
+def _true_path(run, episode):
+    """Yield where the tip truly went elsewhere than the plan states, in a file that is complete."""
+    if not episode.phases or episode.press.index < 0:
+        return
+    begin, end = ((t - EPOCH - START) * 1e-9 for t in (episode.phases[0].start_ns, episode.phases[-1].end_ns))
+    rows = np.array([row for row in run.world.path if begin <= row[0] <= end], float).reshape(-1, 6)
+    if not len(rows):
+        return
+    press = run.world.plan.presses[episode.press.index]
+    wanted = run.world.rig().registration.to_machine(press.x, press.y, press.depth)
+    deepest = rows[int(np.argmin(rows[:, 3])), 1:4]
+    if np.abs(deepest - wanted).max() > OFF:
+        yield f"{episode.path.name} is complete, and the tip went to {deepest}, not to {np.round(wanted, 3)}"
 
 
 def play(seed, only=()):
@@ -198,10 +253,12 @@ def play(seed, only=()):
         settings = draw.choice((None, None, {"$20": "0", "$22": "0"}))
         echo, camera = draw.random() < 0.3, draw.random() < 0.3
         more = {"echo": echo, "camera": camera}
+        later = random.Random(f"later {seed}")  # of its own, so that seeds keep what they drew before
+        more["zero"] = later.random() < 0.5
         world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, **more)
         faults = Faults(world, seed, only)
         try:
-            found = list(_play(world, faults))
+            found = list(_play(world, faults, later.random() < 0.5, later.random() < 0.5))
         finally:
             faults.end()
             world.end()
@@ -209,7 +266,7 @@ def play(seed, only=()):
         return [*kind, *faults.names], found, world.schedule.now
 
 
-def _play(world, faults):
+def _play(world, faults, anew=False, unlocks=False):
     run = Run(world)
     faults.end()
     yield from (f"first run: {words}" for words in broken(run, faults))
@@ -218,16 +275,20 @@ def _play(world, faults):
     world.reboot()
     world.schedule.run_for(0.1, world.bench)  # what went wrong at the very end has its effect
     lost = world.lost or world.controller.machine.alarm is not None
-    calm = world.repair(lost)
+    cut = run.killed and run.here[2] < ORIGIN[2] + CLEARANCE - NEAR  # nobody saw its motion end
+    calm = world.repair(lost, unlocks)
     resume = world.folder.exists()
     before = world.path[-1][1:4] if world.path else None
-    if lost:
+    if lost or cut:
+        if anew:  # people whose session broke begin a new folder
+            world.folder, resume = world.folder.with_name("session2"), False
         run = Run(world, resume)
         yield from (f"without an answer: {words}" for words in broken(run, calm))
-        if resume and (run.error is None or np.abs(np.array(world.path[-1][1:4]) - before).max() > NEAR):
+        if (resume or anew) and (run.error is None or np.abs(np.array(world.path[-1][1:4]) - before).max() > NEAR):
             yield f"it moved from a lost place without an answer; its words:\n{run.words}"
         world.reboot()
-        world.home()
+        if lost:
+            world.home()
     world.answer = lambda question: True
     run = Run(world, world.folder.exists())
     yield from (f"resumed: {words}" for words in broken(run, calm))
