@@ -42,7 +42,7 @@ class RegistryMember:
 
 def registries() -> dict[str, Registry]:
     """Return every registry by name: a module that sets ``ROOM, BASE = "package", "base"`` declares one."""
-    found = {}
+    by_name = {}
     for path in (p for package in PACKAGES for p in sorted(_folder(package).rglob("*.py"))):
         text = path.read_text(encoding="utf-8")
         # Few files declare one, and parsing all of them takes a second.
@@ -50,8 +50,8 @@ def registries() -> dict[str, Registry]:
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "(ROOM, BASE)":
                 room, base = ast.literal_eval(node.value)
                 name = room.rsplit(".", 1)[-1]
-                found[name] = Registry(name, room, base, _first_line(_parse(_folder(room) / "__init__.py")))
-    return dict(sorted(found.items()))
+                by_name[name] = Registry(name, room, base, _first_line(_parse(_folder(room) / "__init__.py")))
+    return dict(sorted(by_name.items()))
 
 
 def members(name: str) -> list[RegistryMember]:
@@ -60,15 +60,15 @@ def members(name: str) -> list[RegistryMember]:
     Raises:
         UsageError: If there is no such registry.
     """
-    known = registries()
-    if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
+    by_name = registries()
+    if name not in by_name:
+        close = difflib.get_close_matches(name, by_name, n=1)
         raise UsageError(
             f"no folder of members is called {name!r}",
-            ", ".join(known),
+            ", ".join(by_name),
             f"did you mean {close[0]!r}?" if close else "tacdata list shows them all",
         )
-    room, base = known[name].room, known[name].base
+    room, base = by_name[name].room, by_name[name].base
     return [_member(room, member) for member in registry.names(room, base)]
 
 

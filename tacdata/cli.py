@@ -116,9 +116,9 @@ def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
             with progress.silenced(quiet), redirect_stdout(sys.stderr) if as_json else nullcontext():
                 result = verb(*arguments, **options)
         except KeyboardInterrupt as error:
-            said = last_words(error)
-            kept = "" if said else ": what was finished is kept"
-            print("\n".join([f"interrupted{kept}", *said]), file=sys.stderr)
+            notes = last_words(error)
+            remark = "" if notes else ": what was finished is kept"
+            print("\n".join([f"interrupted{remark}", *notes]), file=sys.stderr)
             raise typer.Exit(Exit.INTERRUPTED) from None
         except ModuleNotFoundError as error:
             raise missing_package(error, name) or error from None
@@ -177,12 +177,17 @@ def in_words(error: Any) -> UsageError:
     if kind == "BadOptionUsage":
         return UsageError(f"{error.option_name} without a value", "a value behind it", f"name it; {remedy}")
     if kind == "NoSuchOption":
-        known = [option for one in context.command.get_params(context) for option in one.opts if option[:2] == "--"]
-        return UsageError(f"{path} with {error.option_name}", ", ".join(sorted(known)), remedy)
+        allowed_names = [
+            option
+            for parameter_info in context.command.get_params(context)
+            for option in parameter_info.opts
+            if option[:2] == "--"
+        ]
+        return UsageError(f"{path} with {error.option_name}", ", ".join(sorted(allowed_names)), remedy)
     if kind == "NoSuchCommand" or "No such command" in error.message:
-        known = ", ".join(context.command.list_commands(context))
-        given = error.message.rstrip(".").replace("No such command", f"{path} has no verb")
-        return UsageError(given, known, remedy)
+        allowed_names = ", ".join(context.command.list_commands(context))
+        problem = error.message.rstrip(".").replace("No such command", f"{path} has no verb")
+        return UsageError(problem, allowed_names, remedy)
     if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)", error.message):
         return UsageError(f"{path} with {extra[1]}, which it has no place for", allowed, f"leave it out; {remedy}")
     return UsageError(f"{path}: {error.format_message().rstrip('.')}", allowed, remedy)

@@ -50,8 +50,8 @@ class Displayed:
         """
         portrait = _portrait(type(self))
         if portrait is None:
-            known = ", ".join(registry.names(ROOM, BASE))
-            raise UsageError(f"no picture of a {type(self).__name__}", known, "plot one of them, or its parts")
+            drawable = ", ".join(registry.names(ROOM, BASE))
+            raise UsageError(f"no picture of a {type(self).__name__}", drawable, "plot one of them, or its parts")
         figure = portrait(self)
         if path is not None:
             if Path(path).exists():

@@ -121,11 +121,11 @@ def _not_finite(content: Any, place: str = "") -> str:
     """Return where a number is not finite, and which; "" if all are."""
     inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
     for key, value in inner:
-        here = f"{place}/{key}" if place else str(key)
+        location = f"{place}/{key}" if place else str(key)
         if isinstance(value, float) and not math.isfinite(value):
-            return f"{here}: {value}"
-        if found := _not_finite(value, here):
-            return found
+            return f"{location}: {value}"
+        if deeper := _not_finite(value, location):
+            return deeper
     return ""
 
 
@@ -173,10 +173,10 @@ def _nested(text: str) -> int:
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object of a JSON text; duplicate keys are left to `_Loader`, which knows the lines."""
-    found = {composed(name): value for name, value in pairs}
-    if len(found) < len(pairs):
+    content = {composed(name): value for name, value in pairs}
+    if len(content) < len(pairs):
         raise ValueError("a key twice")
-    return found
+    return content
 
 
 def composed(text: str) -> str:

@@ -108,24 +108,24 @@ def extras_of(package: str) -> tuple[str, ...]:
         lines = requires("tacdata") or ()
     except PackageNotFoundError:
         return ()
-    found = set()
+    names = set()
     for line in lines:
         name = re.match(r"[A-Za-z0-9._-]+", line)
         extra = re.search(r"extra == ['\"]([\w-]+)['\"]", line)
         if name and extra and _same(name[0], package):
-            found.add(extra[1])
-    return tuple(sorted(found - {ALL}))
+            names.add(extra[1])
+    return tuple(sorted(names - {ALL}))
 
 
-def _same(one: str, other: str) -> bool:
-    one, other = (re.sub(r"[-_.]+", "-", name).lower() for name in (one, other))
-    return one == other
+def _same(first: str, second: str) -> bool:
+    first, second = (re.sub(r"[-_.]+", "-", name).lower() for name in (first, second))
+    return first == second
 
 
 def _askers(trace: TracebackType | None) -> list[str]:
     """Return the modules that an error passed through, the outermost first: the first room among them asked."""
-    found = []
+    modules = []
     while trace is not None:
-        found.append(trace.tb_frame.f_globals.get("__name__", ""))
+        modules.append(trace.tb_frame.f_globals.get("__name__", ""))
         trace = trace.tb_next
-    return found
+    return modules

@@ -19,11 +19,11 @@ _quiet = False
 def silenced(quiet: bool) -> Iterator[None]:
     """Leave progress and hints out while the block runs, if ``quiet``."""
     global _quiet
-    before, _quiet = _quiet, _quiet or quiet
+    previous, _quiet = _quiet, _quiet or quiet
     try:
         yield
     finally:
-        _quiet = before
+        _quiet = previous
 
 
 def is_quiet() -> bool:

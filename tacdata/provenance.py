@@ -83,18 +83,18 @@ def code_hash(*names: str, without: tuple[str, ...] = ()) -> Any:
         for path, place in sorted(_sources(each).items(), key=itemgetter(1)):
             if path not in left_out:
                 digest.update(f"{place}\0{_syntax(ast.parse(path.read_bytes()))}\0".encode())
-    found = digest.hexdigest()
-    name, _ = EQUAL_VERSIONS.get(found, (found, ""))
+    version = digest.hexdigest()
+    name, _ = EQUAL_VERSIONS.get(version, (version, ""))
     return name
 
 
 def _sources(name: str) -> dict[Path, str]:
     """Return the source files of a module or package, with their places in it."""
-    found = find_spec(name)
-    if found is None or found.origin is None:
+    spec = find_spec(name)
+    if spec is None or spec.origin is None:
         raise ModuleNotFoundError(f"no module {name}")
-    path = Path(found.origin)
-    if not found.submodule_search_locations:
+    path = Path(spec.origin)
+    if not spec.submodule_search_locations:
         return {path: path.name}
     return {each: each.relative_to(path.parent).as_posix() for each in path.parent.rglob("*.py")}
 

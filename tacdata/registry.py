@@ -49,9 +49,9 @@ def add_folder(folder: StrPath) -> None:
             "a folder with a folder for each room: devices/my_board.py, effects/my_effect.py, ...",
             f"make one; {HELP} explains it",
         )
-    known = os.environ.get(VARIABLE, "")
-    if str(place) not in known.split(os.pathsep):
-        os.environ[VARIABLE] = os.pathsep.join(filter(None, (known, str(place))))
+    folders = os.environ.get(VARIABLE, "")
+    if str(place) not in folders.split(os.pathsep):
+        os.environ[VARIABLE] = os.pathsep.join(filter(None, (folders, str(place))))
 
 
 def add_project(folder: Path) -> None:
@@ -135,12 +135,12 @@ def load_module(room: str, base: str, name: str) -> ModuleType:
     """
     # Asked by its name: listing the folder for each of its members would read it as often as it has members.
     if not has(room, base, name):
-        known = names(room, base)
-        close = difflib.get_close_matches(name, known, n=1)
+        members = names(room, base)
+        close = difflib.get_close_matches(name, members, n=1)
         kind = _kind(room)
         raise UsageError(
             f"{name!r} is not among the {kind}",
-            ", ".join(known),
+            ", ".join(members),
             f"did you mean {close[0]!r}?" if close else f"choose one, or add {kind}/{name}.py as a plug-in ({HELP})",
         )
     if _has_file(room, name):
@@ -188,8 +188,8 @@ def _has_file(room: str, name: str) -> bool:
 def _search_path(room: str) -> list[str]:
     """Return a room's folders; the room itself may need a package that is not installed, and is not imported."""
     spec = find_spec(room)
-    own = sys.modules[room].__path__ if room in sys.modules else spec.submodule_search_locations if spec else None
-    return list(dict.fromkeys([*(own or ()), *_plug_in_places(room, os.environ.get(VARIABLE, ""))]))
+    shipped = sys.modules[room].__path__ if room in sys.modules else spec.submodule_search_locations if spec else None
+    return list(dict.fromkeys([*(shipped or ()), *_plug_in_places(room, os.environ.get(VARIABLE, ""))]))
 
 
 @cache
@@ -209,19 +209,19 @@ def _plug_in_places(room: str, variable: str) -> tuple[str, ...]:
 def _refuse_shipped(plugged: Set[str], room: str, origin: str) -> None:
     """Refuse plug-ins that have the name of a member that ships."""
     spec = find_spec(room)
-    own = list(spec.submodule_search_locations or ())[:1] if spec else []
-    if taken := plugged & {module.name for module in pkgutil.iter_modules(own)}:
-        given = f"{origin} holds {min(taken)}, and tacdata ships {_kind(room)}/{min(taken)}"
-        raise UsageError(given, "a name that is not taken", "rename the plug-in")
+    shipped = list(spec.submodule_search_locations or ())[:1] if spec else []
+    if conflicts := plugged & {module.name for module in pkgutil.iter_modules(shipped)}:
+        problem = f"{origin} holds {min(conflicts)}, and tacdata ships {_kind(room)}/{min(conflicts)}"
+        raise UsageError(problem, "a name that is not taken", "rename the plug-in")
 
 
 @cache
 def _installed(room: str) -> dict[str, EntryPoint]:
     """Return the entry points of a room, by name."""
-    found = {point.name: point for point in entry_points(group=f"{GROUP}{_kind(room)}")}
-    if found:
-        _refuse_shipped(found.keys(), room, f"an entry point of {GROUP}{_kind(room)}")
-    return found
+    points = {point.name: point for point in entry_points(group=f"{GROUP}{_kind(room)}")}
+    if points:
+        _refuse_shipped(points.keys(), room, f"an entry point of {GROUP}{_kind(room)}")
+    return points
 
 
 def _load_installed(point: EntryPoint) -> ModuleType:

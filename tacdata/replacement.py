@@ -12,14 +12,14 @@ from typing import BinaryIO
 
 
 @contextmanager
-def replacement(path: Path, beside: Path | None = None, settled: bool = True) -> Iterator[BinaryIO]:
+def replacement(path: Path, folder: Path | None = None, settled: bool = True) -> Iterator[BinaryIO]:
     """Yield a stream whose bytes become the file ``path`` when the block ends; until then the old file stays.
 
     A crash or a full disk leaves the old file or the new one, never a half. If the block raises, nothing is left.
 
     Args:
         path: The file; its folder is made if it is missing.
-        beside: Folder of the unfinished file, on the same file system; by default the file's own, under a hidden name.
+        folder: Folder of the unfinished file, on the same file system; by default the file's own, under a hidden name.
         settled: Whether the new name is synced too when the block ends. Without it, a power cut in the next seconds may
             leave the old file.
 
@@ -27,7 +27,7 @@ def replacement(path: Path, beside: Path | None = None, settled: bool = True) ->
         OSError: If the disk refuses it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=beside or path.parent, prefix=f".{path.name}." if beside is None else None)
+    handle, temporary = tempfile.mkstemp(dir=folder or path.parent, prefix=f".{path.name}." if folder is None else None)
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream

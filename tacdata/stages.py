@@ -33,10 +33,10 @@ LIFELINE = "TACDATA_LIFELINE"
 class StageError(TacdataError):
     """A stage ended with an error that the person has already read."""
 
-    def __init__(self, number: int, line: str, code: int, kept: str) -> None:
+    def __init__(self, number: int, line: str, code: int, remains: str) -> None:
         self.exit_code = code if 0 < code < 256 else 1
         super().__init__(
-            f"stage {number} ended with exit code {code}: {line}", "exit code 0", f"see the message above; {kept}"
+            f"stage {number} ended with exit code {code}: {line}", "exit code 0", f"see the message above; {remains}"
         )
 
 
@@ -53,9 +53,9 @@ def written(arguments: list[str]) -> str:
 class Line:
     """Runs verbs one after the other and shows each one's command, number and time."""
 
-    def __init__(self, total: int, kept: str) -> None:
-        """Prepare for ``total`` stages; ``kept`` describes what is left if one fails."""
-        self.total, self.kept = total, kept
+    def __init__(self, total: int, remains: str) -> None:
+        """Prepare for ``total`` stages; ``remains`` describes what is left if one fails."""
+        self.total, self.kept = total, remains
         self.number = 0
         self.begin = time.monotonic()
 
@@ -191,13 +191,13 @@ class Background:
     def follow(self) -> int:
         """Show the last line of its log and all that comes, until it ends; return its exit code."""
         with self.log.open(errors="replace") as stream:
-            said = stream.read()
-            for one in said.rstrip().splitlines()[-1 if self.process.poll() is None else -_TAIL :]:
-                print(one, flush=True)
+            output = stream.read()
+            for line in output.rstrip().splitlines()[-1 if self.process.poll() is None else -_TAIL :]:
+                print(line, flush=True)
             while True:
                 code = self.process.poll()
-                if said := stream.read():
-                    print(said, end="", flush=True)
+                if output := stream.read():
+                    print(output, end="", flush=True)
                 if code is not None:
                     return code
                 time.sleep(0.05)
@@ -211,10 +211,10 @@ class Background:
         deadline = time.monotonic() + timeout
         while not ready():
             if (code := self.process.poll()) is not None or time.monotonic() > deadline:
-                said = self.log.read_text(errors="replace").strip().splitlines()[-5:]
+                tail = self.log.read_text(errors="replace").strip().splitlines()[-5:]
                 state = f"is not ready after {timeout:g} s" if code is None else f"ended with exit code {code}"
                 raise DeviceError(
-                    f"{written(self.arguments)} {state}" + "".join(f"\n    {line}" for line in said),
+                    f"{written(self.arguments)} {state}" + "".join(f"\n    {line}" for line in tail),
                     what,
                     f"read {self.log}",
                 )

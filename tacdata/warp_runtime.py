@@ -33,13 +33,13 @@ def _start_quietly() -> None:
         return
     sys.stderr.flush()
     with tempfile.TemporaryFile() as printed:
-        kept = os.dup(2)
+        descriptor = os.dup(2)
         os.dup2(printed.fileno(), 2)
         try:
             wp.init()
         finally:
-            os.dup2(kept, 2)
-            os.close(kept)
+            os.dup2(descriptor, 2)
+            os.close(descriptor)
             printed.seek(0)
             lines = [line for line in printed.read().splitlines(keepends=True) if NO_GPU not in line]
             os.write(2, b"".join(lines))

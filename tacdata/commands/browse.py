@@ -44,34 +44,34 @@ def run(
     from viewers.browse.list_sources import episodes_at
 
     if flag is not None or unflag is not None:
-        whole = episodes_at(path, labels)
+        all_episodes = episodes_at(path, labels)
         if flag is not None:
-            print(f"set aside: {flag_episode(whole, flag, reason)}")
+            print(f"set aside: {flag_episode(all_episodes, flag, reason)}")
         if unflag is not None:
-            print(f"taken back: {unflag_episode(whole, unflag)}")
+            print(f"taken back: {unflag_episode(all_episodes, unflag)}")
         return Result({"set_aside": flag, "taken_back": unflag})
-    chosen = episodes_at(path, labels, predictions)
+    episodes = episodes_at(path, labels, predictions)
     for condition in where or ():
-        chosen = chosen.where(condition)
-    chosen = chosen.by(sort)
+        episodes = episodes.where(condition)
+    episodes = episodes.by(sort)
     if catalogue:
-        _catalogue(chosen, labels, predictions, most)
+        _catalogue(episodes, labels, predictions, most)
         return Result(None)
     if web:
-        _serve(chosen, labels, predictions)
+        _serve(episodes, labels, predictions)
         return Result(None)
-    _print(chosen, most, predictions is not None)
-    if chosen.entries:
+    _print(episodes, most, predictions is not None)
+    if episodes.entries:
         more = ("--predictions", predictions) if predictions else ()
-        suggest("view", path, "--episode", chosen.entries[0].number, *more)
-    return Result({"episodes": chosen.entries, "remarks": chosen.remarks})
+        suggest("view", path, "--episode", episodes.entries[0].number, *more)
+    return Result({"episodes": episodes.entries, "remarks": episodes.remarks})
 
 
-def _print(chosen: EpisodeList, most: int, scored: bool) -> None:
+def _print(episodes: EpisodeList, most: int, scored: bool) -> None:
     from viewers.browse.list_table import list_table
 
-    print(list_table(chosen, most, scored))
-    for remark in chosen.remarks:
+    print(list_table(episodes, most, scored))
+    for remark in episodes.remarks:
         print(f"note: {remark}")
 
 
@@ -82,17 +82,17 @@ def serve(path: Path, labels: Path | None, predictions: Path | None) -> None:
     _serve(episodes_at(path, labels, predictions).by("error" if predictions else "number"), labels, predictions)
 
 
-def _catalogue(chosen: EpisodeList, labels: Path | None, predictions: Path | None, most: int) -> None:
+def _catalogue(episodes: EpisodeList, labels: Path | None, predictions: Path | None, most: int) -> None:
     from viewers.browse.catalogue import catalogue_server
     from viewers.rerun import window
 
-    def drawn(count: int, whole: int) -> None:
-        say(f"  {count} of {whole} episodes drawn")
+    def drawn(count: int, total: int) -> None:
+        say(f"  {count} of {total} episodes drawn")
 
-    with catalogue_server(chosen, labels, predictions, drawn) as served:
+    with catalogue_server(episodes, labels, predictions, drawn) as served:
         print(f"open {served.whole}\ncatalogue {served.address}")
         if served.dataset:
-            for entry in chosen.entries[:most]:
+            for entry in episodes.entries[:most]:
                 print(f"episode {entry.number} at its deepest: {served.at_deepest(entry.number)}")
         else:
             say("Rerun lays them out itself; `pip install 'rerun-sdk[catalog]'` brings our layout and links to moments")
@@ -102,11 +102,11 @@ def _catalogue(chosen: EpisodeList, labels: Path | None, predictions: Path | Non
         window.until_interrupted()
 
 
-def _serve(chosen: EpisodeList, labels: Path | None, predictions: Path | None) -> None:
+def _serve(episodes: EpisodeList, labels: Path | None, predictions: Path | None) -> None:
     from viewers.browse.server import browse_server
     from viewers.rerun import window
 
-    with browse_server(chosen, labels, predictions) as address:
+    with browse_server(episodes, labels, predictions) as address:
         print(f"open {address}\nCtrl-C ends it", flush=True)
         if window.has_display():
             typer.launch(address)

@@ -69,29 +69,29 @@ def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: P
     say(f"{picker.seen} images, the board in {picker.with_board}, {len(picker.views)} views taken")
     if odd := picker.check_board(LEAST_VIEWS):
         print(f"note: {odd}")
-    found = calibrate(picker.views, board, picker.size or (0, 0), model)
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    document = found.document(board, source, provenance.code_version(), now)
+    calibration = calibrate(picker.views, board, picker.size or (0, 0), model)
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    document = calibration.document(board, source, provenance.code_version(), date)
     documents.write(out, document, "camera_calibration")
-    picture.write_bytes(cv2.imencode(".png", draw_calibration(found))[1].tobytes())
-    for used in found.views:
+    picture.write_bytes(cv2.imencode(".png", draw_calibration(calibration))[1].tobytes())
+    for used in calibration.views:
         if used.reason:
             print(f"dropped {used.view.name}: {used.reason}")
-    for remark in found.remarks:
+    for remark in calibration.remarks:
         print(f"note: {remark}")
-    spread = found.spread
+    spread = calibration.spread
     print(
-        f"fx {found.matrix[0, 0]:.2f} +- {spread[0]:.2f}, fy {found.matrix[1, 1]:.2f} +- {spread[1]:.2f}, "
-        f"cx {found.matrix[0, 2]:.2f} +- {spread[2]:.2f}, cy {found.matrix[1, 2]:.2f} +- {spread[3]:.2f} px"
+        f"fx {calibration.matrix[0, 0]:.2f} +- {spread[0]:.2f}, fy {calibration.matrix[1, 1]:.2f} +- {spread[1]:.2f}, "
+        f"cx {calibration.matrix[0, 2]:.2f} +- {spread[2]:.2f}, cy {calibration.matrix[1, 2]:.2f} +- {spread[3]:.2f} px"
     )
-    kept = sum(not used.reason for used in found.views)
+    used_views = sum(not used.reason for used in calibration.views)
     print(
-        f"{found.model}; rms {found.rms:.3f} px over {kept} views, {found.held_out_rms:.3f} px on views held out; "
-        f"corners in {found.coverage:.0%} of the image"
+        f"{calibration.model}; rms {calibration.rms:.3f} px over {used_views} views, "
+        f"{calibration.held_out_rms:.3f} px on views held out; corners in {calibration.coverage:.0%} of the image"
     )
     print(f"written to {out} and {picture}")
     say("next: put this into the camera's entry of the rig file\n")
-    say(yaml.safe_dump({"intrinsics": found.intrinsics}, sort_keys=False, default_flow_style=None).rstrip())
+    say(yaml.safe_dump({"intrinsics": calibration.intrinsics}, sort_keys=False, default_flow_style=None).rstrip())
     return Result(document)
 
 
@@ -107,31 +107,31 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
     for path in (target, board):
         if path.exists():
             raise UsageError(f"{path} exists", "a new file", "choose another name")
-    wanted = printable(Board.from_document({"version": "1.0", **shape}, "--draw"))
-    sheet = Image.fromarray(draw_board(wanted, paper)).convert("1", dither=Image.Dither.NONE)
+    drawing = printable(Board.from_document({"version": "1.0", **shape}, "--draw"))
+    sheet = Image.fromarray(draw_board(drawing, paper)).convert("1", dither=Image.Dither.NONE)
     target.parent.mkdir(parents=True, exist_ok=True)
     if target.suffix.lower() == ".pdf":
         sheet.save(target, resolution=DPI)
     else:
         sheet.save(target, dpi=(DPI, DPI))
-    documents.write(board, wanted.document, "calibration_board")
+    documents.write(board, drawing.document, "calibration_board")
     print(f"{target} is to be printed at 100 %; measure its squares and correct square and marker in {board}")
     suggest("calibrate-camera --board", board, "--source IMAGES --out camera.yaml")
 
 
-def _look_through(source: Path, board: Board, wanted: int) -> ViewPicker:
+def _look_through(source: Path, board: Board, views: int) -> ViewPicker:
     """Take a folder's images all, and of a video the still ones that show something new."""
     from tacdata.tags.calibration.view_picker import ViewPicker, images_of
 
     picker = ViewPicker(board, still=not source.is_dir())
     for name, image in images_of(source):
         picker.take(image, name)
-        if picker.still and len(picker.views) >= wanted:
+        if picker.still and len(picker.views) >= views:
             break
     return picker
 
 
-def _watch(source: str, board: Board, size: str, wanted: int) -> ViewPicker:
+def _watch(source: str, board: Board, size: str, views: int) -> ViewPicker:
     """Watch a live camera until there are enough views, or Ctrl-C."""
     from tacdata.clock import Clock
     from tacdata.devices.opencv_camera import OpencvCamera
@@ -147,13 +147,13 @@ def _watch(source: str, board: Board, size: str, wanted: int) -> ViewPicker:
     say("Show the board to every part of the image, tilted to all sides, and hold it still. Ctrl-C ends.")
     with OpencvCamera(Clock.start(), source, shape) as camera:
         try:
-            while len(picker.views) < wanted:
+            while len(picker.views) < views:
                 images = camera.read(1.0)
                 # The two latest tell whether it is held still; older ones would only add delay.
                 for image in images[-2:]:
                     if picker.take(image.image, f"image {image.sequence}"):
                         share = coverage_of(picker.views, (shape["width"], shape["height"]))
-                        say(f"  view {len(picker.views)} of {wanted}, {share:.0%} of the image")
+                        say(f"  view {len(picker.views)} of {views}, {share:.0%} of the image")
         except KeyboardInterrupt:
             print()
     return picker

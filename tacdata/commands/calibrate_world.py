@@ -45,24 +45,24 @@ def run(
     if pairs is not None:
         from tacdata.demonstrations.camera_pose.hand_eye_pairs import solve_pairs
 
-        found = solve_pairs(pairs)
+        solution = solve_pairs(pairs)
     elif board is not None and images is not None and calibration is not None:
-        found = _by_board(board, images, calibration, camera, frame)
+        solution = _by_board(board, images, calibration, camera, frame)
     else:
         raise UsageError(
             "neither --pairs nor --board with --images and --calibration",
             "one of them",
             "see tacdata calibrate-world --help",
         )
-    document = found.document(datetime.now(UTC).isoformat(timespec="seconds"))
+    document = solution.document(datetime.now(UTC).isoformat(timespec="seconds"))
     documents.write(out, document, "camera_world")
-    x, y, z = found.matrix[:3, 3]
-    place, turn = found.residual
-    print(f"camera {found.camera} stands at {x:.4f}, {y:.4f}, {z:.4f} m in {found.frame!r} ({found.method})")
-    print(f"{found.poses} poses leave {1000 * place:.2f} mm and {np.degrees(turn):.3f} deg (root mean square)")
-    if found.spread:
-        print(f"it is known to {1000 * found.spread[0]:.2f} mm and {np.degrees(found.spread[1]):.3f} deg")
-    for remark in found.remarks:
+    x, y, z = solution.matrix[:3, 3]
+    place, turn = solution.residual
+    print(f"camera {solution.camera} stands at {x:.4f}, {y:.4f}, {z:.4f} m in {solution.frame!r} ({solution.method})")
+    print(f"{solution.poses} poses leave {1000 * place:.2f} mm and {np.degrees(turn):.3f} deg (root mean square)")
+    if solution.spread:
+        print(f"it is known to {1000 * solution.spread[0]:.2f} mm and {np.degrees(solution.spread[1]):.3f} deg")
+    for remark in solution.remarks:
         print(f"note: {remark}")
     print(f"written to {out}")
     say(f"next: put  world: {out.name}  into the camera's entry of the demo rig file")
@@ -77,6 +77,6 @@ def _by_board(board: Path, images: Path, calibration: Path, camera: str, frame: 
     from tacdata.tags.calibration.view_picker import images_of
 
     intrinsics = documents.read(calibration, "camera_calibration")["intrinsics"]
-    known = read_board(board)
-    poses, rms, spread = board_poses(images_of(images), known, intrinsics)
-    return replace(board_world(camera, frame, poses, rms, spread), board=known.document)
+    layout = read_board(board)
+    poses, rms, spread = board_poses(images_of(images), layout, intrinsics)
+    return replace(board_world(camera, frame, poses, rms, spread), board=layout.document)

@@ -27,11 +27,11 @@ def run(
 
     if out and out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
-    found = read_dataset(dataset)
-    text = card.card(found)
+    opened = read_dataset(dataset)
+    text = card.card(opened)
     print(text)
     if out:
         documents.write_text(out / "card.md", text)
-        coverage_picture.draw(out / card.PICTURE, found)
+        coverage_picture.draw(out / card.PICTURE, opened)
         print(f"written: {out / 'card.md'}, {card.PICTURE}")
     return Result({"card": text})

@@ -38,10 +38,10 @@ def run(
     from viewers import comparison, showing
 
     output = showing.Output(save, picture, video, web)
-    asked = [name for name, given in (("labels", labels), ("predictions", predictions), ("spec", spec)) if given]
-    if len(asked) != 1:
-        given = "nothing to compare" if not asked else "--" + " and --".join(asked)
-        raise UsageError(given, "one of --labels, --predictions, --spec", "say what to compare")
+    options = [name for name, value in (("labels", labels), ("predictions", predictions), ("spec", spec)) if value]
+    if len(options) != 1:
+        problem = "nothing to compare" if not options else "--" + " and --".join(options)
+        raise UsageError(problem, "one of --labels, --predictions, --spec", "say what to compare")
     output.check()
     if labels:
         scene = comparison.labels_at(path, labels, episode)
@@ -67,23 +67,24 @@ def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:
 
     # A response that is fitted needs every press, so all are read even where one is shown.
     course = course_of([path])
-    chosen = f"episode-{episode:06d}" if episode is not None else course.names[0]
-    if chosen not in course.names:
+    recording = f"episode-{episode:06d}" if episode is not None else course.names[0]
+    if recording not in course.names:
         raise UsageError(f"--episode {episode}: not in {path}", ", ".join(course.names), "choose one of them")
-    rows = np.flatnonzero((course.episode == course.names.index(chosen)) & (course.averaged > 0))
-    measured, said = course.readings[rows], {}
+    rows = np.flatnonzero((course.episode == course.names.index(recording)) & (course.averaged > 0))
+    measured, readings = course.readings[rows], {}
     models = {name: read_spec(file) for name, file in zip(telling_names(specs), specs, strict=True)}
     if len(models) == 1:
-        name, own = next(iter(models.items()))
-        effects = " and ".join(entry["effect"] for entry in own.document["effects"])
+        name, model = next(iter(models.items()))
+        effects = " and ".join(entry["effect"] for entry in model.document["effects"])
         if effects:  # effects show in a comparison with the same model without them
-            bare = replace(own, document={**own.document, "effects": []})
-            models = {f"without {effects}": bare, f"with {effects}": own}
+            bare = replace(model, document={**model.document, "effects": []})
+            models = {f"without {effects}": bare, f"with {effects}": model}
     for name, spec in models.items():
-        held = Comparison(course, spec)
-        own = held.predicted(held.before.response, [])[rows]
-        said[name] = own + (measured - own).mean(axis=0)  # the offset of a press is no property of a model
+        comparison = Comparison(course, spec)
+        prediction = comparison.predicted(comparison.before.response, [])[rows]
+        # The offset of a press is no property of a model.
+        readings[name] = prediction + (measured - prediction).mean(axis=0)
     time = np.round(1e9 * (course.time[rows] - course.time[rows[0]])).astype(np.int64)
-    title = f"{path.resolve().name}/{chosen}: model and measurement"
+    title = f"{path.resolve().name}/{recording}: model and measurement"
     shape, unit = array_of(path, course.channels)
-    return readings_comparison(title, shape, time, measured, said, unit)
+    return readings_comparison(title, shape, time, measured, readings, unit)

@@ -41,8 +41,8 @@ def run(
     recorded = _is_recorded(_Place(out))
     place = _Place(out if recorded else _new_folder(out))
     recording, learning = place.recording(presses, seed), place.learning(epochs, seed)
-    kept = f"finished stages are in {place.folder}; `tacdata demo --out {place.folder}` goes on once all is recorded"
-    line = stages.Line(len(recording) + len(learning) + 3, kept)
+    remains = f"finished stages are in {place.folder}; `tacdata demo --out {place.folder}` goes on once all is recorded"
+    line = stages.Line(len(recording) + len(learning) + 3, remains)
     begin = time.monotonic()
     try:
         if recorded:
@@ -57,7 +57,7 @@ def run(
                 line.run(purpose, arguments)
         line.run(*place.viewing())
     except KeyboardInterrupt:
-        print(f"\nstopped at stage {line.number}: {kept}", file=sys.stderr)
+        print(f"\nstopped at stage {line.number}: {remains}", file=sys.stderr)
         raise
     duration = time.monotonic() - begin
     print(f"\nthe whole job took {stages.clock_face(duration)}; its products:")

@@ -54,15 +54,15 @@ def run(
         files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [_tracks(path)]
         demonstrations = map(read_tracks, files)
     episodes = []
-    for made in demonstrations:
-        chosen = None if direct else read_gains(gains).of(task or made.task)
-        episodes.append(targets_of(made, chosen, finger or ()))
+    for demonstration in demonstrations:
+        gain = None if direct else read_gains(gains).of(task or demonstration.task)
+        episodes.append(targets_of(demonstration, gain, finger or ()))
         if not with_guesses:
             check_guesses(episodes[-1])
     limits = writer.write(episodes, out)
     for targets in episodes:
-        moved = 1000 * abs(targets.position - targets.seen).max()
-        kind = f"compensated by up to {moved:.1f} mm" if targets.kind == "compensated" else "direct"
+        shift = 1000 * abs(targets.position - targets.seen).max()
+        kind = f"compensated by up to {shift:.1f} mm" if targets.kind == "compensated" else "direct"
         print(f"{targets.recording}: {len(targets.time_ns)} targets for {', '.join(targets.fingers)}, {kind}")
     for targets in episodes:
         for words in (*doubts(targets), *_notes(targets)):
@@ -72,10 +72,12 @@ def run(
     for words in (*limits, *writer.remarks):
         print(f"note: {words}")
     print(f"written to {out} ({form}), poses in frame {episodes[0].frame!r}")
-    told = [{"recording": t.recording, "kind": t.kind, "targets": len(t.time_ns), "notes": _notes(t)} for t in episodes]
+    summary = [
+        {"recording": t.recording, "kind": t.kind, "targets": len(t.time_ns), "notes": _notes(t)} for t in episodes
+    ]
     unfit = bool(limits) and writer.needs_robot
-    made = {"targets": told, "limits": limits, "remarks": writer.remarks, "folder": out}
-    return Result(made, Exit.UNFIT if unfit else Exit.DONE)
+    result = {"targets": summary, "limits": limits, "remarks": writer.remarks, "folder": out}
+    return Result(result, Exit.UNFIT if unfit else Exit.DONE)
 
 
 def _presses(session: Path) -> Iterator[Demonstration]:
@@ -90,10 +92,10 @@ def _presses(session: Path) -> Iterator[Demonstration]:
 
 def _notes(targets: FingertipTargets) -> list[str]:
     """Return remarks on compensated targets: missing readings, and unknown quantities."""
-    made = targets.source
-    if made is None or targets.kind == "direct":
+    source = targets.source
+    if source is None or targets.kind == "direct":
         return []
-    return [words for words in targets.remarks if words not in made.remarks] + made.guesses(targets.fingers)
+    return [words for words in targets.remarks if words not in source.remarks] + source.guesses(targets.fingers)
 
 
 def _tracks(path: Path) -> Path:

@@ -49,7 +49,7 @@ def run(
     sensor = fingertip_sensor()
     trained = checkpoint.load(network or _trained(sensor, out / NETWORK, epochs, seed, threads))
     trained.check_sensor(sensor, "the study's fingertip")
-    found = result.result(
+    study = result.result(
         Setup(repeats=repeats, seed=seed),
         read_presses(FOLDER / "orange.npz", sensor),
         sensor,
@@ -57,11 +57,11 @@ def run(
         identity(trained),
         _told,
     )
-    documents.write(out / RESULT, found, "grasp_study")
-    picture.save(found, out / PICTURE)
-    print("\n".join(result.lines(found)))
+    documents.write(out / RESULT, study, "grasp_study")
+    picture.save(study, out / PICTURE)
+    print("\n".join(result.lines(study)))
     print(f"written to {out / RESULT} and {out / PICTURE}")
-    return Result(found)
+    return Result(study)
 
 
 def _told(done: int, of: int) -> None:
@@ -91,18 +91,18 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
     return run
 
 
-def _frames(found: list[Lesson], sensor: Sensor, origin: str) -> Frames:
+def _frames(lessons: list[Lesson], sensor: Sensor, origin: str) -> Frames:
     import numpy as np
 
     from training.frames.frames import EpisodeSpan, Frames
 
-    ends = np.cumsum([len(lesson.taxels) for lesson in found]).tolist()
+    ends = np.cumsum([len(lesson.taxels) for lesson in lessons]).tolist()
     spans = []
-    for number, (lesson, stop) in enumerate(zip(found, ends, strict=True)):
+    for number, (lesson, stop) in enumerate(zip(lessons, ends, strict=True)):
         x, y, depth = lesson.tip[int(lesson.tip[:, 2].argmax())].tolist()
         start = stop - len(lesson.taxels)
         spans.append(EpisodeSpan(number, start, stop, lesson.indenter, lesson.shape, x=x, y=y, depth=depth))
-    taxels, maps, tip = (np.concatenate([getattr(v, n) for v in found]) for n in ("taxels", "depth", "tip"))
+    taxels, maps, tip = (np.concatenate([getattr(v, n) for v in lessons]) for n in ("taxels", "depth", "tip"))
     count = len(taxels)
     times = (np.arange(count) * 1e9 / sensor.taxels.rate).astype(np.int64)
     return Frames(

@@ -48,13 +48,13 @@ def run(
         say(f"read {folder}")
     visits = in_order(visits)  # before a network is asked
     network = _network_errors(model, visits) if model else {}
-    found = history(visits, network)
-    written = document(found)
-    print(text(found), flush=True)  # whatever becomes of the files
-    place = out or found.last.session.folder
+    report = history(visits, network)
+    written = document(report)
+    print(text(report), flush=True)  # whatever becomes of the files
+    place = out or report.last.session.folder
     documents.write(place / "health.json", written, "health")
-    picture.draw(found, place / "health.png")
-    documents.write_text(place / "health.html", page(found))
+    picture.draw(report, place / "health.png")
+    documents.write_text(place / "health.html", page(report))
     print(f"page: {place / 'health.html'}")
     well = written["advice"][0]["do"] in (NOTHING, FIRST)
     return Result(written, Exit.DONE if well else Exit.UNFIT)
@@ -89,8 +89,8 @@ def _network_errors(model: Path, visits: list[Visit]) -> dict[str, NetworkError]
         with TemporaryDirectory(dir=visit.session.folder.parent, prefix=".health-") as folder:
             kept = [e for e in episodes if e.number in present]
             packed = pack(kept, lambda e, paths=present: read_label(paths[e.number]), Path(folder) / "dataset")
-            left = {name for name, _ in packed.left_out}
-            numbers = [e.number for e in kept if e.path.name not in left]
+            unpacked = {name for name, _ in packed.left_out}
+            numbers = [e.number for e in kept if e.path.name not in unpacked]
             scored = evaluate(trained, read_frames(packed.root))
             errors = {
                 number: float(np.nanmean(scores.contact_rmse[result.valid & scores.labelled]))

@@ -38,14 +38,17 @@ def run(
             "--mapping FILE --out SESSION, or --propose FILE alone",
             "add --out, or leave --propose out",
         )
-    made = td.import_files(source, mapping, out, progress=say)
-    for note in _together(made.notes):
+    imported = td.import_files(source, mapping, out, progress=say)
+    for note in _together(imported.notes):
         print(f"note: {note}")
-    for text in made.refused:
+    for text in imported.refused:
         print(f"left out: {text}")
-    print(f"{made.recordings} recordings in {made.folder}" + f", {len(made.refused)} left out" * bool(made.refused))
-    suggest("check", made.folder)
-    return Result(made, Exit.FORMAT if made.refused else Exit.DONE)
+    print(
+        f"{imported.recordings} recordings in {imported.folder}"
+        + f", {len(imported.refused)} left out" * bool(imported.refused)
+    )
+    suggest("check", imported.folder)
+    return Result(imported, Exit.FORMAT if imported.refused else Exit.DONE)
 
 
 def _together(notes: tuple[str, ...]) -> list[str]:

@@ -116,8 +116,8 @@ class _Bars:
             self._tasks[stage] = self._progress.add_task(names[stage], total=total)
         self._progress.update(self._tasks[stage], completed=done)
         if not sys.stdout.isatty() and stage == "solve" and done:
-            left = (time.monotonic() - self._began) * (total - done) / done
-            say(f"  press {done} of {total} solved, about {left:.0f} s left")
+            seconds = (time.monotonic() - self._began) * (total - done) / done
+            say(f"  press {done} of {total} solved, about {seconds:.0f} s left")
 
 
 def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:
@@ -158,10 +158,10 @@ def _report_margins(summary: LabellingSummary) -> None:
     margins = summary.margins
     if not margins:
         return
-    known = [margin.uncertainty for margin in margins if margin.uncertainty is not None]
+    uncertainties = [margin.uncertainty for margin in margins if margin.uncertainty is not None]
     numerical, between = (median(getattr(margin, name) for margin in margins) for name in ("numerical", "between"))
-    spread = f"± {median(known):.4f} mm" if known else "not known, none stated or asked for"
+    spread = f"± {median(uncertainties):.4f} mm" if uncertainties else "not known, none stated or asked for"
     print(f"medians inside contact: numerical error ± {numerical:.4f} mm; by the sensor file's spreads: {spread}")
     print(f"largest error of a state that is left out: {between:.4f} mm, median of the labels")
-    if 0 < len(known) < len(margins):
-        print(f"{len(margins) - len(known)} labels know of no spread: their provenance says why")
+    if 0 < len(uncertainties) < len(margins):
+        print(f"{len(margins) - len(uncertainties)} labels know of no spread: their provenance says why")

@@ -50,7 +50,7 @@ def run(
     trained = pretrained(network)
     source = touched_board(rig, finger, trained.sensor)
     trained.check_sensor(source.sensor, str(rig))
-    offsets, known = trained.network.offsets, novelty.read(trained.path.parent, trained.content_hash)
+    offsets, readings = trained.network.offsets, novelty.read(trained.path.parent, trained.content_hash)
     stream = DepthStream(
         window_map(trained),
         offsets,
@@ -58,7 +58,7 @@ def run(
         stream_clock(source.board),
         round(tare * source.rate),
         causal,
-        known.novelty if known else None,
+        readings.novelty if readings else None,
     )
     say(_mode(trained.network.name, max(offsets), causal, source.rate))
     if words := unfitted(trained):
@@ -95,10 +95,10 @@ def _tare_at_enter(loop: LiveLoop) -> None:
         loop.tare()
 
 
-def _mode(name: str, ahead: int, causal: bool, rate: float) -> str:
+def _mode(name: str, lookahead: int, causal: bool, rate: float) -> str:
     """Print the delay by the network's look-ahead."""
-    wait = f"{ahead} frames, {1000 * ahead / rate:.0f} ms at {rate:g} Hz"
-    if ahead <= 0:
+    wait = f"{lookahead} frames, {1000 * lookahead / rate:.0f} ms at {rate:g} Hz"
+    if lookahead <= 0:
         return f"network {name} needs no later frames: each estimate is of the newest one"
     if causal:
         return (
@@ -112,9 +112,9 @@ def _mode(name: str, ahead: int, causal: bool, rate: float) -> str:
 def _stopping(loop: LiveLoop) -> Iterator[None]:
     """Ctrl-C ends the loop and prints the measured figures."""
     numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: loop.stop()) for number in numbers]
+    handlers = [signal.signal(number, lambda *_: loop.stop()) for number in numbers]
     try:
         yield
     finally:
-        for number, handler in zip(numbers, before, strict=True):
+        for number, handler in zip(numbers, handlers, strict=True):
             signal.signal(number, handler)

@@ -113,5 +113,5 @@ def _summary(plan: Plan, skin: Sensor, expected: PlanTime) -> str:
         f"{expected.mountings} mounting{'s' * (expected.mountings > 1)}, about {mounting:.0f} min",
     ]
     shapes = {p.indenter_name: p.indenter for p in presses}
-    lines += [f"note: {name}: {said}" for name, shape in shapes.items() if (said := tip_aside(shape))]
+    lines += [f"note: {name}: {remark}" for name, shape in shapes.items() if (remark := tip_aside(shape))]
     return "\n".join(lines)

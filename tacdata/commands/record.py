@@ -76,12 +76,12 @@ def run(
         from tacdata.tags import look
 
         skin = read_sensor(sensor) if sensor else default_sensor()
-        chosen = chosen_registration(read_rig(rig), rig, registration, skin)
-        bench = chosen.rig
+        registered = chosen_registration(read_rig(rig), rig, registration, skin)
+        bench = registered.rig
 
     def confirm(summary: Preflight) -> bool:
         print(summary.text, flush=True)
-        print("\n".join(chosen.warnings), file=sys.stderr, flush=True)
+        print("\n".join(registered.warnings), file=sys.stderr, flush=True)
         return yes or _answer("Move now? [y/N] ").lower() in ("y", "yes")
 
     if live:
@@ -115,7 +115,7 @@ def run(
             print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
             raise typer.Exit(Exit.INTERRUPTED) from None
         finally:
-            chosen.keep(out)
+            registered.keep(out)
     print(f"{len(session.done)} of {len(session.plan.presses)} presses recorded in {out}")
     suggest("check", out)
     return Result({"session": out, "recorded": len(session.done), "planned": len(session.plan.presses)})
@@ -198,13 +198,13 @@ class _Bar:
         if self._progress and self._task is not None:
             self._progress.stop()
 
-    def _show(self, done: int, wanted: int, seconds: float) -> None:
+    def _show(self, done: int, total: int, seconds: float) -> None:
         self._seconds, self._since = seconds, time.monotonic()
         if self._progress is None:
-            say(f"  press {done} of {wanted} recorded, {self.left()} left")
+            say(f"  press {done} of {total} recorded, {self.left()} left")
             return
         if self._task is None:
-            self._task = self._progress.add_task("", total=wanted)
+            self._task = self._progress.add_task("", total=total)
         self._progress.start()
         self._progress.update(self._task, completed=done)
 

@@ -21,8 +21,8 @@ def run(
     from tacdata.errors import Exit
     from tacdata.recording.files.recover import recover
 
-    found = recover(file, out)
-    for damage in found.damage or ["nothing was wrong with it"]:
+    result = recover(file, out)
+    for damage in result.damage or ["nothing was wrong with it"]:
         print(f"{file.name}: {damage}")
-    print(f"{found.messages} messages and {found.attachments} attachments are in {found.path}")
-    return Result(found, Exit.FORMAT if found.damage else Exit.DONE)
+    print(f"{result.messages} messages and {result.attachments} attachments are in {result.path}")
+    return Result(result, Exit.FORMAT if result.damage else Exit.DONE)

@@ -164,10 +164,10 @@ def _touch(
             raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
         guard.require_known(safe)
         _mount(rig, specimen)
-        told = lambda text: say(f"  {text}")  # noqa: E731
-        with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption, motion, told) as probe:
-            found = register(probe, sensor, rig.registration, settings, say=told)
-    return document_of(found, rig, sensor, specimen, controller), found.text
+        show = lambda text: say(f"  {text}")  # noqa: E731
+        with guarded_probe(rig, devices, safe, LIFT_SPEED, interruption, motion, show) as probe:
+            result = register(probe, sensor, rig.registration, settings, say=show)
+    return document_of(result, rig, sensor, specimen, controller), result.text
 
 
 def _mount(rig: Rig, specimen: dict[str, Any]) -> None:

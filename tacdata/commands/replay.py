@@ -74,38 +74,42 @@ def run(
             raise UsageError(f"{file} exists", "a new file", "choose another name")
     if gain_from is not None and not find_gain:
         raise UsageError("--gain-from without --find-gain", "both or none", "add --find-gain")
-    given = {"radius": (radius, 1, 200, "mm"), "mass": (mass, 0.001, 10, "kg"), "stiffness": (stiffness, 1, 1e5, "N/m")}
-    given |= {"most-slip": (most_slip, 0.1, 100, "mm"), "most-force": (most_force, 0.1, 1000, "N")}
-    given["least-grip"] = (least_grip, 0.1, 100, "times the load")
-    for option, (value, least, most, unit) in given.items():
-        if value is not None and not least <= value <= most:
-            raise UsageError(f"--{option} {value:g}", f"{least:g} to {most:g} {unit}", "correct it")
-    made = [read_tracks(_tracks(path)) for path in paths]
-    source = read_tracks(_tracks(gain_from)) if gain_from is not None else made[0]
-    names = {task or one.task for one in (*made, source)}
+    limits = {
+        "radius": (radius, 1, 200, "mm"),
+        "mass": (mass, 0.001, 10, "kg"),
+        "stiffness": (stiffness, 1, 1e5, "N/m"),
+    }
+    limits |= {"most-slip": (most_slip, 0.1, 100, "mm"), "most-force": (most_force, 0.1, 1000, "N")}
+    limits["least-grip"] = (least_grip, 0.1, 100, "times the load")
+    for option, (value, lower, upper, unit) in limits.items():
+        if value is not None and not lower <= value <= upper:
+            raise UsageError(f"--{option} {value:g}", f"{lower:g} to {upper:g} {unit}", "correct it")
+    demonstrations = [read_tracks(_tracks(path)) for path in paths]
+    source = read_tracks(_tracks(gain_from)) if gain_from is not None else demonstrations[0]
+    names = {task or one.task for one in (*demonstrations, source)}
     if len(names) > 1:
         raise UsageError(f"recordings of the tasks {', '.join(sorted(names))}", "one task", "replay each task alone")
-    if gain_from is not None and source.recording_hash in {one.recording_hash for one in made}:
+    if gain_from is not None and source.recording_hash in {one.recording_hash for one in demonstrations}:
         raise UsageError(f"{gain_from} among those tried", "other recordings than that", "try others")
     name = names.pop()
     weight = {} if mass is None else {"mass": mass}
     scene = scene_of(name, thing, None if radius is None else radius / 1000, stiffness=stiffness, **weight)
-    known, chosen = {"compensated": read_gains(gains).of(name)}, None
+    gain_sets, gain = {"compensated": read_gains(gains).of(name)}, None
     # Before the search: these remarks may explain its failure.
-    for one in {one.recording_hash: one for one in (source, *made)}.values():
-        seen = Trials(one, {}, scene).seen
+    for one in {one.recording_hash: one for one in (source, *demonstrations)}.values():
+        original = Trials(one, {}, scene).seen
         if not with_guesses:
-            check_guesses(seen)
-        for words in (*doubts(seen), *one.guesses(), *(_other_network(source, one) if find_gain else ())):
+            check_guesses(original)
+        for words in (*doubts(original), *one.guesses(), *(_other_network(source, one) if find_gain else ())):
             print(f"note: {one.recording}: {words}")
     if find_gain:
-        found = Trials(source, {}, scene).find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
-        print(f"found on {source.recording}: {found.text}")
-        chosen, known["chosen"] = (source, found), dict.fromkeys(source.tracks, found.gain)
-    tried = [Trials(one, known, scene) for one in made]
+        search = Trials(source, {}, scene).find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
+        print(f"found on {source.recording}: {search.text}")
+        gain, gain_sets["chosen"] = (source, search), dict.fromkeys(source.tracks, search.gain)
+    tried = [Trials(one, gain_sets, scene) for one in demonstrations]
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
-    document = result(tried, seeds, scene, chosen)
+    document = result(tried, seeds, scene, gain)
     rates = document["controls"] | document
     for kind in tried[0].paths:
         low, high = rates[kind]["wilson_95"]
@@ -166,12 +170,12 @@ def _save(view: Path | None, video: Path | None, tried: Trials, scene: ReplaySce
     from viewers.pictures.replay_film import film_replays
     from viewers.rerun.replay import save_replays
 
-    shown = {kind: tried.one(kind, scene) for kind in tried.paths}
+    scenes = {kind: tried.one(kind, scene) for kind in tried.paths}
     if view is not None:
-        save_replays(view, shown, tried.seen)
+        save_replays(view, scenes, tried.seen)
     if video is not None:
-        film_replays(video, shown, tried.seen)
-    for kind, outcome in shown.items():
+        film_replays(video, scenes, tried.seen)
+    for kind, outcome in scenes.items():
         forces = ", ".join(f"{name} {force:.2f} N" for name, force in outcome.force.items())
         print(f"undisturbed, {kind}: {outcome.reason} ({forces})")
     if view is not None:

@@ -47,7 +47,7 @@ def run(
     if trials:
         read_dataset(trials).check_measured("the paper's trials")
     trained = [checkpoint.load(folder) for folder in _folders(runs)]
-    known: dict[Path, Frames] = {}
+    by_folder: dict[Path, Frames] = {}
     scored = []
     for network in trained:
         place = dataset or Path(network.document["dataset"]["path"])
@@ -55,7 +55,7 @@ def run(
             raise UsageError(
                 f"the dataset {place} of {network.path} is not there", "a dataset folder", "give --dataset"
             )
-        frames = known.setdefault(place, read_frames(place)) if place not in known else known[place]
+        frames = by_folder.setdefault(place, read_frames(place)) if place not in by_folder else by_folder[place]
         scored.append(Scored(network.settings.title, evaluate(network, frames, device, threads), frames))
         say(f"scored {network.path.parent}")
     sheet = markdown(protocols(frames_of(read_dataset(trials)), trained[0])) if trials else ""
@@ -64,12 +64,12 @@ def run(
     return Result({"runs": [{"title": run.name, **run.evaluation.document} for run in scored], "report": out})
 
 
-def _folders(given: list[Path]) -> list[Path]:
+def _folders(paths: list[Path]) -> list[Path]:
     """Return the runs: those named, and those in folders that hold runs."""
     from training.inference.checkpoint import BEST
 
-    found = []
-    for path in given:
+    runs = []
+    for path in paths:
         inside = sorted(best.parent for best in path.glob(f"*/{BEST}")) if path.is_dir() else []
-        found += inside if inside and not (path / BEST).is_file() else [path]
-    return found
+        runs += inside if inside and not (path / BEST).is_file() else [path]
+    return runs

@@ -74,15 +74,15 @@ def run(
             print(f"  left out, {change['name']}: {change['before']:.3g} before, {change['after']:.3g} after")
         worst = max(gap["slices"], key=lambda c: c["after"])
         print(f"  worst of them after, {worst['name']}: {worst['before']:.3g} before, {worst['after']:.3g} after")
-    for moved in document["labels"]:
+    for entry in document["labels"]:
         print(
-            f"{moved['session']}: {moved['paths']} of {moved['episodes']} paths move, {moved['path_rms']:.4f} mm rms, "
-            f"{moved['path_most']:.4f} mm at most"
+            f"{entry['session']}: {entry['paths']} of {entry['episodes']} paths move, {entry['path_rms']:.4f} mm rms, "
+            f"{entry['path_most']:.4f} mm at most"
         )
-        if moved["labels"]:
+        if entry["labels"]:
             print(
-                f"  {moved['labels']} labels made again: {moved['rms']:.4f} mm rms, {moved['most']:.4f} mm at most; "
-                f"{moved['solved']} paths solved, {moved['found']} found in the store"
+                f"  {entry['labels']} labels made again: {entry['rms']:.4f} mm rms, {entry['most']:.4f} mm at most; "
+                f"{entry['solved']} paths solved, {entry['found']} found in the store"
             )
     for t in document["tips"]:
         print(

@@ -25,9 +25,9 @@ def run(
     from tacdata.cases.case import read_case, solve_case
 
     console = progress.console()
-    wanted = read_case(case)
-    with console.status(f"{wanted.name}: meshing and factorizing") as status:
-        report = solve_case(wanted, out, lambda depth: status.update(f"{wanted.name}: {depth:g} mm solved"), picture)
+    problem = read_case(case)
+    with console.status(f"{problem.name}: meshing and factorizing") as status:
+        report = solve_case(problem, out, lambda depth: status.update(f"{problem.name}: {depth:g} mm solved"), picture)
     answer = documents.read(report, "case_result")
     mesh = answer["mesh"]
     console.print(

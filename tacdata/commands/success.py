@@ -38,14 +38,14 @@ def run(
         if not (name and members):
             raise UsageError(f"--group {text}", "NAME=POSITION,POSITION,...", "for example edge=1,2,7,8")
         groups[name] = {m.strip() for m in members.split(",")}
-    found = []
+    attempts = []
     for text in trials or []:
         if "=" in text and not Path(text).exists():
-            found.append(success.counted(text))
+            attempts.append(success.counted(text))
         else:
-            found += success.rates(success.read_attempts(Path(text)), groups)
-    if found:
-        print(success.markdown(found))
+            attempts += success.rates(success.read_attempts(Path(text)), groups)
+    if attempts:
+        print(success.markdown(attempts))
     if paper:
         print("\nThe paper's (Exp. 3, on a real robot):\n\n" + success.markdown(success.published_rates()))
-    return Result({"rates": found, "published": success.published_rates() if paper else []})
+    return Result({"rates": attempts, "published": success.published_rates() if paper else []})

@@ -45,15 +45,15 @@ def run(
         settings = TableSettings(spacing, MeshSettings() if fine else None, device, capacity, left_out)
         ready = work(what.sensor, what.reaches, settings)
     mesh = ready.model.settings.mesh
-    left = len(ready.missing)
+    missing = len(ready.missing)
     print(
         f"{ready.presses} presses of {', '.join(ready.names)} on {len(ready.model.mesh.nodes)} nodes "
-        f"(edges of {mesh.outer:g} mm outside), {left} of them to solve"
-        + (f", about {clock_face(ready.expected_seconds)} on one core" if left else "")
+        f"(edges of {mesh.outer:g} mm outside), {missing} of them to solve"
+        + (f", about {clock_face(ready.expected_seconds)} on one core" if missing else "")
     )
-    known = {"presses": ready.presses, "to_solve": left, "seconds": ready.expected_seconds if left else 0.0}
+    figures = {"presses": ready.presses, "to_solve": missing, "seconds": ready.expected_seconds if missing else 0.0}
     if dry_run:
-        return Result(known)
+        return Result(figures)
     with console.status("solving") as status:
 
         def told(done: int, of: int, seconds: float) -> None:
@@ -61,18 +61,18 @@ def run(
             if not console.is_terminal and done:
                 say(f"  press {done} of {of}, about {clock_face(seconds)} left")
 
-        table, off = ready.done(told)
-    if off:
+        table, error = ready.done(told)
+    if error:
         print(
-            f"{off.presses} presses left out: loads off by {100 * off.load:.1f} % rms, {100 * off.worst:.1f} % at most "
-            f"of a press's largest; forces by {100 * off.normal:.1f} %"
+            f"{error.presses} presses left out: loads off by {100 * error.load:.1f} % rms, "
+            f"{100 * error.worst:.1f} % at most of a press's largest; forces by {100 * error.normal:.1f} %"
         )
     outside = table.uncovered(what.places)
     if outside:
         print(
             f"{len(outside)} presses lie where the model cannot be pressed (over a bonded rim), continued from beside"
         )
-    spec = written_spec(out, ready, table, off)
+    spec = written_spec(out, ready, table, error)
     print(f"written: {spec}")
     suggest("discrepancy", *recordings, "--spec", spec, "--out VERDICT")
-    return Result({**known, "left_out": off, "uncovered": len(outside), "spec": spec})
+    return Result({**figures, "left_out": error, "uncovered": len(outside), "spec": spec})

@@ -48,47 +48,47 @@ def run(
     if not recordings:
         raise UsageError(f"no finished demonstration in {path}", "one or more", "record with tacdata record --demo")
     estimators = _estimators(network or [])
-    told = []
+    summary = []
     for recording in recordings:
         read = read_demo(recording)
-        made = track(look_again(read, _told) if every_image else read, rate, estimators)
+        demonstration = track(look_again(read, _told) if every_image else read, rate, estimators)
         before = path_of(recording)
         if not estimators and before.is_file() and (lost := read_tracks(before).network):
             print(f"note: {before.name} held depth predicted by {lost['hash'][:12]}; without --network it goes")
-        write_tracks(before, made)
-        _draw(made, recording)
-        length = f"{made.seconds[-1]:.1f} s in frame {made.frame!r}"
+        write_tracks(before, demonstration)
+        _draw(demonstration, recording)
+        length = f"{demonstration.seconds[-1]:.1f} s in frame {demonstration.frame!r}"
         print(f"{recording.name}: {length}, written to {path_of(recording).name}")
-        for name, found in made.tracks.items():
+        for name, finger_track in demonstration.tracks.items():
             felt = ""
-            if found.depth is not None:
-                depth = contact_depth(found.depth)
+            if finger_track.depth is not None:
+                depth = contact_depth(finger_track.depth)
                 felt = f", predicted depth up to {max(depth[depth == depth], default=0.0):.2f} mm"
             print(
-                f"  {name:<8} {found.sightings} sightings, {found.outliers} left out, "
-                f"{found.gap.mean():.1%} of the time in gaps{felt}"
+                f"  {name:<8} {finger_track.sightings} sightings, {finger_track.outliers} left out, "
+                f"{finger_track.gap.mean():.1%} of the time in gaps{felt}"
             )
-        told.append(
+        summary.append(
             {
                 "recording": recording.name,
-                "frame": made.frame,
-                "seconds": made.seconds[-1],
-                "remarks": made.remarks,
+                "frame": demonstration.frame,
+                "seconds": demonstration.seconds[-1],
+                "remarks": demonstration.remarks,
                 "fingers": {
                     name: {"sightings": t.sightings, "left_out": t.outliers, "gap": t.gap.mean()}
-                    for name, t in made.tracks.items()
+                    for name, t in demonstration.tracks.items()
                 },
             }
         )
-        for remark in made.remarks:
+        for remark in demonstration.remarks:
             print(f"  note: {remark}")
-    if any(words.startswith(UNSEARCHED) for one in told for words in one["remarks"]) and not every_image:
+    if any(words.startswith(UNSEARCHED) for one in summary for words in one["remarks"]) and not every_image:
         named = " ".join(f"--network {words}" for words in network or [])
         suggest("track", path, f"{named} --every-image".strip())
-        return Result({"recordings": told})
+        return Result({"recordings": summary})
     hint = "" if network else "  (with --network the targets can be compensated)"
     suggest("export", path, "--out EXPORT", hint)
-    return Result({"recordings": told})
+    return Result({"recordings": summary})
 
 
 def _told(done: int) -> None:
@@ -96,7 +96,7 @@ def _told(done: int) -> None:
         say(f"{done} images searched for tags")
 
 
-def _draw(made: Demonstration, recording: Path) -> None:
+def _draw(demonstration: Demonstration, recording: Path) -> None:
     import numpy as np
 
     from tacdata.demonstrations.compensation import contact_depth
@@ -105,31 +105,31 @@ def _draw(made: Demonstration, recording: Path) -> None:
     strips = [
         Strip(
             name,
-            found.position,
-            np.sqrt(np.trace(found.covariance[:, 3:, 3:], axis1=1, axis2=2) / 3),
-            found.gap,
-            None if found.depth is None else contact_depth(found.depth),
+            finger_track.position,
+            np.sqrt(np.trace(finger_track.covariance[:, 3:, 3:], axis1=1, axis2=2) / 3),
+            finger_track.gap,
+            None if finger_track.depth is None else contact_depth(finger_track.depth),
         )
-        for name, found in made.tracks.items()
+        for name, finger_track in demonstration.tracks.items()
     ]
-    title = f"{recording.name}: {made.task}, frame {made.frame!r}"
-    draw_tracks(recording.with_suffix(".tracks.png"), made.seconds, strips, title)
+    title = f"{recording.name}: {demonstration.task}, frame {demonstration.frame!r}"
+    draw_tracks(recording.with_suffix(".tracks.png"), demonstration.seconds, strips, title)
 
 
-def _estimators(given: list[str]) -> dict[str, Estimator]:
+def _estimators(options: list[str]) -> dict[str, Estimator]:
     """Read the networks that --network names: finger -> estimator, `ALL` for one without finger."""
     from tacdata.demonstrations.paths.estimator import ALL
     from tacdata.errors import UsageError
 
-    found: dict[str, Estimator] = {}
-    for words in given:
+    estimators: dict[str, Estimator] = {}
+    for words in options:
         finger, equals, run = words.partition("=")
         finger, run = (finger, run) if equals and not Path(words).exists() else (ALL, words)
-        if finger in found:
+        if finger in estimators:
             which = f"finger {finger}" if finger else "all fingers"
             raise UsageError(f"two networks for {which}", "one each", "leave one --network out")
-        found[finger] = _estimator(run)
-    return found
+        estimators[finger] = _estimator(run)
+    return estimators
 
 
 def _estimator(run: str) -> Estimator:
@@ -139,7 +139,7 @@ def _estimator(run: str) -> Estimator:
     from training.pretraining.shipped import pretrained, unfitted
 
     trained = pretrained(run)
-    known = novelty.read(trained.path.parent, trained.content_hash)
+    readings = novelty.read(trained.path.parent, trained.content_hash)
     maps, words = partial(sequence_maps, trained), unfitted(trained)
     who = identity(trained) | ({"unfitted": words} if words else {})
-    return Estimator(who, trained.sensor, maps, known.novelty if known else None)
+    return Estimator(who, trained.sensor, maps, readings.novelty if readings else None)

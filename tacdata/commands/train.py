@@ -121,21 +121,21 @@ def _say_calibration(best: Checkpoint, dataset: Path) -> None:
     from training.frames.channel_calibration import doubts
     from training.frames.data import read_frames
 
-    known = best.calibration
-    if not known:
+    calibration = best.calibration
+    if not calibration:
         return
-    mean, error = known.gain.mean(), float(np.median(known.gain_error / known.gain))
+    mean, error = calibration.gain.mean(), float(np.median(calibration.gain_error / calibration.gain))
     print(
         f"calibration: {mean:.3g} N at 1000 counts, each channel to {100 * error:.0f} %; "
-        f"exponent {known.exponent:.2f} ± {known.exponent_error:.2f}; {known.presses} presses"
+        f"exponent {calibration.exponent:.2f} ± {calibration.exponent_error:.2f}; {calibration.presses} presses"
     )
-    if known.mixing is not None:
-        wider = "farther" if known.spread >= 0 else "less far"
+    if calibration.mixing is not None:
+        wider = "farther" if calibration.spread >= 0 else "less far"
         print(
             f"the model spreads a load {wider} than this skin, and its forces are spread alike: variance "
-            f"{known.spread:+.2f} ± {known.spread_error:.2f} mm²"
+            f"{calibration.spread:+.2f} ± {calibration.spread_error:.2f} mm²"
         )
-    for words in doubts(known, read_frames(dataset), best.split.train):
+    for words in doubts(calibration, read_frames(dataset), best.split.train):
         print(f"note: {words}")
 
 

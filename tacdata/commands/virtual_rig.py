@@ -103,21 +103,21 @@ def run(
     print("stopped", flush=True)
 
 
-def _skins(given: list[str], demo: bool) -> dict[str, Sensor]:
+def _skins(options: list[str], demo: bool) -> dict[str, Sensor]:
     """Read the sensor files of --sensor: finger -> sensor. A file without finger is for all that are not named."""
     from tacdata.errors import UsageError
     from tacdata.sensor import read_sensor
     from tacdata.virtual_rig.world.hand import DIRECTIONS
 
-    found: dict[str, Sensor] = {}
-    for words in given:
+    skins: dict[str, Sensor] = {}
+    for words in options:
         finger, equals, file = words.partition("=")
         finger, file = (finger, file) if equals and not Path(words).exists() else ("", words)
         if finger and not demo:
             raise UsageError(f"--sensor {words} without --demo", "--sensor FILE", "leave the finger out, or add --demo")
-        if finger in found:
+        if finger in skins:
             which = f"finger {finger}" if finger else "all fingers"
             raise UsageError(f"two sensors for {which}", "one each", "leave one --sensor out")
-        found[finger] = read_sensor(Path(file))
-    rest = found.pop("", None)
-    return found if rest is None else {**dict.fromkeys(DIRECTIONS, rest), **found}
+        skins[finger] = read_sensor(Path(file))
+    default = skins.pop("", None)
+    return skins if default is None else {**dict.fromkeys(DIRECTIONS, default), **skins}

@@ -35,7 +35,7 @@ def judge(
         FormatError: If recordings and spec do not fit together.
     """
     paths = [sessions] if isinstance(sessions, str | PathLike) else list(sessions)
-    kept = None if out else tempfile.TemporaryDirectory(prefix="tacdata-verdict-")
-    folder = Path(out) if out else Path(kept.name if kept else "") / "verdict"
+    temporary = None if out else tempfile.TemporaryDirectory(prefix="tacdata-verdict-")
+    folder = Path(out) if out else Path(temporary.name if temporary else "") / "verdict"
     run([Path(path) for path in paths], read_spec(Path(spec) if spec else None), folder, progress, stop_after)
-    return read_verdict(folder, kept)
+    return read_verdict(folder, temporary)

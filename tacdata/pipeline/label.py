@@ -77,14 +77,14 @@ def label(
     recorded = read_session(folder)
     if not recorded.episodes and not follow:
         raise UsageError(f"{folder} holds no finished recording", "at least one", "record: `tacdata record`")
-    chosen = devices_named(devices)
+    workplaces = devices_named(devices)
     limit = Tolerance(least=tolerance) if tolerance else None
     settings = FarmSettings(
         factory=factory or FACTORY,
         ladder=Ladder(load_step=load_step, unload_step=unload_step, tolerance=limit),
         uncertainty=uncertainty,
-        workers=workers or (cores() if chosen == ("cpu",) else len(chosen)),
-        devices=chosen,
+        workers=workers or (cores() if workplaces == ("cpu",) else len(workplaces)),
+        devices=workplaces,
         redo=redo,
         engine=dask_engine(dask) if dask else Pool,
     )

@@ -52,5 +52,5 @@ def open(path: StrPath) -> Session | Episode | Label | Dataset | TrainedNetwork 
         from tacdata.pipeline.trained_network import read_network
 
         return read_network(place)
-    given = f"{path} is no session, dataset, verdict or network" if place.exists() else f"no file or folder {path}"
-    raise UsageError(given, ALLOWED, "check the path")
+    problem = f"{path} is no session, dataset, verdict or network" if place.exists() else f"no file or folder {path}"
+    raise UsageError(problem, ALLOWED, "check the path")

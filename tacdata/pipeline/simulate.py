@@ -105,11 +105,11 @@ def simulate(
         raise UsageError("neither --out nor --solved", "a folder to write to", "add --out DATASET")
     extra = _optional(columns) if columns else ()
     folder = Path(solved or f"{out}.solved")
-    given = default_sensor() if sensor is None else sensor
+    design = default_sensor() if sensor is None else sensor
     ranges = read_simulation_plan(Path(plan) if plan else DEFAULT)
     for path in effects:
         ranges = with_effects(ranges, effects_of(Path(path)))
-    skin = given if isinstance(given, Sensor) else read_sensor(given)
+    skin = design if isinstance(design, Sensor) else read_sensor(design)
     simulation = Simulation(folder, ranges, skin, seed, mesh_error)
     devices = chosen_devices(device)
     simulation.check()

@@ -28,8 +28,8 @@ class SolvableSkin:
             device: "cpu", or a GPU such as "cuda:0".
             settings: Discretization and solver.
         """
-        given = default_sensor() if sensor is None else sensor
-        self.sensor = given if isinstance(given, Sensor) else read_sensor(given)
+        design = default_sensor() if sensor is None else sensor
+        self.sensor = design if isinstance(design, Sensor) else read_sensor(design)
         self.device, self.settings = device, settings
 
     @cached_property

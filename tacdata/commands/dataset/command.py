@@ -21,7 +21,7 @@ def numbers(text: str) -> list[int]:
         >>> numbers("0-2,7")
         [0, 1, 2, 7]
     """
-    found: list[int] = []
+    result: list[int] = []
     for part in text.split(","):
         typed = RANGE.fullmatch(part.strip())
         first, last = (int(typed[1]), int(typed[2] or typed[1])) if typed else (1, 0)
@@ -29,8 +29,8 @@ def numbers(text: str) -> list[int]:
             raise UsageError(
                 f"episodes {text!r}", "numbers and ranges from 0 on, such as 0-4,7", "correct the list of episodes"
             )
-        found += range(first, last + 1)
-    return found
+        result += range(first, last + 1)
+    return result
 
 
 def counted(episodes: Collection[int]) -> str:

@@ -22,8 +22,8 @@ def run(
     from tacdata.commands.dataset.command import counted, lacking, numbers
     from tacdata.dataset.edit import delete
 
-    chosen = numbers(episodes)
-    missing = delete(dataset, chosen, out)
-    print(f"{out}: {dataset} without {counted(set(chosen))}; the others are numbered anew{lacking(missing)}")
+    indices = numbers(episodes)
+    missing = delete(dataset, indices, out)
+    print(f"{out}: {dataset} without {counted(set(indices))}; the others are numbered anew{lacking(missing)}")
     suggest("card", out)
     return Result({"dataset": out, "without_record": missing})

@@ -32,7 +32,7 @@ def run(
             )
         parts[name] = numbers(listed)
     missing = split(dataset, parts, out)
-    for name, chosen in parts.items():
-        print(f"{out / name}: {counted(chosen)}{lacking(missing[name])}")
+    for name, indices in parts.items():
+        print(f"{out / name}: {counted(indices)}{lacking(missing[name])}")
     suggest("card", out / next(iter(parts)))
     return Result({"datasets": [out / name for name in parts], "without_record": missing})

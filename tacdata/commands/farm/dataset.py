@@ -30,14 +30,14 @@ def run(
 
     folder.read_info(dataset)
     sensors = (metadata.read_main(dataset) or {"sensors": {}})["sensors"]
-    models, held = {}, label_states.models_in(dataset)
+    models, present = {}, label_states.models_in(dataset)
     for key, document in sensors.items() if build else ():
         skin = Sensor.from_document(document, str(dataset))
         models[key] = version(factory or FACTORY, skin).content_hash
-        if held.get(key) != models[key]:
+        if present.get(key) != models[key]:
             # Labels made with --no-uncertainty are of the same model without the sensor file's spreads.
             plain = version(factory or FACTORY, replace(skin, uncertainty={})).content_hash
-            models[key] = plain if held.get(key) == plain else models[key]
+            models[key] = plain if present.get(key) == plain else models[key]
     states = label_states.states(dataset, models)
     for entry in states:
         if entry.state != "complete":

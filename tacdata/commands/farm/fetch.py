@@ -38,22 +38,24 @@ def run(
         # Its state is requested first: labels finished by then are copied below.
         entry = client.get(client.submission(number))
         fetch.bring()
-    found = fetch.fetched
-    print(f"labels fetched: {len(found.written)}, already here: {len(found.current)}, failed: {len(found.failed)}")
-    for episode, reason in sorted(found.failed.items()):
+    fetched = fetch.fetched
+    print(
+        f"labels fetched: {len(fetched.written)}, already here: {len(fetched.current)}, failed: {len(fetched.failed)}"
+    )
+    for episode, reason in sorted(fetched.failed.items()):
         print(f"  episode {episode}: no label: {reason.splitlines()[0]}")
-    told = {"submission": entry, "fetched": found}
-    left = entry["episodes"] - len(found.written) - len(found.current) - len(found.failed)
+    summary = {"submission": entry, "fetched": fetched}
+    missing = entry["episodes"] - len(fetched.written) - len(fetched.current) - len(fetched.failed)
     if entry["state"] in ("waiting", "planning", "running"):
-        print(f"{left} episodes are still to come: the submission is {entry['state']}")
+        print(f"{missing} episodes are still to come: the submission is {entry['state']}")
         suggest("farm fetch", number, session, "--wait")
-    elif found.failed:
+    elif fetched.failed:
         error = SolveError(
-            f"{len(found.failed)} of {entry['episodes']} episodes have no label",
+            f"{len(fetched.failed)} of {entry['episodes']} episodes have no label",
             "a label for every episode",
             f"read {session}/labels/episode-*.failure.json; `tacdata farm submit --redo` tries again",
         )
-        return Result(told, error)
+        return Result(summary, error)
     else:
         suggest("pack", session, "--out DATASET")
-    return Result(told)
+    return Result(summary)

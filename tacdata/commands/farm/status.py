@@ -56,10 +56,10 @@ def run(
 
 
 def _line(entry: dict[str, Any]) -> None:
-    left = f", {entry['presses_left']} presses to go" if entry.get("presses_left") else ""
+    remaining = f", {entry['presses_left']} presses to go" if entry.get("presses_left") else ""
     print(
         f"{entry['id']}  {entry['state']:9}  {entry['labelled']} of {entry['episodes']} labelled, "
-        f"{entry['failed']} failed{left}  {entry['session']}  (by {entry['by']}, priority {entry['priority']})"
+        f"{entry['failed']} failed{remaining}  {entry['session']}  (by {entry['by']}, priority {entry['priority']})"
     )
 
 
