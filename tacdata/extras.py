@@ -15,7 +15,13 @@ IMPORTED_AS = {"markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "warp": "w
 """What is imported by another name than it is installed by."""
 ALL = "all"
 """The extra that brings everything: never the least that is needed."""
-ROOMS = {"tacdata.revision": "fem", "training": "learn", "viewers": "view"}
+ROOMS = {
+    "tacdata.revision": "fem",
+    "training": "learn",
+    "tacdata.pipeline.skin_press": "fem",
+    "tacdata.pipeline": "learn",
+    "viewers": "view",
+}
 """Who asks decides, where two extras bring the same package: torch solves for `fem` and trains for `learn`."""
 
 
