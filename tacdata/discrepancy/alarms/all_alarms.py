@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tacdata.discrepancy.alarms.alarm import Alarm
+from tacdata.discrepancy.alarms.channel_drops import channel_drops
 from tacdata.discrepancy.alarms.channel_histories import channel_histories
 from tacdata.discrepancy.alarms.cleaned import Cleaned
 from tacdata.discrepancy.alarms.motor_lines import motor_lines
@@ -21,4 +22,4 @@ def alarms(problem: Problem, form_error: float = 0.0) -> tuple[Alarm, ...]:
     cleaned = Cleaned.of(problem, form_error)
     # What moves readings while the path moves shows in more than one test: the finest that sees it speaks.
     moving = channel_histories(cleaned) or swings(cleaned) or motor_lines(cleaned)
-    return (*moving, *press_depths(cleaned))
+    return (*moving, *press_depths(cleaned), *channel_drops(cleaned))

@@ -16,18 +16,13 @@ from tacdata.chain import Course
 from tacdata.chain.memory import low_pass, play, running_max
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.alarms.randomization import DRAWS, Largest, largest
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.regressors.generic import depth_share
 from tacdata.discrepancy.statistics.gram_fit import flips
 
 FEWEST = 12
 """Presses, at least."""
-DRAWS = 2000
-"""Flips of sign."""
-CHANCE = 0.001
-"""Level of the test, over all histories [1]."""
-LEAST_Z = 3.7
-"""Least score, as a normal number by Wilson & Hilferty [1]."""
 MOST_LEVERAGE = 0.5
 """A channel of which one press holds a larger share of the information does not count [1]."""
 STIRRED = 0.02
@@ -51,8 +46,7 @@ class Best:
     history: str
     over: str
     """What its size goes with: "", the time or the temperature."""
-    z: float
-    p: float
+    test: Largest
     weight: np.ndarray
     """Weight of each channel [its unit, 1 or s, over the history], shape (channels,); 0 where it does not count."""
     size: np.ndarray
@@ -64,12 +58,12 @@ def channel_histories(cleaned: Cleaned) -> list[Alarm]:
     if len(cleaned.begins) < FEWEST or cleaned.course.channels < FEWEST_CHANNELS:
         return []
     best = strongest(cleaned)
-    return [] if best is None or best.p > CHANCE or best.z < LEAST_Z else [_told(cleaned, best)]
+    return [] if best is None or not best.test.alarms else [_told(cleaned, best)]
 
 
 def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
     """Return the history that channels follow most, with its p-value over all of them."""
-    found, drawn = [], []
+    found, tables, beyond = [], [], []
     signs: np.ndarray | None = None
     for kind, history, over, column in _columns(cleaned):
         white = cleaned.whitened(column)
@@ -85,23 +79,17 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
         weight = score.sum(axis=0) / total
         rest = (score - known[:, counts] * weight) / (1 - leverage) / np.sqrt(total)
         null = np.square(signs @ rest).sum(axis=1) * _scatter(rest)
-        seen = float(np.sum(score.sum(axis=0) ** 2 / total))
-        root = np.cbrt(null)
-        middle, spread = float(root.mean()), float(root.std()) + 1e-12
-        z = (np.cbrt(seen) - middle) / spread
-        if seen - null.mean() < cleaned.least_of_channels:
-            z = min(z, 0.0)
-        drawn.append((root - middle) / spread)
+        observed = float(np.sum(score.sum(axis=0) ** 2 / total))
+        tables.append(np.append(observed, null))
+        beyond.append(observed - null.mean() >= cleaned.least_of_channels)
         every = np.zeros(len(counts))
         every[counts] = weight
-        size = np.abs(every) * np.quantile(np.abs(column), USUAL, axis=0)
-        found.append(Best(kind, history, over, float(z), 1.0, every, size))
+        found.append((kind, history, over, every, np.abs(every) * np.quantile(np.abs(column), USUAL, axis=0)))
     if not found:
         return None
-    first = max(found, key=lambda one: one.z)
-    most = np.max(drawn, axis=0)
-    p = float((1 + (most >= first.z).sum()) / (DRAWS + 1))
-    return Best(first.kind, first.history, first.over, first.z, p, first.weight, first.size)
+    test = largest(np.stack(tables, axis=1), np.array(beyond))
+    kind, history, over, weight, size = found[test.at]
+    return Best(kind, history, over, test, weight, size)
 
 
 def _scatter(rest: np.ndarray) -> float:

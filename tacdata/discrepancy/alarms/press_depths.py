@@ -12,6 +12,7 @@ from scipy.stats import chi2_contingency
 from tacdata.chain import Course
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.alarms.randomization import DRAWS, RATE
 from tacdata.discrepancy.noise.nuisances import FITTED_DEPTH_PRIOR, POSE_PRIOR
 from tacdata.discrepancy.noise.variance_components import one_by_one
 from tacdata.discrepancy.search.problem import Problem
@@ -22,10 +23,6 @@ LEAST_STRETCH = 4
 """Presses of a stretch, and beside it, at least."""
 MOST_EDGES = 60
 """Stretches begin and end at so many presses, at most."""
-DRAWS = 1000
-"""Permutations of presses."""
-CHANCE = 0.001
-"""Level of the permutation test, over all stretches [1]."""
 LEAST_Z = 5.0
 """A stretch differs by so many standard errors, at least [1]."""
 LEAST_RATIO = 13.0
@@ -130,7 +127,7 @@ def stretch(depth: np.ndarray, place: np.ndarray, seed: int = 0) -> tuple[int, i
     fair = z - np.sqrt(2 * np.log(count / np.minimum(long, count - long)))
     best = int(np.argmax(fair[0]))
     p = (1 + (fair[1:].max(axis=1) >= fair[0, best]).sum()) / (DRAWS + 1)
-    if p > CHANCE or z[0, best] < LEAST_Z:
+    if p > RATE or z[0, best] < LEAST_Z:
         return None
     return int(begin[best]), int(end[best]), float(by[0, best] / np.sqrt(power[kept][best]))
 

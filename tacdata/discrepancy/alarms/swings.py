@@ -16,6 +16,7 @@ import numpy as np
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
 from tacdata.discrepancy.alarms.motor_lines import hums
+from tacdata.discrepancy.alarms.randomization import DRAWS, Largest, largest
 from tacdata.discrepancy.plain_number import plain_number
 
 FEWEST = 12
@@ -37,12 +38,6 @@ MOVES = 0.05
 """Rows move from this share of the usual largest rate of depth on [1]."""
 USUAL_RATE = 0.95
 """Quantile of the rates of depth that counts as the usual largest [1]."""
-DRAWS = 2000
-"""Draws of signs."""
-CHANCE = 0.001
-"""Level of the test, over all waves [1]."""
-LEAST_Z = 3.7
-"""Least score, as a normal number by Wilson & Hilferty [1]."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +46,7 @@ class Swing:
 
     wave: int
     """Its number: `WAVES`, then `HERTZ`."""
-    z: float
-    p: float
+    test: Largest
     share: float
     """Its amplitude over the rise [1]."""
 
@@ -60,7 +54,7 @@ class Swing:
 def swings(cleaned: Cleaned) -> list[Alarm]:
     """Return the alarm of swings that differ from press to press, or none."""
     found = strongest(cleaned)
-    if found is None or found.p > CHANCE or found.z < LEAST_Z:
+    if found is None or not found.test.alarms:
         return []
     share, most = plain_number(100 * found.share, 2), plain_number(found.share * cleaned.largest, 2)
     size = f"by about {share} % of the rise, up to {most} in readings"
@@ -112,16 +106,11 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
             signs[at][0] = 1.0
         energy += by * (np.square(signs[at] @ own.real) + np.square(signs[at] @ own.imag))
     energy[1:] *= 1 + _shared_in_air(cleaned)
-    root = np.cbrt(energy)
-    middle, spread = root[1:].mean(axis=0), root[1:].std(axis=0)
-    z = np.where(spread > 1e-9, (root - middle) / np.maximum(spread, 1e-9), 0.0)
     beyond = np.square(np.abs(parts.sum(axis=1))) - alone
     size = 4 * beyond.sum(axis=0) / np.maximum(np.square(power).sum(axis=0), 1e-30)
     explained = (2 * beyond / np.maximum(power, 1e-30)).sum(axis=0)
-    z[0] = np.where(explained >= cleaned.least, z[0], np.minimum(z[0], 0.0))
-    best = int(np.argmax(z[0]))
-    p = float((1 + (z[1:].max(axis=1) >= z[0, best]).sum()) / (DRAWS + 1))
-    return Swing(best, float(z[0, best]), p, float(np.sqrt(max(size[best], 0.0))))
+    test = largest(energy, explained >= cleaned.least)
+    return Swing(test.at, test, float(np.sqrt(max(size[test.at], 0.0))))
 
 
 def _shared_in_air(cleaned: Cleaned) -> float:

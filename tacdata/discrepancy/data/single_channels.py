@@ -37,16 +37,17 @@ def odd_channels(course: Course, response: Response) -> list[str]:
     if len(episodes) < FEWEST:
         return []
     rows = [np.flatnonzero(reduced.episode == e) for e in episodes]
-    measured = [_level(reduced.readings[r]) for r in rows]
-    expected = [_level(predicted[r]) for r in rows]
+    measured = [risen(reduced.readings[r]) for r in rows]
+    expected = [risen(predicted[r]) for r in rows]
     swapped = _swaps(course, episodes, measured, expected)
     turned = _turned(course, episodes, rows, measured)
     taken, places = {*turned, *(c for pair in swapped for c in pair)}, [*turned.values(), *swapped.values()]
-    gains = _gains(measured, expected)
+    gains = press_gains(measured, expected)
     return [*places, *_jumps_and_wanders(course, episodes, gains, taken)][:MOST_LISTED]
 
 
-def _level(values: np.ndarray) -> np.ndarray:
+def risen(values: np.ndarray) -> np.ndarray:
+    """Return a press's readings above those that it begins with, shape (n, channels)."""
     return values - np.nanmedian(values[: max(len(values) // 10, 1)], axis=0)
 
 
@@ -75,7 +76,7 @@ def _turned(course: Course, episodes: np.ndarray, rows: list[np.ndarray], measur
     return words
 
 
-def _gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
+def press_gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
     """Return each channel's gain in each press [1], shape (presses, channels); NaN where a press hardly stirs it."""
     power = np.array([np.nansum(np.square(p), axis=0) for p in expected])
     both = np.array([np.nansum(m * p, axis=0) for m, p in zip(measured, expected, strict=True)])
