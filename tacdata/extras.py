@@ -18,8 +18,9 @@ ALL = "all"
 ROOMS = {
     "tacdata.revision": "fem",
     "training": "learn",
-    "tacdata.pipeline.skin_press": "fem",
-    "tacdata.pipeline": "learn",
+    "tacdata.pipeline.evaluate": "learn",
+    "tacdata.pipeline.train": "learn",
+    "tacdata.pipeline.trained_network": "learn",
     "viewers": "view",
 }
 """Who asks decides, where two extras bring the same package: torch solves for `fem` and trains for `learn`."""
