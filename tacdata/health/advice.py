@@ -49,19 +49,19 @@ class Advice:
 def advice(history: History) -> tuple[Advice, ...]:
     """Return what to do, the gravest first."""
     faults, changed = history.wiring, history.changed
-    moved = elsewhere(history)
-    if moved:  # what gains change cannot be told from so large a shift
+    shifted = elsewhere(history)
+    if shifted:  # what gains change cannot be told from so large a shift
         changed = tuple(c for c in changed if c[1].quantity not in ("common gain", "gain"))
-    found = [*_wiring(history, faults), *_noise(history, [c for c in changed if c[1].quantity == "noise"])]
+    advices = [*_wiring(history, faults), *_noise(history, [c for c in changed if c[1].quantity == "noise"])]
     for do, quantities in (
         (REGISTER, ("depth", "x", "y", "repeatability")),
         (RECALIBRATE, ("common gain", "gain", "loop", "network error")),
         (TARE, ("zero", "drift")),
     ):
         for quantity in quantities:
-            found += _told(history, do, [c for c in changed if c[1].quantity == quantity])
-    if found:
-        return tuple(found)
+            advices += _told(history, do, [c for c in changed if c[1].quantity == quantity])
+    if advices:
+        return tuple(advices)
     if len(history.visits) == 1:
         why = "there is nothing to compare with yet: record the same plan at the next visit and name both sessions"
         return (Advice(FIRST, (), why),)
@@ -77,10 +77,12 @@ def elsewhere(history: History) -> bool:
 
 
 def _wiring(history: History, faults: Wiring) -> list[Advice]:
-    found, count = [], history.last.sensor.taxels.count
+    advices, count = [], history.last.sensor.taxels.count
     faulty = sorted(faults.unfit)
     if len(faulty) > max(2.0, MOST_FAULTY * count):
-        found.append(Advice(REPLACE, tuple(faulty), f"{len(faulty)} of {count} channels give no readings of their own"))
+        advices.append(
+            Advice(REPLACE, tuple(faulty), f"{len(faulty)} of {count} channels give no readings of their own")
+        )
     elif faults.dead:
         why = f"{named(faults.dead)} {'do' if len(faults.dead) > 1 else 'does'} not answer to presses close by"
         number = len(history.visits) - 2
@@ -88,16 +90,16 @@ def _wiring(history: History, faults: Wiring) -> list[Advice]:
         if old := sorted(set(before) & set(faults.dead)):
             again = "the same" if len(old) == len(faults.dead) else named(old)
             why += f", {again} as at {history.visits[number].name}: if the wires are sound, replace the unit"
-        found.append(Advice(WIRING, faults.dead, why))
+        advices.append(Advice(WIRING, faults.dead, why))
     if faults.swapped:
         pairs = ", ".join(f"channel {channel} answers like taxel {taxel}" for channel, taxel in faults.swapped)
-        found.append(Advice(WIRING, tuple(channel for channel, _ in faults.swapped), pairs))
-    if not found or found[0].do != REPLACE:
+        advices.append(Advice(WIRING, tuple(channel for channel, _ in faults.swapped), pairs))
+    if not advices or advices[0].do != REPLACE:
         for pair in faults.tied:
-            found.append(Advice(WIRING, pair, f"channels {pair[0]} and {pair[1]} read the same throughout"))
+            advices.append(Advice(WIRING, pair, f"channels {pair[0]} and {pair[1]} read the same throughout"))
         if faults.undefined:
-            found.append(Advice(WIRING, faults.undefined, f"readings of {named(faults.undefined)} are no numbers"))
-    return found
+            advices.append(Advice(WIRING, faults.undefined, f"readings of {named(faults.undefined)} are no numbers"))
+    return advices
 
 
 def _noise(history: History, changed: list[tuple[int, Change]]) -> list[Advice]:
@@ -128,8 +130,8 @@ def _told(history: History, do: str, changed: list[tuple[int, Change]]) -> list[
 def _sentence(history: History, against: int, change: Change) -> str:
     """Return a change in words, with its interval and what it is compared with."""
     of = "" if change.channel is None else f" of channel {change.channel}"
-    beside = "" if change.quantity in ABSOLUTE else f" against {history.visits[against].name}"
-    return f"{CALLED[change.quantity]}{of}: {told(change)}{beside}"
+    reference = "" if change.quantity in ABSOLUTE else f" against {history.visits[against].name}"
+    return f"{CALLED[change.quantity]}{of}: {told(change)}{reference}"
 
 
 def told(change: Change) -> str:

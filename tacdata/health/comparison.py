@@ -110,9 +110,9 @@ def compare(
     if network and (
         grown := growth(*network, [(now.responses[a].press.index, before.responses[b].press.index) for a, b in pairs])
     ):
-        found = _change("network error", None, grown, "1", float(np.log1p(NETWORK)))
-        value, low, high = (float(np.expm1(v)) for v in (found.value, found.low, found.high))
-        changes.append(replace(found, value=value, low=low, high=high, tolerance=NETWORK))
+        change = _change("network error", None, grown, "1", float(np.log1p(NETWORK)))
+        value, low, high = (float(np.expm1(v)) for v in (change.value, change.low, change.high))
+        changes.append(replace(change, value=value, low=low, high=high, tolerance=NETWORK))
     return VisitComparison(against, tuple(pairs), gains, faults, tuple(changes))
 
 
@@ -126,13 +126,15 @@ def corrected(comparisons: Sequence[VisitComparison]) -> tuple[VisitComparison, 
 
     Two families, as a channel is one of many and the unit is one.
     """
-    every = [change for c in comparisons for change in c.changes]
-    p_values = np.ones(len(every))
+    changes = [change for c in comparisons for change in c.changes]
+    p_values = np.ones(len(changes))
     for of_channel in (True, False):
-        rows = [k for k, change in enumerate(every) if (change.channel is not None) == of_channel]
-        p_values[rows] = holm([every[k].p for k in rows])
-    left = iter(p_values.tolist())
-    return tuple(replace(c, changes=tuple(replace(x, corrected=next(left)) for x in c.changes)) for c in comparisons)
+        rows = [k for k, change in enumerate(changes) if (change.channel is not None) == of_channel]
+        p_values[rows] = holm([changes[k].p for k in rows])
+    remaining = iter(p_values.tolist())
+    return tuple(
+        replace(c, changes=tuple(replace(x, corrected=next(remaining)) for x in c.changes)) for c in comparisons
+    )
 
 
 def _order(faults: Wiring, count: int) -> np.ndarray:
@@ -162,8 +164,8 @@ def _by_labels(now: Visit, before: Visit, faults: Wiring) -> GainFit | None:
     if after is None or ahead is None:
         return None
     ratio = {k: _ratio(e, ahead.channels[k]) for k, e in after.channels.items() if k in ahead.channels}
-    own = {k: _ratio(e, ahead.own[k]) for k, e in after.own.items() if k in ahead.own}
-    return GainFit(ratio, _ratio(after.common, ahead.common), own, {}, min(after.presses, ahead.presses))
+    ratios = {k: _ratio(e, ahead.own[k]) for k, e in after.own.items() if k in ahead.own}
+    return GainFit(ratio, _ratio(after.common, ahead.common), ratios, {}, min(after.presses, ahead.presses))
 
 
 def model_gains(visit: Visit, faults: Wiring) -> GainFit | None:
@@ -176,19 +178,19 @@ def model_gains(visit: Visit, faults: Wiring) -> GainFit | None:
     return fit_gains(visit.predicted, sorted_back, noise, visit.sensor, faults.unfit, predicted=True)
 
 
-def _ratio(one: UncertainValue, other: UncertainValue) -> UncertainValue:
-    value = one.value / other.value
-    error = abs(value) * float(np.hypot(one.error / one.value, other.error / other.value))
-    return UncertainValue(value, error, min(one.freedom, other.freedom))
+def _ratio(numerator: UncertainValue, denominator: UncertainValue) -> UncertainValue:
+    value = numerator.value / denominator.value
+    error = abs(value) * float(np.hypot(numerator.error / numerator.value, denominator.error / denominator.value))
+    return UncertainValue(value, error, min(numerator.freedom, denominator.freedom))
 
 
 def _gain_changes(gains: GainFit | None) -> list[Change]:
     if gains is None:
         return []
-    found = [_change("common gain", None, _less_one(gains.common), "1", COMMON)]
-    found += [_change("gain", k, _less_one(e), "1", OWN) for k, e in gains.own.items()]
+    changes = [_change("common gain", None, _less_one(gains.common), "1", COMMON)]
+    changes += [_change("gain", k, _less_one(e), "1", OWN) for k, e in gains.own.items()]
     limits = {"depth": DEPTH, "x": SIDEWAYS, "y": SIDEWAYS}
-    return found + [_change(name, None, e, "mm", limits[name]) for name, e in gains.shift.items()]
+    return changes + [_change(name, None, e, "mm", limits[name]) for name, e in gains.shift.items()]
 
 
 def _less_one(gain: UncertainValue) -> UncertainValue:
@@ -199,23 +201,23 @@ def _channel_changes(now: Visit, before: Visit, faults: Wiring, order: np.ndarra
     """Return what each channel did without contact, and how repeatable a press was."""
     strongest = np.max([np.abs(press.hold) for press in before.responses], axis=0)
     zero, noise, drift, ahead, noisy = now.zero, now.noise, now.drift, before.zero, before.noise
-    found = []
+    changes = []
     for taxel, channel in enumerate(order.tolist()):
         if channel in faults.unfit or not strongest[taxel] > 0:
             continue
-        moved = UncertainValue(
+        shift = UncertainValue(
             zero[channel].value - ahead[taxel].value,
             float(np.hypot(zero[channel].error, ahead[taxel].error)),
             min(zero[channel].freedom, ahead[taxel].freedom),
         )
-        found.append(_change("zero", channel, moved, now.unit, ZERO * float(strongest[taxel])))
-        found.append(_change("drift", channel, drift[channel], f"{now.unit}/min", DRIFT * float(strongest[taxel])))
-        found.append(_louder(channel, noise[channel], noisy[taxel]))
+        changes.append(_change("zero", channel, shift, now.unit, ZERO * float(strongest[taxel])))
+        changes.append(_change("drift", channel, drift[channel], f"{now.unit}/min", DRIFT * float(strongest[taxel])))
+        changes.append(_louder(channel, noise[channel], noisy[taxel]))
     if repeated := now.repeatability:
         low, high = repeated.interval
         p = repeated.p_above(REPEATABLE)
-        found.append(Change("repeatability", None, repeated.value, low, high, "1", REPEATABLE, p))
-    return found
+        changes.append(Change("repeatability", None, repeated.value, low, high, "1", REPEATABLE, p))
+    return changes
 
 
 def _louder(channel: int, now: Spread, before: Spread) -> Change:
@@ -227,6 +229,6 @@ def _louder(channel: int, now: Spread, before: Spread) -> Change:
     return Change("noise", channel, ratio, ratio * float(np.exp(-half)), ratio * float(np.exp(half)), "1", NOISE, p)
 
 
-def _change(quantity: str, channel: int | None, found: UncertainValue, unit: str, tolerance: float) -> Change:
-    low, high = map(float, found.interval)
-    return Change(quantity, channel, float(found.value), low, high, unit, tolerance, found.p_beyond(tolerance))
+def _change(quantity: str, channel: int | None, estimate: UncertainValue, unit: str, tolerance: float) -> Change:
+    low, high = map(float, estimate.interval)
+    return Change(quantity, channel, float(estimate.value), low, high, unit, tolerance, estimate.p_beyond(tolerance))

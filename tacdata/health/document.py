@@ -76,14 +76,14 @@ def _gains(fit: GainFit | None) -> dict[str, Any] | None:
     }
 
 
-def _estimate(found: UncertainValue) -> dict[str, Any]:
-    low, high = found.interval
-    return {"value": _number(found.value), "low": _number(low), "high": _number(high)}
+def _estimate(estimate: UncertainValue) -> dict[str, Any]:
+    low, high = estimate.interval
+    return {"value": _number(estimate.value), "low": _number(low), "high": _number(high)}
 
 
-def _spread(found: Spread) -> dict[str, Any]:
-    low, high = found.interval
-    return {"value": _number(found.value), "low": _number(low), "high": _number(high)}
+def _spread(spread: Spread) -> dict[str, Any]:
+    low, high = spread.interval
+    return {"value": _number(spread.value), "low": _number(low), "high": _number(high)}
 
 
 def _change(change: Change) -> dict[str, Any]:
@@ -106,41 +106,41 @@ def _number(value: float) -> float | None:
 
 def not_assessed(history: History) -> list[str]:
     """Return what the visits cannot tell, and what to record, as sentences."""
-    last, found = history.last, []
+    last, lines = history.last, []
     if len(history.visits) > 1:
         fit = history.comparisons[-1][0].gains
         before = history.visits[history.comparisons[-1][0].against]
         if fit is None:
             pairs = len(history.comparisons[-1][0].pairs)
-            found.append(
+            lines.append(
                 f"gains: {last.name} and {before.name} share {pairs} presses of one indenter, place, depth and speed, "
                 "at three sites or more they are needed; record the same plan, or label both"
             )
         else:
-            left = sorted(set(range(last.sensor.taxels.count)) - set(fit.channels) - history.wiring.unfit)
-            if left:
-                found.append(f"gain of {named(left)}: no press near; `tacdata plan health` presses near every taxel")
+            missing = sorted(set(range(last.sensor.taxels.count)) - set(fit.channels) - history.wiring.unfit)
+            if missing:
+                lines.append(f"gain of {named(missing)}: no press near; `tacdata plan health` presses near every taxel")
     if elsewhere(history):
-        found.append("gains: the tip stood elsewhere than before; register again and repeat the visit")
+        lines.append("gains: the tip stood elsewhere than before; register again and repeat the visit")
     if last.repeatability is None:
-        found.append("repeatability: no press is repeated; the plan health repeats one")
+        lines.append("repeatability: no press is repeated; the plan health repeats one")
     if not np.isfinite(last.drift[0].value):
-        found.append("drift: fewer than three recordings with a rest")
-    return found
+        lines.append("drift: fewer than three recordings with a rest")
+    return lines
 
 
 def remarks(history: History) -> list[str]:
     """Return what a reader should know of the sessions, as sentences."""
-    found = []
+    lines = []
     for visit in history.visits:
-        found += [f"{visit.name}: {file} is left out: {reason}" for file, reason in visit.left_out]
+        lines += [f"{visit.name}: {file} is left out: {reason}" for file, reason in visit.left_out]
         if visit.label_remark:
-            found.append(f"{visit.name}: {visit.label_remark}")
+            lines.append(f"{visit.name}: {visit.label_remark}")
         if visit.session.remaining:
-            found.append(f"{visit.name}: {len(visit.session.remaining)} presses of its plan are not recorded")
+            lines.append(f"{visit.name}: {len(visit.session.remaining)} presses of its plan are not recorded")
     if len({visit.sensor.content_hash for visit in history.visits}) > 1:
-        found.append("the sensor file changed between visits: gains beside the model compare two models")
-    return found
+        lines.append("the sensor file changed between visits: gains beside the model compare two models")
+    return lines
 
 
 def _provenance(history: History) -> dict[str, Any]:
@@ -178,23 +178,23 @@ def summary(history: History) -> list[tuple[str, str]]:
     last, number = history.last, len(history.visits) - 1
     first, model = history.beside_first(number), history.model[number]
     noise = float(np.median([value.value for value in last.noise.values()]))
-    found = []
+    tiles = []
     if first and first.gains:
-        beside = history.visits[0].name
-        found.append(("gain", f"{_percent(first.gains.common)} of that at {beside}, all channels (median)"))
+        reference = history.visits[0].name
+        tiles.append(("gain", f"{_percent(first.gains.common)} of that at {reference}, all channels (median)"))
     if model:
-        found.append(("gain of model", f"{_percent(model.common)} of what labels predict, all channels (median)"))
-    found.append(("noise", f"{noise:.1f} {last.unit} (median of the channels)"))
-    found.append(("loop", f"{_percent(last.loop)} of depth times answer"))
+        tiles.append(("gain of model", f"{_percent(model.common)} of what labels predict, all channels (median)"))
+    tiles.append(("noise", f"{noise:.1f} {last.unit} (median of the channels)"))
+    tiles.append(("loop", f"{_percent(last.loop)} of depth times answer"))
     if repeated := last.repeatability:
         low, high = (100 * bound for bound in repeated.interval)
-        found.append(("repeatability", f"{100 * repeated.value:.1f} % ({low:.1f} to {high:.1f})"))
+        tiles.append(("repeatability", f"{100 * repeated.value:.1f} % ({low:.1f} to {high:.1f})"))
     if errors := history.network.get(number):
         low, high = errors.mean.interval
-        found.append(("network", f"error in contact {errors.mean.value:.3f} mm ({low:.3f} to {high:.3f})"))
-    return found
+        tiles.append(("network", f"error in contact {errors.mean.value:.3f} mm ({low:.3f} to {high:.3f})"))
+    return tiles
 
 
-def _percent(found: UncertainValue) -> str:
-    low, high = (100 * bound for bound in found.interval)
-    return f"{100 * found.value:.1f} % ({low:.1f} to {high:.1f})"
+def _percent(estimate: UncertainValue) -> str:
+    low, high = (100 * bound for bound in estimate.interval)
+    return f"{100 * estimate.value:.1f} % ({low:.1f} to {high:.1f})"

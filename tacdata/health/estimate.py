@@ -61,10 +61,10 @@ class Spread:
 
 def mean(values: np.ndarray) -> UncertainValue:
     """Return the mean of independent values, shape (n,), with its standard error; NaN from fewer than two."""
-    known = values[np.isfinite(values)]
-    if len(known) < 2:
-        return UncertainValue(float(known.mean()) if len(known) else float("nan"), float("nan"), 1.0)
-    return UncertainValue(float(known.mean()), float(known.std(ddof=1) / np.sqrt(len(known))), len(known) - 1.0)
+    finite = values[np.isfinite(values)]
+    if len(finite) < 2:
+        return UncertainValue(float(finite.mean()) if len(finite) else float("nan"), float("nan"), 1.0)
+    return UncertainValue(float(finite.mean()), float(finite.std(ddof=1) / np.sqrt(len(finite))), len(finite) - 1.0)
 
 
 def holm(p_values: Sequence[float]) -> np.ndarray:

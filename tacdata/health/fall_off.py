@@ -59,10 +59,10 @@ def fall_off(presses: Sequence[PressResponse], near: Sequence[Sequence[int]], ce
     terms = []
     for level in range(len(LEVELS) + 1):
         rows, heights = [held], [0.0] * taxels
-        for k, (press, found, apart) in enumerate(zip(presses, near, squared, strict=True)):
+        for k, (press, found, distances) in enumerate(zip(presses, near, squared, strict=True)):
             use = [c for c in found if press.levels[level, c] * press.hold[c] > 0]
             row = np.zeros((len(use), held.shape[1]))
-            row[:, :DEGREE] = (apart[use, None] / unit) ** powers
+            row[:, :DEGREE] = (distances[use, None] / unit) ** powers
             row[:, DEGREE + k] = 1.0
             row[np.arange(len(use)), DEGREE + len(presses) + np.array(use, int)] = 1.0
             rows.append(row)

@@ -133,8 +133,8 @@ def _scale(pairs: list[_Pair]) -> float:
 
 def _spreads(sensor: Sensor) -> list[float]:
     """Return the spreads of a registration in depth, x and y [mm]."""
-    known: dict[str, Any] = sensor.uncertainty or {}
-    return [known.get(name) or usual for name, usual in (("z", 0.02), ("x", 0.05), ("y", 0.05))]
+    stated: dict[str, Any] = sensor.uncertainty or {}
+    return [stated.get(name) or usual for name, usual in (("z", 0.02), ("x", 0.05), ("y", 0.05))]
 
 
 def _rows(
@@ -146,24 +146,24 @@ def _rows(
     gain = np.maximum(value[place], WEAKEST * float(np.median(value[: len(channels)])))[:, None]
     away = sensor.taxels.centers - (pair.before.press.x, pair.before.press.y)
     factor, sides = (np.moveaxis(part[:, found], 0, 1) for part in fall.shifted(away, shift))
-    said = factor * pair.before.levels[:, found].T  # (channels, levels)
+    predicted = factor * pair.before.levels[:, found].T  # (channels, levels)
     # The mean of both slopes is right to second order in the shift of depth.
     slope = 0.5 * (gain * factor * pair.before.slope[:, found].T + pair.after.slope[:, found].T)
     design = np.zeros((count, levels, len(value)))
-    design[np.arange(count), :, place] = said
+    design[np.arange(count), :, place] = predicted
     design[:, :, -3] = slope
-    design[:, :, -2:] = (gain * said)[:, :, None] * sides
+    design[:, :, -2:] = (gain * predicted)[:, :, None] * sides
     answer = pair.after.levels[:, found].T + design[:, :, -2:] @ shift
-    felt, faint = gain * said, FAINT * gain * np.abs(pair.before.hold).max() * np.ones_like(said)
-    early = TIMING * pair.before.press.speed * slope
-    early[:, -1] = 0.0  # a hold does not depend on when it began
+    felt, faint = gain * predicted, FAINT * gain * np.abs(pair.before.hold).max() * np.ones_like(predicted)
+    timing = TIMING * pair.before.press.speed * slope
+    timing[:, -1] = 0.0  # a hold does not depend on when it began
     reading = visits * (np.diag(pair.after.spread) + pair.after.spread[-1])  # the reading at rest is shared
-    known = np.kron(np.diag(np.maximum(noise[found], 1.0) ** 2), reading) + visits * np.outer(early, early)
+    known = np.kron(np.diag(np.maximum(noise[found], 1.0) ** 2), reading) + visits * np.outer(timing, timing)
     known += np.diag((LEVEL * (np.abs(felt) + faint) + STEEPER * np.abs(slope * value[-3])).ravel() ** 2)
     known += _each(MISFIT * design[:, :, -2:] @ shift)
     # A relative error is like another gain, at all levels; else the levels of one press would tell gains.
-    own = _each(felt) + _each(faint)
-    return SiteRows(design.reshape(count * levels, -1), answer.ravel(), known, own, np.outer(felt, felt))
+    loading = _each(felt) + _each(faint)
+    return SiteRows(design.reshape(count * levels, -1), answer.ravel(), known, loading, np.outer(felt, felt))
 
 
 def _each(size: np.ndarray) -> np.ndarray:
@@ -183,12 +183,12 @@ def _fit(value: np.ndarray, covariance: np.ndarray, channels: list[int], sites: 
     mean, apart = np.full(count, 1 / count), np.eye(count) - 1 / count
     remains = middle * np.hypot(REMAINS, DEEPER * value[count])
     shared = float(np.hypot(np.sqrt(max(mean @ covariance[:count, :count] @ mean, 0.0)), remains))
-    own = np.sqrt(np.maximum(np.diag(apart @ covariance[:count, :count] @ apart.T), 0.0))
+    errors = np.sqrt(np.maximum(np.diag(apart @ covariance[:count, :count] @ apart.T), 0.0))
     pairs = list(enumerate(channels))
     return GainFit(
         {k: UncertainValue(float(gain[i]), float(error[i]), freedom) for i, k in pairs},
         UncertainValue(middle, shared, freedom),
-        {k: UncertainValue(float(gain[i] / middle), float(own[i] / middle), freedom) for i, k in pairs},
+        {k: UncertainValue(float(gain[i] / middle), float(errors[i] / middle), freedom) for i, k in pairs},
         {name: UncertainValue(float(value[i]), float(error[i]), freedom) for i, name in enumerate(AXES, count)},
         sites,
     )

@@ -39,8 +39,8 @@ class History:
 
     def wiring_at(self, number: int) -> Wiring:
         """Return the faults of the channels at a visit."""
-        found = self.comparisons[number]
-        return found[-1].wiring if found else wiring_alone(self.visits[number])
+        comparisons = self.comparisons[number]
+        return comparisons[-1].wiring if comparisons else wiring_alone(self.visits[number])
 
     def beside_first(self, number: int) -> VisitComparison | None:
         """Return a visit beside the first one; None for the first."""
@@ -102,9 +102,9 @@ def in_order(visits: Sequence[Visit]) -> list[Visit]:
         kind = f"{visit.sensor.name} ({taxels.columns} x {taxels.rows} taxels of {taxels.pitch_x:g} x "
         units.setdefault(f"{kind}{taxels.pitch_y:g} mm)", []).append(visit.session.folder)
     if len(units) > 1:
-        told = "; ".join(f"{name}: {', '.join(p.name for p in paths)}" for name, paths in units.items())
+        named = "; ".join(f"{name}: {', '.join(p.name for p in paths)}" for name, paths in units.items())
         typed = "; ".join("tacdata health " + " ".join(map(str, paths)) for paths in units.values())
-        raise UsageError(f"sessions of {len(units)} units: {told}", "sessions of one unit", f"ask for each: {typed}")
+        raise UsageError(f"sessions of {len(units)} units: {named}", "sessions of one unit", f"ask for each: {typed}")
     folders = [visit.session.folder.resolve() for visit in visits]
     twice = {path.name for path in folders if folders.count(path) > 1}
     if twice:

@@ -55,8 +55,8 @@ def relative_errors(rows: Sequence[SiteRows], precision: np.ndarray) -> np.ndarr
         return rest - fitted + float(np.linalg.slogdet(information + 1e-12 * np.eye(len(score)))[1])
 
     options = {"xatol": STEP, "fatol": STEP, "maxfev": MOST}
-    found = minimize(loss, np.log(START), method="Nelder-Mead", options=options)
-    return np.maximum(np.exp(found.x), SMALLEST)
+    optimum = minimize(loss, np.log(START), method="Nelder-Mead", options=options)
+    return np.maximum(np.exp(optimum.x), SMALLEST)
 
 
 def _sums(rows: Sequence[SiteRows], precision: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -38,12 +38,12 @@ def page(history: History) -> str:
 
 def _rows(comparison: VisitComparison) -> list[tuple[str, str, str, str, bool]]:
     """Return the table of a comparison: quantity, value with interval, tolerance, corrected p-value, changed."""
-    chosen = []
+    changes = []
     for quantity in CALLED:
         of = sorted((c for c in comparison.changes if c.quantity == quantity), key=lambda c: -abs(c.value))
-        chosen += [c for k, c in enumerate(of) if c.changed or k < FEWEST_ROWS]
+        changes += [c for k, c in enumerate(of) if c.changed or k < FEWEST_ROWS]
     rows = []
-    for c in chosen:
+    for c in changes:
         words = CALLED[c.quantity] + ("" if c.channel is None else f", channel {c.channel}")
         share = 100 if c.unit == "1" and c.quantity != "noise" else 1
         unit = {"noise": "times", "loop": "points"}.get(c.quantity, "%" if share == 100 else c.unit)

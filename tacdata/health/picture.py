@@ -42,8 +42,8 @@ def draw(history: History, out: Path | BinaryIO) -> None:
 
 def reference(history: History) -> tuple[str, list[GainFit | None]]:
     """Return what gains are drawn beside, and the gains of each visit: the first visit, or the model if alone."""
-    beside = [history.beside_first(k) for k in range(len(history.visits))]
-    fits = [c.gains if c else None for c in beside]
+    comparisons = [history.beside_first(k) for k in range(len(history.visits))]
+    fits = [c.gains if c else None for c in comparisons]
     if any(fits):
         return f"first visit, {history.visits[0].name}", fits
     return "the model", list(history.model)
@@ -53,17 +53,17 @@ def _gains(axes: Any, history: History) -> None:
     """Draw the gain of every channel over the visits, and the common one with its interval."""
     name, fits = reference(history)
     bad = set(_marked(history))
-    known = [(k, fit) for k, fit in enumerate(fits) if fit is not None]
-    if not known:
+    fitted = [(k, fit) for k, fit in enumerate(fits) if fit is not None]
+    if not fitted:
         _say_unknown(axes)
-    start = [(0, 1.0)] if known and known[0][0] > 0 else []
-    for channel in sorted({c for _, fit in known for c in fit.channels}):
-        line = start + [(k, fit.channels[channel].value) for k, fit in known if channel in fit.channels]
+    start = [(0, 1.0)] if fitted and fitted[0][0] > 0 else []
+    for channel in sorted({c for _, fit in fitted for c in fit.channels}):
+        line = start + [(k, fit.channels[channel].value) for k, fit in fitted if channel in fit.channels]
         style = {"color": BAD, "linewidth": 1.4, "zorder": 3} if channel in bad else {"color": GREY, "linewidth": 0.8}
         axes.plot(*zip(*line, strict=True), ".-", markersize=3, **style)
         if channel in bad:
             axes.annotate(str(channel), line[-1], color=BAD, xytext=(5, -3), textcoords="offset points", fontsize=9)
-    _errors(axes, [(k, fit.common) for k, fit in known])
+    _errors(axes, [(k, fit.common) for k, fit in fitted])
     axes.set(title=f"gain beside {name}", ylabel="gain [1]")
     _visits(axes, history)
 
@@ -77,11 +77,11 @@ def _say_unknown(axes: Any) -> None:
 
 def _errors(axes: Any, series: list[tuple[int, UncertainValue]]) -> None:
     """Draw estimates with their intervals."""
-    for k, found in series:
-        low, high = found.interval
+    for k, gains in series:
+        low, high = gains.interval
         if np.isfinite(low):
             axes.plot([k, k], [low, high], color=GOOD, linewidth=2, zorder=4)
-        axes.plot(k, found.value, "o", color=GOOD, markersize=5, zorder=5)
+        axes.plot(k, gains.value, "o", color=GOOD, markersize=5, zorder=5)
 
 
 def _array(axes: Any, history: History) -> None:
@@ -91,20 +91,20 @@ def _array(axes: Any, history: History) -> None:
     values = np.full(taxels.count, np.nan)
     for channel, gain in (fit.own if fit else {}).items():
         values[channel] = 100 * (gain.value - 1)
-    most = max(float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0, 100 * OWN)
+    limit = max(float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0, 100 * OWN)
     image = axes.imshow(
         values.reshape(taxels.rows, taxels.columns),
         cmap="RdBu",
-        vmin=-most,
-        vmax=most,
+        vmin=-limit,
+        vmax=limit,
         origin="lower",
         aspect=taxels.pitch_y / taxels.pitch_x,
     )
     axes.figure.colorbar(image, ax=axes)
-    dead, moved = set(history.wiring.unfit), dict(history.wiring.swapped)
+    dead, swapped = set(history.wiring.unfit), dict(history.wiring.swapped)
     for k in range(taxels.count):
-        word = "dead" if k in dead else f"{k} for {moved[k]}" if k in moved else str(k)
-        color = BAD if k in dead or k in moved else "black"
+        word = "dead" if k in dead else f"{k} for {swapped[k]}" if k in swapped else str(k)
+        color = BAD if k in dead or k in swapped else "black"
         axes.text(k % taxels.columns, k // taxels.columns, word, ha="center", va="center", fontsize=7, color=color)
     axes.set(title=f"{history.last.name}: own gains [%], from above", xticks=[], yticks=[])
 
@@ -150,8 +150,8 @@ def _loop(axes: Any, history: History) -> None:
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     if history.network:
         twin = axes.twinx()
-        known = sorted(history.network.items())
-        twin.plot([k for k, _ in known], [e.mean.value for _, e in known], "s--", color=BAD, markersize=4)
+        errors = sorted(history.network.items())
+        twin.plot([k for k, _ in errors], [e.mean.value for _, e in errors], "s--", color=BAD, markersize=4)
         twin.set_ylabel("network's error in contact [mm]", color=BAD)
         twin.set_ylim(bottom=0.0)
     _visits(axes, history)

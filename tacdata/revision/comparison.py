@@ -100,8 +100,8 @@ class Comparison:
         residual = (course.readings - self.predicted(model.response, model.placed)[self.course.read]) / scale
         for number in np.unique(course.episode):
             rows = course.episode == number
-            seen = np.isfinite(residual[rows]).any(axis=0)
-            residual[np.ix_(rows, seen)] -= np.nanmedian(residual[rows][:, seen], axis=0)
+            readable = np.isfinite(residual[rows]).any(axis=0)
+            residual[np.ix_(rows, readable)] -= np.nanmedian(residual[rows][:, readable], axis=0)
         return np.square(residual)
 
     def mean_squares(self, model: Refined, episodes: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -17,41 +17,41 @@ DIGITS = 8
 """Significant digits of a reading."""
 
 
-def write_corrected(held: Comparison, model: Refined, path: Path) -> dict[str, str]:
+def write_corrected(comparison: Comparison, model: Refined, path: Path) -> dict[str, str]:
     """Write readings as recorded and as corrected, a row a reading, as CSV; return what was corrected.
 
     A delay is taken off the times, a kinematic effect is put into the path. Of any other effect its contribution to
     the readings, as the model predicts it, is subtracted.
 
     Args:
-        held: Recordings and the model before.
+        comparison: Recordings and the model before.
         model: The model with the effects.
         path: File to write.
     """
-    course, rows = held.course, held.course.read
-    late = sum(p.effect.delay(p.values) for p in model.placed)
+    course, rows = comparison.course, comparison.course.read
+    delay = sum(p.effect.delay(p.values) for p in model.placed)
     kinematic = [p for p in model.placed if p.stage == "kinematics"]
     delays = [p for p in model.placed if p.effect.delay(p.values) != 0]
-    others = [p for p in model.placed if p not in kinematic and p not in delays]
-    every = predict(course, model.response, [*held.setting.given, *model.placed])
+    additive = [p for p in model.placed if p not in kinematic and p not in delays]
+    prediction = predict(course, model.response, [*comparison.setting.given, *model.placed])
     changed: dict[str, str] = {}
-    columns: list[tuple[str, np.ndarray]] = [("time_s", _since_start(held)[rows])]
+    columns: list[tuple[str, np.ndarray]] = [("time_s", _since_start(comparison)[rows])]
     if delays:
-        columns.append(("time_corrected_s", columns[0][1] - late))
-        changed["times"] = f"{_names(delays)}: {late:.4g} s taken off"
+        columns.append(("time_corrected_s", columns[0][1] - delay))
+        changed["times"] = f"{_names(delays)}: {delay:.4g} s taken off"
     columns.append(("depth_mm", course.tip[rows, 2]))
     if kinematic:
-        columns.append(("depth_corrected_mm", every.pose[rows, 2]))
-        shift = float(np.abs(every.pose[rows, 2] - course.tip[rows, 2]).max())
+        columns.append(("depth_corrected_mm", prediction.pose[rows, 2]))
+        shift = float(np.abs(prediction.pose[rows, 2] - course.tip[rows, 2]).max())
         changed["path"] = f"{_names(kinematic)}: depth changed by up to {shift:.4g} mm"
     contribution = np.zeros((len(rows), course.channels))
-    if others:
-        bare = predict(course, model.response, [*held.setting.given, *kinematic, *delays])
-        contribution = (every.signal - bare.signal)[rows]
-        changed["readings"] = f"{_names(others)}: up to {float(np.abs(contribution).max()):.4g} subtracted"
+    if additive:
+        bare = predict(course, model.response, [*comparison.setting.given, *kinematic, *delays])
+        contribution = (prediction.signal - bare.signal)[rows]
+        changed["readings"] = f"{_names(additive)}: up to {float(np.abs(contribution).max()):.4g} subtracted"
     for k, name in enumerate(course.channel_names):
         columns.append((name.replace(" ", "_"), course.readings[rows, k]))
-        if others:
+        if additive:
             columns.append((f"{name.replace(' ', '_')}_corrected", course.readings[rows, k] - contribution[:, k]))
     values = np.column_stack([column for _, column in columns])
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -66,9 +66,9 @@ def _names(placed: Sequence[Placed]) -> str:
     return " and ".join(p.effect.spoken for p in placed)
 
 
-def _since_start(held: Comparison) -> np.ndarray:
+def _since_start(comparison: Comparison) -> np.ndarray:
     """Return the time since the first row of each row's recording [s], shape (rows,)."""
-    course = held.course
+    course = comparison.course
     recording = np.arange(course.episodes) if course.recording is None else course.recording
     of_row = recording[course.episode]
     start = np.array([course.time[np.argmax(of_row == k)] for k in range(int(recording.max()) + 1)])

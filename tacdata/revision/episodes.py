@@ -85,12 +85,12 @@ def groups(course: Course) -> list[tuple[str, np.ndarray]]:
     speed = np.array([np.abs(course.speed[inside & (course.episode == e)]).max(initial=0.0) for e in number])
     deepest = np.array([course.tip[course.episode == e, 2].max() for e in number])
     tool = np.array([course.tool[course.episode == e][0] for e in number])
-    found: list[tuple[str, np.ndarray]] = []
+    groups_of: list[tuple[str, np.ndarray]] = []
     for what, unit, values in (("rate", "mm/s", np.round(speed, 2)), ("depth", "mm", np.round(deepest, 2))):
         low, high = np.quantile(values, [0.25, 0.75])
         if high > 1.2 * low > 0:
-            found.append((f"slowest {what}s" if what == "rate" else "shallowest", number[values <= low]))
-            found.append((f"{what} from {high:.2g} {unit}", number[values >= high]))
+            groups_of.append((f"slowest {what}s" if what == "rate" else "shallowest", number[values <= low]))
+            groups_of.append((f"{what} from {high:.2g} {unit}", number[values >= high]))
     if len(course.tools) > 1:
-        found += [(f"indenter {t.name}", number[tool == k]) for k, t in enumerate(course.tools)]
-    return [(name, own) for name, own in found if FEWEST <= len(own) <= course.episodes - FEWEST]
+        groups_of += [(f"indenter {t.name}", number[tool == k]) for k, t in enumerate(course.tools)]
+    return [(name, numbers) for name, numbers in groups_of if FEWEST <= len(numbers) <= course.episodes - FEWEST]

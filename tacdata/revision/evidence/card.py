@@ -61,9 +61,9 @@ def _tiles(revision: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[str,
             tiles.append((f"of the gap closed{spread}", f"{100 * gap['closed']:.0f} %"))
         sealed = gap["sealed"]
         tiles.append(("residual before → after (1 is noise)", f"{sealed['before']:.3g} → {sealed['after']:.3g}"))
-    moved = revision["labels"]
-    if moved:
-        tiles.append(("largest shift of the tip [mm]", f"{max(m['path_most'] for m in moved):.3g}"))
+    labels = revision["labels"]
+    if labels:
+        tiles.append(("largest shift of the tip [mm]", f"{max(m['path_most'] for m in labels):.3g}"))
     return tiles
 
 
@@ -83,11 +83,11 @@ def _parameters(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
         for name, p in e["parameters"].items():
             value = p["value"]
             if isinstance(value, list):
-                shown, spread = f"{min(value):.3g} to {max(value):.3g} over the channels", _number(p["error"], 2)
+                size, spread = f"{min(value):.3g} to {max(value):.3g} over the channels", _number(p["error"], 2)
             else:
-                shown = f"{value:.4g}"
+                size = f"{value:.4g}"
                 spread = "{:.4g} to {:.4g}".format(*p["interval"]) if "interval" in p else _number(p["error"], 2)
-            rows.append((e["effect"], name, shown, spread, p["unit"]))
+            rows.append((e["effect"], name, size, spread, p["unit"]))
     _table(page, "Size of the effects", ("effect", "parameter", "value", "90 % interval", "unit"), rows)
 
 
@@ -104,35 +104,38 @@ def _rivals(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
 
 
 def _gap(page: HtmlPage, gap: dict[str, Any]) -> None:
-    kept = (
+    reservation = (
         "the verdict was reached without them"
         if gap["unseen"]
         else ("the effects' parameters were fitted without them; the name was found with them")
     )
-    rows = [(f"sealed episodes: {kept}", gap["sealed"]), ("worst of them: " + gap["worst"]["name"], gap["worst"])]
+    rows = [
+        (f"sealed episodes: {reservation}", gap["sealed"]),
+        ("worst of them: " + gap["worst"]["name"], gap["worst"]),
+    ]
     rows += [(f"{c['name']}, not fitted to", c) for c in gap["elsewhere"]]
     cells = [(name, c["episodes"], f"{c['before']:.3g}", f"{c['after']:.3g}") for name, c in rows]
     _table(page, "The gap", ("where", "episodes", "before", "after (1 is the noise floor)"), cells)
 
 
-def _slices(page: HtmlPage, told: list[dict[str, Any]]) -> None:
-    if not told:
+def _slices(page: HtmlPage, slices: list[dict[str, Any]]) -> None:
+    if not slices:
         return
-    worst = max(told, key=lambda c: c["after"])
-    lost = [c["name"] for c in told if c["after"] > 1.1 * max(c["before"], 1.0)]
+    worst = max(slices, key=lambda c: c["after"])
+    lost = [c["name"] for c in slices if c["after"] > 1.1 * max(c["before"], 1.0)]
     words = f"Worst after: {worst['name']}, {worst['before']:.3g} before, {worst['after']:.3g} after."
     words += f" Worse than before: {', '.join(lost)}." if lost else " None became worse."
-    channels = sorted((c for c in told if c["name"].startswith("channel")), key=lambda c: -c["after"])
-    shown = [*(c for c in told if c not in channels), *channels[:CHANNELS]]
+    channels = sorted((c for c in slices if c["name"].startswith("channel")), key=lambda c: -c["after"])
+    listed = [*(c for c in slices if c not in channels), *channels[:CHANNELS]]
     if len(channels) > CHANNELS:
         words += f" Of {len(channels)} channels the {CHANNELS} worst are listed; gap.csv has all."
     words += " These figures include differences of the contact between presses; those above do not."
-    cells = [(c["name"], c["episodes"], f"{c['before']:.3g}", f"{c['after']:.3g}") for c in shown]
+    cells = [(c["name"], c["episodes"], f"{c['before']:.3g}", f"{c['after']:.3g}") for c in listed]
     head = ("of the sealed episodes", "episodes", "before", "after (1 is the noise floor)")
     _table(page, "Where the gap is", head, cells, words)
 
 
-def _tips(page: HtmlPage, told: list[dict[str, Any]]) -> None:
+def _tips(page: HtmlPage, tips: list[dict[str, Any]]) -> None:
     rows = [
         (
             t["session"],
@@ -143,7 +146,7 @@ def _tips(page: HtmlPage, told: list[dict[str, Any]]) -> None:
             f"{t['better']} / {t['worse']}",
             f"{t['constant_before']:.4f} / {t['constant_after']:.4f}",
         )
-        for t in told
+        for t in tips
     ]
     head = (
         "session",
@@ -165,8 +168,8 @@ def _networks(page: HtmlPage, trained: dict[str, Any] | None) -> None:
 
 
 def _labels(page: HtmlPage, revision: dict[str, Any]) -> None:
-    moved = revision["labels"]
-    if not (revision["added"] and moved):
+    labels = revision["labels"]
+    if not (revision["added"] and labels):
         page.heading("Labels")
         named = "No label changes: the effect acts on readings alone."
         page.paragraph(
@@ -181,13 +184,13 @@ def _labels(page: HtmlPage, revision: dict[str, Any]) -> None:
             m["labels"] or "not requested",
             f"{_number(m['rms'])} / {_number(m['most'])}" if m["labels"] else "–",
         )
-        for m in moved
+        for m in labels
     ]
     head = ("session", "paths that change", "tip, rms / most [mm]", "labels made again", "depth, rms / most [mm]")
     _table(page, "Labels", head, rows)
 
 
-def _confirmed(page: HtmlPage, found: list[dict[str, Any]]) -> None:
+def _confirmed(page: HtmlPage, presses: list[dict[str, Any]]) -> None:
     rows = [
         (
             c["tool"],
@@ -196,7 +199,7 @@ def _confirmed(page: HtmlPage, found: list[dict[str, Any]]) -> None:
             f"{100 * c['change']:.1f} %",
             f"{100 * c['difference']:.1f} %" if c["solved"] else "no equilibrium",
         )
-        for c in found
+        for c in presses
     ]
     head = ("tool", "place [mm]", "depth [mm]", "change by the effect", "surrogate minus finite elements (rms)")
     _table(page, "Solved again by finite elements", head, rows)
@@ -223,13 +226,13 @@ def _next(page: HtmlPage, following: dict[str, Any]) -> None:
 
 
 def _data(page: HtmlPage, verdict: dict[str, Any]) -> None:
-    told = "; ".join(
+    figures = "; ".join(
         f"{name} {f'{value:.4g}' if isinstance(value, float) else value}"
         for name, value in verdict["data"].items()
         if not isinstance(value, list | dict)
     )
     page.heading("The recordings")
-    page.paragraph(told, note=True)
+    page.paragraph(figures, note=True)
     page.items(verdict["remarks"], note=True)
 
 

@@ -47,20 +47,20 @@ class EpisodeCurves:
         return float(np.sqrt(np.nanmean(np.square(predicted - self.measured))))
 
 
-def curves(held: Comparison, change: GapReduction, episodes: np.ndarray, count: int = 3) -> list[EpisodeCurves]:
+def curves(comparison: Comparison, change: GapReduction, episodes: np.ndarray, count: int = 3) -> list[EpisodeCurves]:
     """Return the episodes in which the effects change most, largest change first.
 
     Args:
-        held: Recordings and the model before.
+        comparison: Recordings and the model before.
         change: The gap, with the models before and after: figures and pictures are of the same models.
         episodes: Those to choose from.
         count: Number of episodes at most.
     """
-    course, scale = held.course, change.scale
-    before, after = (held.predicted(model.response, model.placed) for model in (change.before, change.after))
+    course, scale = comparison.course, change.scale
+    before, after = (comparison.predicted(model.response, model.placed) for model in (change.before, change.after))
     size = np.square((after - before) / scale).mean(axis=1)
     order = sorted(episodes.tolist(), key=lambda e: -float(size[course.episode == e].mean()))[:count]
-    found = []
+    episode_curves = []
     for e in order:
         rows = np.flatnonzero((course.episode == e) & (course.averaged > 0))
         measured = course.readings[rows]
@@ -70,7 +70,7 @@ def curves(held: Comparison, change: GapReduction, episodes: np.ndarray, count: 
             return predicted[rows] + np.nanmedian(measured - predicted[rows], axis=0)
 
         time = course.time[rows] - course.time[rows[0]]
-        found.append(
+        episode_curves.append(
             EpisodeCurves(
                 course.names[e],
                 time,
@@ -82,4 +82,4 @@ def curves(held: Comparison, change: GapReduction, episodes: np.ndarray, count: 
                 course.channel_names,
             )
         )
-    return found
+    return episode_curves

@@ -61,51 +61,51 @@ class GapReduction:
 
 
 def gap(
-    held: Comparison,
+    comparison: Comparison,
     placed: Sequence[Placed],
-    chosen: Sealed,
+    sealed: Sealed,
     scale: np.ndarray,
     note: Callable[[str], None] = lambda text: None,
 ) -> GapReduction:
     """Measure the gap on the verdict's scale: mean squares over the noise, each episode's median subtracted.
 
     Args:
-        held: Recordings and the model before.
+        comparison: Recordings and the model before.
         placed: The effects to add.
-        chosen: Episodes that the effects' parameters are not fitted to.
+        sealed: Episodes that the effects' parameters are not fitted to.
         scale: Noise of a reading [the source's unit], shape (channels,).
         note: Called with a line for each group that is left out.
     """
-    numbers = chosen.numbers
-    predicted = held.covered(numbers)
-    others = held.without(numbers) if predicted else held
-    fitted = tuple(placed) if chosen.unseen else held.fitted_without(placed, numbers)
-    before, after = others.before, others.after(fitted)
-    pair = np.array([held.mean_squares(model, numbers, scale) for model in (before, after)])
+    numbers = sealed.numbers
+    predicted = comparison.covered(numbers)
+    response_base = comparison.without(numbers) if predicted else comparison
+    fitted = tuple(placed) if sealed.unseen else comparison.fitted_without(placed, numbers)
+    before, after = response_base.before, response_base.after(fitted)
+    pair = np.array([comparison.mean_squares(model, numbers, scale) for model in (before, after)])
     at = int(np.argmax(pair[1]))
     total = ResidualChange("sealed episodes", len(numbers), *(float(v) for v in pair.mean(axis=1)))
-    worst = ResidualChange(held.course.names[numbers[at]], 1, *(float(v) for v in pair[:, at]))
+    worst = ResidualChange(comparison.course.names[numbers[at]], 1, *(float(v) for v in pair[:, at]))
     elsewhere = []
-    for name, group in groups(held.course):
+    for name, group in groups(comparison.course):
         note(f"gap, fitted without: {name}")
-        there = held.after(held.fitted_without(placed, group))
-        sizes = (float(held.mean_squares(model, group, scale).mean()) for model in (held.before, there))
+        there = comparison.after(comparison.fitted_without(placed, group))
+        sizes = (float(comparison.mean_squares(model, group, scale).mean()) for model in (comparison.before, there))
         elsewhere.append(ResidualChange(name, len(group), *sizes))
-    return GapReduction(total, _interval(pair), chosen.unseen, predicted, worst, tuple(elsewhere), before, after, scale)
+    return GapReduction(total, _interval(pair), sealed.unseen, predicted, worst, tuple(elsewhere), before, after, scale)
 
 
-def noise_of(verdict: dict[str, Any], held: Comparison) -> np.ndarray:
+def noise_of(verdict: dict[str, Any], comparison: Comparison) -> np.ndarray:
     """Return the noise by which the verdict divides residuals [the source's unit], shape (channels,).
 
     Args:
         verdict: The verdict's document.
-        held: Recordings and model; their own noise is used if the verdict states none for these channels.
+        comparison: Recordings and model; their own noise is used if the verdict states none for these channels.
     """
     stated = verdict.get("gate", {})
     scale, memory = np.array(stated.get("noise", ()), dtype=float), float(stated.get("memory", 0.0))
-    channels = held.course.channels
+    channels = comparison.course.channels
     if len(scale) < channels or not (scale[:channels] > 0).all():
-        return held.noise
+        return comparison.noise
     return scale[:channels] / np.sqrt(max(1 - memory**2, LEAST_WHITE))
 
 

@@ -20,14 +20,18 @@ TITLE = 130
 
 
 def draw(
-    title: str, shown: Sequence[EpisodeCurves], found: GapReduction, path: Path, networks: Sequence[dict[str, Any]] = ()
+    title: str,
+    episodes: Sequence[EpisodeCurves],
+    gap: GapReduction,
+    path: Path,
+    networks: Sequence[dict[str, Any]] = (),
 ) -> None:
     """Draw the page into a PNG file.
 
     Args:
         title: Its title.
-        shown: Episodes, at most three.
-        found: The gap.
+        episodes: Episodes, at most three.
+        gap: The gap.
         path: File to write.
         networks: Metrics of networks before and after (`tacdata.revision.labels.retrain`), if any were trained.
     """
@@ -44,43 +48,43 @@ def draw(
         figure.suptitle("\n".join(textwrap.wrap(title, TITLE)), fontsize=12)
         halves: Any = figure.subfigures(2, 1)
         upper, lower = halves
-        top: Any = np.atleast_1d(upper.subplots(1, max(len(shown), 1)))
+        top: Any = np.atleast_1d(upper.subplots(1, max(len(episodes), 1)))
         bottom: Any = lower.subplots(1, 3 if networks else 2)
-        for k, own in enumerate(shown):
-            _curves(top[k], own, k == 0)
-        _residuals(bottom[0], shown)
-        _groups(bottom[1], found)
+        for k, episode in enumerate(episodes):
+            _curves(top[k], episode, k == 0)
+        _residuals(bottom[0], episodes)
+        _groups(bottom[1], gap)
         if networks:
             _networks(bottom[2], networks)
         with written_beside(path) as temporary:
             figure.savefig(temporary, dpi=110)
 
 
-def _curves(axis: Any, own: EpisodeCurves, legend: bool) -> None:
-    c = own.channel
-    axis.plot(own.time, own.measured[:, c], ".", ms=3, color=MEASURED, label="measured")
-    axis.plot(own.time, own.before[:, c], color=BEFORE, lw=1.2, label="model before")
-    axis.plot(own.time, own.after[:, c], color=AFTER, lw=1.2, label="model after")
-    axis.set(title=f"{own.name}, {own.channel_name}", xlabel="time [s]", ylabel="reading")
+def _curves(axis: Any, episode: EpisodeCurves, legend: bool) -> None:
+    c = episode.channel
+    axis.plot(episode.time, episode.measured[:, c], ".", ms=3, color=MEASURED, label="measured")
+    axis.plot(episode.time, episode.before[:, c], color=BEFORE, lw=1.2, label="model before")
+    axis.plot(episode.time, episode.after[:, c], color=AFTER, lw=1.2, label="model after")
+    axis.set(title=f"{episode.name}, {episode.channel_name}", xlabel="time [s]", ylabel="reading")
     if legend:
         axis.legend(loc="best")
 
 
-def _residuals(axis: Any, shown: Sequence[EpisodeCurves]) -> None:
+def _residuals(axis: Any, episodes: Sequence[EpisodeCurves]) -> None:
     axis.axhspan(-2, 2, color="0.9", zorder=0, label="noise, two standard deviations")
     at = 0.0
-    for k, own in enumerate(shown):
-        c = own.channel
-        for predicted, color, name in ((own.before, BEFORE, "before"), (own.after, AFTER, "after")):
-            wrong = (own.measured[:, c] - predicted[:, c]) / own.noise[c]
-            axis.plot(own.time + at, wrong, color=color, lw=1.0, label=name if k == 0 else None)
-        at += float(own.time[-1]) + 0.5
+    for k, episode in enumerate(episodes):
+        c = episode.channel
+        for predicted, color, name in ((episode.before, BEFORE, "before"), (episode.after, AFTER, "after")):
+            wrong = (episode.measured[:, c] - predicted[:, c]) / episode.noise[c]
+            axis.plot(episode.time + at, wrong, color=color, lw=1.0, label=name if k == 0 else None)
+        at += float(episode.time[-1]) + 0.5
     axis.set(title="what the model leaves, in the same episodes", xlabel="time [s]", ylabel="residual / noise")
     axis.legend(loc="best", fontsize=8)
 
 
-def _groups(axis: Any, found: GapReduction) -> None:
-    rows: list[ResidualChange] = [found.total, *found.elsewhere]
+def _groups(axis: Any, gap: GapReduction) -> None:
+    rows: list[ResidualChange] = [gap.total, *gap.elsewhere]
     where = np.arange(len(rows))
     axis.barh(where - 0.2, [c.before for c in rows], 0.38, color=BEFORE, label="before")
     axis.barh(where + 0.2, [c.after for c in rows], 0.38, color=AFTER, label="after")
@@ -100,12 +104,12 @@ def _groups(axis: Any, found: GapReduction) -> None:
 
 def _networks(axis: Any, metrics: Sequence[dict[str, Any]]) -> None:
     """Draw each metric after over before: they have different units."""
-    known = [m for m in metrics if m["before"] and m["after"] is not None]
-    where = np.arange(len(known))
-    axis.barh(where, [m["after"] / m["before"] for m in known], 0.6, color=AFTER)
+    comparable = [m for m in metrics if m["before"] and m["after"] is not None]
+    where = np.arange(len(comparable))
+    axis.barh(where, [m["after"] / m["before"] for m in comparable], 0.6, color=AFTER)
     axis.axvline(1.0, color=BEFORE, lw=1.5)
-    for at, m in zip(where, known, strict=True):
+    for at, m in zip(where, comparable, strict=True):
         axis.text(0.02, at, f"{m['before']:.3g} → {m['after']:.3g} {m['unit']}", va="center", fontsize=8, color="white")
-    axis.set_yticks(where, [m["title"].partition(",")[0] for m in known], fontsize=8)
+    axis.set_yticks(where, [m["title"].partition(",")[0] for m in comparable], fontsize=8)
     axis.invert_yaxis()
     axis.set(xlim=(0, None), xlabel="after / before", title="a network trained before and after")

@@ -14,10 +14,10 @@ def rows(revision: dict[str, Any]) -> list[tuple[str, int, float, float, float |
     gap = revision["gap"]
     if gap is None:
         return []
-    found = [("sealed episodes", gap["sealed"]), (f"worst: {gap['worst']['name']}", gap["worst"])]
-    found += [(f"left out: {c['name']}", c) for c in gap["elsewhere"]]
-    found += [(f"sealed, {c['name']}", c) for c in gap.get("slices", ())]
-    return [(name, c["episodes"], c["before"], c["after"], _closed(c)) for name, c in found]
+    entries = [("sealed episodes", gap["sealed"]), (f"worst: {gap['worst']['name']}", gap["worst"])]
+    entries += [(f"left out: {c['name']}", c) for c in gap["elsewhere"]]
+    entries += [(f"sealed, {c['name']}", c) for c in gap.get("slices", ())]
+    return [(name, c["episodes"], c["before"], c["after"], _closed(c)) for name, c in entries]
 
 
 def _closed(change: dict[str, Any]) -> float | None:
@@ -34,12 +34,12 @@ def markdown(revision: dict[str, Any]) -> str:
 
 
 def _tips(revision: dict[str, Any]) -> list[str]:
-    told = revision.get("tips") or []
-    if not told:
+    tips = revision.get("tips") or []
+    if not tips:
         return []
     lines = ["", "| tip error [mm] | reference | episodes | before | after | better | worse |"]
     lines.append("|---|---|---:|---:|---:|---:|---:|")
-    for t in told:
+    for t in tips:
         lines.append(
             f"| {t['session']} | {t['against']} | {t['episodes']} | {t['before']:.4f} | {t['after']:.4f} "
             f"| {t['better']} | {t['worse']} |"

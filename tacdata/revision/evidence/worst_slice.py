@@ -14,25 +14,25 @@ FEW = 20
 THIRDS = [0, 1 / 3, 2 / 3, 1]
 
 
-def sealed_slices(held: Comparison, change: GapReduction, episodes: np.ndarray) -> list[ResidualChange]:
+def sealed_slices(comparison: Comparison, change: GapReduction, episodes: np.ndarray) -> list[ResidualChange]:
     """Return the mean square by phase, depth, rate and channel, over the noise; each episode's offset is subtracted.
 
     Args:
-        held: Recordings and the model before.
+        comparison: Recordings and the model before.
         change: The gap, with the models before and after.
         episodes: The sealed ones.
     """
-    course = held.course.reduced
-    squares = [held.squares(model, change.scale) for model in (change.before, change.after)]
+    course = comparison.course.reduced
+    squares = [comparison.squares(model, change.scale) for model in (change.before, change.after)]
     inside = np.isin(course.episode, episodes)
-    found = []
+    slices = []
     for name, rows in _parts(course, inside):
         if rows.sum() >= FEW:
             count = len(np.unique(course.episode[rows]))
-            found.append(ResidualChange(name, count, *(float(np.nanmean(s[rows])) for s in squares)))
+            slices.append(ResidualChange(name, count, *(float(np.nanmean(s[rows])) for s in squares)))
     for k, name in enumerate(course.channel_names):
-        found.append(ResidualChange(name, len(episodes), *(float(np.nanmean(s[inside, k])) for s in squares)))
-    return found
+        slices.append(ResidualChange(name, len(episodes), *(float(np.nanmean(s[inside, k])) for s in squares)))
+    return slices
 
 
 def _parts(course: Course, sealed: np.ndarray) -> list[tuple[str, np.ndarray]]:

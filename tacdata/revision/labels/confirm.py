@@ -51,7 +51,7 @@ def touches_fem(placed: Sequence[Placed]) -> bool:
 
 
 def confirm(
-    held: Comparison,
+    comparison: Comparison,
     placed: Sequence[Placed],
     sensor: Sensor,
     reaches: dict[str, Reach],
@@ -62,7 +62,7 @@ def confirm(
     """Solve a few presses where the effects change the loads most, each at another place.
 
     Args:
-        held: Recordings and a model that starts from a table.
+        comparison: Recordings and a model that starts from a table.
         placed: The effects that were added.
         sensor: The sensor.
         reaches: The tools by name.
@@ -70,58 +70,58 @@ def confirm(
         mesh: The mesh that the table was made on.
         progress: Called with the presses done, their total, and the seconds left.
     """
-    response = held.setting.response
+    response = comparison.setting.response
     if not isinstance(response, TableResponse) or not touches_fem(placed) or count < 1:
         return []
-    course = held.course
-    before = predict(course, response, held.setting.given).pose
-    after = predict(course, response, [*held.setting.given, *placed]).pose
+    course = comparison.course
+    before = predict(course, response, comparison.setting.given).pose
+    after = predict(course, response, [*comparison.setting.given, *placed]).pose
     mechanical = [p for p in placed if p.effect.changes_skin]
     # Two changes of the loads: the tip is elsewhere, and effects of the skin multiply them.
-    loads, moved = response.load(before, course.tool), response.load(after, course.tool)
+    loads, revised_loads = response.load(before, course.tool), response.load(after, course.tool)
     for effect in mechanical:
-        moved = moved * _factor(held, effect, after)[:, None]
+        revised_loads = revised_loads * _factor(comparison, effect, after)[:, None]
     # Both the change and the difference are given over the largest load, so that they can be compared.
     top = max(float(np.abs(loads).max()), 1e-12)
-    change = np.abs(moved - loads).max(axis=1) / top
+    change = np.abs(revised_loads - loads).max(axis=1) / top
     rows = _spread(change, course.row_site, course.tool, count)
     skin = changed_skin(sensor, placed) or sensor
     model = SkinModel(skin, ModelSettings(mesh=mesh, error_estimate=False))
-    asked = [_press(reaches[course.tools[int(course.tool[r])].name], after[r]) for r in rows]
-    answers = PressStore.of(model).solve(asked, 1, progress)
-    found = []
-    for r, press, answer in zip(rows, asked, answers, strict=True):
+    requests = [_press(reaches[course.tools[int(course.tool[r])].name], after[r]) for r in rows]
+    answers = PressStore.of(model).solve(requests, 1, progress)
+    confirmed = []
+    for r, press, answer in zip(rows, requests, answers, strict=True):
         name = course.tools[int(course.tool[r])].name
         at, depth = (float(after[r, 0]), float(after[r, 1])), float(press.depths[-1])
         if isinstance(answer, SolveError) or len(answer.depths) < len(press.depths):
-            found.append(Confirmed(name, at, depth, float(change[r]), float("nan"), float("nan"), False))
+            confirmed.append(Confirmed(name, at, depth, float(change[r]), float("nan"), float("nan"), False))
             continue
         reading = reading_of(sensor, answer.loads)
         true = reading.load(Loads(*(v[-1:] for v in vars(answer.loads).values())), Transducer.of(sensor))[0]
-        wrong = np.abs(moved[r] - true) / max(float(np.abs(true).max()), 1e-12)
+        wrong = np.abs(revised_loads[r] - true) / max(float(np.abs(true).max()), 1e-12)
         rms = float(np.sqrt(np.mean(wrong**2)))
-        found.append(Confirmed(name, at, depth, float(change[r]), rms, float(wrong.max()), True))
-    return found
+        confirmed.append(Confirmed(name, at, depth, float(change[r]), rms, float(wrong.max()), True))
+    return confirmed
 
 
-def _factor(held: Comparison, effect: Placed, pose: np.ndarray) -> np.ndarray:
+def _factor(comparison: Comparison, effect: Placed, pose: np.ndarray) -> np.ndarray:
     """Return the factor of a mechanical effect on the loads of every row, shape (rows,)."""
     from tacdata.chain.state import State
 
     ones = np.ones((len(pose), 1))
-    state = State(held.course, held.setting.response, pose, ones, ones[:, 0], ones)
+    state = State(comparison.course, comparison.setting.response, pose, ones, ones[:, 0], ones)
     return effect.act(state).load[:, 0]
 
 
 def _spread(change: np.ndarray, site: np.ndarray, tool: np.ndarray, count: int) -> list[int]:
     """Return the rows of largest change, each at another place."""
     rows: list[int] = []
-    taken: set[tuple[int, int]] = set()
+    used: set[tuple[int, int]] = set()
     for r in np.argsort(-change).tolist():
         key = (int(site[r]), int(tool[r]))
-        if key in taken or change[r] <= 0:
+        if key in used or change[r] <= 0:
             continue
-        taken.add(key)
+        used.add(key)
         rows.append(r)
         if len(rows) == count:
             break

@@ -28,8 +28,8 @@ def moved_episodes(episodes: Sequence[Episode], placed: Sequence[Placed]) -> lis
         episodes: The episodes of one session.
         placed: The model's effects; all but kinematic ones and a constant delay are ignored.
     """
-    late = round(1e9 * sum(p.effect.delay(p.values) for p in placed))
-    return [replace(e, tip_ns=e.tip_ns + late) for e in _placed_elsewhere(episodes, placed)]
+    delay_ns = round(1e9 * sum(p.effect.delay(p.values) for p in placed))
+    return [replace(e, tip_ns=e.tip_ns + delay_ns) for e in _placed_elsewhere(episodes, placed)]
 
 
 def _placed_elsewhere(episodes: Sequence[Episode], placed: Sequence[Placed]) -> list[Episode]:

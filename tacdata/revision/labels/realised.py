@@ -62,22 +62,22 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
     """
     old = [read_episode(path) for path in read_session(session).episodes]
     if truth is not None:
-        seen, effects = _true_views(truth, old), [p for p in placed if p.stage == "kinematics"]
+        views, effects = _true_views(truth, old), [p for p in placed if p.stage == "kinematics"]
     else:
-        seen = {k: (view.time_ns, view.tip) for k, view in second_views(old).items()}
+        views = {k: (view.time_ns, view.tip) for k, view in second_views(old).items()}
         effects = [p for p in placed if p.stage == "kinematics" and p.seen_by_tag]
     if not effects:
         return None
     new = {e.number: e for e in moved_episodes(old, effects)}
-    apart = [_apart(old[k], new[old[k].number], *view) for k, view in sorted(seen.items())]
-    apart = [pair for pair in apart if len(pair[0]) >= FEWEST]
-    if not apart:
+    errors = [_apart(old[k], new[old[k].number], *view) for k, view in sorted(views.items())]
+    errors = [pair for pair in errors if len(pair[0]) >= FEWEST]
+    if not errors:
         return None
     # The registration has a constant error of its own, which is reported apart from the path's.
-    whole = [np.nanmedian(np.concatenate([pair[i] for pair in apart]), axis=0) for i in (0, 1)]
-    apart = [(a - whole[0], b - whole[1]) for a, b in apart]
-    constant = [0.0 if truth is None else float(np.sqrt(np.nansum(np.square(w)))) for w in whole]
-    far = [[np.sqrt(np.nansum(np.square(way), axis=1)) for way in pair] for pair in apart]
+    constants = [np.nanmedian(np.concatenate([pair[i] for pair in errors]), axis=0) for i in (0, 1)]
+    errors = [(a - constants[0], b - constants[1]) for a, b in errors]
+    constant = [0.0 if truth is None else float(np.sqrt(np.nansum(np.square(w)))) for w in constants]
+    far = [[np.sqrt(np.nansum(np.square(way), axis=1)) for way in pair] for pair in errors]
     each = np.array([[np.sqrt(np.mean(way**2)) for way in pair] for pair in far])
     first, last = (np.concatenate([pair[i] for pair in far]) for i in (0, 1))
     return TipError(
@@ -93,29 +93,29 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
     )
 
 
-def _apart(before: Episode, after: Episode, time_ns: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _apart(before: Episode, after: Episode, time_ns: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the tip error before and after while it touches [mm], each of shape (n, 3)."""
-    told, revised = before.tip_at(time_ns), after.tip_at(time_ns)
-    good = (told[:, 2] > 0) & np.isfinite(seen[:, 2])
+    nominal, revised = before.tip_at(time_ns), after.tip_at(time_ns)
+    good = (nominal[:, 2] > 0) & np.isfinite(view[:, 2])
     good &= (time_ns >= before.tip_ns[0] - NEAR_NS) & (time_ns <= before.tip_ns[-1] + NEAR_NS)
-    return seen[good] - told[good], seen[good] - revised[good]
+    return view[good] - nominal[good], view[good] - revised[good]
 
 
 def _true_views(path: Path, episodes: Sequence[Episode]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     time, tip = _read(path)
-    found = {}
+    views = {}
     for k, episode in enumerate(episodes):
         if len(episode.tip_ns):
             rows = slice(*np.searchsorted(time, [episode.tip_ns[0], episode.tip_ns[-1] + 1]))
             if len(time[rows]) >= FEWEST:
-                found[k] = time[rows], tip[rows]
-    if not found:
+                views[k] = time[rows], tip[rows]
+    if not views:
         raise UsageError(
             f"{path} covers none of the recordings' times",
             "the recordings' own clock, in ns",
             "check its column time_ns",
         )
-    return found
+    return views
 
 
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray]:

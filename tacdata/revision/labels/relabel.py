@@ -56,7 +56,7 @@ def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
     """Return how a model's effects shift the tip in a session, without making labels."""
     old = [read_episode(path) for path in read_session(session).episodes]
     new = {e.number: e for e in moved_episodes(old, placed)}
-    squares, most, paths, touching = [], 0.0, 0, 0
+    squares, largest, paths, touching = [], 0.0, 0, 0
     for before in old:
         inside = before.tip[:, 2] > 0
         if not inside.any():
@@ -66,9 +66,9 @@ def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
         nominal = before.tip_at(after.tip_ns)
         way = np.linalg.norm(after.tip - nominal, axis=1)[(nominal[:, 2] > 0) | (after.tip[:, 2] > 0)]
         squares.append(np.mean(way**2))
-        most = max(most, float(way.max()))
+        largest = max(largest, float(way.max()))
         paths += bool(way.max() > LEAST)
-    return Moved(touching, paths, float(np.sqrt(np.mean(squares))) if squares else 0.0, most)
+    return Moved(touching, paths, float(np.sqrt(np.mean(squares))) if squares else 0.0, largest)
 
 
 def relabelled(
@@ -92,10 +92,10 @@ def relabelled(
         progress: Called with the progress.
     """
     recorded = read_session(session)
-    moved = {e.number: e for e in moved_episodes([read_episode(p) for p in recorded.episodes], placed)}
+    episodes = {e.number: e for e in moved_episodes([read_episode(p) for p in recorded.episodes], placed)}
     skin = changed_skin(recorded.sensor, placed)
     labelling = Labelling(folder, Store(store or file_names.store(file_names.folder(session))), settings, progress)
-    readers = {number: (lambda e=episode: e) for number, episode in moved.items()}
+    readers = {number: (lambda e=episode: e) for number, episode in episodes.items()}
     summary = labelling.run(readers, skin)
     return _compared(paths_moved(session, placed), file_names.folder(session), folder, summary)
 
@@ -108,8 +108,8 @@ def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
     return replace(sensor, skin=replace(sensor.skin, thickness=sensor.skin.thickness * factor))
 
 
-def _compared(moved: Moved, before: Path, after: Path, summary: LabellingSummary) -> Moved:
-    squares, count, most, labels = 0.0, 0, 0.0, 0
+def _compared(shift: Moved, before: Path, after: Path, summary: LabellingSummary) -> Moved:
+    squares, count, largest, labels = 0.0, 0, 0.0, 0
     for path in file_names.present(after).values():
         if not (before / path.name).is_file():
             continue
@@ -120,12 +120,12 @@ def _compared(moved: Moved, before: Path, after: Path, summary: LabellingSummary
         dented = old.dented | new.dented
         change = (new.depth - old.depth)[dented]
         squares, count = squares + float(np.square(change, dtype=float).sum()), count + int(dented.sum())
-        most = max(most, float(np.abs(change).max(initial=0.0)))
+        largest = max(largest, float(np.abs(change).max(initial=0.0)))
     return replace(
-        moved,
+        shift,
         labels=labels,
         rms=float(np.sqrt(squares / count)) if count else (0.0 if labels else float("nan")),
-        most=most if labels else float("nan"),
+        most=largest if labels else float("nan"),
         solved=len(summary.seconds),
         found=summary.found,
         failed=dict(summary.failed),

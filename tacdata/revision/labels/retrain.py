@@ -57,7 +57,7 @@ class Retrained:
 def retrained(
     sessions: Sequence[Path],
     labels: dict[Path, Path],
-    held: Comparison,
+    comparison: Comparison,
     placed: Sequence[Placed],
     folder: Path,
     recipe: Recipe,
@@ -68,7 +68,7 @@ def retrained(
     Args:
         sessions: Folders of recordings, in the order of the verdict.
         labels: Session -> folder of its labels under the revised model; without entries labels are kept.
-        held: Recordings and the model before.
+        comparison: Recordings and the model before.
         placed: The effects that were added.
         folder: Folder of both datasets and networks.
         recipe: How to train.
@@ -86,7 +86,7 @@ def retrained(
             "run `tacdata label SESSION` first",
         )
     note("datasets of both models")
-    simulated = _Simulated(held) if by == READINGS else None
+    simulated = _Simulated(comparison) if by == READINGS else None
     sides = {}
     for side in ("before", "after"):
         episodes = [pair.episode(side) for pair in pairs]
@@ -119,29 +119,29 @@ class _Pair:
 
 
 def _pairs(sessions: Sequence[Path], labels: dict[Path, Path], placed: Sequence[Placed]) -> list[_Pair]:
-    found = []
+    pairs = []
     for session in sessions:
         if not file_names.folder(session).is_dir():
             raise UsageError(f"{session} has no labels", "a labelled session", f"run `tacdata label {session}` first")
         episodes = [read_episode(path) for path in read_session(session).episodes]
         old = LabelFiles(file_names.folder(session))
-        new, moved = old, {e.path: e for e in episodes}
+        new, revised = old, {e.path: e for e in episodes}
         if session in labels:
-            new, moved = LabelFiles(labels[session]), {e.path: e for e in moved_episodes(episodes, placed)}
+            new, revised = LabelFiles(labels[session]), {e.path: e for e in moved_episodes(episodes, placed)}
         for episode in episodes:
             pair = old(episode), new(episode)
             if pair[0] is not None and pair[1] is not None:
-                found.append(_Pair(episode, moved[episode.path], (pair[0], pair[1])))
-    return found
+                pairs.append(_Pair(episode, revised[episode.path], (pair[0], pair[1])))
+    return pairs
 
 
 class _Simulated:
     """A model's predicted readings of a recording, with noise like the recording's."""
 
-    def __init__(self, held: Comparison) -> None:
-        self._held = held
+    def __init__(self, comparison: Comparison) -> None:
+        self._held = comparison
         self._predicted: dict[int, np.ndarray] = {}
-        self._names = list(held.course.names)
+        self._names = list(comparison.course.names)
 
     def __call__(self, episode: Episode, placed: Sequence[Placed]) -> np.ndarray:
         course, key = self._held.course, id(placed)
@@ -158,8 +158,8 @@ class _Simulated:
         level = np.nanmedian(course.readings[read] - self._predicted[key][read], axis=0)
         noise = self._held.null.noise.scale
         for c, number in enumerate(course.numbers or range(course.channels)):
-            said = np.interp(seconds, when, self._predicted[key][rows, c]) + level[c]
-            counts[:, number] = said + noise[c] * rng.normal(size=len(seconds))
+            simulated = np.interp(seconds, when, self._predicted[key][rows, c]) + level[c]
+            counts[:, number] = simulated + noise[c] * rng.normal(size=len(seconds))
         return counts
 
 
