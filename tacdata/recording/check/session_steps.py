@@ -102,6 +102,8 @@ def strength_step(entries: list[RecordingFigures], found: Answers) -> StepSearch
     presses = [entry.recording.episode.press for entry in entries if counts_as_press(entry)]
     amplitude = fit_answers(found).amplitude
     known = np.flatnonzero(amplitude > 0)
+    if len(known) < 2:
+        return StepSearch(None, np.inf)
     depth = np.log([presses[k].depth for k in known])
     explained = np.column_stack([_explained([presses[k] for k in known]), depth, depth**2])
     return _back(find_step(explained, np.log(amplitude[known])[:, None], STRONGER), known)
