@@ -7,7 +7,7 @@ import signal
 import sys
 from pathlib import Path
 
-from tacdata.demonstrations.recording.reader import TIMELY, read_demo
+from tacdata.demonstrations.recording.reader import TIMELY, times_known
 from tacdata.demonstrations.recording.recorder import DemoRecorder
 from tacdata.demonstrations.recording.rig import read_demo_rig
 from tacdata.demonstrations.recording.session import DemoSession, open_demo_session
@@ -60,9 +60,9 @@ def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count
 
 def _times_known(path: Path) -> str:
     """Return how well the times of a recording's images are known, in words, and what to do where that is badly."""
-    known = read_demo(path).times_known
+    known = times_known(path)
     if not known:
-        return "no image was searched for tags while recording"
+        return "too few images to know their times: record again"
     best = min(known.values())
     return f"times known to {best:.3f} s" if best <= TIMELY else f"times known to {best:.2f} s: record again"
 

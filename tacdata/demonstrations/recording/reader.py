@@ -54,19 +54,6 @@ class DemoRecording:
     """Which images were searched for tags, in words."""
 
     @property
-    def times_known(self) -> dict[str, float]:
-        """Camera -> standard uncertainty of nearly all of its images' times [s]; those without an image are missing."""
-        found: dict[str, list[np.ndarray]] = {}
-        for view in self.views:
-            own = np.zeros(len(view.sample_ns)) if view.timing is None else view.timing
-            found.setdefault(view.camera, []).append(np.hypot(own, self.timing.get(view.camera, 0.0)))
-        return {
-            name: float(np.quantile(np.concatenate(parts), NEARLY_ALL))
-            for name, parts in found.items()
-            if len(parts[0])
-        }
-
-    @property
     def span_ns(self) -> tuple[int, int]:
         """First and last time of any data [ns]."""
         times = [s.sample_ns for s in (*self.taxels.values(), *self.views) if len(s.sample_ns)]
@@ -89,6 +76,22 @@ def read_demo(path: StrPath) -> DemoRecording:
             "a demonstration recorded by this release of tacdata",
             "use the release that wrote it",
         ) from error
+
+
+def times_known(path: Path) -> dict[str, float]:
+    """Return camera -> standard uncertainty of nearly all of its images' times [s]; those with few images are missing.
+
+    Args:
+        path: A demonstration; raises as `read_demo`.
+    """
+    records = read_records(Path(path), images=False)
+    cameras = _attachment(records, "demo_rig.json")["cameras"]
+    clocks = {name: clock_of(records, name, entry.get("rate")) for name, entry in cameras.items()}
+    return {
+        name: float(np.quantile(clock.uncertainty, NEARLY_ALL))
+        for name, clock in clocks.items()
+        if isinstance(clock, ImageClock)
+    }
 
 
 def _recording(records: Records) -> DemoRecording:
