@@ -40,7 +40,6 @@ Progress = Callable[[str, int, int], None]
 Delivered = Callable[[int, str], None]
 """Called with an episode's number and "" once its label is written, or the reason why it has none."""
 
-
 KEPT_REQUESTS = 256
 """Requests kept in memory with their frames; others are read again when their press is solved."""
 

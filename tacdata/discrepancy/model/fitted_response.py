@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 from scipy.sparse import csr_array
 
 from tacdata.chain import Course, Response
+from tacdata.discrepancy.model.contexts import contexts
 
 EVEN_INTERVALS = 8
 """With so few intervals, knots stay evenly spaced."""
@@ -398,9 +399,3 @@ def about_means(residual: np.ndarray, course: Course) -> np.ndarray:
     into = csr_array((np.ones(len(episode)), (episode, np.arange(len(episode)))), shape=(course.episodes, len(episode)))
     mean = (into @ known) / np.maximum(into.sum(axis=1), 1)[:, None]
     return into @ np.square(known - mean[episode])
-
-
-def contexts(course: Course) -> np.ndarray:
-    """Return the place-and-tool of every row, numbered from 0, shape (n,), int64."""
-    key = course.row_site * (int(course.tool.max()) + 1) + course.tool
-    return np.unique(key, return_inverse=True)[1].astype(np.int64)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from tacdata.chain import Course
-from tacdata.discrepancy.model.fitted_response import contexts
+from tacdata.discrepancy.model.contexts import contexts
 from tacdata.discrepancy.model.laws.law import ContactLaw, laws
 from tacdata.discrepancy.statistics.gram_fit import FOLDS, fold_of
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.model.fitted_response import contexts
+from tacdata.discrepancy.model.contexts import contexts
 
 POWERS = np.arange(0.8, 3.21, 0.05)
 """Of depth, that a common law may have [1]."""

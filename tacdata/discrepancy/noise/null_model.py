@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.chain import Course, Prediction, predict
 from tacdata.discrepancy.data.streams import Streams
-from tacdata.discrepancy.model.fitted_response import contexts
+from tacdata.discrepancy.model.contexts import contexts
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise import offset_random_walk, readings, table_error
