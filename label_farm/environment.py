@@ -1,4 +1,4 @@
-"""How the farm starts a Python process: same interpreter, same packages, one thread."""
+"""Environment of the farm's Python processes: same interpreter, same packages, one thread."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class GrowingSession:
         self._last, self._next = time.monotonic(), 0.0
 
     def new(self) -> dict[int, Path]:
-        """Return the recordings that are finished and were not returned before, by number."""
+        """Return finished recordings that were not returned before, by number."""
         clock = time.monotonic()
         if self.ended or clock < self._next:
             return {}

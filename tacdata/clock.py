@@ -25,7 +25,7 @@ class Clock:
 
     @classmethod
     def start(cls, rate: float = 1.0, host: Host = COMPUTER) -> Clock:
-        """Return a clock that shows the present time now and runs at ``rate``."""
+        """Return a clock that starts at the present time, at ``rate``."""
         return cls(host.time_ns(), host.monotonic_ns(), rate, host)
 
     @property

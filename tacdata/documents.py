@@ -1,4 +1,4 @@
-"""Reads, checks and writes YAML and JSON documents by the schemas in `schemas/`."""
+"""Reads, checks and writes YAML and JSON documents by `schemas/`."""
 
 from __future__ import annotations
 

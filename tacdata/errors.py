@@ -58,7 +58,7 @@ class FormatError(TacdataError):
 
 
 class DeviceError(TacdataError):
-    """A device is missing, silent or in a state that forbids the action."""
+    """A device is missing, silent or in a state without this action."""
 
     exit_code = Exit.DEVICE
 
@@ -70,7 +70,7 @@ class SolveError(TacdataError):
 
 
 class PackageError(TacdataError):
-    """A package is missing that an extra of the install brings (`tacdata.extras`)."""
+    """A package of an extra of the install is missing (`tacdata.extras`)."""
 
     exit_code = Exit.PACKAGE
 

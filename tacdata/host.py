@@ -95,7 +95,7 @@ class Host:
         os.fsync(stream.fileno())
 
     def signal(self, number: int, handler: Any) -> Any:
-        """Set a signal's handler and return the one before; for the main thread."""
+        """Set a signal's handler and return the previous one; main thread only."""
         return signal.signal(number, handler)
 
 

@@ -56,7 +56,7 @@ class DatasetFlow:
         self._models: dict[str, str] = {}
 
     def deliver(self, number: int, reason: str) -> None:
-        """Append an episode that has a label, or note why it has none.
+        """Append an episode with a label, or note why it has none.
 
         Raises:
             UsageError: If the dataset holds labels of another model version.

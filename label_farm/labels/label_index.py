@@ -108,7 +108,7 @@ class LabelIndex:
 
 
 def stamp(path: Path) -> str:
-    """Return a file's size, time and number in words; "" if there is none."""
+    """Return a file's size, time and number as text; "" without one."""
     try:
         status = path.stat()
     except OSError:

@@ -1,4 +1,4 @@
-"""Makes the label of an episode from its frames and the solved press."""
+"""Makes an episode's label from its frames and the solved press."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def code_hash() -> str:
 
 
 def parents(request: LabelRequest | Planned) -> dict[str, str]:
-    """Return the hashes of everything that a label is made from, by name. Equal hashes give an equal label."""
+    """Return the hashes of all inputs of a label, by name. Equal hashes give an equal label."""
     made_from = {
         "recording": request.recording,
         "sensor": request.sensor.content_hash,

@@ -161,7 +161,7 @@ class Ledger:
             self._db.executemany("INSERT OR REPLACE INTO model (version, sensor) VALUES (?, ?)", rows)
 
     def sensor(self, version: str) -> dict[str, Any] | None:
-        """Return the document of a model's sensor; None if nobody registered the model."""
+        """Return the document of a model's sensor; None for an unregistered model."""
         row = self._db.execute("SELECT sensor FROM model WHERE version = ?", (version,)).fetchone()
         return json.loads(row[0]) if row else None
 
@@ -316,7 +316,7 @@ class Ledger:
         return [JobOutcome(number, key, state == DONE, error, seconds) for number, key, state, error, seconds in rows]
 
     def counts(self) -> dict[int, int]:
-        """Return how many jobs are in each state (`WAITING`, `LEASED`, `DONE`, `FAILED`)."""
+        """Return the number of jobs by state (`WAITING`, `LEASED`, `DONE`, `FAILED`)."""
         counts = dict(self._db.execute("SELECT state, count(*) FROM job GROUP BY state").fetchall())
         return {state: counts.get(state, 0) for state in (WAITING, LEASED, DONE, FAILED)}
 
@@ -325,7 +325,7 @@ class Ledger:
         return bool(self._db.execute("SELECT 1 FROM job WHERE key = ?", (key,)).fetchone())
 
     def held(self, key: str, owner: str) -> Job | None:
-        """Return a job that a worker holds; None if its lease was lost."""
+        """Return a worker's leased job; None if its lease was lost."""
         row = self._db.execute(
             "SELECT document, tries FROM job WHERE key = ? AND state = 1 AND owner = ?", (key, owner)
         ).fetchone()
@@ -337,7 +337,7 @@ class Ledger:
         return sum(self._db.execute(count.format(state), (limit,)).fetchone()[0] for state in (WAITING, LEASED))
 
     def withdraw(self, run: str) -> int:
-        """Withdraw a run's jobs; those that no other run wants leave the queue.
+        """Withdraw a run's jobs; those of no other run leave the queue.
 
         One that a worker holds is solved to its end, but not taken up again if that worker gives it back or dies.
 

@@ -70,7 +70,7 @@ class FemModel:
         return provenance.content_hash([self._model.content_hash, spreads, code])
 
     def solve(self, job: Job) -> PathSolution:
-        """Solve one path, with states added where the job's tolerance asks for them.
+        """Solve one path, with more states where the job's tolerance needs them.
 
         Raises:
             SolveError: If the press is impossible or an equilibrium is not found.

@@ -99,7 +99,7 @@ def _add_submissions(api: FastAPI, foreman: Foreman) -> None:
 
     @api.get("/api/throughput")
     def throughput() -> list[dict[str, Any]]:
-        """Presses settled in each minute since the service began, a day at most."""
+        """Presses settled a minute since the service began, for one day."""
         return foreman.gauges.throughput()
 
     @api.post("/api/submissions", status_code=201)

@@ -49,7 +49,7 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
 
     @api.get("/api/submissions/{number}/labels/{episode}/log")
     def log(number: str, episode: int) -> dict[str, str]:
-        """Who made a finished label, how, and how well; one line a fact."""
+        """Author, method and error of a finished label, one line each."""
         from label_farm.service.preview import account
 
         return {"log": account(_labels(foreman, number).path(episode))}

@@ -32,7 +32,7 @@ def chosen_devices(name: str) -> tuple[str, ...]:
 def solve_all(
     simulation: Simulation, presses: int, devices: Sequence[str], workers: int, settled: Callable[[int, str], None]
 ) -> None:
-    """Solve missing presses by ``workers`` processes; by this one if that is one.
+    """Solve missing presses by ``workers`` processes; in this one for 1.
 
     Args:
         simulation: The simulation.

@@ -70,7 +70,7 @@ def write_dataset(
     extra: Sequence[str] = (),
     done: Callable[[int, str], None] = lambda number, left_out: None,
 ) -> tuple[int, int]:
-    """Append the solved presses that a dataset lacks; an interruption keeps finished ones.
+    """Append solved presses that a dataset lacks; an interruption keeps finished ones.
 
     Args:
         simulation: The simulation.

@@ -88,7 +88,7 @@ class DrawnEffect:
 def effects_of(path: Path) -> list[dict[str, Any]]:
     """Return the effects that a verdict names, or that a model spec holds, as entries of a simulation plan.
 
-    A number with a 90 % interval becomes that interval, within the parameter's bounds.
+    A number with a 90 % interval becomes this interval, within bounds.
 
     Raises:
         UsageError: If there is no such file.

@@ -54,7 +54,7 @@ def swallowed_at(job: Job, sensor: Sensor, solution: PathSolution) -> float | No
 
 
 def underside(request: PressRequest, sensor: Sensor) -> np.ndarray:
-    """Return the height of a shape's underside above the press's depth [mm].
+    """Return a shape's underside height above the press's depth [mm].
 
     Args:
         request: The press.

@@ -1,4 +1,4 @@
-"""Solves jobs on a Dask cluster; ledger and store stay on this computer.
+"""Solves jobs on a Dask cluster; ledger and store stay here.
 
 Dask is not durable; the ledger and the store are: a task that is lost with its worker, or with the
 whole cluster, is a claim that is given back. Dask's own messages are pickled: scheduler and workers belong on a network
@@ -49,7 +49,7 @@ _models: dict[str, Any] = {}
 
 
 def solve_there(factory: str, version: str, sensor: dict[str, Any], documents: list[dict[str, Any]]) -> dict[str, Any]:
-    """Solve jobs; this runs on a Dask worker. Returns each result as the store's own bytes, or why there is none."""
+    """Solve jobs; this runs on a Dask worker. Returns each result as the store's bytes, or its error."""
     from dataclasses import replace
 
     from label_farm.presses.model import batch_size, build, solve_each

@@ -19,7 +19,7 @@ class Desk(Protocol):
     """The interface of a desk, local or remote."""
 
     def offers(self) -> list[str]:
-        """Return the model versions that there is work for, the most urgent first."""
+        """Return the model versions with waiting jobs, the most urgent first."""
         ...
 
     def sensor(self, version: str) -> Sensor:
@@ -85,7 +85,7 @@ class LocalDesk:
         self._roster.enter(self.owner, self._device)
 
     def offers(self) -> list[str]:
-        """Return the model versions that there is work for, the most urgent first."""
+        """Return the model versions with waiting jobs, the most urgent first."""
         if self._versions is not None:
             return [version for version in self._versions if self.ledger.has_work(version)]
         return self.ledger.offered()

@@ -1,4 +1,4 @@
-"""Worker processes on this machine: started, watched, replaced when they die, stopped cleanly."""
+"""Worker processes on this machine: started, watched, replaced after death, stopped cleanly."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ class Worker:
         self._refused: dict[str, str] = {}
 
     def step(self) -> bool:
-        """Take one batch of jobs and settle it; False if there is none."""
+        """Take one batch of jobs and settle it; False without jobs."""
         for version in self.desk.offers():
             # Before a job is claimed: a model that cannot be built here is no fault of the press.
             model = self._model(version)

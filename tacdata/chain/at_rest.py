@@ -45,7 +45,7 @@ def told_at_rest(course: Course) -> tuple[np.ndarray | None, str]:
 
 @dataclass(frozen=True)
 class ZeroSide:
-    """How far a path goes below zero, and how much readings change there."""
+    """Extent of a path below zero, and change of the readings there."""
 
     low: float
     """Way below zero [mm]; 0 if it is too short for an answer."""

@@ -1,4 +1,4 @@
-"""Operators with memory along a course: the building blocks of effects of history."""
+"""Operators with memory along a course: building blocks of history effects."""
 
 from __future__ import annotations
 

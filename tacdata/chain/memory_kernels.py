@@ -1,4 +1,4 @@
-"""Recursions along rows, compiled: row after row, all columns of a row together."""
+"""Recursions along rows, compiled: row after row, all columns together."""
 
 from __future__ import annotations
 

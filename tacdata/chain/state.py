@@ -60,7 +60,7 @@ class State:
         return replace(self, load=self.load * np.reshape(factor, (-1, 1)), force=self.force * factor)
 
     def with_loads(self, loads: np.ndarray) -> State:
-        """Return the state with other loads and force, in the order of `loads`."""
+        """Return the state with other loads and force, ordered as `loads`."""
         return replace(self, load=loads[:, :-1], force=loads[:, -1])
 
     def with_rise(self, rise: np.ndarray) -> State:

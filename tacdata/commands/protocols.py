@@ -24,7 +24,7 @@ def run(
     """Evaluate labels and predictions against the prescribed contact, with the paper's rows for comparison.
 
     The plan that `tacdata plan evaluation` writes holds 78 depth and 40 position trials; presses whose purpose is
-    "wearing trial" are scored by participant. Where no press of the dataset has a purpose, each counts as both.
+    "wearing trial" are scored by participant. If no press of the dataset has a purpose, each has both.
     """
     from tacdata import documents
     from tacdata.dataset.reader import read_dataset

@@ -59,7 +59,7 @@ def run(
         bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
     ] = False,
 ) -> Result:
-    """Replay demonstrated grasps or wipes directly and compensated in MuJoCo, over many seeds."""
+    """Replay demonstrated grasps or wipes, direct and compensated, in MuJoCo, over seeds."""
     from tacdata import documents
     from tacdata.demonstrations.compensation import read_gains
     from tacdata.demonstrations.paths.tracks_file import read_tracks

@@ -49,7 +49,7 @@ def run(
 ) -> Result:
     """Make a dataset of random presses by the skin model; stopped and run again, it goes on.
 
-    The dataset is marked as simulated. Solved presses stay in their folder: more presses or other noise reuse them.
+    The dataset is marked as simulated. Solved presses stay in their folder; other noise reuses them.
     """
     import tacdata as td
 

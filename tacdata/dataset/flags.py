@@ -143,7 +143,7 @@ def carry_flags(session: Path, dataset: Path) -> list[Flag]:
 
 
 def flagged_episodes(dataset: Dataset) -> dict[int, str]:
-    """Return the episodes of a dataset that were set aside: number -> reason.
+    """Return the flagged episodes of a dataset: number -> reason.
 
     Raises:
         FormatError: If the file is damaged.

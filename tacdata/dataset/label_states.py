@@ -16,7 +16,7 @@ FILE = Path("meta/tacdata_labels.json")
 
 @dataclass
 class LabelledSession:
-    """A session whose labels are appended to a dataset as they are finished."""
+    """A session whose labels are appended to a dataset once finished."""
 
     name: str
     """Its folder."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class LostProvenanceWarning(UserWarning):
-    """A tool that edited the dataset dropped part of where it comes from."""
+    """A tool that edited the dataset dropped part of its provenance."""
 
 
 @dataclass(frozen=True)

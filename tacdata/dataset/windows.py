@@ -1,4 +1,4 @@
-"""Windows of neighbouring frames for torch, gathered from memory maps, under LeRobotDataset's keys."""
+"""Windows of neighbouring frames for torch, from memory maps, under LeRobotDataset's keys."""
 
 from __future__ import annotations
 

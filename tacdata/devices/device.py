@@ -188,7 +188,7 @@ class MotionController(Device):
 
     @property
     def moved(self) -> bool:
-        """Whether any motion was commanded since this was created, homing at opening included."""
+        """Whether any motion was commanded since creation, homing at opening included."""
         return False
 
     @abstractmethod

@@ -194,7 +194,7 @@ class Grbl(MotionController):
 
     @property
     def moved(self) -> bool:
-        """Whether a move or a homing cycle was sent since this was created."""
+        """Whether a move or a homing cycle was sent since creation."""
         return self._moved
 
     @property
@@ -243,7 +243,7 @@ class Grbl(MotionController):
             link.wait(lambda: link.last is not None and link.last.state == "Idle", idle)
 
     def statuses(self) -> list[CncStatus]:
-        """Return the reports received since the last call; those before a fault too."""
+        """Return the reports since the last call; those before a fault too."""
         return self._opened().take_statuses()
 
     def check(self) -> None:

@@ -22,6 +22,6 @@ class BaselineTracking(Effect):
         return state.with_signal(state.idle + rise - low_pass(rise, state.course.step, 1 / rate))
 
     def time_constant(self, values: Values) -> float:
-        """Return the time by which it follows, one over its rate [s]."""
+        """Return the time constant, one over its rate [s]."""
         rate = float(values["r"])
         return 1 / rate if rate > 0 else 0.0

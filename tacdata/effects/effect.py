@@ -139,7 +139,7 @@ class GainKind(StrEnum):
 
 
 class LikeGain(StrEnum):
-    """Similarity of an effect to a common gain if no force is read."""
+    """Similarity of an effect to a common gain without a force channel."""
 
     EQUAL = "equal"
     """The two are the same: calibration absorbs it."""
@@ -268,7 +268,7 @@ class Effect(ABC):
         return 0.0
 
     def nested(self, values: Values) -> Placed | None:
-        """Return the model nested in it, with its values; None for most effects."""
+        """Return the nested model with its values; None for most effects."""
         return None
 
     def thickness_factor(self, values: Values) -> float:
@@ -280,7 +280,7 @@ class Effect(ABC):
         return None
 
     def remark(self, values: Values) -> str:
-        """Return its meaning for the recordings, with the remedy; empty for most effects."""
+        """Return its meaning for recordings, with the remedy; empty for most effects."""
         return ""
 
 
@@ -308,7 +308,7 @@ class Placed:
 
 
 def load(name: str) -> Effect:
-    """Return an effect by the name of its file, or of its form.
+    """Return an effect by the name of its file or form.
 
     Raises:
         UsageError: If there is none.

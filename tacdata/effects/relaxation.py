@@ -76,7 +76,7 @@ class RelaxationRead(Relaxation):
         return state.with_loads(net * scale)
 
     def late(self, load: np.ndarray, step: np.ndarray, values: Values) -> np.ndarray:
-        """Return the mean of the past loads that relaxes, of the same shape."""
+        """Return the relaxing mean of the past loads, of the same shape."""
         return low_pass(load, step, float(values["tau"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
@@ -135,7 +135,7 @@ class PowerCreep(Effect):
 
 
 class PowerCreepLetGo(PowerCreep):
-    """Stress relaxation over many decades, of a skin that the tool can leave."""
+    """Stress relaxation over many decades, of a skin that can separate."""
 
     equation = "q = q_e - f mean of L_tau q_e over six times in steps of 3, 0 where the force would pull"
     source = "broad spectrum; Ferry, ch. 4; unilateral contact: Johnson, Contact Mechanics, ch. 6.5"
@@ -155,5 +155,5 @@ class PowerCreepRead(RelaxationRead):
     parameters = (*PowerCreep.parameters, POWER)
 
     def late(self, load: np.ndarray, step: np.ndarray, values: Values) -> np.ndarray:
-        """Return the mean of the past loads that relaxes, of the same shape."""
+        """Return the relaxing mean of the past loads, of the same shape."""
         return low_passes(load, step, float(values["tau0"]) * 3.0 ** np.arange(6), np.full(6, 1 / 6))

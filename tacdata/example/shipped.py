@@ -1,4 +1,4 @@
-"""Where the shipped recording lies, and a copy of it to work on."""
+"""Place of the shipped recording, and a copy to work on."""
 
 from __future__ import annotations
 

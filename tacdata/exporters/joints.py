@@ -33,7 +33,7 @@ class Joints(Exporter):
     needs_robot = True
 
     def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
-        """Solve and write a new folder; return what cannot be reached, as sentences."""
+        """Solve and write a new folder; return unreachable targets, as sentences."""
         if self.robot is None:
             raise UsageError("no robot", "a robot file", "name it with --robot")
         robot, sentences = read_robot(self.robot), []

@@ -1,4 +1,4 @@
-"""LeRobot v3.0: targets as actions; what was seen, felt and predicted as observations."""
+"""LeRobot v3.0: targets as actions; images, readings and predictions as observations."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ FRAMES = 9
 
 
 def bias(touch: OrangeTouch, presses: PressSet, maps: Maps, force: float, band: float) -> dict[str, Any]:
-    """Return true and estimated lateral positions of the orange, from the middle outwards.
+    """Return true and estimated lateral positions of the orange, middle first.
 
     Args:
         touch: The skin's answer to the orange.

@@ -52,7 +52,7 @@ def orange_presses() -> list[PressRequest]:
 
 
 def training_presses(sensor: Sensor, count: int, seed: int = 0) -> list[PressRequest]:
-    """Return presses of spheres and ellipsoids at random positions, beyond the edge too.
+    """Return presses of spheres and ellipsoids at random positions, also beyond edges.
 
     Args:
         sensor: The skin.

@@ -1,4 +1,4 @@
-"""Runs the whole study; its result as a document (`schemas/grasp_study.schema.json`) and as text."""
+"""Runs the study; its result as document (`schemas/grasp_study.schema.json`) and text."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class FingertipSpread:
 
 
 class Fingertip:
-    """One of the two fingertips; its position and taxel errors are drawn once."""
+    """One of two fingertips; its position and taxel errors are drawn once."""
 
     def __init__(self, touch: OrangeTouch, spread: FingertipSpread, side: int, rng: np.random.Generator) -> None:
         """Draw it.

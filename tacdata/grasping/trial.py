@@ -1,4 +1,4 @@
-"""One trial: close, measure, move toward the band, measure again, and finally lift."""
+"""One trial: close, measure, move toward the band, measure again, lift."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def advice(history: History) -> tuple[Advice, ...]:
 
 
 def elsewhere(history: History) -> bool:
-    """Return whether the tip stood elsewhere at the latest visit, beyond the tolerance."""
+    """Return whether the tip moved beyond the tolerance at the latest visit."""
     return any(change.quantity in ("depth", "x", "y") for _, change in history.changed)
 
 

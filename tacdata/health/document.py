@@ -1,4 +1,4 @@
-"""The health of a unit as its file's document (`schemas/health.schema.json`), and as text."""
+"""The health of a unit as document (`schemas/health.schema.json`) and text."""
 
 from __future__ import annotations
 

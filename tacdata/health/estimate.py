@@ -68,7 +68,7 @@ def mean(values: np.ndarray) -> UncertainValue:
 
 
 def holm(p_values: Sequence[float]) -> np.ndarray:
-    """Return p-values corrected for all of these tests, shape (n,): Holm's step-down method."""
+    """Return p-values corrected for all tests, shape (n,): Holm's step-down method."""
     p = np.asarray(p_values, float)
     order = np.argsort(p, kind="stable")
     corrected = np.empty_like(p)

@@ -22,7 +22,7 @@ WRITTEN = re.compile(r"[-+]?\d*[.,]?\d+([eE][-+]?\d+)?")
 
 
 def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
-    """Return the names of the columns that a mapping means, in its order.
+    """Return the column names that a mapping selects, in its order.
 
     Args:
         table: The file's columns.

@@ -13,7 +13,7 @@ UNKNOWN = "not said by the source; a stand-in"
 
 
 def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rate: float) -> tuple[Sensor, list[str]]:
-    """Return the sensor of an import, and which of its values are stand-ins.
+    """Return the sensor of an import, and its assumed values.
 
     Args:
         entry: ``sensor`` of the mapping: a sensor file's path beside it, or what is known.

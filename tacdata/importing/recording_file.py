@@ -1,4 +1,4 @@
-"""An imported press as an MCAP file like those that `tacdata record` writes."""
+"""An imported press as an MCAP file like those of `tacdata record`."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class ImportedPress:
 
 
 def write(path: Path, imported: ImportedPress) -> None:
-    """Write one file; it gets its final name only when it is complete.
+    """Write one file; it gets its final name once complete.
 
     Raises:
         UsageError: If it exists.

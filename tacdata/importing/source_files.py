@@ -171,7 +171,7 @@ def without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
 
 
 def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
-    """Return tables below each other, with the columns that all of them have.
+    """Return tables below each other, with their common columns.
 
     Raises:
         FormatError: If they have none in common, or the clock of a part is no number where it is to be continued.

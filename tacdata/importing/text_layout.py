@@ -114,7 +114,7 @@ def is_comment(line: str, missing: tuple[str, ...] = ()) -> bool:
 
 
 def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
-    """Recognize the layout from a file's beginning; ``options`` of the mapping take precedence.
+    """Recognize the layout from a file's beginning; the mapping's ``options`` take precedence.
 
     Raises:
         FormatError: If there are no rows of one and the same number of columns.
@@ -203,7 +203,7 @@ def split(line: str, delimiter: str) -> list[str]:
 
 
 def is_number(field: str, decimal: str) -> bool:
-    """Whether a field is a number or a text for a missing one."""
+    """Whether a field is a number or a missing value."""
     if field in MISSING:
         return True
     try:

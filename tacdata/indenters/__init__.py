@@ -1,4 +1,4 @@
-"""Rigid indenters, one shape per file; `indenter.py` states the contents of a file."""
+"""Rigid indenters, one shape per file; `indenter.py` describes such a file."""
 
 from tacdata.indenters.indenter import Indenter, from_document
 

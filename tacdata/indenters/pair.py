@@ -1,4 +1,4 @@
-"""Two solids of any other shapes on one holder: two contacts at once."""
+"""Two solids of any shapes on one holder: two contacts at once."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Live estimates: depth maps while the sensor is touched, messages for controllers, latencies."""
+"""Live estimates: depth maps during touch, messages for controllers, latencies."""

@@ -57,7 +57,7 @@ class DepthStream:
     A centred window estimates the frame ``lookahead`` frames before the newest one.
 
     With ``causal`` the newest frame is estimated, and it is repeated in place of the network's later frames, as
-    training did at the end of an episode. That is right while the contact holds still, and late while it changes.
+    training did at the end of an episode. That is right for a constant contact, and late for a changing one.
     """
 
     def __init__(

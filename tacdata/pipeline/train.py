@@ -67,7 +67,7 @@ def train(
     progress: Callable[[Progress], None] = lambda step: None,
     **options: Unpack[TrainingOptions],
 ) -> TrainedNetwork:
-    """Train a network that maps readings to depth maps; returns its best epoch.
+    """Train a network from readings to depth maps; returns its best epoch.
 
     Args:
         dataset: Dataset folder.

@@ -260,7 +260,7 @@ def write_stats(root: Path, stats: dict[str, Statistics]) -> None:
 
 
 def read_row_stats(root: Path, info: dict[str, Any]) -> dict[str, Statistics]:
-    """Return the dataset's statistics, merged from those that each counted episode's row holds.
+    """Return the dataset's statistics, merged from the rows of counted episodes.
 
     Raises:
         FormatError: If a file is damaged.

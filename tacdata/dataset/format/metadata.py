@@ -94,7 +94,7 @@ class EpisodeRecord:
 
 
 def write_main(root: Path, sensors: dict[str, dict[str, Any]], rate: float) -> None:
-    """Write meta/tacdata.json for the sensor documents given by content hash; ``rate`` in Hz."""
+    """Write meta/tacdata.json for sensor documents by content hash; ``rate`` in Hz."""
     made = provenance.stamp("tacdata.dataset", {}, {})
     documents.write(
         root / MAIN,

@@ -383,9 +383,7 @@ def _shaken(left: np.ndarray, course: Course) -> np.ndarray:
         if whole >= 3:
             means = left[rows[: whole * BLOCK]].reshape(whole, BLOCK, -1).mean(axis=1)
             found = np.concatenate([found, means[2:] - 2 * means[1:-1] + means[:-2]])
-    if not len(found):
-        return np.zeros(left.shape[1])
-    return 1.4826 * np.median(np.abs(found), axis=0) * np.sqrt(BLOCK / 6)
+    return 1.4826 * np.median(np.abs(found), axis=0) * np.sqrt(BLOCK / 6) if len(found) else np.zeros(left.shape[1])
 
 
 def about_means(residual: np.ndarray, course: Course) -> np.ndarray:

@@ -31,7 +31,7 @@ POLICY = CodePolicy()
 def without_codes(
     values: np.ndarray, name: str, *, rails: bool, policy: CodePolicy = POLICY
 ) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return numbers with NaN for codes, and how many there were, as sentences.
+    """Return numbers with NaN for codes, and their counts as sentences.
 
     Args:
         values: Numbers as in the file [any], shape (rows, k).
