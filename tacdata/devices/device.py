@@ -19,8 +19,8 @@ import numpy as np
 
 from tacdata import registry
 from tacdata.clock import Clock
-from tacdata.errors import DeviceError, UsageError
-from tacdata.wire.delivered import CncStatus, OwesAnswer, StreamCounts, TaxelFrame
+from tacdata.errors import UsageError
+from tacdata.wire.delivered import CncStatus, OwesAnswer, StandsStill, StreamCounts, TaxelFrame
 
 ROOM, BASE = "tacdata.devices", "device"
 
@@ -40,15 +40,6 @@ __all__ = [
     "TaxelFrame",
     "create",
 ]
-
-
-class StandsStill(DeviceError):
-    """A machine that has come to rest, and whose motion cannot be abandoned."""
-
-    def __init__(self, given: str, allowed: str, remedy: str, at: tuple[float, float, float] | None = None) -> None:
-        """Say why; ``at`` is where it stands [mm, machine], if that is known."""
-        super().__init__(given, allowed, remedy)
-        self.at = at
 
 
 @dataclass(frozen=True)

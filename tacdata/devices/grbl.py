@@ -11,24 +11,18 @@ from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, Motion, MotionController, StandsStill
 from tacdata.errors import DeviceError, UsageError
 from tacdata.wire.grbl import codes
-from tacdata.wire.grbl.lines import AT_REST, BRAKING, MOVING, OPENED_AGAIN
+from tacdata.wire.grbl.lines import OPENED_AGAIN
 from tacdata.wire.grbl.link import GrblLink
 from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked, name_alarm, straighten, unblock
 from tacdata.wire.grbl.owed import Owed
+from tacdata.wire.grbl.rest import come_to_rest, in_motion, in_words
 from tacdata.wire.grbl.settings import GrblSettings
-from tacdata.wire.patience import Patience
 from tacdata.wire.serial_port import open_port
 
 HOMING = 600.0
 """Longest homing cycle [s of the clock]: 1.5 times the travel of two slow cycles."""
-COMING_TO_REST = 30.0
-"""Longest deceleration of a feed hold [s of the clock]."""
-STANDING = 3.0
-"""A machine that reports the same place for so long stands still, whatever its state says [s of the clock]."""
 LONGEST_LINE = 80
 """Longest line that is sent, with its end [bytes]."""
-LOOK = 0.05
-"""Time between two reports that are compared [s, real time]."""
 LATE = (1.5, 15.0)
 """Motion counts as a fault when it takes longer than this many times its expected duration, plus this time [s of the
 clock].
@@ -129,7 +123,7 @@ class Grbl(MotionController):
             if link.homing:
                 link.lost = link.lost or "homing was broken off"
                 link.realtime(b"\x18")  # homing heeds nothing else
-            elif not link.fault and (not link.at_rest if link.polled else _moves(link)):
+            elif not link.fault and (not link.at_rest if link.polled else in_motion(link)):
                 link.realtime(b"!")
         link.stop()
         self._lost = link.lost or self._lost
@@ -163,7 +157,7 @@ class Grbl(MotionController):
         if link.alarm not in (None, codes.HOMING_REQUIRED):
             return codes.alarm_in_words(link.alarm)
         here = link.last.position
-        was_on = f"the controller is locked and says {_text(here)} mm: it was not just switched on"
+        was_on = f"the controller is locked and says {in_words(here)} mm: it was not just switched on"
         return was_on if np.any(here) else ""
 
     @property
@@ -282,8 +276,8 @@ class Grbl(MotionController):
         self._target, self._ends_ns = None, 0
         if link.halted and link.fault:
             raise StandsStill(link.fault.given, link.fault.allowed, link.fault.remedy)
-        status = self._rest(link)
-        stands, (x, y, z) = f"stands at {_text(status.position)} mm", status.position.tolist()
+        status = come_to_rest(link)
+        stands, (x, y, z) = f"stands at {in_words(status.position)} mm", status.position.tolist()
         if link.pendant:
             raise StandsStill(
                 f"a pendant has control of the machine, which {stands}",
@@ -392,45 +386,3 @@ class Grbl(MotionController):
         }
         if link.resets and not self._answers.homing:
             self._lost = "the controller was reset when its port was opened, so it counts from where it stands now"
-
-    def _rest(self, link: GrblLink) -> CncStatus:
-        """Return a report of the machine at rest; a moving machine gets a feed hold.
-
-        Raises:
-            DeviceError: On a fault, or if it goes on moving.
-        """
-        end = self.clock.now_ns() + round(COMING_TO_REST * 1e9)
-        standing = Patience(STANDING, self.clock.rate, STANDING / 2, host=self.clock.host)
-        place = np.full(3, np.nan)
-        while True:
-            status = link.fresh_status(ANSWER)
-            moved, place = not np.array_equal(status.position, place), status.position
-            state = status.state.split(":")[0]
-            if state not in MOVING and status.state not in BRAKING:
-                if not moved or status.state in AT_REST or state in AT_REST:
-                    return status  # a hold with another substate, or with none, may still brake
-                self.clock.host.sleep(LOOK)
-            if moved:
-                standing.restart()
-            elif standing.over() and state != "Door":
-                raise StandsStill(
-                    f"the controller stays in state {status.state}; the machine stands at {_text(place)} mm",
-                    "a controller that comes to rest",
-                    "look at it, then reset it and find its zero again",
-                )
-            if state in MOVING:
-                link.realtime(b"!")
-            if self.clock.now_ns() > end:
-                raise DeviceError(
-                    f"the machine is in state {status.state} {COMING_TO_REST:g} s after a feed hold",
-                    "a machine at rest",
-                    "press the emergency stop and look at it",
-                )
-
-
-def _text(position: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in position) + ")"
-
-
-def _moves(link: GrblLink) -> bool:
-    return link.last is not None and link.last.state.split(":")[0] in MOVING

@@ -59,3 +59,12 @@ class StreamCounts:
 
 class OwesAnswer(DeviceError):
     """The controller stands idle and can no longer send what it owes: an answer was lost, or the firmware stalled."""
+
+
+class StandsStill(DeviceError):
+    """A machine that has come to rest, and whose motion cannot be abandoned."""
+
+    def __init__(self, given: str, allowed: str, remedy: str, at: tuple[float, float, float] | None = None) -> None:
+        """Say why; ``at`` is where it stands [mm, machine], if that is known."""
+        super().__init__(given, allowed, remedy)
+        self.at = at
