@@ -279,10 +279,12 @@ def foreign_hold(faults):
 
 
 def foreign_door(faults):
+    faults.must_end(2.0)
     faults.world.controller.inject_byte(0x84)
 
 
 def door(faults):
+    faults.must_end(2.0)
     faults.world.controller.inject_door(True)
     if faults.random.random() < 0.5:
         faults.after(faults.random.uniform(0.05, 3.0), lambda: faults.world.controller.inject_door(False))
