@@ -100,6 +100,7 @@ class Recorder:
         self.devices = devices or RigDevices.of(rig)
         self._mount, self._detect, self._progress = mount, detect, progress
         self._mounted: tuple[str, float, float, float] | None = None
+        self._bad_readings = False  # then no contact is judged: the plan takes such readings
         self._height = safe_height(plan, rig)
         self._interruption = interruption or Interruption()
         self._state = MachineState(rig, self.devices.cnc)
@@ -155,6 +156,7 @@ class Recorder:
         return True
 
     def _say_bad(self, words: str) -> None:
+        self._bad_readings = True
         self._say(f"WARNING: {words}; it goes on, as the plan says")
 
     def _open_and_record(
@@ -225,7 +227,7 @@ class Recorder:
             changed = press.mounting != judged
             position = self._record(press, position, streams, limits)
             session = refresh(session)
-            if changed or done <= JUDGED:
+            if (changed or done <= JUDGED) and not self._bad_readings:
                 require_contact(file_names.finished(self.out)[press.index])
             judged = press.mounting
             if self._progress:

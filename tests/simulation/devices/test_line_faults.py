@@ -121,7 +121,9 @@ def test_without_an_echo_it_is_noticed_when_the_reports_leave_the_path(tmp_path)
 
 def test_a_recording_says_whether_its_lines_were_checked(tmp_path):
     for echo in (False, True):
-        world = World(4, tmp_path / f"session {echo}", presses=1, echo=echo)
+        world = World(
+            4, tmp_path / f"rig {echo}" / "session", presses=1, echo=echo
+        )  # a rig each: the tip was left elsewhere
         session = world.record()
         world.end()
         attached = read_records(session.episodes[0]).attachments["controller.json"].data
