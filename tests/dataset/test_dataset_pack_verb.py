@@ -36,7 +36,9 @@ def recorded(tmp_path: Path, monkeypatch) -> Path:
         "code_version": "0",
     }
     documents.write(folder / "labels" / "episode-000002.failure.json", failure, "label_failure")
-    found = SimpleNamespace(episodes=tuple(episodes), unfinished=(folder / "episode-000003.partial.mcap",))
+    found = SimpleNamespace(
+        episodes=tuple(episodes), unfinished=(folder / "episode-000003.partial.mcap",), labels=folder / "labels"
+    )
     monkeypatch.setattr(session, "read_session", lambda _: found)
     monkeypatch.setattr(reader, "read_episode", episodes.__getitem__)
     return folder
