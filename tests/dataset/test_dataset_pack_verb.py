@@ -3,7 +3,7 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
+from typing import NamedTuple
 
 import press_example as example
 import pytest
@@ -14,6 +14,17 @@ from tacdata.dataset.flags import carry_flags, flagged_episodes, read_flags, set
 from tacdata.labels import write_label
 from tacdata.recording import session
 from tacdata.recording.files import reader
+
+
+class RecordedSession(NamedTuple):
+    """A session whose episodes come from memory."""
+
+    episodes: tuple[Path, ...]
+    unfinished: tuple[Path, ...]
+    labels: Path
+
+    def __iter__(self):
+        return (reader.read_episode(path) for path in self.episodes)
 
 
 @pytest.fixture
@@ -36,10 +47,9 @@ def recorded(tmp_path: Path, monkeypatch) -> Path:
         "code_version": "0",
     }
     documents.write(folder / "labels" / "episode-000002.failure.json", failure, "label_failure")
-    found = SimpleNamespace(
-        episodes=tuple(episodes), unfinished=(folder / "episode-000003.partial.mcap",), labels=folder / "labels"
-    )
+    found = RecordedSession(tuple(episodes), (folder / "episode-000003.partial.mcap",), folder / "labels")
     monkeypatch.setattr(session, "read_session", lambda _: found)
+    monkeypatch.setattr("tacdata.pipeline.pack.read_session", lambda _: found)
     monkeypatch.setattr(reader, "read_episode", episodes.__getitem__)
     return folder
 

@@ -34,7 +34,9 @@ NOTEBOOKS = ROOT / "docs" / "notebooks"
 GUIDES = [page for page in PAGES if page.parent == ROOT or page.is_relative_to(ROOT / "docs")]
 GUIDES = [page for page in GUIDES if not page.is_relative_to(NOTEBOOKS)]
 PYTHON = [page for page in GUIDES if blocks(page, "python")]
-OF_ROOMS = [page for page in PAGES if page not in GUIDES and blocks(page, "python")]
+NOTEBOOKS = ROOT / "docs" / "notebooks"
+"""Pages written by `.dev/notebooks.py`, which runs them whole (tests/examples/test_notebooks.py)."""
+OF_ROOMS = [page for page in PAGES if page not in GUIDES and NOTEBOOKS not in page.parents and blocks(page, "python")]
 
 
 @pytest.fixture(scope="module")

@@ -16,11 +16,10 @@ from training.inference.prediction import PredictedMaps, write_prediction
 from viewers.pictures import film
 
 PICTURES = HOW_TO.parent / "pictures"
-HEADINGS = {
-    "Taxel signals": (112, 126, 0, 640),
-    "Label, Prediction, Prediction − label, Pressure, Shear": (499, 514, 0, 640),
-}
-"""Headings -> rows and columns of the page in which they stand, and nothing of the press [pixels]."""
+HEADINGS = {"Taxel signals": (124, 138, 0, 640)}
+"""Headings -> rows and columns of the page in which they stand, and nothing of the press [pixels].
+
+Headings of the maps are left out: their number depends on the maps that a label holds."""
 APART, MOVED, LETTER = 20, 10, 4
 """Gap between two headings, and how far an axis of other numbers moves them; less than a letter [pixels]."""
 
