@@ -19,14 +19,14 @@ class Exit(IntEnum):
         member.meaning = meaning
         return member
 
-    DONE = 0, "What was asked for is done."
+    DONE = 0, "The task is done."
     UNFIT = 1, "It was looked at, and the answer is no: a recording is unfit, or a robot cannot follow."
     USAGE = 2, "The command or its arguments do not fit together."
-    FORMAT = 3, "A file or stream is not what its schema says."
+    FORMAT = 3, "A file or stream does not fit its schema."
     DEVICE = 4, "A device is missing, silent, or in a state that forbids the action."
     SOLVE = 5, "A simulation cannot be set up, or did not reach equilibrium."
     PACKAGE = 6, "A package is missing that an extra of the install brings."
-    INTERRUPTED = 130, "Ctrl-C ended it; what was finished is kept."
+    INTERRUPTED = 130, "Ctrl-C ended it; finished parts are kept."
 
 
 class TacdataError(Exception):

@@ -18,6 +18,8 @@ BLOSC_HEADER = 16
 """Bytes at a chunk's beginning; the last four say its length."""
 ENDS = "meta/episode_ends"
 """Array with the row after each episode's last."""
+USUAL = 0.99
+"""Quantile of the steps between rows up to which a step is usual [1]."""
 WIDEST = 4096
 """Values a row above which an array holds images, and no channels."""
 
@@ -64,11 +66,13 @@ class Zarr(SourceFormat):
 def _without_lost(array: Any, folder: Path, values: np.ndarray) -> tuple[np.ndarray, str]:
     """Return an array's values with NaN for those of chunks that are not there, and how many chunks that are, as words.
 
-    A store leaves out chunks that hold the fill value alone. Where the rows before and behind hold it too, it stays.
+    A store leaves out chunks that hold the fill value alone. Where the neighbouring rows are within a usual step of it,
+    the values stay.
     """
     if values.dtype.kind not in "biuf" or array.shards is not None:
         return values, f"some of {array.nchunks} chunks are not there; {array.fill_value} stands for their values"
     result, lost, empty = values.astype(float), 0, 0
+    step = np.quantile(np.abs(np.diff(result, axis=0)), USUAL) if len(result) > 1 else 0.0
     for place in np.ndindex(*(-(-size // chunk) for size, chunk in zip(array.shape, array.chunks, strict=True))):
         names = [str(number) for number in place]
         spelled = ("/".join(("c", *names)), ".".join(("c", *names)), ".".join(names), "/".join(names))
@@ -77,7 +81,7 @@ def _without_lost(array: Any, folder: Path, values: np.ndarray) -> tuple[np.ndar
         block = tuple(slice(k * n, (k + 1) * n) for k, n in zip(place, array.chunks, strict=True))
         ends = [block[0].start - 1, block[0].stop]
         beside = np.array([values[(row, *block[1:])].ravel() for row in ends if 0 <= row < len(values)])
-        if beside.size and (beside == array.fill_value).all():
+        if beside.size and (np.abs(beside - array.fill_value) <= step).all():
             empty += 1
             continue
         result[block], lost = np.nan, lost + 1
