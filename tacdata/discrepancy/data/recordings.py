@@ -16,6 +16,7 @@ from tacdata.discrepancy.data.path_noise import resolved, without_dropouts, with
 from tacdata.discrepancy.data.specimens import specimens
 from tacdata.discrepancy.data.strokes import strokes
 from tacdata.discrepancy.data.tip_observation import Views, second_views
+from tacdata.discrepancy.model.slack import without_slack
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 from tacdata.recording import Episode, read_session
@@ -95,7 +96,8 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
         notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
     if any(e.tags for _, e in found) and not views:
         notes.append("the tag was seen too seldom to check the guide: keep it in view during the presses")
-    return _joined(parts, (kept, limits), found[0][1], (bool(force), bool(temperature), bool(views)), notes)
+    streams = bool(force), bool(temperature), bool(views)
+    return without_slack(_joined(parts, (kept, limits), found[0][1], streams, notes))
 
 
 def _of_one_sensor(episodes: list[Episode]) -> list[str]:

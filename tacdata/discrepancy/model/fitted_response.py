@@ -39,6 +39,8 @@ MOST_SMOOTHING = 1e9
 SLOPES = 10.0
 """REML: noise is taken for so many times its variance. What moves the tip shows by slopes, which need more smoothing
 than values do. What a smoother response misses of the values is projected out [1]."""
+FILLS = 4
+"""Times that readings at a limit are replaced by the splines there [1]: each time half of what is off goes."""
 INNER = (0.02, 0.98)
 """Quantiles of readings between which their range is taken: a few odd ones do not count [1]."""
 CACHED = 6
@@ -90,6 +92,12 @@ class FittedResponse(Response):
             self._bases = [self._bent(k, count) for k in range(len(self._bases))]
             self._air = [self._design(basis, basis.t[:1]) for basis in self._bases]
             self._fit(streams)
+        if reduced.clipped is not None:
+            unknown = np.zeros(streams.shape, dtype=bool)
+            unknown[:, : course.channels] = reduced.clipped
+            for _ in range(FILLS):
+                streams = np.where(unknown, self._followed(), streams)
+                self._fit(streams)
 
     def copied(self) -> FittedResponse:
         """Return the same response, to be corrected by itself."""

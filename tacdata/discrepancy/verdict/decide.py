@@ -35,6 +35,8 @@ SURELY_CLOSED = 0.5
 """Sealed episodes: the gap surely closes if the 90 % interval of the share that is closed begins above this [1]."""
 SETTLED_Z = 5.0
 """J test: a rival beaten by so many standard errors is out, whatever the answer leaves [1]."""
+FAR_Z = 10.0
+"""J test: beaten by so many standard errors, no other form of a rival is near, whatever these presses can split [1]."""
 LOUD = 2.0
 """Residual: a mean square of so many noise floors is unknown, not none, even if no test rejects [1]."""
 RARE_P = 0.003
@@ -179,9 +181,11 @@ def decide(
             status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
     if status in ("named", INCOMPLETE) and refuted(shown):
         status, reason = "unknown", Reason.SEALED
-    if status == "named" and not found.gap and not borne_out(shown):
-        # Behind a closed gate, sealed episodes alone bear a gain out.
-        levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
+    if status in ("named", INCOMPLETE) and not borne_out(shown):
+        # Behind a closed gate, sealed episodes alone bear a gain out; a name that they do not show is suspected.
+        unshown = shown is not None and sealed and shown.interval[0] <= 0
+        if unshown or (status == "named" and not found.gap):
+            levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
     if checks.contradictions:
         status, reason = "unknown", Reason.CONTRADICTION
     elif checks.too_few:
@@ -332,7 +336,7 @@ def answer_of(found: Findings) -> list[FoundEffect]:
     course, own = found.problem.setting.course, []
     for f in found.effects:
         effect = f.placed.effect
-        alike = lookalikes(course, effect, f.placed.values)
+        alike = [name for name in lookalikes(course, effect, f.placed.values) if not _far(f, name)]
         rivals = [name for name in dict.fromkeys([*f.rivals, *alike, *_hidden(found, f)]) if name != effect.called]
         # A size says nothing against what these presses cannot split.
         unphysical = tuple(name for name in f.unphysical if name in rivals and name not in alike)
@@ -340,6 +344,12 @@ def answer_of(found: Findings) -> list[FoundEffect]:
     # What is within another's form, and only where its own equation ends, is no sign of more.
     own = [f for f in own if not (f.at_bound and lent(found, f))]
     return [*(f for f in own if not calibration_error(f)), *gains_beyond_calibration(found)]
+
+
+def _far(finding: FoundEffect, mechanism: str) -> bool:
+    """Return whether every form of a mechanism that was tried in an effect's place fits far worse."""
+    tried = [by for name, by in finding.margins.items() if load(name).called == mechanism]
+    return bool(tried) and min(tried) >= FAR_Z
 
 
 def adequate(found: Findings, answer: list[FoundEffect]) -> bool:
