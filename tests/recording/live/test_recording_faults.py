@@ -1,6 +1,7 @@
 """Faults in mid-press on the emulated rig: the motion stops, what was received is on disk, the session goes on."""
 
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -126,7 +127,8 @@ def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(be
     # A long hold: a busy machine that kills late does not find the press done and no file open.
     (tmp_path / "plan.yaml").write_text(yaml.safe_dump(plan_document(2, hold=8.0, rest=0.4)))
     child = subprocess.Popen(bench, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while height(virtual) > -0.2:
+    # The touch that proves the zero goes as deep, before any file is open.
+    while height(virtual) > -0.2 or not list(out.glob("*.partial.mcap")):
         time.sleep(0.002)
     time.sleep(0.3)
     killed_ns = virtual.clock.now_ns()
@@ -138,7 +140,11 @@ def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(be
     found = recover(partial, tmp_path / "copy.mcap")
     assert found.messages > 20
     time.sleep(1.0)  # the emulated machine ends its last line
-    result = subprocess.run([*bench, "--resume"], capture_output=True, text=True, check=False)
+    refused = subprocess.run([*bench, "--resume"], capture_output=True, text=True, check=False)
+    [code] = re.findall(r"--confirm-position (\w+)\)", refused.stderr)
+    assert refused.returncode != 0 and "nothing was moved" in refused.stderr
+    bench = [*bench, "--resume", "--confirm-position", code]
+    result = subprocess.run(bench, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
     assert "2 of 2" in result.stdout
     assert len(file_names.unfinished(out)) == 1, "what the kill left is put aside, not overwritten"
