@@ -104,8 +104,10 @@ def track(
     for name, path in paths.items():
         tracks[name], words = _track(name, path, sightings[name], recording, times, estimators.get(name))
         remarks += words
-    tracks, words = _against_touch(tracks, paths, sightings, times)
-    remarks += words
+    # Paths of a camera that was moved show no time of closing fingers.
+    if not bumps:
+        tracks, words = _against_touch(tracks, paths, sightings, times)
+        remarks += words
     parents = {"recording": provenance.file_hash(recording.path)}
     network = identity_of(estimators)
     if network:
