@@ -1,5 +1,6 @@
 """`tacdata label`: what it prints, what it refuses, and its exit codes."""
 
+import importlib
 import json
 import os
 import subprocess
@@ -12,8 +13,6 @@ from typer.testing import CliRunner
 
 from tacdata import cli
 from tacdata.errors import SolveError
-from tacdata.recording import session as sessions
-from tacdata.recording.files import reader
 
 FARM = Path(__file__).resolve().parent.parent / "label_farm"
 
@@ -27,8 +26,9 @@ def label(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(FARM))
     episodes = {f"episode-{k:06d}.mcap": press_episode(tmp_path, k, x=float(k), depth=k - 0.5) for k in range(3)}
     session = SimpleNamespace(episodes=tuple(tmp_path / name for name in episodes))
-    monkeypatch.setattr(sessions, "read_session", lambda folder: session)
-    monkeypatch.setattr(reader, "read_episode", lambda path: episodes[path.name])
+    pipeline = importlib.import_module("tacdata.pipeline.label")
+    monkeypatch.setattr(pipeline, "read_session", lambda folder: session)
+    monkeypatch.setattr(pipeline, "read_episode", lambda path: episodes[path.name])
 
     def run(*options):
         arguments = ["label", str(tmp_path), "--factory", "fast_model:FastModel", "--workers", "1", *options]

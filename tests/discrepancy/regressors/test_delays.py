@@ -68,7 +68,7 @@ def test_readings_that_come_early_are_asked_about_unless_the_answer_is_a_loop():
     assert not any("earlier than their times" in words for words in answered["remarks"])
 
 
-@pytest.mark.parametrize(("late", "words"), [(0.6, "0.60 s late"), (-0.6, "0.60 s early, as no sensor does")])
+@pytest.mark.parametrize(("late", "words"), [(0.6, "0.60 s late"), (-0.6, "0.60 s early, impossible for a sensor")])
 def test_a_long_delay_of_either_sign_is_said_as_it_is(late, words):
     assert words in load("latency").remark({"L": np.array(late)})
     assert load("latency").remark({"L": np.array(late / 100)}) == ""

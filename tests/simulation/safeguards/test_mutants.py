@@ -3,14 +3,18 @@
 import pytest
 from mutants import KINDS, MUTANTS, noticed
 
-ROOMS = ("tacdata/recording", "tacdata/wire", "tacdata/devices", "tests/simulation")
-
 
 def test_every_mutant_names_its_faults():
     assert set(KINDS) == set(MUTANTS)
 
 
-@pytest.mark.long(*ROOMS, reason="some recordings with each of 15 safeguards missing")
+@pytest.mark.long(
+    "tacdata/recording",
+    "tacdata/wire",
+    "tacdata/devices",
+    "tests/simulation",
+    reason="some recordings with each of 15 safeguards missing",
+)
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_missing_safeguard_is_noticed_by_its_own_faults(name):
     assert noticed(name, range(25), KINDS[name]) is not None
