@@ -23,10 +23,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from label_farm.presses.ladder import Ladder
 from tacdata.errors import SolveError
 from tacdata.indenters import from_document
 from tacdata.indenters.flat_punch import FlatPunch
+from tacdata.label_farm.presses.ladder import Ladder
 from tacdata.plans.shipped.training import training_plan
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.skin.model import ModelSettings, SkinModel

@@ -32,8 +32,8 @@ MEASURED = """
 import json, resource, sys, time
 begun = time.perf_counter()
 from pathlib import Path
-from viewers.browse.list_sources import episodes_at
-from viewers.source import scene_at
+from tacdata.viewers.browse.list_sources import episodes_at
+from tacdata.viewers.source import scene_at
 root, number = Path(sys.argv[1]), int(sys.argv[2])
 shown = len(episodes_at(root).entries) if number < 0 else len(scene_at(root, episode=number).frame_ns)
 used = resource.getrusage(resource.RUSAGE_SELF)

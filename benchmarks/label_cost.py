@@ -19,9 +19,9 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from label_farm.presses.fem import FemModel
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
+from tacdata.label_farm.presses.fem import FemModel
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder
 from tacdata.labels import PathSolution
 from tacdata.plans.shipped.training import training_plan
 from tacdata.sensor import Sensor, default_sensor

@@ -27,16 +27,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 
-from label_farm import environment
-from label_farm.ledger.ledger import FAILED, Ledger
-from label_farm.ledger.roster import Roster
-from label_farm.presses import model
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
-from label_farm.store.store import Store
-from label_farm.workers.pool import Pool
 from tacdata import provenance
 from tacdata.errors import TacdataError, UsageError
+from tacdata.label_farm import environment
+from tacdata.label_farm.ledger.ledger import FAILED, Ledger
+from tacdata.label_farm.ledger.roster import Roster
+from tacdata.label_farm.presses import model
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.pool import Pool
 from tacdata.sensor import Sensor, default_sensor
 
 REACH = (4.5, 2.5)

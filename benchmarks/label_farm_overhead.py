@@ -15,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from label_farm import environment
-from label_farm.ledger.ledger import Ledger
-from label_farm.presses.interpolate import Branch
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
-from label_farm.store.store import Store
-from label_farm.workers.pool import Pool
 from tacdata import provenance
+from tacdata.label_farm import environment
+from tacdata.label_farm.ledger.ledger import Ledger
+from tacdata.label_farm.presses.interpolate import Branch
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.pool import Pool
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor, default_sensor
 

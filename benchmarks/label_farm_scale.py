@@ -24,13 +24,13 @@ sys.path.append(str(Path(__file__).resolve().parent.parent / "tests" / "label_fa
 import numpy as np
 from farm_examples import press_episode
 
-from label_farm import environment
-from label_farm.labelling import Labelling
-from label_farm.labels.label_index import Known, LabelIndex, stamp
-from label_farm.labels.recall import skin_key
-from label_farm.settings import FarmSettings
-from label_farm.store.store import Store
 from tacdata import provenance
+from tacdata.label_farm import environment
+from tacdata.label_farm.labelling import Labelling
+from tacdata.label_farm.labels.label_index import Known, LabelIndex, stamp
+from tacdata.label_farm.labels.recall import skin_key
+from tacdata.label_farm.settings import FarmSettings
+from tacdata.label_farm.store.store import Store
 from tacdata.recording.episode import Episode
 
 

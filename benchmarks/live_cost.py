@@ -21,8 +21,8 @@ from tacdata.devices.device import TaxelFrame
 from tacdata.live.depth_stream import DepthStream
 from tacdata.live.message_server import message
 from tacdata.sensor import default_sensor
-from training.metrics.novelty import KEPT, TrainingReadings
-from training.networks.network import create
+from tacdata.training.metrics.novelty import KEPT, TrainingReadings
+from tacdata.training.networks.network import create
 
 NETWORKS = ("paper", "causal", "pattern")
 RATE, TARED = 30.0, 30

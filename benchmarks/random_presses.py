@@ -27,10 +27,10 @@ import numpy as np
 import torch
 from scipy.stats import binomtest
 
-from label_farm.simulated.plan import SimulationPlan, read_simulation_plan
-from label_farm.simulated.press_draw import draw_press
-from label_farm.simulated.specimen import stretched
 from tacdata.errors import SolveError
+from tacdata.label_farm.simulated.plan import SimulationPlan, read_simulation_plan
+from tacdata.label_farm.simulated.press_draw import draw_press
+from tacdata.label_farm.simulated.specimen import stretched
 from tacdata.plans import Press
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.skin.contact.press_limits import check_press

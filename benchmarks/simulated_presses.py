@@ -16,11 +16,11 @@ from pathlib import Path
 
 import torch
 
-from label_farm.simulated import solving
-from label_farm.simulated.packing import write_dataset
-from label_farm.simulated.plan import DEFAULT, read_simulation_plan
-from label_farm.simulated.shard import read_shard, shard_files
-from label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated import solving
+from tacdata.label_farm.simulated.packing import write_dataset
+from tacdata.label_farm.simulated.plan import DEFAULT, read_simulation_plan
+from tacdata.label_farm.simulated.shard import read_shard, shard_files
+from tacdata.label_farm.simulated.simulation import Simulation
 from tacdata.sensor import default_sensor
 
 

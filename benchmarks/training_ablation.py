@@ -16,14 +16,14 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from training.frames.data import read_frames
-from training.generalization import generalize
-from training.inference import checkpoint
-from training.loss import WeightedLoss
-from training.reports.comparison import groups
-from training.reports.score_sheet import number, row, rule, title
-from training.scoring.evaluate import METRICS
-from training.settings import TrainingSettings
+from tacdata.training.frames.data import read_frames
+from tacdata.training.generalization import generalize
+from tacdata.training.inference import checkpoint
+from tacdata.training.loss import WeightedLoss
+from tacdata.training.reports.comparison import groups
+from tacdata.training.reports.score_sheet import number, row, rule, title
+from tacdata.training.scoring.evaluate import METRICS
+from tacdata.training.settings import TrainingSettings
 
 PAST = [-8, -7, -6, -5, -4, -3, -2, -1, 0]
 CONTACT = WeightedLoss(mixture=0.2, threshold=0.033, foreground=3.0)

@@ -25,14 +25,14 @@ import torch
 
 from tacdata import provenance
 from tacdata.sensor import default_sensor
-from training.frames.data import read_frames
-from training.frames.frames import EpisodeSpan, Frames
-from training.frames.windows import Windows
-from training.inference.checkpoint import load
-from training.inference.compute import choose_device, reproducible
-from training.inference.predictor import milliseconds_per_frame
-from training.settings import TrainingSettings
-from training.train import Progress, train
+from tacdata.training.frames.data import read_frames
+from tacdata.training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.checkpoint import load
+from tacdata.training.inference.compute import choose_device, reproducible
+from tacdata.training.inference.predictor import milliseconds_per_frame
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import Progress, train
 
 REPEATS = 3
 

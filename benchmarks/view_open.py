@@ -172,7 +172,7 @@ def main() -> None:
         if not path.is_file():
             write(folder, args.minutes, args.rate, args.camera_rate, not args.unlabelled)
         runs = [opened(path, Path(temporary) / f"{k}.rrd") for k in range(3)]
-        from viewers.source import scene_at
+        from tacdata.viewers.source import scene_at
 
         scene = scene_at(path)
         drawn = {

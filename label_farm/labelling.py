@@ -13,23 +13,23 @@ from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
-from label_farm.growing_session import GrowingSession
-from label_farm.labels import make_label
-from label_farm.labels.label_index import Known, stamp
-from label_farm.labels.margin import Margin
-from label_farm.labels.recall import FLUSH, Recall, skin_key
-from label_farm.labels.request import LabelRequest, Planned, request
-from label_farm.labels.session_labels import SessionLabels
-from label_farm.ledger.ledger import JobOutcome, Ledger, owner_name
-from label_farm.presses import model
-from label_farm.presses.job import Job
-from label_farm.settings import FarmSettings
-from label_farm.store.failure import Failure
-from label_farm.store.store import Store
-from label_farm.summary import LabellingSummary
-from label_farm.workers.engine import POLL_SECONDS, StoreFull
 from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.growing_session import GrowingSession
+from tacdata.label_farm.labels import make_label
+from tacdata.label_farm.labels.label_index import Known, stamp
+from tacdata.label_farm.labels.margin import Margin
+from tacdata.label_farm.labels.recall import FLUSH, Recall, skin_key
+from tacdata.label_farm.labels.request import LabelRequest, Planned, request
+from tacdata.label_farm.labels.session_labels import SessionLabels
+from tacdata.label_farm.ledger.ledger import JobOutcome, Ledger, owner_name
+from tacdata.label_farm.presses import model
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.settings import FarmSettings
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.summary import LabellingSummary
+from tacdata.label_farm.workers.engine import POLL_SECONDS, StoreFull
 from tacdata.recording.episode import Episode
 from tacdata.recording.files.reader import read_episode
 from tacdata.sensor import Sensor

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from label_farm import environment
-from label_farm.ledger.ledger import LEASE_SECONDS
-from label_farm.presses import model
-from label_farm.presses.ladder import Ladder
-from label_farm.workers.engine import EngineMaker
-from label_farm.workers.pool import Pool
+from tacdata.label_farm import environment
+from tacdata.label_farm.ledger.ledger import LEASE_SECONDS
+from tacdata.label_farm.presses import model
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.workers.engine import EngineMaker
+from tacdata.label_farm.workers.pool import Pool
 
 
 @dataclass(frozen=True)

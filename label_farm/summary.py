@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from label_farm.labels.margin import Margin
+from tacdata.label_farm.labels.margin import Margin
 
 
 @dataclass

@@ -11,7 +11,7 @@ from pathlib import Path
 from tacdata import registry
 from tacdata.errors import UsageError
 
-PACKAGES = ("tacdata", "label_farm", "training", "viewers")
+PACKAGES = ("tacdata", "tacdata.label_farm", "tacdata.training", "tacdata.viewers")
 
 
 @dataclass(frozen=True)

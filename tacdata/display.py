@@ -21,7 +21,7 @@ from tacdata.paths import StrPath
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ROOM, BASE = "viewers.portraits", "portrait"
+ROOM, BASE = "tacdata.viewers.portraits", "portrait"
 LINES = 6
 """Most lines of a description."""
 RESOLUTION = 72

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 from jsonschema import Draft202012Validator
 
-import schemas
+from tacdata import schemas
 from tacdata.errors import WRITABLE, DeviceError, FormatError, UsageError, refused_by_system
 from tacdata.paths import StrPath
 from tacdata.replacement import replacement

@@ -17,11 +17,11 @@ ALL = "all"
 """The extra that brings everything: never the least that is needed."""
 ROOMS = {
     "tacdata.revision": "fem",
-    "training": "learn",
+    "tacdata.training": "learn",
     "tacdata.pipeline.evaluate": "learn",
     "tacdata.pipeline.train": "learn",
     "tacdata.pipeline.trained_network": "learn",
-    "viewers": "view",
+    "tacdata.viewers": "view",
 }
 """Who asks decides, where two extras bring the same package: torch solves for `fem` and trains for `learn`."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import re
 import subprocess
 from datetime import UTC, datetime
 from functools import cache
@@ -104,6 +105,12 @@ def _syntax(node: Any) -> Any:
     if isinstance(node, list):
         # A docstring of a function or a field is such a text: it does nothing.
         return [_syntax(each) for each in node if not _stands_alone(each)]
+    if isinstance(node, str):
+        # Their versions are those of releases that had these packages beside tacdata.
+        return re.sub(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)", "", node)
+    if isinstance(node, str):
+        # Their versions are those of releases that had these packages beside tacdata.
+        return re.sub(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)", "", node)
     if not isinstance(node, ast.AST):
         return node
     # Which fields of a kind there are grows with Python's releases; their new ones are empty.

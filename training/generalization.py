@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tacdata.errors import FormatError, UsageError
-from training.frames.frames import Frames
-from training.inference import checkpoint
-from training.reports import report
-from training.scoring.evaluate import Evaluation, evaluate
-from training.settings import TrainingSettings
-from training.splits.split import divide
-from training.train import Progress, train
+from tacdata.training.frames.frames import Frames
+from tacdata.training.inference import checkpoint
+from tacdata.training.reports import report
+from tacdata.training.scoring.evaluate import Evaluation, evaluate
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.splits.split import divide
+from tacdata.training.train import Progress, train
 
 DEFAULTS = ("episode", "configuration", "indenter", "site", "depth", "rate", "specimen")
 """Every way to hold presses out."""

@@ -10,15 +10,15 @@ import numpy as np
 import torch
 
 from tacdata.errors import UsageError
-from training.frames.channel_calibration import calibrate
-from training.frames.frames import Frames
-from training.frames.label_tensor import label_tensor
-from training.frames.variation import Variation
-from training.frames.windows import Windows
-from training.inference.checkpoint import Checkpoint
-from training.loss import normalized
-from training.networks.network import Network, create
-from training.settings import TrainingSettings
+from tacdata.training.frames.channel_calibration import calibrate
+from tacdata.training.frames.frames import Frames
+from tacdata.training.frames.label_tensor import label_tensor
+from tacdata.training.frames.variation import Variation
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.loss import normalized
+from tacdata.training.networks.network import Network, create
+from tacdata.training.settings import TrainingSettings
 
 
 class Rehearsal:

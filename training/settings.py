@@ -7,7 +7,7 @@ from math import cos, pi
 from typing import Any
 
 from tacdata.errors import UsageError
-from training.loss import WeightedLoss
+from tacdata.training.loss import WeightedLoss
 
 SCHEDULES = ("constant", "cosine")
 PRECISIONS = ("float32", "bfloat16")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tacdata.extras import missing_package
-from training.train import Progress
+from tacdata.training.train import Progress
 
 FOLDER = "tensorboard"
 

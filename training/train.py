@@ -12,24 +12,23 @@ from typing import Any
 import numpy as np
 import torch
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.errors import TacdataError, UsageError
-from training.frames.channel_calibration import calibrate
-from training.frames.frames import Frames
-from training.frames.label_tensor import label_tensor
-from training.frames.variation import Variation
-from training.frames.windows import Windows
-from training.inference import checkpoint
-from training.inference.compute import choose_device, reproducible
-from training.inference.predictor import predict
-from training.loss import normalized
-from training.metrics import conformal_intervals, depth_maps, novelty
-from training.metrics.conformal_intervals import ConformalIntervals
-from training.networks.network import Network, create
-from training.rehearsal import Rehearsal
-from training.settings import TrainingSettings
-from training.splits.split import Split, divide
+from tacdata.training.frames.channel_calibration import calibrate
+from tacdata.training.frames.frames import Frames
+from tacdata.training.frames.label_tensor import label_tensor
+from tacdata.training.frames.variation import Variation
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference import checkpoint
+from tacdata.training.inference.compute import choose_device, reproducible
+from tacdata.training.inference.predictor import predict
+from tacdata.training.loss import normalized
+from tacdata.training.metrics import conformal_intervals, depth_maps, novelty
+from tacdata.training.metrics.conformal_intervals import ConformalIntervals
+from tacdata.training.networks.network import Network, create
+from tacdata.training.rehearsal import Rehearsal
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.splits.split import Split, divide
 
 METRICS = "metrics.jsonl"
 _PULLED = 10

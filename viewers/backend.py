@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from viewers.scene.scene import Scene
+from tacdata.viewers.scene.scene import Scene
 
 
 class Backend(ABC):

@@ -10,13 +10,13 @@ import numpy as np
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import file_names
 from tacdata.sensor import Sensor
-from viewers.kinds.session import episode_of, spans
-from viewers.parts import signals
-from viewers.parts.label import shown_label
-from viewers.parts.prediction_files import find_prediction, first_predicted
-from viewers.scene.scene import Scene, Span
-from viewers.scenes.comparison import Side, maps_comparison
-from viewers.scenes.dataset import phase_spans
+from tacdata.viewers.kinds.session import episode_of, spans
+from tacdata.viewers.parts import signals
+from tacdata.viewers.parts.label import shown_label
+from tacdata.viewers.parts.prediction_files import find_prediction, first_predicted
+from tacdata.viewers.scene.scene import Scene, Span
+from tacdata.viewers.scenes.comparison import Side, maps_comparison
+from tacdata.viewers.scenes.dataset import phase_spans
 
 
 def labels_at(path: Path, folders: Sequence[Path], episode: int | None) -> Scene:

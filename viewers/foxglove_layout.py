@@ -8,8 +8,8 @@ from typing import Any
 from tacdata import documents
 from tacdata.recording.files import topics
 from tacdata.recording.files.mcap_records import read_records
-from viewers.output_file import new_file
-from viewers.scene.color_scale import HUES
+from tacdata.viewers.output_file import new_file
+from tacdata.viewers.scene.color_scale import HUES
 
 ENDING = ".json"
 

@@ -10,10 +10,10 @@ from importlib import import_module
 from pathlib import Path
 
 from tacdata.errors import UsageError
-from viewers import output_file
-from viewers.rerun import window
-from viewers.rerun.steering import Moment, deepest_moment
-from viewers.scene.scene import Scene
+from tacdata.viewers import output_file
+from tacdata.viewers.rerun import window
+from tacdata.viewers.rerun.steering import Moment, deepest_moment
+from tacdata.viewers.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,13 @@ class Output:
 
     def prepare(self) -> None:
         """Import the drawing packages, which takes as long as reading a large file."""
-        import viewers.scenes.episode
+        import tacdata.viewers.scenes.episode
 
         import_module("trimesh.creation")  # of which indenters are made
         if self.save is not None or self.opens:
-            import viewers.rerun.backend
+            import tacdata.viewers.rerun.backend
         if self.picture is not None:
-            import viewers.pictures.backend  # noqa: F401
+            import tacdata.viewers.pictures.backend  # noqa: F401
 
     def check(self) -> None:
         """Refuse impossible requests, before anything is read.
@@ -79,8 +79,8 @@ def show(scene: Scene, output: Output) -> None:
 
     Example:
         >>> from pathlib import Path
-        >>> from viewers.showing import Output, show
-        >>> from viewers.source import scene_at
+        >>> from tacdata.viewers.showing import Output, show
+        >>> from tacdata.viewers.source import scene_at
         >>> show(scene_at(Path("session/episode-000000.mcap")), Output(picture=Path("press.png")))
         saved press.png
     """
@@ -88,12 +88,12 @@ def show(scene: Scene, output: Output) -> None:
         write_rerun(scene, output.save)
         print(f"saved {output.save}; look at it with: tacdata view {output.save}")
     if output.picture is not None:
-        from viewers.pictures.backend import PictureBackend
+        from tacdata.viewers.pictures.backend import PictureBackend
 
         PictureBackend(output.picture).draw(scene)
         print(f"saved {output.picture}")
     if output.video is not None:
-        from viewers.pictures.film import FilmBackend
+        from tacdata.viewers.pictures.film import FilmBackend
 
         FilmBackend(output.video).draw(scene)
         print(f"saved {output.video}")
@@ -119,7 +119,7 @@ def show_saved(path: Path, output: Output) -> None:
 
 def write_rerun(scene: Scene, file: Path) -> None:
     """Write a Rerun file."""
-    from viewers.rerun.backend import RerunBackend
+    from tacdata.viewers.rerun.backend import RerunBackend
 
     RerunBackend(file).draw(scene)
 

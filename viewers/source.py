@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from viewers.kinds.kind import kind_of
-from viewers.scene.request import Asked, nothing
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import kind_of
+from tacdata.viewers.scene.request import Asked, nothing
+from tacdata.viewers.scene.scene import Scene
 
 
 def scene_at(
@@ -32,7 +32,7 @@ def scene_at(
 
     Example:
         >>> from pathlib import Path
-        >>> from viewers.source import scene_at
+        >>> from tacdata.viewers.source import scene_at
         >>> scene = scene_at(Path("session/episode-000000.mcap"))
         >>> [phase.name for phase in scene.phases][:3]
         ['rest', 'approach', 'press']

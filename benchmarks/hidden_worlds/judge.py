@@ -87,7 +87,7 @@ def setting_of(folder, course, without=(), **switches):
 
 def spec_of(folder):
     """Return the model's spec, as a lab would write it."""
-    import schemas
+    from tacdata import schemas
     from tacdata.discrepancy.model.spec import Spec
 
     kind = json.loads((folder / "task.json").read_text())["response"]

@@ -16,8 +16,8 @@ import numpy as np
 import run
 from wearing import DEEP, overlaps
 
-from training.frames.frames import Frames
-from training.pretraining.shipped import NAME, pretrained
+from tacdata.training.frames.frames import Frames
+from tacdata.training.pretraining.shipped import NAME, pretrained
 
 
 def exact(folder: Path) -> Frames:

@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 import run
 
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference import checkpoint
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD, score_frames
 from tacdata.virtual_rig.world import world
-from training.frames.windows import Windows
-from training.inference import checkpoint
-from training.inference.checkpoint import Checkpoint
-from training.inference.predictor import predict
-from training.metrics.depth_maps import CONTACT_THRESHOLD, score_frames
 
 DEPTHS = (0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 2.0)
 """Borders of the largest labelled depth [mm]."""

@@ -22,21 +22,21 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from label_farm.simulated.packing import simulated_episode
-from label_farm.simulated.plan import SimulationPlan
-from label_farm.simulated.shard import read_shard, shard_files
-from label_farm.simulated.simulation import FILE, Simulation
 from tacdata import documents
+from tacdata.label_farm.simulated.packing import simulated_episode
+from tacdata.label_farm.simulated.plan import SimulationPlan
+from tacdata.label_farm.simulated.shard import read_shard, shard_files
+from tacdata.label_farm.simulated.simulation import FILE, Simulation
 from tacdata.plans import Press
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor
+from tacdata.training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.metrics.contacts import ContactMatch, match
+from tacdata.training.metrics.depth_maps import score_frames
+from tacdata.training.pretraining import curve_picture
+from tacdata.training.pretraining.learning_curve import DEEP, learning_curve
+from tacdata.training.pretraining.shipped import NAME, pretrained
 from tacdata.virtual_rig.world.world import World, draw
-from training.frames.frames import EpisodeSpan, Frames
-from training.metrics.contacts import ContactMatch, match
-from training.metrics.depth_maps import score_frames
-from training.pretraining import curve_picture
-from training.pretraining.learning_curve import DEEP, learning_curve
-from training.pretraining.shipped import NAME, pretrained
 
 UNSEEN = ("square", "ring", "prism")
 """Shapes that no press to train on has."""
@@ -129,8 +129,8 @@ def at_edge(span: EpisodeSpan, sensor: Sensor) -> bool:
 
 def scores(network, frames: Frames) -> dict[str, float]:
     """Return the errors of a network on all presses of some frames."""
-    from training.frames.windows import Windows
-    from training.inference.predictor import predict
+    from tacdata.training.frames.windows import Windows
+    from tacdata.training.inference.predictor import predict
 
     top = frames.sensor.map.depth_max
     found = predict(network, Windows(frames, network.offsets), np.arange(len(frames.taxels)), top)
@@ -146,8 +146,8 @@ def scores(network, frames: Frames) -> dict[str, float]:
 
 def contacts(network, frames: Frames) -> dict[str, dict[str, float]]:
     """Return for each indenter how often all contacts of a press are found at full depth, how far off, the overlap."""
-    from training.frames.windows import Windows
-    from training.inference.predictor import predict
+    from tacdata.training.frames.windows import Windows
+    from tacdata.training.inference.predictor import predict
 
     top, windows = frames.sensor.map.depth_max, Windows(frames, network.offsets)
     found: dict[str, list[tuple[ContactMatch, float]]] = {}
@@ -189,7 +189,7 @@ def main() -> None:
     start, numbers = pretrained(arguments.start), [int(n) for n in arguments.presses.split(",")]
     simulated = None
     if arguments.simulated:
-        from training.frames.data import read_frames
+        from tacdata.training.frames.data import read_frames
 
         simulated = read_frames(arguments.simulated)
     merged, apart = None, []
@@ -212,7 +212,7 @@ def main() -> None:
             told=lambda point: print(point, flush=True),
         )
         for run in sorted(folder.glob("*-*-*")):
-            from training.inference import checkpoint
+            from tacdata.training.inference import checkpoint
 
             network = checkpoint.load(run).network
             for name, spans in (("unseen shapes", unseen), ("edge", edge)):

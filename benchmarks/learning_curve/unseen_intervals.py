@@ -15,15 +15,15 @@ from pathlib import Path
 import numpy as np
 import run
 
-from training.frames.windows import Windows
-from training.inference.predictor import predict
-from training.metrics import conformal_intervals
-from training.metrics.conformal_intervals import ConformalIntervals, reliability
-from training.pretraining.recipe import recipe
-from training.pretraining.shipped import NAME, pretrained
-from training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
-from training.splits.split import divide
-from training.train import train
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics import conformal_intervals
+from tacdata.training.metrics.conformal_intervals import ConformalIntervals, reliability
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.pretraining.shipped import NAME, pretrained
+from tacdata.training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
+from tacdata.training.splits.split import divide
+from tacdata.training.train import train
 
 EVERY = 5
 """Every so manieth frame of a press is scored: neighbours hardly differ."""

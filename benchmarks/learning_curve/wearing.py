@@ -16,17 +16,17 @@ from pathlib import Path
 import numpy as np
 import run
 
-from label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.simulation import Simulation
 from tacdata.plans import Press
-from training.frames.frames import Frames
-from training.frames.windows import Windows
-from training.inference.predictor import predict
-from training.metrics.overlap import aligned_iou
-from training.networks.network import Network
-from training.pretraining.recipe import recipe
-from training.pretraining.shipped import NAME, pretrained
-from training.splits.split import divide
-from training.train import train
+from tacdata.training.frames.frames import Frames
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics.overlap import aligned_iou
+from tacdata.training.networks.network import Network
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.pretraining.shipped import NAME, pretrained
+from tacdata.training.splits.split import divide
+from tacdata.training.train import train
 
 PARTICIPANTS, TRIALS = 12, 5
 """As in the paper: 57 presses of 12 participants."""

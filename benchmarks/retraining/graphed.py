@@ -16,15 +16,15 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from training import train as loop
-from training.frames.frames import Frames
-from training.frames.variation import Variation
-from training.frames.windows import Windows
-from training.inference.checkpoint import BEST, Checkpoint, load, save
-from training.loss import normalized
-from training.metrics.depth_maps import CONTACT_THRESHOLD
-from training.settings import TrainingSettings
-from training.splits.split import Split
+from tacdata.training import train as loop
+from tacdata.training.frames.frames import Frames
+from tacdata.training.frames.variation import Variation
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.checkpoint import BEST, Checkpoint, load, save
+from tacdata.training.loss import normalized
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.splits.split import Split
 
 _TRIAL, _WARM_UP = 200, 0.02
 """Steps that tell how long one takes [count]; share of the steps over which the rate rises [1]."""

@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from label_farm.simulated.packing import simulated_episode
-from label_farm.simulated.shard import read_about, read_shard, shard_files
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.swallowed_shape import swallowed_at
 from tacdata import provenance
 from tacdata.dataset import frames as columns
 from tacdata.dataset.format import features
-from training.frames.frames import EpisodeSpan, Frames
-from training.metrics.depth_maps import CONTACT_THRESHOLD
+from tacdata.label_farm.simulated.packing import simulated_episode
+from tacdata.label_farm.simulated.shard import read_about, read_shard, shard_files
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.swallowed_shape import swallowed_at
+from tacdata.training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
 
 CHUNK = 64
 """Presses in a file of packed frames [count]."""

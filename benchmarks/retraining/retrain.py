@@ -154,7 +154,7 @@ def train(work: Path, out: Path, seconds: float, device: str, names: list[str], 
 def _train_one(name: str, work: Path, out: Path, until: float, device: str, batch: int, start: str | None) -> None:
     import variants
 
-    from training.pretraining.shipped import pretrained
+    from tacdata.training.pretraining.shipped import pretrained
 
     def shown(line: str) -> None:
         print(line, flush=True)

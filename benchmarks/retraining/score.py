@@ -18,9 +18,9 @@ import model_forces
 import run
 import wearing
 
-from training.inference import checkpoint
-from training.pretraining.learning_curve import learning_curve
-from training.pretraining.shipped import pretrained
+from tacdata.training.inference import checkpoint
+from tacdata.training.pretraining.learning_curve import learning_curve
+from tacdata.training.pretraining.shipped import pretrained
 
 RIGS = (20, 21, 22)
 WEARERS = range(300, 306)

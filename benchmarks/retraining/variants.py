@@ -11,13 +11,13 @@ from pathlib import Path
 
 import presses
 
-from training.frames.frames import Frames
-from training.inference.checkpoint import Checkpoint
-from training.metrics.depth_maps import CONTACT_THRESHOLD
-from training.pretraining.recipe import recipe
-from training.settings import TrainingSettings
-from training.splits.split import Split, divide
-from training.train import Progress, train
+from tacdata.training.frames.frames import Frames
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.splits.split import Split, divide
+from tacdata.training.train import Progress, train
 
 BROAD = {"gain_jitter": 0.1, "scale_jitter": 0.25, "exponent_jitter": 0.15}
 """How far a unit may be from the model, as the network that ships was trained until now [1]."""

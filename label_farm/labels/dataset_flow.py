@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from label_farm.labels.label_index import stamp
 from tacdata.dataset import frames, label_states
 from tacdata.dataset.format import folder, metadata
 from tacdata.dataset.pack import append_episode
 from tacdata.dataset.writer import DatasetWriter
 from tacdata.errors import UsageError
+from tacdata.label_farm.labels.label_index import stamp
 from tacdata.labels import file_names, read_label, table
 from tacdata.recording.files.reader import read_episode
 from tacdata.sensor import Sensor

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from label_farm.labels.request import LabelRequest, Planned
-from label_farm.presses.interpolate import Branch
 from tacdata import provenance
 from tacdata.errors import SolveError
+from tacdata.label_farm.labels.request import LabelRequest, Planned
+from tacdata.label_farm.presses.interpolate import Branch
 from tacdata.labels import Label, PathSolution, columns
 from tacdata.sensor import Sensor
 from tacdata.transduction import Loads, Transducer
@@ -26,9 +26,9 @@ CARRIED = tuple(name for name in columns.ALL if name in columns.PATH and name no
 """Quantities that a label interpolates from those of the same name in its path, if the path has them."""
 
 _DECIDING = (
-    "label_farm.presses.interpolate",
-    "label_farm.labels.make_label",
-    "label_farm.labels.request",
+    "tacdata.label_farm.presses.interpolate",
+    "tacdata.label_farm.labels.make_label",
+    "tacdata.label_farm.labels.request",
     "tacdata.transduction",
 )
 """Code that decides the label of a solution; engines and services do not."""

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from label_farm.labels.label_index import Known, LabelIndex, stamp
 from tacdata import provenance
 from tacdata.errors import FormatError
+from tacdata.label_farm.labels.label_index import Known, LabelIndex, stamp
 from tacdata.sensor import Sensor
 
 FLUSH = 500

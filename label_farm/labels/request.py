@@ -7,10 +7,10 @@ from typing import Self
 
 import numpy as np
 
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder, goes_up_otherwise
 from tacdata import provenance
 from tacdata.errors import FormatError
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder, goes_up_otherwise
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
 

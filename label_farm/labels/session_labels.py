@@ -9,13 +9,13 @@ from itertools import islice
 from pathlib import Path
 from typing import Self
 
-from label_farm.labels.make_label import make_label, parents
-from label_farm.labels.request import LabelRequest, Planned
-from label_farm.presses.job import Job
-from label_farm.store.failure import Failure
-from label_farm.store.store import STALE_SECONDS
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.labels.make_label import make_label, parents
+from tacdata.label_farm.labels.request import LabelRequest, Planned
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.store import STALE_SECONDS
 from tacdata.labels import Label, PathSolution, file_names, read_label, table, write_label
 
 _PULL = 0.01

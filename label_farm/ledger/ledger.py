@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from label_farm.ledger.tables import (
+from tacdata.errors import FormatError
+from tacdata.label_farm.ledger.tables import (
     DROP_UNWANTED,
     FIRST_EXPIRED,
     FIRST_WAITING,
@@ -27,8 +28,7 @@ from label_farm.ledger.tables import (
     UNWANTED,
     WAITING_TOGETHER,
 )
-from label_farm.presses.job import Job
-from tacdata.errors import FormatError
+from tacdata.label_farm.presses.job import Job
 
 WAITING, LEASED, DONE, FAILED = range(4)
 LEASE_SECONDS = 30.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from label_farm.ledger.ledger import Ledger, boot_name, is_dead
+from tacdata.label_farm.ledger.ledger import Ledger, boot_name, is_dead
 
 
 @dataclass(frozen=True)

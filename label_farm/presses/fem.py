@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from label_farm import environment
-from label_farm.presses.job import Job
-from label_farm.presses.tolerance import Tolerance
 from tacdata import provenance
 from tacdata.errors import SolveError
 from tacdata.indenters import from_document
+from tacdata.label_farm import environment
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.tolerance import Tolerance
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 
@@ -31,7 +31,7 @@ neighbours without it, several times the error with it."""
 _AT_A_TIME = {"cpu": 16, "cuda": 512}
 """Presses that a device solves at a time [1] (benchmarks/skin_throughput.py); a CPU reads its factor once for all."""
 
-_DECIDING = tuple(f"label_farm.presses.{name}" for name in ("fem", "interpolate", "tolerance"))
+_DECIDING = tuple(f"tacdata.label_farm.presses.{name}" for name in ("fem", "interpolate", "tolerance"))
 """Files of the farm that decide which states a path gets."""
 
 _SPREADS = "tacdata.skin.derivatives"

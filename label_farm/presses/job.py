@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
-import schemas
-from label_farm.presses.tolerance import Tolerance
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
+from tacdata.label_farm.presses.tolerance import Tolerance
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from label_farm.presses.tolerance import Tolerance
 from tacdata.errors import UsageError
+from tacdata.label_farm.presses.tolerance import Tolerance
 from tacdata.sensor.sensor import ContactProperties
 
 FINEST = 0.001

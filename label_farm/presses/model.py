@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import tacdata.errors
-from label_farm import environment
-from label_farm.presses.job import Job
 from tacdata.errors import SolveError, TacdataError, UsageError
 from tacdata.extras import missing_package
+from tacdata.label_farm import environment
+from tacdata.label_farm.presses.job import Job
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 
-FACTORY = "label_farm.presses.fem:FemModel"
+FACTORY = "tacdata.label_farm.presses.fem:FemModel"
 """Dotted path of the function that builds the model of a sensor."""
 
 
@@ -106,7 +106,7 @@ def version(factory: str, sensor: Sensor) -> Version:
     request = json.dumps({"factory": factory, "sensor": sensor.document})
     for _ in range(_TRIES):
         finished = subprocess.run(
-            environment.python("label_farm.presses.model"),
+            environment.python("tacdata.label_farm.presses.model"),
             env=environment.variables(),
             input=request,
             capture_output=True,

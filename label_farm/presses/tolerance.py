@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from label_farm.presses.interpolate import Branch, branches
 from tacdata.errors import UsageError
+from tacdata.label_farm.presses.interpolate import Branch, branches
 
 _SHARPEST = 1.2
 """Power of the spacing with which a left-out state's error falls at the least [1]: where the edge of the contact

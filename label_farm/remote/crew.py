@@ -9,10 +9,10 @@ import sys
 import time
 from contextlib import suppress
 
-from label_farm import environment
-from label_farm.presses.model import FACTORY
-from label_farm.remote.client import Client
 from tacdata.errors import SolveError, TacdataError
+from tacdata.label_farm import environment
+from tacdata.label_farm.presses.model import FACTORY
+from tacdata.label_farm.remote.client import Client
 
 WATCH_SECONDS = 0.5
 MOST_DEATHS = 20
@@ -65,7 +65,7 @@ class Crew:
     def _start(self, number: int) -> subprocess.Popen[str]:
         device = self._devices[number % len(self._devices)]
         process = subprocess.Popen(
-            environment.python("label_farm.remote.worker"),
+            environment.python("tacdata.label_farm.remote.worker"),
             env=environment.variables(device),
             process_group=0,
             text=True,

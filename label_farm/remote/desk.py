@@ -7,14 +7,14 @@ import time
 from dataclasses import asdict
 from urllib.error import URLError
 
-from label_farm.ledger.ledger import Lease
-from label_farm.presses.job import Job
-from label_farm.remote.client import Client
-from label_farm.store import solution_file
-from label_farm.store.failure import Failure
-from label_farm.store.solution_check import check_solution
-from label_farm.workers.usage import usage_of
 from tacdata.errors import DeviceError
+from tacdata.label_farm.ledger.ledger import Lease
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.remote.client import Client
+from tacdata.label_farm.store import solution_file
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.solution_check import check_solution
+from tacdata.label_farm.workers.usage import usage_of
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from label_farm.labels.session_labels import SessionLabels
-from label_farm.remote.client import Client
 from tacdata import documents, provenance
 from tacdata.errors import DeviceError, UsageError
+from tacdata.label_farm.labels.session_labels import SessionLabels
+from tacdata.label_farm.remote.client import Client
 from tacdata.labels import Label, read_label
 from tacdata.recording.session import read_session
 from tacdata.replacement import replacement

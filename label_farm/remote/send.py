@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from label_farm.remote.client import Client
 from tacdata import provenance
 from tacdata.errors import DeviceError, FormatError
+from tacdata.label_farm.remote.client import Client
 from tacdata.recording import session
 
 PIECE = 8 << 20

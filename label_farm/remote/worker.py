@@ -12,11 +12,11 @@ import sys
 import threading
 import time
 
-from label_farm.ledger.ledger import owner_name
-from label_farm.remote.client import Client
-from label_farm.remote.desk import RemoteDesk
-from label_farm.workers.worker import BROKEN, Worker, beat, work
 from tacdata.errors import DeviceError, TacdataError
+from tacdata.label_farm.ledger.ledger import owner_name
+from tacdata.label_farm.remote.client import Client
+from tacdata.label_farm.remote.desk import RemoteDesk
+from tacdata.label_farm.workers.worker import BROKEN, Worker, beat, work
 
 AGAIN_SECONDS = 2.0
 

@@ -11,17 +11,17 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from label_farm.ledger.ledger import Ledger
-from label_farm.service.foreman import Foreman
-from label_farm.service.gauges import SHOWN as MINUTES
-from label_farm.service.guard import Guard
-from label_farm.service.metrics import add_metrics
-from label_farm.service.receiving import add_receiving
-from label_farm.service.results import add_results
-from label_farm.service.submission import Submission
-from label_farm.service.work import add_work
 from tacdata import provenance
 from tacdata.errors import FormatError, SolveError, TacdataError, UsageError
+from tacdata.label_farm.ledger.ledger import Ledger
+from tacdata.label_farm.service.foreman import Foreman
+from tacdata.label_farm.service.gauges import SHOWN as MINUTES
+from tacdata.label_farm.service.guard import Guard
+from tacdata.label_farm.service.metrics import add_metrics
+from tacdata.label_farm.service.receiving import add_receiving
+from tacdata.label_farm.service.results import add_results
+from tacdata.label_farm.service.submission import Submission
+from tacdata.label_farm.service.work import add_work
 
 SHOWN = 20
 """Of how many submissions, the newest, labels and failures are shown."""
@@ -80,7 +80,7 @@ def application(foreman: Foreman, token: str = "") -> Guard:
 
     @api.get("/", response_class=HTMLResponse, include_in_schema=False)
     def page() -> HTMLResponse:
-        text = (files("label_farm.service") / "page.html").read_text()
+        text = (files("tacdata.label_farm.service") / "page.html").read_text()
         return HTMLResponse(text, headers={"Content-Security-Policy": POLICY, "X-Frame-Options": "DENY"})
 
     _add_submissions(api, foreman)

@@ -12,17 +12,17 @@ from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from label_farm.labels.session_labels import SessionLabels
-from label_farm.ledger.ledger import Ledger
-from label_farm.ledger.roster import Roster, WorkerRow
-from label_farm.presses.model import Version
-from label_farm.service.gauges import Gauges
-from label_farm.service.run import RECENT, Run
-from label_farm.service.submission import OPEN, Submission, Submissions
-from label_farm.settings import FarmSettings
-from label_farm.store.store import Store
-from label_farm.workers.engine import Engine, StoreFull
 from tacdata.errors import TacdataError, UsageError
+from tacdata.label_farm.labels.session_labels import SessionLabels
+from tacdata.label_farm.ledger.ledger import Ledger
+from tacdata.label_farm.ledger.roster import Roster, WorkerRow
+from tacdata.label_farm.presses.model import Version
+from tacdata.label_farm.service.gauges import Gauges
+from tacdata.label_farm.service.run import RECENT, Run
+from tacdata.label_farm.service.submission import OPEN, Submission, Submissions
+from tacdata.label_farm.settings import FarmSettings
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.engine import Engine, StoreFull
 
 ROUND_SECONDS = 0.1
 PAUSE_SECONDS = 5.0

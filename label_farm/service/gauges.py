@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from threading import Lock
 from typing import Any
 
-from label_farm.workers.usage import Usage, local_process, usage_of
+from tacdata.label_farm.workers.usage import Usage, local_process, usage_of
 
 KEPT = 1440
 """Minutes that are remembered: a day. They start empty with each service."""

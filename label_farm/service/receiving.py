@@ -12,10 +12,10 @@ from typing import Annotated, Any
 from fastapi import FastAPI, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
-from label_farm.service.confined import confined
-from label_farm.service.foreman import Foreman
 from tacdata import provenance
 from tacdata.errors import DeviceError, FormatError, UsageError
+from tacdata.label_farm.service.confined import confined
+from tacdata.label_farm.service.foreman import Foreman
 from tacdata.recording import session
 from tacdata.recording.files import file_names
 

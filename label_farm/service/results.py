@@ -7,10 +7,10 @@ from typing import Any
 
 from fastapi import FastAPI, Request, Response
 
-from label_farm.labels.session_labels import SessionLabels
-from label_farm.service.foreman import Foreman
 from tacdata import documents
 from tacdata.errors import UsageError
+from tacdata.label_farm.labels.session_labels import SessionLabels
+from tacdata.label_farm.service.foreman import Foreman
 from tacdata.recording.files import file_names
 
 
@@ -42,7 +42,7 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
     @api.get("/api/submissions/{number}/labels/{episode}.png")
     def preview(number: str, episode: int) -> Response:
         """The deepest frame of a finished label as a picture; the header X-Depth has its depth [mm]."""
-        from label_farm.service.preview import picture
+        from tacdata.label_farm.service.preview import picture
 
         content, depth = picture(_labels(foreman, number).path(episode))
         return Response(content, media_type="image/png", headers={"X-Depth": f"{depth:.4f}"})
@@ -50,14 +50,14 @@ def add_results(api: FastAPI, foreman: Foreman) -> None:
     @api.get("/api/submissions/{number}/labels/{episode}/log")
     def log(number: str, episode: int) -> dict[str, str]:
         """Author, method and error of a finished label, one line each."""
-        from label_farm.service.preview import account
+        from tacdata.label_farm.service.preview import account
 
         return {"log": account(_labels(foreman, number).path(episode))}
 
     @api.get("/api/submissions/{number}/failures/{episode}.png")
     def failed(number: str, episode: int) -> Response:
         """A press that has no label as a picture: place, depth over time, reason."""
-        from label_farm.service.failed_press import failed_press
+        from tacdata.label_farm.service.failed_press import failed_press
 
         labels = _labels(foreman, number)
         reason = documents.read(labels.failure_path(episode), "label_failure")["reason"]

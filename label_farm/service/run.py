@@ -8,17 +8,17 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from label_farm.labelling import Labelling
-from label_farm.labels.dataset_flow import DatasetFlow
-from label_farm.ledger.ledger import Ledger
-from label_farm.presses.ladder import Ladder
-from label_farm.presses.model import ProcessDied, Version
-from label_farm.presses.tolerance import Tolerance
-from label_farm.service.confined import confined
-from label_farm.service.submission import Submission, now
-from label_farm.settings import FarmSettings
-from label_farm.store.store import Store
 from tacdata.errors import TacdataError, UsageError
+from tacdata.label_farm.labelling import Labelling
+from tacdata.label_farm.labels.dataset_flow import DatasetFlow
+from tacdata.label_farm.ledger.ledger import Ledger
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.presses.model import ProcessDied, Version
+from tacdata.label_farm.presses.tolerance import Tolerance
+from tacdata.label_farm.service.confined import confined
+from tacdata.label_farm.service.submission import Submission, now
+from tacdata.label_farm.settings import FarmSettings
+from tacdata.label_farm.store.store import Store
 from tacdata.labels import file_names
 
 RECENT = 24

@@ -9,8 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.errors import FormatError, UsageError
 
 OPEN = ("waiting", "planning", "running")

@@ -8,13 +8,13 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from label_farm import environment
-from label_farm.presses.model import FACTORY
-from label_farm.settings import FarmSettings
-from label_farm.store.store import Store
-from label_farm.workers.engine import EngineMaker
-from label_farm.workers.pool import Pool
 from tacdata.errors import UsageError
+from tacdata.label_farm import environment
+from tacdata.label_farm.presses.model import FACTORY
+from tacdata.label_farm.settings import FarmSettings
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.engine import EngineMaker
+from tacdata.label_farm.workers.pool import Pool
 
 SHORTEST_TOKEN = 16
 
@@ -51,8 +51,8 @@ def up(asked: UpSettings) -> None:
     """
     import uvicorn
 
-    from label_farm.service.app import application
-    from label_farm.service.foreman import Foreman
+    from tacdata.label_farm.service.app import application
+    from tacdata.label_farm.service.foreman import Foreman
 
     _check_token(asked)
     if not asked.root.is_dir():
@@ -95,7 +95,7 @@ def _settings(settings: UpSettings) -> FarmSettings:
 def _engine(dask: str) -> EngineMaker:
     if not dask:
         return Pool
-    from label_farm.workers.dask_pool import dask_engine
+    from tacdata.label_farm.workers.dask_pool import dask_engine
 
     return dask_engine(dask)
 

@@ -9,13 +9,13 @@ from fastapi import FastAPI, Request
 from fastapi.concurrency import run_in_threadpool
 from pydantic import BaseModel, ConfigDict, Field
 
-from label_farm.ledger.ledger import Ledger
-from label_farm.ledger.roster import Roster
-from label_farm.service.foreman import Foreman
-from label_farm.store import solution_file
-from label_farm.store.failure import Failure
-from label_farm.workers.usage import Usage
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.ledger.ledger import Ledger
+from tacdata.label_farm.ledger.roster import Roster
+from tacdata.label_farm.service.foreman import Foreman
+from tacdata.label_farm.store import solution_file
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.workers.usage import Usage
 from tacdata.sensor import Sensor
 
 OWNER = r"[A-Za-z0-9_.-]{1,80}/[0-9]{1,10}"

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO
 
-from label_farm import environment
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.solving import solve
 from tacdata.errors import SolveError, UsageError
+from tacdata.label_farm import environment
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.solving import solve
 
 
 def chosen_devices(name: str) -> tuple[str, ...]:
@@ -65,7 +65,7 @@ class _Hand:
     ) -> None:
         self._errors: IO[bytes] = tempfile.TemporaryFile()
         self._process = subprocess.Popen(
-            [*environment.python("label_farm.simulated.worker"), str(folder), str(presses), str(index), str(of)],
+            [*environment.python("tacdata.label_farm.simulated.worker"), str(folder), *map(str, (presses, index, of))],
             env=environment.variables(device),
             stdout=subprocess.PIPE,
             stderr=self._errors,

@@ -9,19 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-from label_farm.labels.make_label import make_label
-from label_farm.labels.request import LabelRequest
-from label_farm.simulated.press_effects import readings_with
-from label_farm.simulated.readings import board_counts
-from label_farm.simulated.shard import read_about, read_shard, shard_files
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.specimen import differences
-from label_farm.simulated.swallowed_shape import swallowed_at
-from label_farm.simulated.timeline import timeline
 from tacdata import provenance
 from tacdata.dataset import DatasetWriter, frames
 from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import UsageError
+from tacdata.label_farm.labels.make_label import make_label
+from tacdata.label_farm.labels.request import LabelRequest
+from tacdata.label_farm.simulated.press_effects import readings_with
+from tacdata.label_farm.simulated.readings import board_counts
+from tacdata.label_farm.simulated.shard import read_about, read_shard, shard_files
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.specimen import differences
+from tacdata.label_farm.simulated.swallowed_shape import swallowed_at
+from tacdata.label_farm.simulated.timeline import timeline
 from tacdata.labels import Label, PathSolution
 from tacdata.recording.episode import Episode
 

@@ -71,7 +71,7 @@ class SimulationPlan:
     """Distribution of a simulated dataset.
 
     Example:
-        >>> from label_farm.simulated.plan import DEFAULT, read_simulation_plan
+        >>> from tacdata.label_farm.simulated.plan import DEFAULT, read_simulation_plan
         >>> plan = read_simulation_plan(DEFAULT)
         >>> plan.depth, plan.specimens.count
         ((0.1, 1.2), 4)

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from label_farm.simulated.plan import DrawnShape, Range, SimulationPlan, as_range
 from tacdata.errors import FormatError
 from tacdata.indenters import Indenter, from_document
+from tacdata.label_farm.simulated.plan import DrawnShape, Range, SimulationPlan, as_range
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from label_farm.simulated.plan import SimulationPlan
 from tacdata import documents
 from tacdata.chain import Course, Response, predict
 from tacdata.chain.course import Tool
 from tacdata.effects import Effect, Parameter, Placed, load
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.simulated.plan import SimulationPlan
 from tacdata.labels import Label
 from tacdata.sensor import Sensor
 from tacdata.transduction import Loads, Transducer

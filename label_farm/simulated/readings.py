@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from label_farm.simulated.plan import ReadingNoise
+from tacdata.label_farm.simulated.plan import ReadingNoise
 
 
 def board_counts(

@@ -8,23 +8,22 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import schemas
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder, goes_up_otherwise
-from label_farm.simulated.plan import SimulationPlan
-from label_farm.simulated.press_draw import draw_press
-from label_farm.simulated.press_effects import specimen_effects
-from label_farm.simulated.shard import read_about, shard_files
-from label_farm.simulated.specimen import draw_specimen
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.effects import Placed
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder, goes_up_otherwise
+from tacdata.label_farm.simulated.plan import SimulationPlan
+from tacdata.label_farm.simulated.press_draw import draw_press
+from tacdata.label_farm.simulated.press_effects import specimen_effects
+from tacdata.label_farm.simulated.shard import read_about, shard_files
+from tacdata.label_farm.simulated.specimen import draw_specimen
 from tacdata.paths import StrPath
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
 
 FILE = "simulation.json"
-_DRAWING = tuple(f"label_farm.simulated.{name}" for name in ("plan", "press_draw", "specimen"))
+_DRAWING = tuple(f"tacdata.label_farm.simulated.{name}" for name in ("plan", "press_draw", "specimen"))
 """Code that decides the draw; each file of presses states the version of its solver."""
 
 

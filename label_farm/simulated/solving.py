@@ -8,11 +8,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from label_farm.simulated.shard import Shard
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.specimen import stretched
 from tacdata.errors import SolveError
 from tacdata.indenters import from_document
+from tacdata.label_farm.simulated.shard import Shard
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.specimen import stretched
 from tacdata.labels import PathSolution
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from label_farm.simulated.plan import SpecimenSpread
 from tacdata.errors import FormatError
+from tacdata.label_farm.simulated.plan import SpecimenSpread
 from tacdata.sensor import Sensor
 from tacdata.transduction import Transducer
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from label_farm.presses.job import Job
 from tacdata.indenters import Indenter, from_document
+from tacdata.label_farm.presses.job import Job
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 

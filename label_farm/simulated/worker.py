@@ -6,9 +6,9 @@ import os
 import sys
 from pathlib import Path
 
-from label_farm import environment
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.solving import Share, solve
+from tacdata.label_farm import environment
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.solving import Share, solve
 
 
 def main() -> None:

@@ -7,9 +7,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import schemas
-from label_farm.presses.job import Job
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
+from tacdata.label_farm.presses.job import Job
 from tacdata.paths import StrPath
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from label_farm.presses.job import Job
 from tacdata.errors import SolveError
+from tacdata.label_farm.presses.job import Job
 from tacdata.labels import PathSolution
 from tacdata.labels.columns import PATH, PATH_OPTIONAL
 from tacdata.sensor import Sensor

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from label_farm.presses.job import Job
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.errors import FormatError
+from tacdata.label_farm.presses.job import Job
 from tacdata.labels import PathSolution
 from tacdata.labels.columns import PATH, PATH_OPTIONAL, PATH_REQUIRED
 

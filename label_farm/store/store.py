@@ -7,13 +7,12 @@ import os
 import time
 from pathlib import Path
 
-import schemas
-from label_farm.presses.job import Job
-from label_farm.store import solution_file
-from label_farm.store.failure import Failure
-from label_farm.store.solution_check import check_solution
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.store import solution_file
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.solution_check import check_solution
 from tacdata.labels import PathSolution
 from tacdata.replacement import replacement
 from tacdata.sensor import Sensor

@@ -20,16 +20,16 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from label_farm import environment
-from label_farm.ledger.ledger import Lease, Ledger, owner_name
-from label_farm.ledger.roster import Roster
-from label_farm.presses.job import Job
-from label_farm.store import solution_file
-from label_farm.store.failure import Failure
-from label_farm.store.store import Store
-from label_farm.workers.engine import Engine, EngineMaker, StoreFull
-from label_farm.workers.worker import is_disk
 from tacdata.errors import DeviceError, SolveError, TacdataError, UsageError
+from tacdata.label_farm import environment
+from tacdata.label_farm.ledger.ledger import Lease, Ledger, owner_name
+from tacdata.label_farm.ledger.roster import Roster
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.store import solution_file
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.engine import Engine, EngineMaker, StoreFull
+from tacdata.label_farm.workers.worker import is_disk
 from tacdata.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -52,8 +52,8 @@ def solve_there(factory: str, version: str, sensor: dict[str, Any], documents: l
     """Solve jobs; this runs on a Dask worker. Returns each result as the store's bytes, or its error."""
     from dataclasses import replace
 
-    from label_farm.presses.model import batch_size, build, solve_each
     from tacdata import provenance
+    from tacdata.label_farm.presses.model import batch_size, build, solve_each
 
     if version not in _models:
         try:

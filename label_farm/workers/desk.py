@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from label_farm.ledger.ledger import Lease, Ledger
-from label_farm.ledger.roster import Roster
-from label_farm.presses.job import Job
-from label_farm.store.failure import Failure
-from label_farm.store.store import Store
 from tacdata.errors import UsageError
+from tacdata.label_farm.ledger.ledger import Lease, Ledger
+from tacdata.label_farm.ledger.roster import Roster
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.store import Store
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 

@@ -7,9 +7,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from label_farm.ledger.ledger import JobOutcome, Ledger
-from label_farm.store.store import Store
 from tacdata.errors import UsageError
+from tacdata.label_farm.ledger.ledger import JobOutcome, Ledger
+from tacdata.label_farm.store.store import Store
 from tacdata.sensor import Sensor
 
 POLL_SECONDS = 0.1

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
 
-from label_farm import environment
-from label_farm.ledger.ledger import LEASE_SECONDS, MAX_TRIES
-from label_farm.ledger.roster import Roster
-from label_farm.store.failure import Failure
-from label_farm.store.store import Store
-from label_farm.workers.engine import Engine, StoreFull
-from label_farm.workers.worker import NO_ROOM, OTHER_CODE, Assignment
 from tacdata.errors import SolveError, UsageError
+from tacdata.label_farm import environment
+from tacdata.label_farm.ledger.ledger import LEASE_SECONDS, MAX_TRIES
+from tacdata.label_farm.ledger.roster import Roster
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.engine import Engine, StoreFull
+from tacdata.label_farm.workers.worker import NO_ROOM, OTHER_CODE, Assignment
 from tacdata.sensor import Sensor
 
 STOP_SECONDS = 5.0
@@ -106,7 +106,7 @@ class Pool(Engine):
         with log.open("w") as stream:
             # A process group of its own: Ctrl-C reaches the pool alone, which stops the workers.
             process = subprocess.Popen(
-                environment.python("label_farm.workers.worker"),
+                environment.python("tacdata.label_farm.workers.worker"),
                 env=environment.variables(device),
                 process_group=0,
                 text=True,

@@ -22,12 +22,12 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Self
 
-from label_farm.ledger.ledger import MAX_TRIES, Lease, owner_name
-from label_farm.presses.model import Model, batch_size, build, solve_each
-from label_farm.store.failure import Failure
-from label_farm.workers.desk import Desk, LocalDesk
 from tacdata import provenance
 from tacdata.errors import DeviceError, SolveError, TacdataError
+from tacdata.label_farm.ledger.ledger import MAX_TRIES, Lease, owner_name
+from tacdata.label_farm.presses.model import Model, batch_size, build, solve_each
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.workers.desk import Desk, LocalDesk
 from tacdata.labels import PathSolution
 
 IDLE_SECONDS = 0.1

@@ -13,8 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.plans.beside_skin import tip_aside
 from tacdata.sensor import Sensor
 from tacdata.skin.contact.press_limits import check_press

@@ -11,7 +11,7 @@ from tacdata.commands.command import PIPELINE, Result
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
-    from viewers.browse.episode_list import EpisodeList
+    from tacdata.viewers.browse.episode_list import EpisodeList
 
 ORDER = 71
 PANEL = PIPELINE
@@ -40,8 +40,8 @@ def run(
     ] = False,
 ) -> Result:
     """List, filter and sort episodes; flag bad ones, which training then leaves out; step through them in a browser."""
-    from viewers.browse.flagging import flag_episode, unflag_episode
-    from viewers.browse.list_sources import episodes_at
+    from tacdata.viewers.browse.flagging import flag_episode, unflag_episode
+    from tacdata.viewers.browse.list_sources import episodes_at
 
     if flag is not None or unflag is not None:
         all_episodes = episodes_at(path, labels)
@@ -68,7 +68,7 @@ def run(
 
 
 def _print(episodes: EpisodeList, most: int, scored: bool) -> None:
-    from viewers.browse.list_table import list_table
+    from tacdata.viewers.browse.list_table import list_table
 
     print(list_table(episodes, most, scored))
     for remark in episodes.remarks:
@@ -77,14 +77,14 @@ def _print(episodes: EpisodeList, most: int, scored: bool) -> None:
 
 def serve(path: Path, labels: Path | None, predictions: Path | None) -> None:
     """Serve the page of a whole session or dataset, the worst episode first where errors are known."""
-    from viewers.browse.list_sources import episodes_at
+    from tacdata.viewers.browse.list_sources import episodes_at
 
     _serve(episodes_at(path, labels, predictions).by("error" if predictions else "number"), labels, predictions)
 
 
 def _catalogue(episodes: EpisodeList, labels: Path | None, predictions: Path | None, most: int) -> None:
-    from viewers.browse.catalogue import catalogue_server
-    from viewers.rerun import window
+    from tacdata.viewers.browse.catalogue import catalogue_server
+    from tacdata.viewers.rerun import window
 
     def drawn(count: int, total: int) -> None:
         say(f"  {count} of {total} episodes drawn")
@@ -103,8 +103,8 @@ def _catalogue(episodes: EpisodeList, labels: Path | None, predictions: Path | N
 
 
 def _serve(episodes: EpisodeList, labels: Path | None, predictions: Path | None) -> None:
-    from viewers.browse.server import browse_server
-    from viewers.rerun import window
+    from tacdata.viewers.browse.server import browse_server
+    from tacdata.viewers.rerun import window
 
     with browse_server(episodes, labels, predictions) as address:
         print(f"open {address}\nCtrl-C ends it", flush=True)

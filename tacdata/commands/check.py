@@ -35,7 +35,7 @@ def checked(path: Path, folder: Path) -> Report:
     """Check a recording or session, print the findings, and write them to a folder, with a picture."""
     import tacdata as td
     from tacdata import documents
-    from viewers.pictures.check import draw
+    from tacdata.viewers.pictures.check import draw
 
     report = td.check(path)
     stem = "check" if path.is_dir() else f"{path.stem}.check"

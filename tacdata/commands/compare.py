@@ -11,7 +11,7 @@ from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import UsageError
 
 if TYPE_CHECKING:
-    from viewers.scene.scene import Scene
+    from tacdata.viewers.scene.scene import Scene
 
 ORDER = 72
 PANEL = PIPELINE
@@ -35,7 +35,7 @@ def run(
     web: Annotated[bool, typer.Option("--web", help="Serve Rerun's web viewer on this machine.")] = False,
 ) -> Result:
     """Show two label versions, two networks, or models and measurement side by side and as difference."""
-    from viewers import comparison, showing
+    from tacdata.viewers import comparison, showing
 
     output = showing.Output(save, picture, video, web)
     options = [name for name, value in (("labels", labels), ("predictions", predictions), ("spec", spec)) if value]
@@ -62,8 +62,8 @@ def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:
     from tacdata.discrepancy.data.recordings import course_of
     from tacdata.discrepancy.model.spec import read_spec
     from tacdata.revision.comparison import Comparison
-    from viewers.comparison import array_of, telling_names
-    from viewers.scenes.comparison import readings_comparison
+    from tacdata.viewers.comparison import array_of, telling_names
+    from tacdata.viewers.scenes.comparison import readings_comparison
 
     # A response that is fitted needs every press, so all are read even where one is shown.
     course = course_of([path])

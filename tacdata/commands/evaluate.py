@@ -30,9 +30,9 @@ def run(
     On the dataset that it was trained on only the test episodes count; another dataset counts as a whole.
     """
     import tacdata as td
-    from training.frames.data import frames_of
-    from training.reports import report
-    from training.reports.score_sheet import markdown
+    from tacdata.training.frames.data import frames_of
+    from tacdata.training.reports import report
+    from tacdata.training.reports.score_sheet import markdown
 
     place = report.places(network, out)
     place.check()

@@ -23,8 +23,8 @@ def run(
     import tacdata as td
     from tacdata.example import DEEPEST
     from tacdata.extras import install_line
-    from viewers.pictures.backend import PictureBackend
-    from viewers.source import scene_at
+    from tacdata.viewers.pictures.backend import PictureBackend
+    from tacdata.viewers.source import scene_at
 
     report = check.checked(td.example_session(out).folder, out)
     scene = scene_at(out, episode=DEEPEST)

@@ -24,10 +24,10 @@ def run(
     import numpy as np
     import torch
 
-    from training.frames.data import read_frames
-    from training.frames.windows import Windows
-    from training.inference import checkpoint
-    from training.inference.onnx_export import export
+    from tacdata.training.frames.data import read_frames
+    from tacdata.training.frames.windows import Windows
+    from tacdata.training.inference import checkpoint
+    from tacdata.training.inference.onnx_export import export
 
     trained = checkpoint.load(network)
     readings = None

@@ -13,8 +13,8 @@ from tacdata.progress import say
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from training.settings import TrainingSettings
-    from training.train import Progress
+    from tacdata.training.settings import TrainingSettings
+    from tacdata.training.train import Progress
 
 ORDER = 64
 PANEL = PIPELINE
@@ -45,11 +45,11 @@ def run(
     """
     from tacdata import documents
     from tacdata.errors import UsageError
-    from training.frames.data import read_frames
-    from training.generalization import DEFAULTS, generalize, run_name
-    from training.reports.report_page import Scored, page
-    from training.settings import TrainingSettings
-    from training.splits.split import describe
+    from tacdata.training.frames.data import read_frames
+    from tacdata.training.generalization import DEFAULTS, generalize, run_name
+    from tacdata.training.reports.report_page import Scored, page
+    from tacdata.training.settings import TrainingSettings
+    from tacdata.training.splits.split import describe
 
     recipe = TrainingSettings(
         network=network,

@@ -13,7 +13,7 @@ from tacdata.progress import say
 if TYPE_CHECKING:
     from tacdata.grasping.lessons import Lesson
     from tacdata.sensor import Sensor
-    from training.frames.frames import Frames
+    from tacdata.training.frames.frames import Frames
 
 ORDER = 124
 PANEL = TOOLS
@@ -40,8 +40,8 @@ def run(
     from tacdata.grasping.fingertip import fingertip_sensor
     from tacdata.grasping.press_set import FOLDER, read_presses
     from tacdata.grasping.study import Setup
-    from training.inference import checkpoint
-    from training.inference.sequence import identity, sequence_maps
+    from tacdata.training.inference import checkpoint
+    from tacdata.training.inference.sequence import identity, sequence_maps
 
     for name in (RESULT, PICTURE):
         if (out / name).exists():
@@ -75,8 +75,8 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
     from tacdata.grasping.lessons import lessons
     from tacdata.grasping.press_set import FOLDER, read_presses
     from tacdata.grasping.touch import FingertipSpread
-    from training.settings import TrainingSettings
-    from training.train import Progress, train
+    from tacdata.training.settings import TrainingSettings
+    from tacdata.training.train import Progress, train
 
     path = FOLDER / "training.npz"
     origin = provenance.content_hash([provenance.file_hash(path), seed])
@@ -94,7 +94,7 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
 def _frames(lessons: list[Lesson], sensor: Sensor, origin: str) -> Frames:
     import numpy as np
 
-    from training.frames.frames import EpisodeSpan, Frames
+    from tacdata.training.frames.frames import EpisodeSpan, Frames
 
     ends = np.cumsum([len(lesson.taxels) for lesson in lessons]).tolist()
     spans = []

@@ -70,9 +70,9 @@ def _network_errors(model: Path, visits: list[Visit]) -> dict[str, NetworkError]
     from tacdata.errors import UsageError
     from tacdata.health.network_error import NetworkError
     from tacdata.labels import file_names, read_label
-    from training.frames.data import read_frames
-    from training.inference import checkpoint
-    from training.scoring.evaluate import evaluate
+    from tacdata.training.frames.data import read_frames
+    from tacdata.training.inference import checkpoint
+    from tacdata.training.scoring.evaluate import evaluate
 
     trained = checkpoint.load(model)
     labelled = [visit for visit in visits if file_names.present(file_names.folder(visit.session.folder))]

@@ -14,7 +14,7 @@ from tacdata.errors import SolveError
 from tacdata.progress import bars, say, suggest
 
 if TYPE_CHECKING:
-    from label_farm.labelling import LabellingSummary
+    from tacdata.label_farm.labelling import LabellingSummary
 
 ORDER = 30
 PANEL = PIPELINE
@@ -56,7 +56,7 @@ def run(
 ) -> Result:
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
     import tacdata as td
-    from label_farm.environment import idle_gpus
+    from tacdata.label_farm.environment import idle_gpus
     from tacdata.labels import file_names
 
     if hint := "" if dask else idle_gpus(device or ()):

@@ -13,8 +13,8 @@ from tacdata.progress import say
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from training.pretraining.learning_curve import CurvePoint
-    from training.train import Progress
+    from tacdata.training.pretraining.learning_curve import CurvePoint
+    from tacdata.training.train import Progress
 
 ORDER = 65
 PANEL = PIPELINE
@@ -43,10 +43,10 @@ def run(
 ) -> Result:
     """Draw the learning curve: the error on presses held out, over the number of presses trained on."""
     from tacdata.errors import UsageError
-    from training.frames.data import read_frames
-    from training.pretraining.curve_picture import draw, table
-    from training.pretraining.learning_curve import FILE, learning_curve
-    from training.pretraining.shipped import pretrained
+    from tacdata.training.frames.data import read_frames
+    from tacdata.training.pretraining.curve_picture import draw, table
+    from tacdata.training.pretraining.learning_curve import FILE, learning_curve
+    from tacdata.training.pretraining.shipped import pretrained
 
     try:
         numbers = sorted({int(number) for number in presses.split(",")})

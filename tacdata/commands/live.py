@@ -43,9 +43,9 @@ def run(
     from tacdata.live.message_server import MessageServer
     from tacdata.live.source import touched_board
     from tacdata.recording.live.device_streams import stream_clock
-    from training.inference.sequence import window_map
-    from training.metrics import novelty
-    from training.pretraining.shipped import pretrained, unfitted
+    from tacdata.training.inference.sequence import window_map
+    from tacdata.training.metrics import novelty
+    from tacdata.training.pretraining.shipped import pretrained, unfitted
 
     trained = pretrained(network)
     source = touched_board(rig, finger, trained.sensor)
@@ -66,7 +66,7 @@ def run(
     with ExitStack() as stack:
         watch = server = None
         if view:
-            from viewers.live.window import live_view
+            from tacdata.viewers.live.window import live_view
 
             watch = stack.enter_context(live_view(view, source.sensor.taxels.columns, source.sensor.taxels.rows))
         if socket is not None:

@@ -23,9 +23,9 @@ def run(
 ) -> Result:
     """Draw the pictures of README and tutorial from the files of the demo: small enough for the repository."""
     from tacdata.errors import UsageError
-    from viewers.browse.list_sources import episodes_at
-    from viewers.pictures.small_pictures import small_film, small_page
-    from viewers.source import scene_at
+    from tacdata.viewers.browse.list_sources import episodes_at
+    from tacdata.viewers.pictures.small_pictures import small_film, small_page
+    from tacdata.viewers.source import scene_at
 
     session, network = demo / "session", demo / "network"
     if not session.is_dir():

@@ -55,7 +55,7 @@ def run(
     expected = plan_time(plan)
     print(_summary(plan, skin, expected))
     if picture:
-        from viewers.pictures.plan import draw
+        from tacdata.viewers.pictures.plan import draw
 
         draw(plan, skin, expected.press_seconds, picture)
         print(f"picture: {picture}")

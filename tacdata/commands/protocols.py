@@ -29,10 +29,10 @@ def run(
     from tacdata import documents
     from tacdata.dataset.reader import read_dataset
     from tacdata.errors import UsageError
-    from training.frames.data import frames_of
-    from training.inference import checkpoint
-    from training.reports.protocol_sheet import markdown
-    from training.scoring.protocols import protocols
+    from tacdata.training.frames.data import frames_of
+    from tacdata.training.inference import checkpoint
+    from tacdata.training.reports.protocol_sheet import markdown
+    from tacdata.training.scoring.protocols import protocols
 
     if out and out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")

@@ -85,7 +85,7 @@ def run(
         return yes or _answer("Move now? [y/N] ").lower() in ("y", "yes")
 
     if live:
-        from viewers.live.window import live_view
+        from tacdata.viewers.live.window import live_view
 
         view = live_view(live, skin.taxels.columns, skin.taxels.rows)
     else:

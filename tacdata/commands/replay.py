@@ -167,8 +167,8 @@ def _tracks(path: Path) -> Path:
 
 def _save(view: Path | None, video: Path | None, tried: Trials, scene: ReplayScene) -> None:
     """Write the undisturbed replays of one recording, and say how they ended."""
-    from viewers.pictures.replay_film import film_replays
-    from viewers.rerun.replay import save_replays
+    from tacdata.viewers.pictures.replay_film import film_replays
+    from tacdata.viewers.rerun.replay import save_replays
 
     scenes = {kind: tried.one(kind, scene) for kind in tried.paths}
     if view is not None:

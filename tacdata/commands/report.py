@@ -34,13 +34,13 @@ def run(
     from tacdata import documents
     from tacdata.dataset.reader import read_dataset
     from tacdata.errors import UsageError
-    from training.frames.data import frames_of, read_frames
-    from training.frames.frames import Frames
-    from training.inference import checkpoint
-    from training.reports.protocol_sheet import markdown
-    from training.reports.report_page import Scored, page
-    from training.scoring.evaluate import evaluate
-    from training.scoring.protocols import protocols
+    from tacdata.training.frames.data import frames_of, read_frames
+    from tacdata.training.frames.frames import Frames
+    from tacdata.training.inference import checkpoint
+    from tacdata.training.reports.protocol_sheet import markdown
+    from tacdata.training.reports.report_page import Scored, page
+    from tacdata.training.scoring.evaluate import evaluate
+    from tacdata.training.scoring.protocols import protocols
 
     if out.exists():
         raise UsageError(f"{out} exists", "a new file; nothing is overwritten", "choose another --out")
@@ -66,7 +66,7 @@ def run(
 
 def _folders(paths: list[Path]) -> list[Path]:
     """Return the runs: those named, and those in folders that hold runs."""
-    from training.inference.checkpoint import BEST
+    from tacdata.training.inference.checkpoint import BEST
 
     runs = []
     for path in paths:

@@ -45,13 +45,13 @@ def run(
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> Result:
     """Add the named effects of a verdict to the model, show the gap before and after, and plan the next presses."""
-    from label_farm.labelling import FarmSettings
-    from label_farm.presses.model import FACTORY
     from tacdata.discrepancy.model.spec import read_spec
+    from tacdata.label_farm.labelling import FarmSettings
+    from tacdata.label_farm.presses.model import FACTORY
     from tacdata.revision.evidence.table import in_words
     from tacdata.revision.labels.retrain import Recipe
     from tacdata.revision.revise import CARD, SPEC, RevisionOptions, revise
-    from viewers.rerun.gap_recording import write
+    from tacdata.viewers.rerun.gap_recording import write
 
     console = progress.console()
     farm = FarmSettings(factory=factory or FACTORY, uncertainty=uncertainty) if relabel else None

@@ -28,7 +28,7 @@ def run(
     A CSV file has the columns condition and success, and may have position and adjustments.
     """
     from tacdata.errors import UsageError
-    from training.scoring import success
+    from tacdata.training.scoring import success
 
     if not trials and not paper:
         raise UsageError("no trials", "a CSV file, counts such as dense=35/40, or --paper", "name some")

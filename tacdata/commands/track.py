@@ -100,7 +100,7 @@ def _draw(demonstration: Demonstration, recording: Path) -> None:
     import numpy as np
 
     from tacdata.demonstrations.compensation import contact_depth
-    from viewers.pictures.tracks import Strip, draw_tracks
+    from tacdata.viewers.pictures.tracks import Strip, draw_tracks
 
     strips = [
         Strip(
@@ -134,9 +134,9 @@ def _estimators(options: list[str]) -> dict[str, Estimator]:
 
 def _estimator(run: str) -> Estimator:
     from tacdata.demonstrations.paths.estimator import Estimator
-    from training.inference.sequence import identity, sequence_maps
-    from training.metrics import novelty
-    from training.pretraining.shipped import pretrained, unfitted
+    from tacdata.training.inference.sequence import identity, sequence_maps
+    from tacdata.training.metrics import novelty
+    from tacdata.training.pretraining.shipped import pretrained, unfitted
 
     trained = pretrained(run)
     readings = novelty.read(trained.path.parent, trained.content_hash)

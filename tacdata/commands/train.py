@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress as Bar
 
-    from training.inference.checkpoint import Checkpoint
-    from training.train import Progress
+    from tacdata.training.inference.checkpoint import Checkpoint
+    from tacdata.training.train import Progress
 
 ORDER = 50
 PANEL = PIPELINE
@@ -71,7 +71,7 @@ def run(
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     import tacdata as td
-    from training.train import METRICS
+    from tacdata.training.train import METRICS
 
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with bars(*columns) as bar:
@@ -118,8 +118,8 @@ def _say_calibration(best: Checkpoint, dataset: Path) -> None:
     """Print the calibration of readings to forces, and its undetermined quantities."""
     import numpy as np
 
-    from training.frames.channel_calibration import doubts
-    from training.frames.data import read_frames
+    from tacdata.training.frames.channel_calibration import doubts
+    from tacdata.training.frames.data import read_frames
 
     calibration = best.calibration
     if not calibration:

@@ -36,12 +36,12 @@ def run(
     ] = None,
 ) -> Result:
     """Look at an episode, a demonstration, targets or a verdict, in a window or browser, or save the view."""
-    from viewers import output_file, showing
-    from viewers.live import following
-    from viewers.source import scene_at
+    from tacdata.viewers import output_file, showing
+    from tacdata.viewers.live import following
+    from tacdata.viewers.source import scene_at
 
     if foxglove is not None:
-        from viewers.foxglove_layout import write_foxglove_layout
+        from tacdata.viewers.foxglove_layout import write_foxglove_layout
 
         write_foxglove_layout(path, foxglove)
         print(f"saved {foxglove}; in Foxglove open {path}, then Layouts, Import from file")

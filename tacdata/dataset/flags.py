@@ -14,8 +14,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.dataset.format import metadata
 from tacdata.dataset.reader import Dataset
 from tacdata.errors import UsageError

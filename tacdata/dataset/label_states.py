@@ -7,8 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.dataset.format import folder, metadata
 
 FILE = Path("meta/tacdata_labels.json")

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.errors import FormatError
 
 UNNAMED = "camera"

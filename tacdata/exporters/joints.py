@@ -12,8 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replacement import replacement

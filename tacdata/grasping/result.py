@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.grasping.bias import bias
 from tacdata.grasping.centre import Maps
 from tacdata.grasping.lift import Grip, lift

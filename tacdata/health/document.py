@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.health import comparison
 from tacdata.health.advice import Advice, advice, elsewhere, named
 from tacdata.health.comparison import Change

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import schemas
+from tacdata import schemas
 from tacdata.errors import FormatError
 from tacdata.sensor import Sensor, read_sensor
 

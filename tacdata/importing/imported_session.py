@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.chain.at_rest import ZeroSide, below_zero, zero_side
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from schemas import tacdata_pb2 as pb
 from tacdata.importing.streams import Stream
 from tacdata.plans import Press
 from tacdata.recording.clocks.stream_pairs import stream_pairs
 from tacdata.recording.episode import Phase
 from tacdata.recording.files import file_names, topics
 from tacdata.recording.files.chunked_file import ChunkedFile
+from tacdata.schemas import tacdata_pb2 as pb
 from tacdata.sensor import Sensor
 
 STATE = "Imported"

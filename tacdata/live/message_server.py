@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-import schemas
+from tacdata import schemas
 from tacdata.errors import UsageError
 from tacdata.live.depth_stream import Estimate
 

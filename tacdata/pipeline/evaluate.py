@@ -7,9 +7,9 @@ from collections.abc import Callable
 from tacdata.dataset.reader import Dataset, read_dataset
 from tacdata.paths import StrPath
 from tacdata.pipeline.trained_network import TrainedNetwork, read_network
-from training.frames.data import frames_of
-from training.scoring.evaluate import Evaluation
-from training.scoring.evaluate import evaluate as score_network
+from tacdata.training.frames.data import frames_of
+from tacdata.training.scoring.evaluate import Evaluation
+from tacdata.training.scoring.evaluate import evaluate as score_network
 
 
 def evaluate(

@@ -7,19 +7,19 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from label_farm.environment import cores
-from label_farm.environment import devices as devices_named
-from label_farm.growing_session import GrowingSession
-from label_farm.labelling import Labelling, LabellingSummary
-from label_farm.labels.dataset_flow import DatasetFlow
-from label_farm.presses.ladder import Ladder
-from label_farm.presses.model import FACTORY
-from label_farm.presses.tolerance import Tolerance
-from label_farm.settings import FarmSettings
-from label_farm.store.store import Store
-from label_farm.workers.dask_pool import dask_engine
-from label_farm.workers.pool import Pool
 from tacdata.errors import UsageError
+from tacdata.label_farm.environment import cores
+from tacdata.label_farm.environment import devices as devices_named
+from tacdata.label_farm.growing_session import GrowingSession
+from tacdata.label_farm.labelling import Labelling, LabellingSummary
+from tacdata.label_farm.labels.dataset_flow import DatasetFlow
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.presses.model import FACTORY
+from tacdata.label_farm.presses.tolerance import Tolerance
+from tacdata.label_farm.settings import FarmSettings
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.dask_pool import dask_engine
+from tacdata.label_farm.workers.pool import Pool
 from tacdata.labels import file_names
 from tacdata.paths import StrPath
 from tacdata.recording.files.reader import read_episode

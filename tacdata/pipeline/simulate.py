@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from label_farm.environment import cores
-from label_farm.simulated.crew import chosen_devices, solve_all
-from label_farm.simulated.plan import DEFAULT, read_simulation_plan
-from label_farm.simulated.press_effects import effects_of, with_effects
-from label_farm.simulated.simulation import Simulation
 from tacdata.errors import SolveError, UsageError
+from tacdata.label_farm.environment import cores
+from tacdata.label_farm.simulated.crew import chosen_devices, solve_all
+from tacdata.label_farm.simulated.plan import DEFAULT, read_simulation_plan
+from tacdata.label_farm.simulated.press_effects import effects_of, with_effects
+from tacdata.label_farm.simulated.simulation import Simulation
 from tacdata.paths import StrPath
 from tacdata.sensor import Sensor, default_sensor, read_sensor
 
@@ -120,7 +120,7 @@ def simulate(
         raise SolveError("none of the presses has an equilibrium", "presses that the skin can take", "narrow the plan")
     if out is None:
         return SimulatedPresses(folder, presses, missing, given_up)
-    from label_farm.simulated.packing import write_dataset
+    from tacdata.label_farm.simulated.packing import write_dataset
 
     left_out, done = Counter[str](), 0
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from label_farm.presses.ladder import Ladder, goes_up_otherwise
 from tacdata.indenters import Indenter, from_document
+from tacdata.label_farm.presses.ladder import Ladder, goes_up_otherwise
 from tacdata.labels import PathSolution
 from tacdata.paths import StrPath
 from tacdata.plans import Press

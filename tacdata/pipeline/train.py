@@ -8,13 +8,13 @@ from typing import TypedDict, Unpack
 
 from tacdata.paths import StrPath
 from tacdata.pipeline.trained_network import TrainedNetwork
-from training.frames.data import read_frames
-from training.pretraining.recipe import recipe
-from training.pretraining.shipped import pretrained
-from training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
-from training.tensorboard import event_log
-from training.train import Progress
-from training.train import train as train_on_frames
+from tacdata.training.frames.data import read_frames
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.pretraining.shipped import pretrained
+from tacdata.training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
+from tacdata.training.tensorboard import event_log
+from tacdata.training.train import Progress
+from tacdata.training.train import train as train_on_frames
 
 
 class TrainingOptions(TypedDict, total=False):

@@ -14,10 +14,10 @@ from tacdata.errors import UsageError
 from tacdata.paths import StrPath
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
-from training.inference.checkpoint import Checkpoint
-from training.inference.prediction import PredictedMaps
-from training.inference.sequence import sequence_maps
-from training.pretraining.shipped import pretrained, unfitted
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.prediction import PredictedMaps
+from tacdata.training.inference.sequence import sequence_maps
+from tacdata.training.pretraining.shipped import pretrained, unfitted
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.errors import FormatError
 from tacdata.paths import StrPath
 from tacdata.plans.plan import Plan

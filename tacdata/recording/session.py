@@ -9,8 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.display import Displayed
 from tacdata.errors import DeviceError, FormatError, TacdataError, UsageError
 from tacdata.labels import file_names as label_files

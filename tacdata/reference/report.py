@@ -7,8 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.effects import load
 from tacdata.reference.difference import NAMED, ZERO, Difference, Mechanism, Size
 

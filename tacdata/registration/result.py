@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.registration.cross_scan import Cross
 from tacdata.registration.settings import RegistrationSettings
 from tacdata.registration.solution import Plane, RigidMotion

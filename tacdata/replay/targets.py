@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.demonstrations.compensation import compensate, contact_depth
 from tacdata.demonstrations.demonstration import GUESS, Demonstration
 from tacdata.demonstrations.paths.path_faults import CONTRADICTING

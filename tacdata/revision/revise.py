@@ -9,14 +9,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import schemas
-from label_farm.labelling import FarmSettings
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.discrepancy.data.recordings import course_of
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.run import VERDICT, recording_hash
 from tacdata.effects import Placed
 from tacdata.errors import UsageError
+from tacdata.label_farm.labelling import FarmSettings
 from tacdata.recording.session import FILE
 from tacdata.revision.additions import Addition, additions, of_verdict, placed_of, suspects
 from tacdata.revision.comparison import Comparison

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance, registry
+from tacdata import documents, provenance, registry, schemas
 from tacdata.errors import FormatError
 from tacdata.paths import StrPath
 from tacdata.sensor.adhesion import Adhesion

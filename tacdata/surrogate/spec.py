@@ -6,8 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.errors import UsageError
 from tacdata.surrogate.build import LeftOut, Work
 from tacdata.surrogate.table import LoadTable

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.clock import Clock
 from tacdata.errors import UsageError
 from tacdata.indenters.sphere import Sphere

@@ -13,8 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.clock import Clock
 from tacdata.errors import UsageError
 from tacdata.rig import Registration

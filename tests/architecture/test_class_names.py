@@ -15,7 +15,7 @@ def registry_files():
     """Return the files of registries: a member is asked for by its file's name, which a person reads in a list."""
     found = set()
     for each in catalogue.registries().values():
-        folder = ROOT / each.room.replace(".", "/")
+        folder = (ROOT / each.room.replace(".", "/")).resolve()
         found |= {folder / f"{name}.py" for name in registry.names(each.room, each.base)}
     return found
 

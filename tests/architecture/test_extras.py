@@ -17,7 +17,7 @@ from tacdata.example.shipped import copy_session
 from tacdata.extras import ALL, IMPORTED_AS, extras_of, missing_package
 
 ROOT = Path(__file__).resolve().parents[2]
-OWN = ("tacdata", "schemas", "label_farm", "training", "viewers")
+OWN = ("tacdata",)
 HEAVY = {"torch", "warp", "mujoco", "mink", "lerobot", "vtkmodules", "pyvista", "rerun", "onnx", "onnxruntime"}
 ROOMS = {
     "tacdata.skin": "fem",
@@ -37,11 +37,11 @@ ROOMS = {
     "tacdata.pipeline.skin_press": "fem",
     "tacdata.pipeline.train": "learn",
     "tacdata.pipeline.trained_network": "learn",
-    "training": "learn",
-    "viewers.browse.catalogue": "view",
-    "viewers.browse.server": "view",
-    "viewers.rerun": "view",
-    "label_farm.service": "farm",
+    "tacdata.training": "learn",
+    "tacdata.viewers.browse.catalogue": "view",
+    "tacdata.viewers.browse.server": "view",
+    "tacdata.viewers.rerun": "view",
+    "tacdata.label_farm.service": "farm",
 }
 """Rooms, and files of light rooms, that need an extra to be imported. Everything else needs the plain install."""
 
@@ -224,7 +224,7 @@ def test_who_asks_decides_where_two_extras_bring_a_package():
 
     assert extras_of("torch") == ("fem", "learn")
     assert "'.[fem]'" in asked_in("tacdata.skin.model").remedy
-    assert "'.[learn]'" in asked_in("training.train").remedy
+    assert "'.[learn]'" in asked_in("tacdata.training.train").remedy
 
 
 def test_every_package_of_an_extra_is_known_by_the_name_it_is_imported_by():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from google.protobuf import descriptor_pb2
 
-import schemas
+from tacdata import schemas
 
 FOLDER = Path(schemas.__file__).parent
 MESSAGES = sorted(FOLDER.glob("*.proto"))

@@ -30,7 +30,7 @@ def members():
     for path in FILES:
         if match := re.search(r'^ROOM, BASE = "([\w.]+)", "(\w+)"', path.read_text(), re.M):
             room, base = match.groups()
-            found[room.replace(".", "/")] |= set(registry.names(room, base))
+            found[name((ROOT / room.replace(".", "/")).resolve())] |= set(registry.names(room, base))
     return found
 
 

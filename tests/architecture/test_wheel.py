@@ -28,17 +28,17 @@ def contents(tmp_path_factory):
 def test_the_wheel_carries_every_source_schema_and_description(contents):
     kinds = (".py", ".json", ".proto", ".yaml", ".yml", ".npz", ".html", ".j2", ".mcap", ".parquet")
     wanted = {
-        p.relative_to(ROOT).as_posix()
+        ("" if package == "tacdata" else "tacdata/") + p.relative_to(ROOT).as_posix()
         for package in PACKAGES
         for p in (ROOT / package).rglob("*")
         if p.suffix in kinds and "__pycache__" not in p.parts
     }
-    assert {"schemas/sensor.schema.json", "tacdata/sensor/tacprint.yaml", "viewers/__init__.py"} <= wanted
+    assert {"tacdata/schemas/sensor.schema.json", "tacdata/sensor/tacprint.yaml", "tacdata/viewers/source.py"} <= wanted
     assert not wanted - set(contents)
 
 
 def test_the_wheel_carries_nothing_else(contents):
-    assert {n.split("/")[0] for n in contents if ".dist-info/" not in n} == set(PACKAGES)
+    assert {n.split("/")[0] for n in contents if ".dist-info/" not in n} == {"tacdata"}
 
 
 def test_the_wheel_says_its_commit(contents):

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from label_farm.simulated.packing import write_dataset
-from label_farm.simulated.plan import SimulationPlan, read_simulation_plan
-from label_farm.simulated.press_draw import draw_press
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.solving import solve_batch
+from tacdata.label_farm.simulated.packing import write_dataset
+from tacdata.label_farm.simulated.plan import SimulationPlan, read_simulation_plan
+from tacdata.label_farm.simulated.press_draw import draw_press
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.solving import solve_batch
 from tacdata.sensor import default_sensor
-from training.frames.data import read_frames
-from training.pretraining.shipped import pretrained
+from tacdata.training.frames.data import read_frames
+from tacdata.training.pretraining.shipped import pretrained
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm" / "simulated"))

@@ -10,8 +10,7 @@ import time
 
 import pytest
 
-import schemas
-from tacdata import extras
+from tacdata import extras, schemas
 from tacdata.commands import demo
 from tacdata.errors import PackageError, UsageError
 

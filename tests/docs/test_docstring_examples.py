@@ -37,10 +37,10 @@ FIRST = (
     "tacdata.effects.library",
     "tacdata.skin.press.PressRequest",
     "tacdata.discrepancy.model.spec.read_spec",
-    "training.metrics.depth_maps.score_frames",
-    "training.networks.network.create",
-    "viewers.source.scene_at",
-    "viewers.showing.show",
+    "tacdata.training.metrics.depth_maps.score_frames",
+    "tacdata.training.networks.network.create",
+    "tacdata.viewers.source.scene_at",
+    "tacdata.viewers.showing.show",
 )
 """Thirty names, by where a user imports them from."""
 PACKAGES = ("tacdata", "schemas", "label_farm", "training", "viewers")
@@ -48,7 +48,8 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
 def module_name(path):
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    return name if name.startswith("tacdata") else f"tacdata.{name}"
 
 
 MODULES = sorted(

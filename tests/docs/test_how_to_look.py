@@ -18,11 +18,11 @@ from tacdata.dataset.format import metadata
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.labels import write_label
 from tacdata.recording import read_episode
-from training.inference.prediction import PredictedMaps, write_prediction
-from training.settings import TrainingSettings
-from training.train import train
-from viewers.browse import catalogue
-from viewers.rerun import window
+from tacdata.training.inference.prediction import PredictedMaps, write_prediction
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import train
+from tacdata.viewers.browse import catalogue
+from tacdata.viewers.rerun import window
 
 TESTS = HOW_TO.parents[1] / "tests"
 for room in ("dataset", "label_farm", "replay", "revision", "demonstrations", "training"):

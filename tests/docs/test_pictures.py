@@ -12,8 +12,8 @@ from running.typed_pages import HOW_TO
 
 from tacdata.labels import read_label
 from tacdata.recording import read_episode
-from training.inference.prediction import PredictedMaps, write_prediction
-from viewers.pictures import film
+from tacdata.training.inference.prediction import PredictedMaps, write_prediction
+from tacdata.viewers.pictures import film
 
 PICTURES = HOW_TO.parent / "pictures"
 HEADINGS = {"Taxel signals": (124, 138, 0, 640)}

@@ -12,8 +12,8 @@ from running.typed_pages import HOW_TO, commands
 from unit_examples import label
 
 from tacdata import documents
-from training.settings import TrainingSettings
-from training.train import train
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import train
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "training"))
 

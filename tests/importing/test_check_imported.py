@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from tacdata import documents
 from tacdata.importing.imported_session import import_session
 from tacdata.recording.check.report import check
-from viewers.pictures.check import _responses, draw
+from tacdata.viewers.pictures.check import _responses, draw
 
 
 def several(presses, begin=2.0, seed=0, spread=0.05):

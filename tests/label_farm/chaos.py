@@ -18,9 +18,9 @@ from pathlib import Path
 from farm_examples import HERE
 from session_examples import session
 
-from label_farm.remote.client import Client
-from label_farm.store import solution_file
 from tacdata.errors import TacdataError
+from tacdata.label_farm.remote.client import Client
+from tacdata.label_farm.store import solution_file
 from tacdata.labels import columns, read_label
 
 ROOT = HERE.parent.parent

@@ -6,7 +6,7 @@ import pytest
 from farm_examples import HERE, label_episodes
 from one_process import OneProcess, version
 
-from label_farm.presses import model
+from tacdata.label_farm.presses import model
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from label_farm.labelling import FarmSettings, Labelling
-from label_farm.store.store import Store
 from tacdata.indenters.sphere import Sphere
+from tacdata.label_farm.labelling import FarmSettings, Labelling
+from tacdata.label_farm.store.store import Store
 from tacdata.plans import Press
 from tacdata.recording.episode import CncStream, Episode, TaxelStream
 from tacdata.sensor import default_sensor

@@ -1,10 +1,10 @@
 """Labelling without processes of workers: each takes half a second of the processor to start."""
 
-from label_farm.ledger.ledger import owner_name
-from label_farm.presses import model
-from label_farm.workers.desk import LocalDesk
-from label_farm.workers.engine import Engine
-from label_farm.workers.worker import Worker
+from tacdata.label_farm.ledger.ledger import owner_name
+from tacdata.label_farm.presses import model
+from tacdata.label_farm.workers.desk import LocalDesk
+from tacdata.label_farm.workers.engine import Engine
+from tacdata.label_farm.workers.worker import Worker
 
 
 class OneProcess(Engine):

@@ -7,8 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, columns, read_label, table, write_label
 

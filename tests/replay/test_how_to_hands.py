@@ -14,8 +14,8 @@ from running.typed_pages import commands as shown
 from tracked_hand import tracks
 
 from tacdata.demonstrations.recording.session import open_demo_session
+from tacdata.viewers.pictures import replay_film
 from tacdata.virtual_rig.world.hand import draw_hand
-from viewers.pictures import replay_film
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tests" / "demonstrations"))

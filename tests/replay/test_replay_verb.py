@@ -13,8 +13,8 @@ from tacdata import documents
 from tacdata.cli import main
 from tacdata.commands.replay import _other_network
 from tacdata.demonstrations.paths.tracks_file import read_tracks
+from tacdata.viewers.pictures import replay_film
 from tacdata.virtual_rig.world.hand import draw_hand
-from viewers.pictures import replay_film
 
 WILSON = [(0.0, 0.4899), (0.0456, 0.6994), (0.1500, 0.8500), (0.3006, 0.9544), (0.5101, 1.0)]
 """Wilson's 95 % interval [1] of k successes in 4 trials, from its quadratic with z^2 = 3.841459."""

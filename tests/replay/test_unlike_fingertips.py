@@ -17,10 +17,10 @@ from tacdata.replay.comparison.trials import Trials
 from tacdata.replay.scene import scene_of
 from tacdata.replay.targets import targets_of
 from tacdata.sensor import Sensor, default_sensor
+from tacdata.viewers.pictures.page_frames import page_frames
+from tacdata.viewers.pictures.replay_film import ReplayPage
+from tacdata.viewers.scenes.hand import demonstration_scene
 from tacdata.virtual_rig.demo import VirtualDemo
-from viewers.pictures.page_frames import page_frames
-from viewers.pictures.replay_film import ReplayPage
-from viewers.scenes.hand import demonstration_scene
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "demonstrations"))
 from demo_examples import HAND, recording, taxels

@@ -3,8 +3,7 @@
 import numpy as np
 import yaml
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.run import recording_hash
 from tacdata.effects import load

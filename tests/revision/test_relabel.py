@@ -10,8 +10,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "label_farm"))
 from farm_examples import HERE, SENSOR, label_episodes, press_episode
 
-from label_farm.labelling import FarmSettings
 from tacdata.effects import Placed, load
+from tacdata.label_farm.labelling import FarmSettings
 from tacdata.revision.labels import relabel
 from tacdata.revision.labels.relabel import changed_skin, moves_labels, relabelled
 

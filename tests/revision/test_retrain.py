@@ -11,11 +11,11 @@ from revised_bench import MAPPING, verdict
 sys.path.insert(0, str(Path(__file__).parents[1] / "label_farm"))
 from farm_examples import HERE
 
-from label_farm.labelling import FarmSettings, Labelling
-from label_farm.store.store import Store
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.errors import UsageError
 from tacdata.importing.imported_session import import_session
+from tacdata.label_farm.labelling import FarmSettings, Labelling
+from tacdata.label_farm.store.store import Store
 from tacdata.recording import read_episode, read_session
 from tacdata.revision.labels.retrain import Recipe
 from tacdata.revision.revise import RevisionOptions, revise

@@ -56,7 +56,7 @@ def test_the_card_stands_alone_and_says_what_it_rests_on(right):
 
 
 def test_the_curves_go_into_a_rerun_file(right, tmp_path):
-    from viewers.rerun.gap_recording import write
+    from tacdata.viewers.rerun.gap_recording import write
 
     # Of 80 ms 10 are left; the response itself took up nearly half of them before, as it cannot know the direction.
     assert right.shown and all(own.rms_error(own.after) < 0.25 * own.rms_error(own.before) for own in right.shown)

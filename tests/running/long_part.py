@@ -172,10 +172,10 @@ def _imported(path):
 
 
 def _room(words):
-    if words[0] not in PACKAGES:
-        return None
     if words[0] != "tacdata":
-        return words[0]
+        return None
+    if words[1:2] and words[1] in PACKAGES:
+        return words[1]
     place = Path("tacdata", *words[1:2])
     return place.as_posix() if (ROOT / place).is_dir() else place.with_suffix(".py").as_posix()
 

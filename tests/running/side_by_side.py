@@ -14,7 +14,7 @@ from running.durations import recorded
 from running.real_time import in_real_time
 from xdist.scheduler import LoadFileScheduling
 
-from viewers.rerun import window
+from tacdata.viewers.rerun import window
 
 ROOT = Path(__file__).parents[2]
 STAND_BACK = 3

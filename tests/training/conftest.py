@@ -9,7 +9,7 @@ import pytest
 sys.path.append(str(Path(__file__).parent))
 from training_frames import build_frames
 
-from training.frames.frames import Frames
+from tacdata.training.frames.frames import Frames
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,11 @@ import pytest
 from running.in_process import tacdata
 
 from tacdata.errors import UsageError
-from training.generalization import generalize
-from training.inference import checkpoint
-from training.reports.comparison import groups, verdicts
-from training.reports.report_page import Scored, page
-from training.settings import TrainingSettings
+from tacdata.training.generalization import generalize
+from tacdata.training.inference import checkpoint
+from tacdata.training.reports.comparison import groups, verdicts
+from tacdata.training.reports.report_page import Scored, page
+from tacdata.training.settings import TrainingSettings
 
 RECIPE = TrainingSettings(network="direct", arguments={"hidden": 16}, epochs=2, batch_size=64)
 

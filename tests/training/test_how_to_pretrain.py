@@ -13,11 +13,11 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm" / "simulated"))
 from bump_skin import BumpSkin
 
-from label_farm.simulated import solving
 from tacdata import documents
+from tacdata.label_farm.simulated import solving
 from tacdata.sensor import default_sensor
-from training.inference import checkpoint
-from training.pretraining import shipped
+from tacdata.training.inference import checkpoint
+from tacdata.training.pretraining import shipped
 
 PAGE = HOW_TO / "pretrain.md"
 QUICK = {

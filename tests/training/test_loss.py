@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from training.loss import WeightedLoss, normalized
+from tacdata.training.loss import WeightedLoss, normalized
 
 
 def test_a_map_of_four_pixels_by_hand():

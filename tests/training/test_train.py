@@ -8,12 +8,12 @@ import pytest
 import torch
 
 from tacdata.errors import FormatError, TacdataError, UsageError
-from training.frames.windows import Windows
-from training.inference import checkpoint
-from training.inference.predictor import predict
-from training.loss import WeightedLoss
-from training.settings import TrainingSettings
-from training.train import normalization, train
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference import checkpoint
+from tacdata.training.inference.predictor import predict
+from tacdata.training.loss import WeightedLoss
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import normalization, train
 
 SMALL = TrainingSettings(arguments={"hidden": 24, "channels": 8}, epochs=3)
 
@@ -203,7 +203,7 @@ def test_tensorboard_shows_what_the_metrics_file_holds(frames, tmp_path):
     pytest.importorskip("tensorboard")
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    from training.tensorboard import FOLDER, event_log
+    from tacdata.training.tensorboard import FOLDER, event_log
 
     run(frames, replace(SMALL, epochs=2), tmp_path / "run", listener=event_log(tmp_path / "run"))
     events = EventAccumulator(str(tmp_path / "run" / FOLDER))

@@ -13,7 +13,7 @@ from tacdata.dataset.format.metadata import EpisodeRecord
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.indenters import from_document
 from tacdata.plans import Press
-from training.frames.data import read_frames
+from tacdata.training.frames.data import read_frames
 
 BALL = {"shape": "sphere", "radius": 2.0}
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from tacdata.recording.episode import PHASES
 from tacdata.sensor import default_sensor
-from training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.frames.frames import EpisodeSpan, Frames
 
 SHAPES = ("sphere", "cylinder", "cone")
 

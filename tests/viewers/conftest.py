@@ -11,7 +11,7 @@ from tacdata.labels import Label
 from tacdata.plans import Press
 from tacdata.recording.episode import CncStream, Episode, Phase, TagStream, TaxelStream
 from tacdata.sensor import default_sensor
-from training.inference.prediction import PredictedMaps
+from tacdata.training.inference.prediction import PredictedMaps
 
 START = 1_760_000_000_000_000_000
 FRAMES, RATE = 120, 30.0

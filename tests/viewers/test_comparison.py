@@ -10,13 +10,13 @@ from recorded_press import write_recording
 from tacdata.errors import UsageError
 from tacdata.labels import write_label
 from tacdata.recording.files.reader import read_episode
-from training.inference.prediction import write_prediction
-from viewers.comparison import labels_at, predictions_at, telling_names
-from viewers.pictures.backend import PictureBackend
-from viewers.pictures.film import FilmBackend, film_times
-from viewers.rerun.backend import RerunBackend
-from viewers.scenes.comparison import readings_comparison
-from viewers.scenes.episode import episode_scene
+from tacdata.training.inference.prediction import write_prediction
+from tacdata.viewers.comparison import labels_at, predictions_at, telling_names
+from tacdata.viewers.pictures.backend import PictureBackend
+from tacdata.viewers.pictures.film import FilmBackend, film_times
+from tacdata.viewers.rerun.backend import RerunBackend
+from tacdata.viewers.scenes.comparison import readings_comparison
+from tacdata.viewers.scenes.episode import episode_scene
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_names_tell_folders_apart(tmp_path):
 
 @pytest.mark.parametrize("ending", [".gif", ".mp4"])
 def test_a_film_shows_the_press_from_approach_to_release(episode, label, tmp_path, monkeypatch, ending):
-    monkeypatch.setattr("viewers.pictures.film.MOST", {".gif": 3, ".mp4": 3})
+    monkeypatch.setattr("tacdata.viewers.pictures.film.MOST", {".gif": 3, ".mp4": 3})
     scene = episode_scene(episode, label)
     FilmBackend(tmp_path / f"film{ending}", resolution=30).draw(scene)
     if ending == ".gif":

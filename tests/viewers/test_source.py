@@ -14,9 +14,9 @@ from tacdata.dataset.pack import pack
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import write_label
 from tacdata.recording.files.reader import read_episode
-from training.inference.prediction import write_prediction
-from viewers.rerun.backend import RerunBackend
-from viewers.source import scene_at
+from tacdata.training.inference.prediction import write_prediction
+from tacdata.viewers.rerun.backend import RerunBackend
+from tacdata.viewers.source import scene_at
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_a_recording_that_is_still_being_written(session, tmp_path):
 
 
 def test_of_many_images_some_are_read_at_equal_distance(session):
-    from viewers.parts.recorded_images import recorded_images
+    from tacdata.viewers.parts.recorded_images import recorded_images
 
     path = session / "episode-000003.mcap"
     whole = list(recorded_images(path, ("top",)))

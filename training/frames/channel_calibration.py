@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
-from training.frames.spreading import laplacian, spreading
-from training.networks.network import CALIBRATION_UNIT
+from tacdata.training.frames.spreading import laplacian, spreading
+from tacdata.training.networks.network import CALIBRATION_UNIT
 
 if TYPE_CHECKING:
     from tacdata.sensor.sensor import Taxels
-    from training.frames.frames import Frames
+    from tacdata.training.frames.frames import Frames
 
 SPREAD = 0.1
 """Standard deviation of a unit's gains about their mean that a stated error allows at least [1]."""
@@ -50,7 +50,7 @@ class ChannelCalibration:
 
     Example:
         >>> import numpy as np
-        >>> from training.frames.channel_calibration import ChannelCalibration
+        >>> from tacdata.training.frames.channel_calibration import ChannelCalibration
         >>> nothing = np.zeros(24)
         >>> calibration = ChannelCalibration(np.full(24, 0.2), 1.5, nothing, 0.0, 10)
         >>> float(calibration.force(np.full((1, 24), 2000.0))[0, 0].round(3))  # 0.2 N at 1000 counts

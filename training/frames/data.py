@@ -11,7 +11,7 @@ from tacdata.dataset.flags import flagged_episodes
 from tacdata.dataset.format import features as key
 from tacdata.dataset.reader import DatasetEpisode
 from tacdata.paths import StrPath
-from training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.frames.frames import EpisodeSpan, Frames
 
 UNKNOWN = "unknown"
 """Indenter of an episode whose record an edit of the dataset lost."""

@@ -17,7 +17,7 @@ def laplacian(taxels: Taxels) -> np.ndarray:
 
     Example:
         >>> from tacdata.sensor import default_sensor
-        >>> from training.frames.spreading import laplacian
+        >>> from tacdata.training.frames.spreading import laplacian
         >>> round(float(abs(laplacian(default_sensor().taxels).sum(axis=1)).max()), 9)  # nothing is lost
         0.0
     """

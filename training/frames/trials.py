@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.errors import UsageError
 from tacdata.recording.episode import PHASES
-from training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.frames.frames import EpisodeSpan, Frames
 
 DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL = "depth trial", "position trial", "wearing trial"
 """Purposes of presses in a plan; the shipped plan `evaluation` writes the first two."""

@@ -6,9 +6,9 @@ import numpy as np
 import torch
 
 from tacdata.sensor import Sensor
-from training.frames.spreading import laplacian
-from training.networks.network import Network
-from training.settings import TrainingSettings
+from tacdata.training.frames.spreading import laplacian
+from tacdata.training.networks.network import Network
+from tacdata.training.settings import TrainingSettings
 
 
 class Variation:

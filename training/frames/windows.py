@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from training.frames.frames import Frames
+from tacdata.training.frames.frames import Frames
 
 
 class Windows:

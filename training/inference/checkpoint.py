@@ -22,10 +22,10 @@ from tacdata import documents, provenance
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 from tacdata.sensor import Sensor
-from training.frames.channel_calibration import ChannelCalibration
-from training.networks.network import Network, create
-from training.settings import TrainingSettings
-from training.splits.split import Split
+from tacdata.training.frames.channel_calibration import ChannelCalibration
+from tacdata.training.networks.network import Network, create
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.splits.split import Split
 
 KEY = "checkpoint"
 BEST, LAST = "best.safetensors", "last.safetensors"

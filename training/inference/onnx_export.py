@@ -15,7 +15,7 @@ import torch
 from torch import nn
 
 from tacdata.errors import FormatError, UsageError
-from training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.checkpoint import Checkpoint
 
 OPSET = 17
 TOLERANCE = 1e-4

@@ -12,8 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.display import Displayed
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath

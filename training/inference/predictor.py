@@ -7,9 +7,9 @@ import time
 import numpy as np
 import torch
 
-from training.frames.windows import Windows
-from training.inference.compute import reproducible
-from training.networks.network import Network
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.compute import reproducible
+from tacdata.training.networks.network import Network
 
 BATCH = 256
 """Frames computed together."""

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 
 from tacdata.errors import FormatError
-from training.inference.checkpoint import Checkpoint
-from training.inference.predictor import BATCH
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.predictor import BATCH
 
 
 @torch.inference_mode()

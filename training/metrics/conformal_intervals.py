@@ -22,10 +22,9 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.errors import FormatError, UsageError
-from training.metrics.depth_maps import CONTACT_THRESHOLD
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
 
 FILE = "spread.json"
 VALIDATION = "validation episodes"

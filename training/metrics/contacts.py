@@ -20,7 +20,7 @@ from scipy.ndimage import label as connected
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from training.metrics.depth_maps import CONTACT_THRESHOLD
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
 
 PROMINENCE = 0.15
 """Least prominence of a hill of a label, over its own depth [1]."""
@@ -76,7 +76,7 @@ def match(prediction: np.ndarray, label: np.ndarray, pitch: float) -> ContactMat
 
     Example:
         >>> import numpy as np
-        >>> from training.metrics.contacts import match
+        >>> from tacdata.training.metrics.contacts import match
         >>> x = np.arange(35)[:, None] - np.array([12, 22])  # px: two balls 4 mm apart
         >>> y = np.arange(26) - 13
         >>> label = np.max(0.8 - 0.02 * (x[:, :, None] ** 2 + y**2), axis=1).clip(0)  # mm

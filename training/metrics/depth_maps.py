@@ -72,7 +72,7 @@ def score_frames(prediction: np.ndarray, label: np.ndarray, threshold: float = C
 
     Example:
         >>> import numpy as np
-        >>> from training.metrics.depth_maps import score_frames
+        >>> from tacdata.training.metrics.depth_maps import score_frames
         >>> label = np.zeros((1, 35, 26), np.float32)
         >>> label[0, 15:20, 10:15] = 1.0  # mm
         >>> scores = score_frames(0.8 * label, label)

@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance
-from training.frames.frames import Frames
-from training.metrics.depth_maps import CONTACT_THRESHOLD
+from tacdata import documents, provenance, schemas
+from tacdata.training.frames.frames import Frames
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
 
 FILE = "seen.json"
 KEPT = 400

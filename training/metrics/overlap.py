@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from training.metrics.depth_maps import centroid
-from training.metrics.physical import REGION_THRESHOLD
+from tacdata.training.metrics.depth_maps import centroid
+from tacdata.training.metrics.physical import REGION_THRESHOLD
 
 
 def aligned_iou(depth: np.ndarray, reference: np.ndarray, threshold: float = REGION_THRESHOLD) -> float | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.sensor import DepthMap
-from training.metrics.depth_maps import centroid
+from tacdata.training.metrics.depth_maps import centroid
 
 REGION_THRESHOLD = 0.4
 """Depth above which a pixel belongs to the contact region [mm] (paper, section on labels)."""

@@ -6,7 +6,7 @@ still deepening) this one must guess from the past.
 
 from __future__ import annotations
 
-from training.networks.paper import Paper
+from tacdata.training.networks.paper import Paper
 
 
 class Causal(Paper):

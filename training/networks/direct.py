@@ -11,8 +11,8 @@ from math import prod
 import torch
 from torch import nn
 
-from training.networks.history import OFFSETS
-from training.networks.network import Network
+from tacdata.training.networks.history import OFFSETS
+from tacdata.training.networks.network import Network
 
 
 class Direct(Network):

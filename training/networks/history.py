@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
-from training.networks.network import ResidualLayers
-from training.networks.paper import Paper
+from tacdata.training.networks.network import ResidualLayers
+from tacdata.training.networks.paper import Paper
 
 OFFSETS = (-64, -32, -16, -8, -4, -3, -2, -1, 0)
 

@@ -18,7 +18,7 @@ from tacdata import registry
 from tacdata.errors import FormatError
 from tacdata.sensor import Sensor
 
-ROOM, BASE = "training.networks", "network"
+ROOM, BASE = "tacdata.training.networks", "network"
 CALIBRATION_UNIT = 1000.0
 """Reading at which a calibrated channel's force is its gain [counts]."""
 
@@ -116,7 +116,7 @@ def create(name: str, sensor: Sensor, arguments: dict[str, Any] | None = None) -
     Example:
         >>> import torch
         >>> from tacdata.sensor import default_sensor
-        >>> from training.networks.network import create
+        >>> from tacdata.training.networks.network import create
         >>> network = create("paper", default_sensor())
         >>> network(torch.zeros(2, 9, 24)).shape  # a batch of two windows gives two maps
         torch.Size([2, 35, 26])

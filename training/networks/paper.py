@@ -15,7 +15,7 @@ from __future__ import annotations
 import torch
 from torch import nn
 
-from training.networks.network import Network
+from tacdata.training.networks.network import Network
 
 
 class Paper(Network):

@@ -15,9 +15,9 @@ from typing import Any, ClassVar
 import torch
 from torch import nn
 
-from training.loss import WeightedLoss
-from training.networks.history import OFFSETS
-from training.networks.network import Network, ResidualLayers
+from tacdata.training.loss import WeightedLoss
+from tacdata.training.networks.history import OFFSETS
+from tacdata.training.networks.network import Network, ResidualLayers
 
 _LEAST = 0.01
 """Scale below which a window counts as noise, over the training frames' own [1]."""

@@ -13,19 +13,18 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.errors import FormatError, UsageError
-from training.frames.frames import Frames
-from training.frames.windows import Windows
-from training.inference.checkpoint import Checkpoint
-from training.inference.compute import reproducible
-from training.inference.predictor import predict
-from training.metrics.depth_maps import score_frames
-from training.pretraining.recipe import recipe
-from training.settings import TrainingSettings
-from training.splits.split import VALIDATION_SHARE, Split, divide, share
-from training.train import Progress, train
+from tacdata.training.frames.frames import Frames
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.compute import reproducible
+from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics.depth_maps import score_frames
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.splits.split import VALIDATION_SHARE, Split, divide, share
+from tacdata.training.train import Progress, train
 
 FILE = "curve.json"
 PRESSES = (0, 3, 10, 30, 100, 300)

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from tacdata import registry
 from tacdata.errors import UsageError
-from training.networks.network import BASE, ROOM, Network
-from training.settings import TrainingSettings
+from tacdata.training.networks.network import BASE, ROOM, Network
+from tacdata.training.settings import TrainingSettings
 
 if TYPE_CHECKING:
-    from training.inference.checkpoint import Checkpoint
+    from tacdata.training.inference.checkpoint import Checkpoint
 
 FITTING: dict[str, Any] = {"epochs": 20, "learning_rate": 5e-4, "batch_size": 64}
 """Settings for fitting a pretrained network to a few recorded presses: small steps, few epochs."""
@@ -33,7 +33,7 @@ def recipe(asked: Mapping[str, Any], pretrained: Checkpoint | None = None, simul
         UsageError: If another network is asked for than the pretrained one, or a setting cannot train.
 
     Example:
-        >>> from training.pretraining.recipe import recipe
+        >>> from tacdata.training.pretraining.recipe import recipe
         >>> recipe({"network": "pattern"}).batch_size, recipe({"network": "pattern", "batch_size": 32}).batch_size
         (128, 32)
     """

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from tacdata import provenance
-from training.inference import checkpoint
-from training.inference.checkpoint import Checkpoint
+from tacdata.training.inference import checkpoint
+from tacdata.training.inference.checkpoint import Checkpoint
 
 NAME = "shipped"
 PATH = Path(__file__).with_name("tacprint.safetensors")
@@ -21,7 +21,7 @@ def pretrained(model: str) -> Checkpoint:
         FormatError: If it is damaged.
 
     Example:
-        >>> from training.pretraining.shipped import pretrained
+        >>> from tacdata.training.pretraining.shipped import pretrained
         >>> pretrained("shipped").network.name
         'pattern'
     """

@@ -13,16 +13,16 @@ from collections.abc import Callable
 import numpy as np
 
 from tacdata.errors import UsageError
-from training.frames.frames import EpisodeSpan, Frames
-from training.frames.windows import Windows
-from training.inference import checkpoint
-from training.inference.checkpoint import Checkpoint
-from training.inference.compute import reproducible
-from training.inference.predictor import predict
-from training.metrics import conformal_intervals
-from training.metrics.conformal_intervals import ConformalIntervals
-from training.splits.split import VALIDATION_SHARE, Split, share
-from training.train import Progress, train
+from tacdata.training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference import checkpoint
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.compute import reproducible
+from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics import conformal_intervals
+from tacdata.training.metrics.conformal_intervals import ConformalIntervals
+from tacdata.training.splits.split import VALIDATION_SHARE, Split, share
+from tacdata.training.train import Progress, train
 
 _SEED = 47
 """Tells the random numbers of groups from those of training."""

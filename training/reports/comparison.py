@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from training.scoring.evaluate import METRICS
-from training.scoring.published import TABLE_1
+from tacdata.training.scoring.evaluate import METRICS
+from tacdata.training.scoring.published import TABLE_1
 
 LARGER_IS_BETTER = {"iou"}
 

@@ -82,6 +82,6 @@ class HtmlPage:
 
 @cache
 def _template() -> Template:
-    sources = PackageLoader("training", "reports")
+    sources = PackageLoader("tacdata.training", "reports")
     environment = Environment(loader=sources, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return environment.get_template("page.html.j2")

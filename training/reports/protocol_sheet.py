@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from training.reports.score_sheet import number, row, rule, spread
-from training.scoring import published
+from tacdata.training.reports.score_sheet import number, row, rule, spread
+from tacdata.training.scoring import published
 
 
 def markdown(document: dict[str, Any]) -> str:

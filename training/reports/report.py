@@ -8,11 +8,11 @@ from pathlib import Path
 
 from tacdata import documents, provenance
 from tacdata.errors import UsageError
-from training.frames.frames import Frames
-from training.inference.prediction import PredictedMaps, file_name, write_prediction
-from training.reports.score_picture import draw
-from training.reports.score_sheet import markdown
-from training.scoring.evaluate import Evaluation
+from tacdata.training.frames.frames import Frames
+from tacdata.training.inference.prediction import PredictedMaps, file_name, write_prediction
+from tacdata.training.reports.score_picture import draw
+from tacdata.training.reports.score_sheet import markdown
+from tacdata.training.scoring.evaluate import Evaluation
 
 JSON, SHEET, PICTURE = "scores.json", "scores.md", "scores.png"
 

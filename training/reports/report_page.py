@@ -8,13 +8,13 @@ from typing import Any, BinaryIO
 import numpy as np
 from matplotlib.figure import Figure
 
-from training.frames.frames import Frames
-from training.reports.comparison import Group, groups, verdicts
-from training.reports.html_page import HtmlPage
-from training.reports.score_picture import draw_cases
-from training.reports.score_sheet import markdown, number, title
-from training.scoring.evaluate import METRICS, Evaluation
-from training.scoring.published import TABLE_1
+from tacdata.training.frames.frames import Frames
+from tacdata.training.reports.comparison import Group, groups, verdicts
+from tacdata.training.reports.html_page import HtmlPage
+from tacdata.training.reports.score_picture import draw_cases
+from tacdata.training.reports.score_sheet import markdown, number, title
+from tacdata.training.scoring.evaluate import METRICS, Evaluation
+from tacdata.training.scoring.published import TABLE_1
 
 
 @dataclass(frozen=True)

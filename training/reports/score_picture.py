@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from training.frames.frames import Frames
-from training.reports.score_sheet import number, spread, title
-from training.scoring.evaluate import METRICS, EpisodeResult, Evaluation
-from training.scoring.published import TABLE_1
+from tacdata.training.frames.frames import Frames
+from tacdata.training.reports.score_sheet import number, spread, title
+from tacdata.training.scoring.evaluate import METRICS, EpisodeResult, Evaluation
+from tacdata.training.scoring.published import TABLE_1
 
 
 def draw(path: Path, evaluation: Evaluation, frames: Frames) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from training.scoring.evaluate import METRICS
-from training.scoring.published import TABLE_1
+from tacdata.training.scoring.evaluate import METRICS
+from tacdata.training.scoring.published import TABLE_1
 
 RULES = (
     "Contact-region RMSE is defined where the label has contact, the centroid error where label and "

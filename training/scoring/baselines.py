@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from training.frames.frames import Frames
-from training.splits.split import Split
+from tacdata.training.frames.frames import Frames
+from tacdata.training.splits.split import Split
 
 RIDGE = 1e-3
 """Ridge of the linear predictor, as a share of the mean variance of the signals [1]."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from training.metrics.contacts import (
+from tacdata.training.metrics.contacts import (
     LEAST_PROMINENCE,
     LONG,
     PREDICTED_LEAST,
@@ -21,7 +21,7 @@ from training.metrics.contacts import (
     ContactMatch,
     match,
 )
-from training.metrics.depth_maps import summarize
+from tacdata.training.metrics.depth_maps import summarize
 
 DISTANCES = (3.0, 4.0, 5.0)
 """Borders of the distance of the two nearest contacts, between groups of presses [mm]."""

@@ -10,18 +10,17 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-import schemas
-from tacdata import provenance
-from training.frames.frames import EpisodeSpan, Frames
-from training.frames.trials import at_full_depth
-from training.frames.windows import Windows
-from training.inference.checkpoint import Checkpoint
-from training.inference.compute import choose_device, reproducible
-from training.inference.predictor import milliseconds_per_frame, predict
-from training.metrics import conformal_intervals, depth_maps, physical
-from training.metrics.depth_maps import FrameScores
-from training.metrics.physical import PressScore
-from training.scoring import baselines, contact_scores, published
+from tacdata import provenance, schemas
+from tacdata.training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.frames.trials import at_full_depth
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.compute import choose_device, reproducible
+from tacdata.training.inference.predictor import milliseconds_per_frame, predict
+from tacdata.training.metrics import conformal_intervals, depth_maps, physical
+from tacdata.training.metrics.depth_maps import FrameScores
+from tacdata.training.metrics.physical import PressScore
+from tacdata.training.scoring import baselines, contact_scores, published
 
 DEPTHS = (0.2, 0.3, 0.5, 0.8)
 """Borders of the largest labelled depth between groups of frames [mm]."""

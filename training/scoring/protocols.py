@@ -14,17 +14,16 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.errors import UsageError
-from training.frames.frames import Frames
-from training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, PressTrial, trials
-from training.frames.windows import Windows
-from training.inference.checkpoint import Checkpoint
-from training.inference.compute import reproducible
-from training.inference.predictor import predict
-from training.metrics.overlap import aligned_iou
-from training.metrics.physical import REGION_THRESHOLD, score_press
+from tacdata.training.frames.frames import Frames
+from tacdata.training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, PressTrial, trials
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.compute import reproducible
+from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics.overlap import aligned_iou
+from tacdata.training.metrics.physical import REGION_THRESHOLD, score_press
 
 THRESHOLDS = (0.3, 0.4, 0.5)
 """Depths above which a pixel belongs to the region [mm] (paper, section on labels)."""

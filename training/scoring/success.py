@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
-from training.scoring import published
+from tacdata.training.scoring import published
 
 TRUE, FALSE = {"1", "true", "yes", "success"}, {"0", "false", "no", "failure"}
 
@@ -123,7 +123,7 @@ def counted(text: str) -> Rate:
         UsageError: If it is not of this form, or makes no proportion.
 
     Example:
-        >>> from training.scoring.success import counted
+        >>> from tacdata.training.scoring.success import counted
         >>> rate = counted("dense=35/40")
         >>> [round(bound, 3) for bound in rate.interval]  # Wilson, 95 %
         [0.739, 0.945]

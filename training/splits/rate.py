@@ -6,8 +6,8 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.sensor import Sensor
-from training.frames.frames import EpisodeSpan
-from training.splits.split import TEST_SHARE, share
+from tacdata.training.frames.frames import EpisodeSpan
+from tacdata.training.splits.split import TEST_SHARE, share
 
 
 def held_out(episodes: tuple[EpisodeSpan, ...], sensor: Sensor, generator: np.random.Generator) -> set[int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.sensor import Sensor
-from training.frames.frames import EpisodeSpan
+from tacdata.training.frames.frames import EpisodeSpan
 
 
 def held_out(episodes: tuple[EpisodeSpan, ...], sensor: Sensor, generator: np.random.Generator) -> set[int]:

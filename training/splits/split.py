@@ -15,9 +15,9 @@ import numpy as np
 
 from tacdata import registry
 from tacdata.errors import UsageError
-from training.frames.frames import Frames
+from tacdata.training.frames.frames import Frames
 
-ROOM, BASE = "training.splits", "split"
+ROOM, BASE = "tacdata.training.splits", "split"
 TEST_SHARE = 0.15
 VALIDATION_SHARE = 0.15
 

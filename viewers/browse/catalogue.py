@@ -14,11 +14,11 @@ from pathlib import Path
 from urllib.parse import quote
 
 from tacdata.errors import UsageError
-from viewers.browse.episode_list import EpisodeList
-from viewers.rerun.shield import LOOPBACK, shielded
-from viewers.rerun.timelines import HOST
-from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
-from viewers.scene.moments import moments
+from tacdata.viewers.browse.episode_list import EpisodeList
+from tacdata.viewers.rerun.shield import LOOPBACK, shielded
+from tacdata.viewers.rerun.timelines import HOST
+from tacdata.viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
+from tacdata.viewers.scene.moments import moments
 
 PORT = 51234
 """Rerun's own port of a catalogue; another where it is in use."""
@@ -106,9 +106,9 @@ def _draw(
     drawn: Callable[[int, int], None],
 ) -> dict[int, int]:
     """Write every episode, and the layout of the first for all; return each one's deepest moment [ns]."""
-    from viewers.rerun.backend import APPLICATION, RerunBackend
-    from viewers.rerun.blueprint import episode_blueprint
-    from viewers.source import scene_at
+    from tacdata.viewers.rerun.backend import APPLICATION, RerunBackend
+    from tacdata.viewers.rerun.blueprint import episode_blueprint
+    from tacdata.viewers.source import scene_at
 
     found = {}
     for count, entry in enumerate(listed.entries, start=1):

@@ -166,7 +166,7 @@ def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, pre
         predicted: Predictions [mm], shape (m, pixels_x, pixels_y).
         predicted_ns: Their times [ns], shape (m,).
     """
-    from training.metrics.depth_maps import score_frames
+    from tacdata.training.metrics.depth_maps import score_frames
 
     _, ours, theirs = np.intersect1d(time_ns, predicted_ns, return_indices=True)
     if not len(ours) or depth.shape[1:] != predicted.shape[1:]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tacdata import provenance
 from tacdata.dataset.flags import clear_flag, set_flag
-from viewers.browse.episode_list import Entry, EpisodeList
+from tacdata.viewers.browse.episode_list import Entry, EpisodeList
 
 
 def flag_episode(listed: EpisodeList, number: int, reason: str) -> str:

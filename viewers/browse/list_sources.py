@@ -18,10 +18,10 @@ from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.labels import file_names as label_names
 from tacdata.recording.files import file_names
 from tacdata.recording.session import read_session
-from training.inference.prediction import PredictedMaps, read_prediction
-from viewers.browse.episode_list import Entry, EpisodeList, Errors, errors_of, of_press, with_flags, with_notes
-from viewers.parts.label import shown_label
-from viewers.parts.prediction_files import prediction_paths
+from tacdata.training.inference.prediction import PredictedMaps, read_prediction
+from tacdata.viewers.browse.episode_list import Entry, EpisodeList, Errors, errors_of, of_press, with_flags, with_notes
+from tacdata.viewers.parts.label import shown_label
+from tacdata.viewers.parts.prediction_files import prediction_paths
 
 
 def episodes_at(path: Path, labels: Path | None = None, predictions: Path | None = None) -> EpisodeList:

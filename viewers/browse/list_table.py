@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viewers.browse.episode_list import SHOWN, UNITS, Entry, EpisodeList
+from tacdata.viewers.browse.episode_list import SHOWN, UNITS, Entry, EpisodeList
 
 
 def list_table(listed: EpisodeList, most: int, scored: bool) -> str:

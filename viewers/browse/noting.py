@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tacdata.dataset.notes import Note, add_note, read_notes, remove_note
 from tacdata.errors import UsageError
-from viewers.browse.episode_list import EpisodeList
-from viewers.browse.flagging import recording_of
+from tacdata.viewers.browse.episode_list import EpisodeList
+from tacdata.viewers.browse.flagging import recording_of
 
 
 def notes_of(listed: EpisodeList, number: int) -> list[Note]:

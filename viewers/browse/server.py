@@ -24,11 +24,11 @@ from pydantic import BaseModel, Field
 from tacdata.dataset.flags import Flag, read_flags, read_history
 from tacdata.dataset.notes import Note, read_notes
 from tacdata.errors import TacdataError
-from viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
-from viewers.browse.flagging import flag_episode, unflag_episode
-from viewers.browse.noting import note_stretch, notes_of, unnote_stretch
-from viewers.rerun.shield import LOOPBACK, shielded
-from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
+from tacdata.viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
+from tacdata.viewers.browse.flagging import flag_episode, unflag_episode
+from tacdata.viewers.browse.noting import note_stretch, notes_of, unnote_stretch
+from tacdata.viewers.rerun.shield import LOOPBACK, shielded
+from tacdata.viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 
 PORT = 9095
 """Where the page is offered; another where it is in use."""
@@ -91,7 +91,7 @@ class Pages:
 
     def page(self) -> str:
         """Return the page."""
-        return files("viewers.browse").joinpath("page.html").read_text()
+        return files("tacdata.viewers.browse").joinpath("page.html").read_text()
 
     def entries(self) -> dict[str, Any]:
         """Return the list, with the flags as they are now."""
@@ -114,9 +114,9 @@ class Pages:
 
     def episode(self, number: int) -> tuple[Path, Times | None]:
         """Return an episode's Rerun file and times, drawn when first asked for. Raises as `viewers.source.scene_at`."""
-        from viewers.rerun.backend import RerunBackend
-        from viewers.rerun.steering import deepest_moment
-        from viewers.source import scene_at
+        from tacdata.viewers.rerun.backend import RerunBackend
+        from tacdata.viewers.rerun.steering import deepest_moment
+        from tacdata.viewers.source import scene_at
 
         self.listed.numbered(number)
         file = self._folder / f"{number}.rrd"

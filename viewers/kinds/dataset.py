@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.errors import UsageError
-from viewers.kinds.kind import Kind
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 MARK = Path("meta/info.json")
 
@@ -26,10 +26,10 @@ class DatasetKind(Kind):
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one episode, the first if none is named."""
         from tacdata.dataset.format import features
-        from viewers.parts.stretch_notes import with_stretch_notes
-        from viewers.scenes.dataset import dataset_scene
-        from viewers.scenes.recording import prediction_for
-        from viewers.scenes.single_episode import read_single
+        from tacdata.viewers.parts.stretch_notes import with_stretch_notes
+        from tacdata.viewers.scenes.dataset import dataset_scene
+        from tacdata.viewers.scenes.recording import prediction_for
+        from tacdata.viewers.scenes.single_episode import read_single
 
         if asked.labels is not None:
             raise UsageError("--labels with a dataset", "a dataset holds its labels", "leave it out")
@@ -50,8 +50,8 @@ class DatasetKind(Kind):
 def _predicted(path: Path, predictions: Path) -> int:
     """Return the first episode of which there is a prediction; else the first of all."""
     from tacdata.dataset.format import features
-    from viewers.parts.prediction_files import first_predicted, prediction_paths
-    from viewers.scenes.single_episode import read_single
+    from tacdata.viewers.parts.prediction_files import first_predicted, prediction_paths
+    from tacdata.viewers.scenes.single_episode import read_single
 
     for file in prediction_paths(predictions):  # named by the episode of the dataset that was predicted
         number = int(file.stem.rsplit("-", 1)[-1])

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tacdata.errors import TacdataError
-from viewers.kinds.kind import Kind, refuse
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind, refuse
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.recording.reader import DemoRecording
@@ -37,8 +37,8 @@ class DemonstrationKind(Kind):
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one demonstration, the first of a folder if none is named."""
         from tacdata.demonstrations.paths.tracks_file import ENDING, path_of, read_tracks
-        from viewers.parts.recorded_images import recorded_images
-        from viewers.scenes.hand import demonstration_scene
+        from tacdata.viewers.parts.recorded_images import recorded_images
+        from tacdata.viewers.scenes.hand import demonstration_scene
 
         refuse(asked, "a demonstration", *(("episode",) if path.is_dir() else ()))
         recording = _recording(path, asked.episode)
@@ -52,7 +52,7 @@ class DemonstrationKind(Kind):
 
 def _recording(path: Path, episode: int | None) -> Path:
     from tacdata.demonstrations.paths.tracks_file import ENDING
-    from viewers.kinds.session import episode_of
+    from tacdata.viewers.kinds.session import episode_of
 
     if path.is_dir():
         return episode_of(path, episode)

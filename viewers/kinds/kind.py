@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 
 from tacdata import registry
 from tacdata.errors import UsageError
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
-ROOM, BASE = "viewers.kinds", "kind"
+ROOM, BASE = "tacdata.viewers.kinds", "kind"
 
 
 class Kind(ABC):

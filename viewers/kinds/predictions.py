@@ -6,9 +6,9 @@ from pathlib import Path
 
 from tacdata.errors import TacdataError, UsageError
 from tacdata.sensor import Sensor
-from viewers.kinds.kind import Kind, refuse
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind, refuse
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 CHECKPOINT = "best.safetensors"
 
@@ -22,8 +22,8 @@ class PredictionsKind(Kind):
         """A folder with a checkpoint, or files that `tacdata evaluate` wrote."""
         import pyarrow.parquet as pq
 
-        from training.inference.prediction import HEADER
-        from viewers.parts.prediction_files import PATTERN
+        from tacdata.training.inference.prediction import HEADER
+        from tacdata.viewers.parts.prediction_files import PATTERN
 
         if (path / CHECKPOINT).is_file():
             return True
@@ -37,9 +37,9 @@ class PredictionsKind(Kind):
 
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one episode's predicted maps, the first if none is named."""
-        from training.inference.prediction import file_name, read_prediction
-        from viewers.parts.prediction_files import prediction_paths
-        from viewers.scenes.prediction import prediction_scene
+        from tacdata.training.inference.prediction import file_name, read_prediction
+        from tacdata.viewers.parts.prediction_files import prediction_paths
+        from tacdata.viewers.scenes.prediction import prediction_scene
 
         refuse(asked, "predictions", "episode")
         files = [path] if path.is_file() else prediction_paths(path)
@@ -60,7 +60,7 @@ def _sensor(path: Path, wanted: str) -> Sensor | None:
     """Return the sensor that the network was trained for, if its checkpoint is in the folder of its predictions."""
     for folder in (path, *path.resolve().parents[:2]):
         if (folder / CHECKPOINT).is_file():
-            from training.inference.checkpoint import load
+            from tacdata.training.inference.checkpoint import load
 
             try:
                 sensor = load(folder).sensor

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewers.kinds.kind import Kind, refuse
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind, refuse
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 
 class RecordingKind(Kind):
@@ -20,7 +20,7 @@ class RecordingKind(Kind):
 
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return the press; of a file that is still being written, its part on the disk."""
-        from viewers.scenes.recording import recording_scene
+        from tacdata.viewers.scenes.recording import recording_scene
 
         refuse(asked, "one recording", "labels", "predictions")
         return recording_scene(path, asked)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewers.kinds.kind import Kind, refuse
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind, refuse
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 FILE, TABLE, CURVES = "revision.json", "gap.md", "gap.rrd"
 
@@ -23,8 +23,8 @@ class RevisionKind(Kind):
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return the gap before and after, with the readings of telling episodes."""
         from tacdata import documents
-        from viewers.rerun.gap_curves import read_gap_curves
-        from viewers.scenes.verdict import revision_scene
+        from tacdata.viewers.rerun.gap_curves import read_gap_curves
+        from tacdata.viewers.scenes.verdict import revision_scene
 
         refuse(asked, "a revision")
         document = documents.read(path / FILE, "revision")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from tacdata.errors import UsageError
 from tacdata.recording.files import file_names
-from viewers.kinds.kind import Kind
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 EARLIER = 1_000_000_000
 """By how much the first frame may have been sampled before its arrival [ns]."""
@@ -28,8 +28,8 @@ class SessionKind(Kind):
 
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one episode; if none is named the first, or the first that the predictions are of."""
-        from viewers.parts.prediction_files import first_predicted
-        from viewers.scenes.recording import recording_scene
+        from tacdata.viewers.parts.prediction_files import first_predicted
+        from tacdata.viewers.scenes.recording import recording_scene
 
         number = asked.episode
         if number is None and asked.predictions is not None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from tacdata.errors import UsageError
-from viewers.kinds.kind import Kind, refuse
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind, refuse
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 MARKS = {
     "lerobot": "meta/tacdata_targets.json",
@@ -33,7 +33,7 @@ class TargetsKind(Kind):
         """Return the targets of one demonstration, the first if none is named."""
         from tacdata.exporters.exporter import exporter
         from tacdata.exporters.joints import read_joints
-        from viewers.scenes.hand import targets_scene
+        from tacdata.viewers.scenes.hand import targets_scene
 
         refuse(asked, "targets", "episode")
         name, number = _format(path) or "", asked.episode or 0

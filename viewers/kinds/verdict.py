@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewers.kinds.kind import Kind, refuse
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.viewers.kinds.kind import Kind, refuse
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 FILE, RESIDUALS = "verdict.json", "residuals.parquet"
 
@@ -24,8 +24,8 @@ class VerdictKind(Kind):
         """Return it as text and bars, with readings and model before and after."""
         from tacdata import documents
         from tacdata.discrepancy.verdict.residual_table import read
-        from viewers.parts.residual_curves import residual_curves
-        from viewers.scenes.verdict import verdict_scene
+        from tacdata.viewers.parts.residual_curves import residual_curves
+        from tacdata.viewers.scenes.verdict import verdict_scene
 
         refuse(asked, "a verdict")
         file = path if path.is_file() else path / FILE

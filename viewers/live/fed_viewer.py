@@ -10,8 +10,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from viewers.rerun.shield import LOOPBACK, shielded
-from viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
+from tacdata.viewers.rerun.shield import LOOPBACK, shielded
+from tacdata.viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
 
 START = 30.0
 """Longest wait for the viewer [s of real time]."""

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.recording.files import file_names
-from viewers.scene.newest_part import ScenePart, open_ended
-from viewers.scene.scene import Scene
+from tacdata.viewers.scene.newest_part import ScenePart, open_ended
+from tacdata.viewers.scene.scene import Scene
 
 if TYPE_CHECKING:
     import rerun as rr
 
-    from viewers.live.fed_viewer import FedViewer
+    from tacdata.viewers.live.fed_viewer import FedViewer
 
 PAUSE = 0.5
 """Least time between two looks at the file [s]; its chunks are closed about as often."""
@@ -30,7 +30,7 @@ class Follower:
     def __init__(self, path: Path, recording: rr.RecordingStream) -> None:
         """Open the file. Raises as `tacdata.recording.files.growing_file.GrowingFile`."""
         from tacdata.recording.files.growing_file import GrowingFile
-        from viewers.parts.recorded_images import ImageSampler
+        from tacdata.viewers.parts.recorded_images import ImageSampler
 
         self._sampler = ImageSampler()
         self._file = GrowingFile(path, self._sampler.take)
@@ -51,7 +51,7 @@ class Follower:
         if scene is None:
             return False
         self._lay_out(scene)
-        from viewers.rerun.columns import RerunParts
+        from tacdata.viewers.rerun.columns import RerunParts
 
         RerunParts(self._recording, self._part.newer(scene)).write()
         self._recording.flush()
@@ -63,7 +63,7 @@ class Follower:
         from dataclasses import replace
 
         from tacdata.recording.files.reader import recording_of
-        from viewers.scenes.recording import scene_of
+        from tacdata.viewers.scenes.recording import scene_of
 
         remarks = () if self.finished else ("being recorded: it goes on while you look",)
         try:
@@ -76,7 +76,7 @@ class Follower:
 
     def _lay_out(self, scene: Scene) -> None:
         """Send the layout again where another view or another scale belongs into it."""
-        from viewers.rerun.blueprint import episode_blueprint
+        from tacdata.viewers.rerun.blueprint import episode_blueprint
 
         scales = tuple((a.scale.low, a.scale.high) for a in scene.arrays)
         layout = (scales, bool(scene.phases), tuple(c.name for c in scene.curves), len(scene.bodies))
@@ -92,8 +92,8 @@ class Follower:
 
 def is_growing(path: Path) -> bool:
     """Say whether a recording of a press has no end yet, by its name: it is being written, or a crash left it."""
-    from viewers.kinds.kind import kind_of
-    from viewers.kinds.recording import RecordingKind
+    from tacdata.viewers.kinds.kind import kind_of
+    from tacdata.viewers.kinds.recording import RecordingKind
 
     return path.is_file() and path.name.endswith(file_names.PARTIAL) and isinstance(kind_of(path), RecordingKind)
 
@@ -123,8 +123,8 @@ def follow(path: Path, web: bool) -> None:
         FormatError: If it is no recording of a press.
         DeviceError: If the viewer does not start.
     """
-    from viewers.live.fed_viewer import fed_viewer
-    from viewers.rerun.window import has_display
+    from tacdata.viewers.live.fed_viewer import fed_viewer
+    from tacdata.viewers.rerun.window import has_display
 
     try:
         with suppress(KeyboardInterrupt), fed_viewer(web) as viewer:
@@ -155,7 +155,7 @@ def _follow_one(path: Path, viewer: FedViewer) -> None:
     """Draw one recording until it ends or the viewer is closed."""
     import rerun as rr
 
-    from viewers.rerun.backend import APPLICATION
+    from tacdata.viewers.rerun.backend import APPLICATION
 
     recording = rr.RecordingStream(APPLICATION)
     viewer.connect(recording)

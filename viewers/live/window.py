@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import UsageError
-from viewers.live.fed_viewer import START, fed_viewer
-from viewers.rerun.window import require_display
+from tacdata.viewers.live.fed_viewer import START, fed_viewer
+from tacdata.viewers.rerun.window import require_display
 
 WAITING = 16
 """Values that wait for the viewer; more are dropped [count]."""

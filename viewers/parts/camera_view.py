@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.recording.episode import Episode, TagStream
-from viewers.scene.scene import CameraView
+from tacdata.viewers.scene.scene import CameraView
 
 AXIS_WITHOUT_SIDE = 20.0
 """Length of the drawn axes where the rig file gives no side of the cube [mm]."""

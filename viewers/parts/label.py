@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tacdata.labels import Label, map_batches, read_label_columns
-from viewers.scene import thinning
+from tacdata.viewers.scene import thinning
 
 BATCH = 2000
 """Maps in memory at a time [frames]."""

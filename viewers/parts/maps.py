@@ -11,9 +11,9 @@ import numpy as np
 
 from tacdata.sensor import Sensor
 from tacdata.sensor.protrusion_pixels import PIXELS, ProtrusionPixels
-from viewers.scene import thinning
-from viewers.scene.color_scale import scale_of
-from viewers.scene.scene import Curves, DepthMaps
+from tacdata.viewers.scene import thinning
+from tacdata.viewers.scene.color_scale import scale_of
+from tacdata.viewers.scene.scene import Curves, DepthMaps
 
 DEPTH_FLOOR = 0.1
 """Least end of the depth scale [mm]: below the paper's contact threshold there is nothing to see."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from training.metrics.depth_maps import CONTACT_THRESHOLD, centroid, score_frames
-from viewers.scene.scene import DepthMaps
+from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD, centroid, score_frames
+from tacdata.viewers.scene.scene import DepthMaps
 
 
 @dataclass(frozen=True)

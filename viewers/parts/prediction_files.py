@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tacdata.errors import FormatError, UsageError
-from training.inference.prediction import PredictedMaps, read_prediction
+from tacdata.training.inference.prediction import PredictedMaps, read_prediction
 
 PATTERN = "episode-*.parquet"
 

@@ -15,7 +15,7 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from tacdata.recording.files import topics
 from tacdata.recording.files.mcap_records import read_records
-from viewers.scene.thinning import IMAGE_BYTES, IMAGES, evenly
+from tacdata.viewers.scene.thinning import IMAGE_BYTES, IMAGES, evenly
 
 RECORD = 1 + 8
 """Opcode and length before a record's body [bytes] (MCAP specification, "Records")."""

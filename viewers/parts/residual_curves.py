@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.discrepancy.verdict.residual_table import Residuals
-from viewers.scene.scene import Curves
-from viewers.scene.thinning import extremes
+from tacdata.viewers.scene.scene import Curves
+from tacdata.viewers.scene.thinning import extremes
 
 ROWS = 4000
 """Rows of a stream that are drawn, about [1]."""

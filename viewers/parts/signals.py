@@ -11,10 +11,10 @@ from tacdata.labels import Label
 from tacdata.recording.episode import PHASES, Episode, Phase, TagStream
 from tacdata.rig import registration_for
 from tacdata.sensor import Sensor
-from viewers.parts.label import ShownLabel
-from viewers.scene import thinning
-from viewers.scene.color_scale import ColorScale, scale_of
-from viewers.scene.scene import Curves, Span, TaxelArray
+from tacdata.viewers.parts.label import ShownLabel
+from tacdata.viewers.scene import thinning
+from tacdata.viewers.scene.color_scale import ColorScale, scale_of
+from tacdata.viewers.scene.scene import Curves, Span, TaxelArray
 
 FRAMES_WITHOUT_REST = 10
 """Frames that stand in for the rest phase where none is marked."""

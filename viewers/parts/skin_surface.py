@@ -7,10 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from tacdata.plans import Press
 from tacdata.sensor import Sensor
-from viewers.parts.maps import DEPTH_FLOOR
-from viewers.scene import thinning
-from viewers.scene.color_scale import scale_of
-from viewers.scene.scene import Body, Cloud, DepthMaps, SkinSurface
+from tacdata.viewers.parts.maps import DEPTH_FLOOR
+from tacdata.viewers.scene import thinning
+from tacdata.viewers.scene.color_scale import scale_of
+from tacdata.viewers.scene.scene import Body, Cloud, DepthMaps, SkinSurface
 
 
 def surfaces(

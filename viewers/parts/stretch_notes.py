@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tacdata.dataset.notes import read_notes
-from viewers.scene.scene import Scene, Span
+from tacdata.viewers.scene.scene import Scene, Span
 
 
 def with_stretch_notes(scene: Scene, root: Path, recording: Callable[[], str]) -> Scene:

@@ -11,10 +11,10 @@ from tacdata.labels import Label
 from tacdata.plans import Press
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
-from training.inference.prediction import PredictedMaps
-from viewers.parts.label import ShownLabel
-from viewers.parts.prediction_error import press_error
-from viewers.scene.scene import CameraView, DepthMaps
+from tacdata.training.inference.prediction import PredictedMaps
+from tacdata.viewers.parts.label import ShownLabel
+from tacdata.viewers.parts.prediction_error import press_error
+from tacdata.viewers.scene.scene import CameraView, DepthMaps
 
 LINE_LENGTH = 170
 """Characters that fit across a page."""

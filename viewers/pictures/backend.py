@@ -9,14 +9,14 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from viewers.backend import Backend
-from viewers.output_file import PICTURE, new_file, written_beside
-from viewers.parts.summary import plain
-from viewers.pictures import panels as panels
-from viewers.pictures.pages import other_page
-from viewers.pictures.skin import skin
-from viewers.scene.moments import moments
-from viewers.scene.scene import Scene
+from tacdata.viewers.backend import Backend
+from tacdata.viewers.output_file import PICTURE, new_file, written_beside
+from tacdata.viewers.parts.summary import plain
+from tacdata.viewers.pictures import panels as panels
+from tacdata.viewers.pictures.pages import other_page
+from tacdata.viewers.pictures.skin import skin
+from tacdata.viewers.scene.moments import moments
+from tacdata.viewers.scene.scene import Scene
 
 STYLE: dict[Any, Any] = {
     "font.size": 10,

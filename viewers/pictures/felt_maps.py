@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.replay.targets import FingertipTargets
-from viewers.parts.maps import DEPTH_FLOOR
-from viewers.scene.color_scale import scale_of
+from tacdata.viewers.parts.maps import DEPTH_FLOOR
+from tacdata.viewers.scene.color_scale import scale_of
 
 
 class FeltMaps:

@@ -13,15 +13,15 @@ from matplotlib.figure import Figure
 
 from tacdata.errors import UsageError
 from tacdata.extras import missing_package
-from viewers.backend import Backend
-from viewers.output_file import FILMS, new_file, written_beside
-from viewers.pictures import panels as panels
-from viewers.pictures.backend import STYLE
-from viewers.pictures.hand_film import HandPage, hand_times
-from viewers.pictures.page_frames import page_frames
-from viewers.pictures.skin import skin
-from viewers.scene.moments import nearest
-from viewers.scene.scene import Scene
+from tacdata.viewers.backend import Backend
+from tacdata.viewers.output_file import FILMS, new_file, written_beside
+from tacdata.viewers.pictures import panels as panels
+from tacdata.viewers.pictures.backend import STYLE
+from tacdata.viewers.pictures.hand_film import HandPage, hand_times
+from tacdata.viewers.pictures.page_frames import page_frames
+from tacdata.viewers.pictures.skin import skin
+from tacdata.viewers.scene.moments import nearest
+from tacdata.viewers.scene.scene import Scene
 
 RATE = {".mp4": 20.0, ".gif": 10.0}
 """Frames a second [Hz]."""

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from scipy.spatial.transform import Rotation
 
-from viewers.scene.color_scale import HUES
-from viewers.scene.moments import nearest
-from viewers.scene.scene import Body, CameraView, Curves, Scene
+from tacdata.viewers.scene.color_scale import HUES
+from tacdata.viewers.scene.moments import nearest
+from tacdata.viewers.scene.scene import Body, CameraView, Curves, Scene
 
 SIZE, RESOLUTION = (13.0, 8.6), 80
 """Of a frame [inch], and dots an inch."""
@@ -188,7 +188,7 @@ def apart(places: np.ndarray, wide: float, high: float) -> np.ndarray:
 
     Example:
         >>> import numpy as np
-        >>> from viewers.pictures.hand_film import apart
+        >>> from tacdata.viewers.pictures.hand_film import apart
         >>> apart(np.array([[0.0, 1.0], [5.0, 0.0]]), wide=26.0, high=8.0)[:, 1].round(1).tolist()
         [12.8, 4.8]
     """

@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from viewers.parts.summary import plain
-from viewers.pictures import panels as panels
-from viewers.scene.color_scale import HUES, taxel_colors
-from viewers.scene.moments import moments
-from viewers.scene.scene import Bars, Cloud, Curves, Scene
+from tacdata.viewers.parts.summary import plain
+from tacdata.viewers.pictures import panels as panels
+from tacdata.viewers.scene.color_scale import HUES, taxel_colors
+from tacdata.viewers.scene.moments import moments
+from tacdata.viewers.scene.scene import Bars, Cloud, Curves, Scene
 
 WIDTH, TITLE, LINE, SPACE, MAPS, CURVES = 16.0, 0.65, 0.2, 5.2, 2.6, 1.9
 """Width of the page, and heights of title, line of text, space, a row of maps and a row of curves [inch]."""

@@ -11,10 +11,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import SubFigure
 from matplotlib.patches import Circle, Rectangle
 
-from viewers.parts.prediction_error import frame_error, pitch
-from viewers.scene.color_scale import HUES, ColorScale, taxel_colors
-from viewers.scene.moments import nearest, picture_at
-from viewers.scene.scene import Scene
+from tacdata.viewers.parts.prediction_error import frame_error, pitch
+from tacdata.viewers.scene.color_scale import HUES, ColorScale, taxel_colors
+from tacdata.viewers.scene.moments import nearest, picture_at
+from tacdata.viewers.scene.scene import Scene
 
 Moments = tuple[tuple[str, int], ...]
 TITLES = {

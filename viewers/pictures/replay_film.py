@@ -15,13 +15,13 @@ from matplotlib.patheffects import withStroke
 
 from tacdata.replay.outcome import ReplayOutcome
 from tacdata.replay.targets import FingertipTargets
-from viewers.output_file import FILMS, new_file
-from viewers.pictures.felt_maps import FeltMaps
-from viewers.pictures.film import MOST, RATE, write_film
-from viewers.pictures.hand_film import apart
-from viewers.pictures.page_frames import page_frames
-from viewers.pictures.replay_object import ReplayObjectShape
-from viewers.scene.color_scale import HUES
+from tacdata.viewers.output_file import FILMS, new_file
+from tacdata.viewers.pictures.felt_maps import FeltMaps
+from tacdata.viewers.pictures.film import MOST, RATE, write_film
+from tacdata.viewers.pictures.hand_film import apart
+from tacdata.viewers.pictures.page_frames import page_frames
+from tacdata.viewers.pictures.replay_object import ReplayObjectShape
+from tacdata.viewers.scene.color_scale import HUES
 
 WIDTH, MAPS, HEIGHT = 4.6, 2.3, 8.6
 """Widths of a replay and of the depth maps, and height of a frame [inch]."""

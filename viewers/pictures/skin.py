@@ -9,9 +9,9 @@ from matplotlib.figure import SubFigure
 from matplotlib.ticker import MaxNLocator
 from scipy.spatial.transform import Rotation
 
-from viewers.pictures.panels import Moments, mappable, seconds
-from viewers.scene.moments import nearest
-from viewers.scene.scene import Body, Scene
+from tacdata.viewers.pictures.panels import Moments, mappable, seconds
+from tacdata.viewers.scene.moments import nearest
+from tacdata.viewers.scene.scene import Body, Scene
 
 
 def skin(figure: SubFigure, scene: Scene, chosen: Moments, bar: bool = True) -> None:

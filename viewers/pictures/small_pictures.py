@@ -6,9 +6,9 @@ import tempfile
 from pathlib import Path
 
 from tacdata.replacement import replacement
-from viewers.pictures.backend import PictureBackend
-from viewers.pictures.film import FilmBackend
-from viewers.scene.scene import Scene
+from tacdata.viewers.pictures.backend import PictureBackend
+from tacdata.viewers.pictures.film import FilmBackend
+from tacdata.viewers.scene.scene import Scene
 
 PAGE, FILM = 64, 52
 """Resolutions [dots per inch]."""

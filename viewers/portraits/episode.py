@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewers.portraits import portrait as parts
+from tacdata.viewers.portraits import portrait as parts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

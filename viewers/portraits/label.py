@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from viewers.portraits import portrait as parts
+from tacdata.viewers.portraits import portrait as parts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewers.portraits import portrait as parts
+from tacdata.viewers.portraits import portrait as parts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from training.inference.prediction import PredictedMaps
+    from tacdata.training.inference.prediction import PredictedMaps
 
 
 def portrait(noun: PredictedMaps) -> Figure:

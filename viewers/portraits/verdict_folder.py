@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from viewers.pictures.pages import other_page
-from viewers.source import scene_at
+from tacdata.viewers.pictures.pages import other_page
+from tacdata.viewers.source import scene_at
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import rerun as rr
 
-from viewers.backend import Backend
-from viewers.output_file import RERUN, new_file, written_beside
-from viewers.rerun.blueprint import episode_blueprint
-from viewers.rerun.columns import RerunParts
-from viewers.rerun.comparison_blueprint import comparison_blueprint
-from viewers.rerun.hand_blueprint import hand_blueprint
-from viewers.rerun.verdict_blueprint import verdict_blueprint
-from viewers.scene.scene import Scene
+from tacdata.viewers.backend import Backend
+from tacdata.viewers.output_file import RERUN, new_file, written_beside
+from tacdata.viewers.rerun.blueprint import episode_blueprint
+from tacdata.viewers.rerun.columns import RerunParts
+from tacdata.viewers.rerun.comparison_blueprint import comparison_blueprint
+from tacdata.viewers.rerun.hand_blueprint import hand_blueprint
+from tacdata.viewers.rerun.verdict_blueprint import verdict_blueprint
+from tacdata.viewers.scene.scene import Scene
 
 APPLICATION = "tacdata"
 LAYOUTS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewers.scene.scene import Bars
+from tacdata.viewers.scene.scene import Bars
 
 LONGEST = 24
 """Letters of the longest bar."""

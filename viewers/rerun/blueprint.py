@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from viewers.rerun.columns import entity, marks_of
-from viewers.rerun.timelines import HOST
-from viewers.scene.scene import Scene
+from tacdata.viewers.rerun.columns import entity, marks_of
+from tacdata.viewers.rerun.timelines import HOST
+from tacdata.viewers.scene.scene import Scene
 
 MAP_TITLES = {
     "label": "Label: depth, 0 to {high:g} mm",

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import rerun as rr
 
-from viewers.rerun.bar_table import bar_table
-from viewers.rerun.timelines import DEVICE, DEVICE_TIME, ELAPSED, HOST
-from viewers.scene.color_scale import HUES, ColorScale, taxel_colors
-from viewers.scene.scene import (
+from tacdata.viewers.rerun.bar_table import bar_table
+from tacdata.viewers.rerun.timelines import DEVICE, DEVICE_TIME, ELAPSED, HOST
+from tacdata.viewers.scene.color_scale import HUES, ColorScale, taxel_colors
+from tacdata.viewers.scene.scene import (
     Bars,
     Body,
     CameraView,
@@ -28,7 +28,7 @@ from viewers.scene.scene import (
     Span,
     TaxelArray,
 )
-from viewers.scene.shading import body_normals, cube_axes, normals
+from tacdata.viewers.scene.shading import body_normals, cube_axes, normals
 
 # PuOr is not among Rerun's colour maps; this one has a middle too and was made for any colour vision.
 COLORMAPS = {"viridis": rr.components.Colormap.Viridis, "PuOr": rr.components.Colormap.CyanToYellow}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from viewers.rerun.blueprint import skin_view
-from viewers.rerun.columns import entity, heat_map_of
-from viewers.rerun.timelines import ELAPSED, HOST
-from viewers.scene.scene import Scene
+from tacdata.viewers.rerun.blueprint import skin_view
+from tacdata.viewers.rerun.columns import entity, heat_map_of
+from tacdata.viewers.rerun.timelines import ELAPSED, HOST
+from tacdata.viewers.scene.scene import Scene
 
 
 def comparison_blueprint(scene: Scene) -> rrb.Blueprint:

@@ -8,8 +8,8 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 from tacdata.errors import FormatError
-from viewers.rerun.gap_recording import COLORS, TIMELINE
-from viewers.scene.scene import Curves
+from tacdata.viewers.rerun.gap_recording import COLORS, TIMELINE
+from tacdata.viewers.scene.scene import Curves
 
 
 def read_gap_curves(path: Path) -> tuple[Curves, ...]:

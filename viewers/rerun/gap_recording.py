@@ -10,8 +10,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from viewers.output_file import RERUN, new_file, written_beside
-from viewers.scene.color_scale import HUES
+from tacdata.viewers.output_file import RERUN, new_file, written_beside
+from tacdata.viewers.scene.color_scale import HUES
 
 TIMELINE = "time_in_episode"
 COLORS = {"measured": (30, 30, 30), "before": HUES[5], "after": HUES[0]}

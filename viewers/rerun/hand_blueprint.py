@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import rerun.blueprint as rrb
 
-from viewers.rerun.columns import entity, heat_map_of
-from viewers.rerun.timelines import ELAPSED, HOST
-from viewers.scene.scene import Scene
+from tacdata.viewers.rerun.columns import entity, heat_map_of
+from tacdata.viewers.rerun.timelines import ELAPSED, HOST
+from tacdata.viewers.scene.scene import Scene
 
 
 def hand_blueprint(scene: Scene) -> rrb.Blueprint:

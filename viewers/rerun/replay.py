@@ -10,8 +10,8 @@ import numpy as np
 
 from tacdata.replay.outcome import ReplayOutcome
 from tacdata.replay.targets import FingertipTargets
-from viewers import output_file
-from viewers.scene.color_scale import HUES
+from tacdata.viewers import output_file
+from tacdata.viewers.scene.color_scale import HUES
 
 if TYPE_CHECKING:
     import rerun as rr

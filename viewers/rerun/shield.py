@@ -16,7 +16,7 @@ from threading import Thread
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
-from viewers.rerun.steering import script
+from tacdata.viewers.rerun.steering import script
 
 LOOPBACK = "127.0.0.1"
 HERE = f"'self' http://{LOOPBACK}:* http://localhost:*"

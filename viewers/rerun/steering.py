@@ -15,9 +15,9 @@ from urllib.parse import quote
 
 import numpy as np
 
-from viewers.rerun.timelines import ELAPSED, HOST
-from viewers.scene.moments import moments
-from viewers.scene.scene import Scene
+from tacdata.viewers.rerun.timelines import ELAPSED, HOST
+from tacdata.viewers.scene.moments import moments
+from tacdata.viewers.scene.scene import Scene
 
 PATIENCE = 30.0
 """Time that a window may take until it listens [s]."""
@@ -51,7 +51,7 @@ def deepest_moment(scene: Scene) -> Moment | None:
 
 def script() -> str:
     """Return the addition to the page of Rerun's web viewer."""
-    return f"<script>{files('viewers.rerun').joinpath('steering.js').read_text()}</script>"
+    return f"<script>{files('tacdata.viewers.rerun').joinpath('steering.js').read_text()}</script>"
 
 
 def steer(port: int, moment: Moment) -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from viewers.parts.residual_curves import READINGS, RESIDUALS
-from viewers.rerun.columns import entity
-from viewers.rerun.timelines import ELAPSED
-from viewers.scene.scene import Bars, Curves, Scene
+from tacdata.viewers.parts.residual_curves import READINGS, RESIDUALS
+from tacdata.viewers.rerun.columns import entity
+from tacdata.viewers.rerun.timelines import ELAPSED
+from tacdata.viewers.scene.scene import Bars, Curves, Scene
 
 
 def verdict_blueprint(scene: Scene) -> rrb.Blueprint:

@@ -15,8 +15,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tacdata.errors import UsageError
-from viewers.rerun.shield import LOOPBACK, shielded
-from viewers.rerun.steering import Moment, steer
+from tacdata.viewers.rerun.shield import LOOPBACK, shielded
+from tacdata.viewers.rerun.steering import Moment, steer
 
 GRPC_PORT, WEB_PORT = 9876, 9090
 """Rerun's own ports; others are taken where these are in use."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewers.scene.scene import DepthMaps, Scene
+from tacdata.viewers.scene.scene import DepthMaps, Scene
 
 
 def moments(scene: Scene) -> tuple[tuple[str, int], ...]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from viewers.scene.scene import CameraView, Cloud, Scene, Span
+from tacdata.viewers.scene.scene import CameraView, Cloud, Scene, Span
 
 TIMED = ("time_ns", "values", "height", "depth", "position")
 """Fields with a row for each time; a grid's axes, and the turn of a body that does not turn, have none."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from viewers.scene.color_scale import ColorScale
-from viewers.scene.space import Body, Cloud, MotionTrail, SkinSurface
+from tacdata.viewers.scene.color_scale import ColorScale
+from tacdata.viewers.scene.space import Body, Cloud, MotionTrail, SkinSurface
 
 __all__ = [
     "Bars",

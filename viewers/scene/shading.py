@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from viewers.scene.scene import Body, CameraView, SkinSurface
+from tacdata.viewers.scene.scene import Body, CameraView, SkinSurface
 
 
 def cube_axes(camera: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewers.scene.color_scale import ColorScale
+from tacdata.viewers.scene.color_scale import ColorScale
 
 UNKNOWN = 160
 """Grey level of a skin whose depth is not known."""

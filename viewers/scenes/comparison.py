@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.sensor import Sensor
-from viewers.parts import maps as depth_maps
-from viewers.parts import signals, skin_surface
-from viewers.parts.maps import DEPTH_FLOOR, ERROR_FLOOR
-from viewers.scene import thinning
-from viewers.scene.color_scale import ColorScale, scale_of
-from viewers.scene.scene import Curves, DepthMaps, Scene, Span, TaxelArray
+from tacdata.viewers.parts import maps as depth_maps
+from tacdata.viewers.parts import signals, skin_surface
+from tacdata.viewers.parts.maps import DEPTH_FLOOR, ERROR_FLOOR
+from tacdata.viewers.scene import thinning
+from tacdata.viewers.scene.color_scale import ColorScale, scale_of
+from tacdata.viewers.scene.scene import Curves, DepthMaps, Scene, Span, TaxelArray
 
 
 @dataclass(frozen=True)

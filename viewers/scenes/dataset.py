@@ -8,10 +8,10 @@ from tacdata.dataset.format import features
 from tacdata.dataset.reader import Dataset
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.episode import PHASES
-from training.inference.prediction import PredictedMaps
-from viewers.parts import maps, signals, skin_surface, summary
-from viewers.scene.scene import Curves, Scene, Span
-from viewers.scenes.episode import thinned_remark
+from tacdata.training.inference.prediction import PredictedMaps
+from tacdata.viewers.parts import maps, signals, skin_surface, summary
+from tacdata.viewers.scene.scene import Curves, Scene, Span
+from tacdata.viewers.scenes.episode import thinned_remark
 
 
 def dataset_scene(

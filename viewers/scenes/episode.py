@@ -10,10 +10,10 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.labels import Label
 from tacdata.recording.episode import PHASES, Episode, TaxelStream
-from training.inference.prediction import PredictedMaps
-from viewers.parts import camera_view, maps, signals, skin_surface, summary
-from viewers.parts.label import ShownLabel
-from viewers.scene.scene import DepthMaps, Scene
+from tacdata.training.inference.prediction import PredictedMaps
+from tacdata.viewers.parts import camera_view, maps, signals, skin_surface, summary
+from tacdata.viewers.parts.label import ShownLabel
+from tacdata.viewers.scene.scene import DepthMaps, Scene
 
 
 def episode_scene(

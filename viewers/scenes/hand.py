@@ -14,11 +14,11 @@ from tacdata.demonstrations.recording.reader import DemoRecording
 from tacdata.demonstrations.touch import baseline
 from tacdata.replay.targets import FingertipTargets
 from tacdata.sensor import Sensor
-from viewers.parts import camera_view, hand_summary, signals
-from viewers.parts.maps import DEPTH_FLOOR, thinned
-from viewers.scene import thinning
-from viewers.scene.color_scale import ColorScale, scale_of
-from viewers.scene.scene import Body, Cloud, Curves, DepthMaps, MotionTrail, Scene
+from tacdata.viewers.parts import camera_view, hand_summary, signals
+from tacdata.viewers.parts.maps import DEPTH_FLOOR, thinned
+from tacdata.viewers.scene import thinning
+from tacdata.viewers.scene.color_scale import ColorScale, scale_of
+from tacdata.viewers.scene.scene import Body, Cloud, Curves, DepthMaps, MotionTrail, Scene
 
 PAD = (18.0, 14.0, 3.0)
 """Size at which a fingertip without a sensor description is drawn [mm]."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.sensor import Sensor
-from training.inference.prediction import PredictedMaps
-from viewers.parts import maps as depth_maps
-from viewers.parts import signals, skin_surface
-from viewers.parts.maps import DEPTH_FLOOR
-from viewers.scene.color_scale import scale_of
-from viewers.scene.scene import Curves, DepthMaps, Scene
+from tacdata.training.inference.prediction import PredictedMaps
+from tacdata.viewers.parts import maps as depth_maps
+from tacdata.viewers.parts import signals, skin_surface
+from tacdata.viewers.parts.maps import DEPTH_FLOOR
+from tacdata.viewers.scene.color_scale import scale_of
+from tacdata.viewers.scene.scene import Curves, DepthMaps, Scene
 
 
 def prediction_scene(title: str, prediction: PredictedMaps, sensor: Sensor | None, files: int) -> Scene:

@@ -15,25 +15,25 @@ from tacdata import documents, provenance
 from tacdata.errors import UsageError
 from tacdata.labels import file_names as label_names
 from tacdata.recording.files import file_names
-from training.inference.prediction import PredictedMaps
-from viewers.parts.label import ShownLabel, shown_label
-from viewers.parts.stretch_notes import with_stretch_notes
-from viewers.scene import thinning
-from viewers.scene.request import Asked
-from viewers.scene.scene import Scene
+from tacdata.training.inference.prediction import PredictedMaps
+from tacdata.viewers.parts.label import ShownLabel, shown_label
+from tacdata.viewers.parts.stretch_notes import with_stretch_notes
+from tacdata.viewers.scene import thinning
+from tacdata.viewers.scene.request import Asked
+from tacdata.viewers.scene.scene import Scene
 
 HAND_OVER = 2e-4
 """Longest that a thread keeps Python's lock while others wait for it [s]."""
 
 if TYPE_CHECKING:
     from tacdata.recording.files.reader import Recording
-    from viewers.parts.recorded_images import ImageSampler
+    from tacdata.viewers.parts.recorded_images import ImageSampler
 
 
 def recording_scene(path: Path, asked: Asked) -> Scene:
     """Return the scene of a recording with the files of its folder. Raises as `viewers.source.scene_at`."""
     from tacdata.recording.files.reader import read_recording
-    from viewers.parts.recorded_images import ImageSampler
+    from tacdata.viewers.parts.recorded_images import ImageSampler
 
     sampler, most = ImageSampler(), None if asked.predictions else thinning.MAPS
     # Files are decoded without Python's lock, which others hold in the meantime.
@@ -71,7 +71,7 @@ def scene_of(
 
     Raises as `viewers.source.scene_at`.
     """
-    from viewers.scenes.episode import episode_scene
+    from tacdata.viewers.scenes.episode import episode_scene
 
     episode, remarks, prediction = recording.episode, list(remarks), None
     if label is not None and not np.isin(label.time_ns, episode.taxels.sample_ns).any():
@@ -115,7 +115,7 @@ def prediction_for(folder: Path, time_ns: np.ndarray, sensor: str) -> tuple[Pred
         UsageError: If the folder holds no prediction at all.
         FormatError: If a file is damaged.
     """
-    from viewers.parts.prediction_files import find_prediction
+    from tacdata.viewers.parts.prediction_files import find_prediction
 
     prediction = find_prediction(folder, time_ns)
     if prediction is None:

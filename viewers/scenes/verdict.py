@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.effects import load
-from viewers.scene.scene import Bars, Curves, Page, Scene
+from tacdata.viewers.scene.scene import Bars, Curves, Page, Scene
 
 GATE = 0.01
 """p-value at or below which a gap counts as one (`tacdata.discrepancy`)."""

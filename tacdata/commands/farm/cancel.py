@@ -18,7 +18,7 @@ def run(
     token: service.Token = "",
 ) -> Result:
     """Take a submission back; labels that are finished stay."""
-    from label_farm.remote.client import Client
+    from tacdata.label_farm.remote.client import Client
 
     client = Client(url, token)
     entry = client.post(f"{client.submission(number)}/cancel")

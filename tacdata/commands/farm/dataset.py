@@ -23,9 +23,9 @@ def run(
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> Result:
     """Say which episodes are complete, failed, waiting, or stale against the model of now."""
-    from label_farm.presses.model import FACTORY, version
     from tacdata.dataset import label_states
     from tacdata.dataset.format import folder, metadata
+    from tacdata.label_farm.presses.model import FACTORY, version
     from tacdata.sensor import Sensor
 
     folder.read_info(dataset)

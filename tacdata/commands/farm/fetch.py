@@ -25,9 +25,9 @@ def run(
     """Copy finished labels to SESSION/labels; run again, it copies new ones."""
     from time import sleep
 
-    from label_farm.remote.client import Client
-    from label_farm.remote.fetch import Fetch
     from tacdata.errors import SolveError
+    from tacdata.label_farm.remote.client import Client
+    from tacdata.label_farm.remote.fetch import Fetch
 
     client = Client(url, token)
     entry = client.get(client.submission(number))

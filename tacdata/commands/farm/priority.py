@@ -19,7 +19,7 @@ def run(
     token: service.Token = "",
 ) -> Result:
     """Change a submission's priority; its waiting presses move at once."""
-    from label_farm.remote.client import Client
+    from tacdata.label_farm.remote.client import Client
 
     client = Client(url, token)
     client.post(f"{client.submission(number)}/priority", {"priority": priority})

@@ -24,8 +24,8 @@ def run(
 ) -> Result:
     """Send a session's recordings to the service; run again, it goes on. Not needed where it sees the same disk."""
 
-    from label_farm.remote.client import Client
-    from label_farm.remote.send import send
+    from tacdata.label_farm.remote.client import Client
+    from tacdata.label_farm.remote.send import send
 
     name = to or session.resolve().name
     sent = send(Client(url, token), session, name)

@@ -22,8 +22,8 @@ def run(
     """Print submissions, their progress, the workers, and reasons of failed presses."""
     from time import sleep
 
-    from label_farm.remote.client import Client
     from tacdata.errors import SolveError, UsageError
+    from tacdata.label_farm.remote.client import Client
 
     client = Client(url, token)
     if wait and not number:

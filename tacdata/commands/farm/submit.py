@@ -35,7 +35,7 @@ def run(
     ] = 10.0,
 ) -> Result:
     """Ask for the labels of a session and walk away; `tacdata farm status` shows the progress."""
-    from label_farm.remote.client import Client, refusal
+    from tacdata.label_farm.remote.client import Client, refusal
 
     wish = {
         "session": session,

@@ -30,7 +30,7 @@ def run(
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> None:
     """Start the service and its page; Ctrl-C stops it, and the next one goes on."""
-    from label_farm.service.up import UpSettings, up
+    from tacdata.label_farm.service.up import UpSettings, up
 
     up(
         UpSettings(

@@ -25,10 +25,10 @@ def run(
 ) -> None:
     """Solve presses for a service, or a Dask scheduler, elsewhere; Ctrl-C gives back unfinished presses."""
     if url.startswith(("tcp://", "tls://")):
-        from label_farm.workers.dask_pool import join
+        from tacdata.label_farm.workers.dask_pool import join
 
         join(url, processes, tuple(device or ()))
         return
-    from label_farm.remote.crew import Crew
+    from tacdata.label_farm.remote.crew import Crew
 
     Crew(url, token, processes, tuple(device or ()), factory).work()

@@ -15,8 +15,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.dataset.format.features import UNITS, short_hash
 from tacdata.errors import FormatError
 from tacdata.plans import Press

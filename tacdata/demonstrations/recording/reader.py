@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from schemas import tacdata_pb2 as pb
 from tacdata.demonstrations.recording.rig import DemoRig, demo_rig_of
 from tacdata.errors import FormatError
 from tacdata.paths import StrPath
@@ -22,6 +21,7 @@ from tacdata.recording.episode import TagStream, TaxelStream
 from tacdata.recording.files import topics
 from tacdata.recording.files.camera_arrays import clock_of, finger_streams
 from tacdata.recording.files.mcap_records import Records, read_records
+from tacdata.schemas import tacdata_pb2 as pb
 
 UNTIMED = 0.02
 """Standard uncertainty of an image's time without a clock model, in a damaged file [s]."""

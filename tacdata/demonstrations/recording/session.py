@@ -7,8 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.demonstrations.recording.rig import DemoRig, demo_rig_of
 from tacdata.errors import UsageError
 from tacdata.paths import StrPath

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents, provenance
+from tacdata import documents, provenance, schemas
 from tacdata.chain import Course, Response
 from tacdata.chain.table_response import TableResponse
 from tacdata.discrepancy.model.fitted_response import FittedResponse

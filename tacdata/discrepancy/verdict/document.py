@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.chain import Course
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.sufficiency import one_rate

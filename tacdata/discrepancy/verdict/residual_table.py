@@ -11,8 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.errors import FormatError
 from tacdata.paths import StrPath
 from tacdata.replacement import replacement

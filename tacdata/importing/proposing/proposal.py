@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
+from tacdata import schemas
 from tacdata.chain.at_rest import below_zero, zero_side
 from tacdata.errors import FormatError
 from tacdata.importing.columns import unit_of

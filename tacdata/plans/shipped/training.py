@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.errors import UsageError
 from tacdata.indenters import from_document
 from tacdata.plans.shipped.shipped_plan import PlanOptions, ShippedPlan

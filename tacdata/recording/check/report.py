@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
+from tacdata import schemas
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 from tacdata.recording.check.clocks import clock_words

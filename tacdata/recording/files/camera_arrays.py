@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
-from schemas import tacdata_pb2 as pb
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.clocks.image_clock import ImageClock, image_clock
 from tacdata.recording.episode import TagStream
 from tacdata.recording.files import topics
 from tacdata.recording.files.mcap_records import Records
+from tacdata.schemas import tacdata_pb2 as pb
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from schemas import tacdata_pb2 as pb
 from tacdata.recording.episode import PHASES, MeasuredStream, Phase
 from tacdata.recording.files import topics
 from tacdata.recording.files.mcap_records import Records
+from tacdata.schemas import tacdata_pb2 as pb
 
 
 def measured_streams(records: Records) -> tuple[MeasuredStream, ...]:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from schemas import tacdata_pb2 as pb
 from tacdata.errors import FormatError
 from tacdata.paths import StrPath
 from tacdata.plans import Press
@@ -28,6 +27,7 @@ from tacdata.recording.motion import move_times
 from tacdata.recording.motion.move_times import AnchoredMove, Command, StatusTimes
 from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.rig import registration_for
+from tacdata.schemas import tacdata_pb2 as pb
 from tacdata.sensor import Sensor
 
 

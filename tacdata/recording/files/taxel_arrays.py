@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from schemas import tacdata_pb2 as pb
+from tacdata.schemas import tacdata_pb2 as pb
 
 VARINT, PACKED = 0, 2
 """Wire types of numbers and of packed doubles (protobuf encoding)."""

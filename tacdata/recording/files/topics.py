@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
-from schemas import tacdata_pb2
+from tacdata.schemas import tacdata_pb2
 
 TAXELS = "/taxels"
 STATUS = "/cnc/status"

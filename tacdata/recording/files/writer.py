@@ -16,7 +16,6 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
-from schemas import tacdata_pb2 as pb
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
 from tacdata.errors import DeviceError, UsageError
@@ -27,6 +26,7 @@ from tacdata.recording.clocks.stream_pairs import stream_pairs
 from tacdata.recording.files import file_names, topics
 from tacdata.recording.files.chunked_file import ChunkedFile
 from tacdata.recording.motion.move_times import Command
+from tacdata.schemas import tacdata_pb2 as pb
 from tacdata.sensor import Sensor
 
 WAITING = 256_000_000

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.devices.device import MotionController
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.motion.move_times import report_resolution

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.recording.clocks.clock_model import StreamLatency
 from tacdata.recording.session import FILE, Session
 from tacdata.recording.sync_tap.delays import SyncTap

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-import schemas
-from tacdata import provenance
+from tacdata import provenance, schemas
 from tacdata.demonstrations.demonstration import Demonstration
 from tacdata.replay.comparison.arms import CONTROLS, DEPTH, DIRECT, control_arms
 from tacdata.replay.comparison.challenges import CHALLENGES, changed

@@ -8,7 +8,7 @@ from typing import Any
 
 from tacdata.discrepancy.verdict.sealed import WIDEST
 from tacdata.revision.evidence.table import in_words
-from training.reports.html_page import HtmlPage
+from tacdata.training.reports.html_page import HtmlPage
 
 CHANNELS = 6
 """Number of channels listed, the worst first."""

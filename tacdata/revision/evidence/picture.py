@@ -39,8 +39,8 @@ def draw(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from viewers.output_file import written_beside
-    from viewers.pictures.backend import STYLE
+    from tacdata.viewers.output_file import written_beside
+    from tacdata.viewers.pictures.backend import STYLE
 
     with rc_context(STYLE):
         figure = Figure(figsize=(13.0, 7.6), layout="constrained")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from label_farm.labelling import FarmSettings, Labelling, LabellingSummary
-from label_farm.store.store import Store
 from tacdata.effects import Placed
+from tacdata.label_farm.labelling import FarmSettings, Labelling, LabellingSummary
+from tacdata.label_farm.store.store import Store
 from tacdata.labels import file_names, read_label
 from tacdata.recording import read_episode, read_session
 from tacdata.revision.labels.pose_path import moved_episodes

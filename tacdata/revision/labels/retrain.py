@@ -19,7 +19,7 @@ from tacdata.revision.comparison import Comparison
 from tacdata.revision.labels.pose_path import moved_episodes
 
 if TYPE_CHECKING:
-    from training.frames.frames import Frames
+    from tacdata.training.frames.frames import Frames
 
 FEWEST = 5
 """Minimum number of episodes with labels: for training, for early stopping, for scoring."""
@@ -164,7 +164,7 @@ class _Simulated:
 
 
 def _frames(folder: Path, episodes: list[Episode], labels: list[Label]) -> Frames:
-    from training.frames.data import read_frames
+    from tacdata.training.frames.data import read_frames
 
     by_path = {e.path: label for e, label in zip(episodes, labels, strict=True)}
     pack(episodes, lambda episode: by_path[episode.path], folder)
@@ -173,9 +173,9 @@ def _frames(folder: Path, episodes: list[Episode], labels: list[Label]) -> Frame
 
 def _scored(frames: Frames, judge: Frames, folder: Path, recipe: Recipe, note: Callable[[str], None]) -> dict[str, Any]:
     """Return the scores of a network on the episodes of another dataset that are its own test episodes."""
-    from training.scoring.evaluate import evaluate
-    from training.settings import TrainingSettings
-    from training.train import train
+    from tacdata.training.scoring.evaluate import evaluate
+    from tacdata.training.settings import TrainingSettings
+    from tacdata.training.train import train
 
     settings = TrainingSettings(network=recipe.network, epochs=recipe.epochs, seed=recipe.seed)
 
@@ -203,7 +203,7 @@ def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
 
 
 def _told(by: str, recipe: Recipe, before: dict[str, Any], after: dict[str, Any]) -> Retrained:
-    from training.scoring.evaluate import METRICS
+    from tacdata.training.scoring.evaluate import METRICS
 
     rows = [
         {

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-import schemas
+from tacdata import schemas
 from tacdata.chain import Course, predict
 from tacdata.plans import Plan
 from tacdata.revision.comparison import Comparison

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import schemas
+from tacdata import schemas
 from tacdata.tags.board import Board
 from tacdata.tags.calibration.board_view import LEAST_CORNERS, BoardView, Markers, find_board, find_markers
 from tacdata.tags.detection.detector import to_grey

@@ -8,8 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-import schemas
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.errors import DeviceError, TacdataError, UsageError
 from tacdata.indenters import Indenter, from_document
 from tacdata.virtual_rig.world.lower_face import LowerFace

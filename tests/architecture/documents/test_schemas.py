@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-import schemas
+from tacdata import schemas
 
 FOLDER = Path(schemas.__file__).parent
 README = (FOLDER / "README.md").read_text()

@@ -13,7 +13,7 @@ from tacdata.discrepancy.verdict.before_and_after import beside_model
 from tacdata.discrepancy.verdict.residual_table import read, write
 from tacdata.discrepancy.verdict.sealed import chosen
 from tacdata.errors import FormatError
-from viewers.parts.residual_curves import residual_curves
+from tacdata.viewers.parts.residual_curves import residual_curves
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ import pytest
 from farm_examples import HERE, SENSOR, label_episodes, press_episode
 
 import tacdata
-from label_farm.labels import make_label
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
-from label_farm.store.store import Store
 from tacdata import provenance
+from tacdata.label_farm.labels import make_label
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.store.store import Store
 from tacdata.labels import read_label
 
 EARLIER = HERE / "labels" / "earlier_release"

@@ -9,8 +9,8 @@ import session_examples
 from farm_examples import HERE
 from running.in_process import tacdata
 
-from label_farm import growing_session
-from label_farm.growing_session import GrowingSession
+from tacdata.label_farm import growing_session
+from tacdata.label_farm.growing_session import GrowingSession
 from tacdata.recording.session import read_session
 
 FAST = ("--factory", "fast_model:FastModel", "--workers", "2", "--no-uncertainty")

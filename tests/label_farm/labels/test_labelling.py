@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from farm_examples import SENSOR, label_episodes, press_episode
 
-from label_farm.labelling import FarmSettings, Labelling
-from label_farm.store.failure import Failure
-from label_farm.store.store import Store
 from tacdata.errors import FormatError, SolveError, UsageError
+from tacdata.label_farm.labelling import FarmSettings, Labelling
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.store import Store
 from tacdata.labels import read_label
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from farm_examples import SENSOR, press_episode
 
-from label_farm.labels.request import request
-from label_farm.presses.fem import _request as pressed
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.labels.request import request
+from tacdata.label_farm.presses.fem import _request as pressed
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder
 from tacdata.plans import Press
 
 MODEL = "0" * 64

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 from farm_examples import HERE
 
-from label_farm.ledger.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING, Ledger, owner_name
-from label_farm.ledger.roster import Roster
-from label_farm.presses.job import Job
 from tacdata.errors import FormatError
+from tacdata.label_farm.ledger.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING, Ledger, owner_name
+from tacdata.label_farm.ledger.roster import Roster
+from tacdata.label_farm.presses.job import Job
 
 MODEL = "a" * 64
 
@@ -91,7 +91,7 @@ def test_being_stopped_is_not_held_against_a_job(ledger):
 def test_leases_of_the_dead_and_of_before_a_restart_are_given_back(tmp_path):
     path = tmp_path / "ledger.sqlite"
     dead = subprocess.run(
-        [sys.executable, "-c", "from label_farm.ledger.ledger import owner_name; print(owner_name())"],
+        [sys.executable, "-c", "from tacdata.label_farm.ledger.ledger import owner_name; print(owner_name())"],
         capture_output=True,
         text=True,
         check=True,
@@ -111,7 +111,7 @@ def test_leases_of_the_dead_and_of_before_a_restart_are_given_back(tmp_path):
 
 
 def test_claims_use_the_indices(ledger):
-    from label_farm.ledger import tables as tables
+    from tacdata.label_farm.ledger import tables as tables
 
     ledger.enqueue(jobs(20))
     statements = {

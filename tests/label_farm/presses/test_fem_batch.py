@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from label_farm.presses.fem import FemModel
-from label_farm.presses.job import Job
-from label_farm.presses.model import solve_each
-from label_farm.presses.tolerance import Tolerance
 from tacdata.errors import SolveError
+from tacdata.label_farm.presses.fem import FemModel
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.model import solve_each
+from tacdata.label_farm.presses.tolerance import Tolerance
 from tacdata.sensor import default_sensor
 
 

@@ -7,11 +7,11 @@ import pytest
 from farm_examples import SENSOR, press_episode
 from fast_model import path
 
-from label_farm.labels.make_label import make_label
-from label_farm.labels.margin import Margin
-from label_farm.labels.request import request
-from label_farm.presses.interpolate import Branch
-from label_farm.presses.ladder import Ladder
+from tacdata.label_farm.labels.make_label import make_label
+from tacdata.label_farm.labels.margin import Margin
+from tacdata.label_farm.labels.request import request
+from tacdata.label_farm.presses.interpolate import Branch
+from tacdata.label_farm.presses.ladder import Ladder
 from tacdata.labels import columns
 from tacdata.transduction import Loads, Transducer
 

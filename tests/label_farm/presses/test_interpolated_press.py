@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from label_farm.presses.interpolate import Branch
-from label_farm.presses.ladder import Ladder
-from label_farm.presses.tolerance import Tolerance
 from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
+from tacdata.label_farm.presses.interpolate import Branch
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.presses.tolerance import Tolerance
 from tacdata.sensor import default_sensor
 
 

@@ -7,11 +7,11 @@ import pytest
 from farm_examples import SENSOR
 from fast_model import path
 
-from label_farm.presses.fem import FemModel
-from label_farm.presses.job import Job
-from label_farm.presses.ladder import Ladder
-from label_farm.presses.tolerance import Tolerance
 from tacdata.errors import UsageError
+from tacdata.label_farm.presses.fem import FemModel
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.presses.tolerance import Tolerance
 
 STRICT = Tolerance(0.01, 0.005)
 

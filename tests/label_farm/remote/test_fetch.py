@@ -6,9 +6,9 @@ import pytest
 from chaos import Service, all_finished, record
 from running.in_process import tacdata
 
-from label_farm.labels.session_labels import SessionLabels
-from label_farm.remote.fetch import Fetch
 from tacdata.errors import UsageError
+from tacdata.label_farm.labels.session_labels import SessionLabels
+from tacdata.label_farm.remote.fetch import Fetch
 from tacdata.labels import read_label
 
 COUNT = 5

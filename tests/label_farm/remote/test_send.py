@@ -8,9 +8,9 @@ from chaos import Service, all_finished
 from running.in_process import tacdata
 from session_examples import session
 
-from label_farm.remote import send as sending
-from label_farm.service import receiving
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.label_farm.remote import send as sending
+from tacdata.label_farm.service import receiving
 
 
 @pytest.fixture(scope="module")

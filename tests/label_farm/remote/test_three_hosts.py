@@ -33,7 +33,7 @@ def tacdata(*arguments):
 def ask(network, url, path, document=None):
     """Ask the service from its own host: this test is in none of them."""
     script = (
-        "import json, sys; from label_farm.remote.client import Client; c = Client(sys.argv[1], sys.argv[2]);"
+        "import json, sys; from tacdata.label_farm.remote.client import Client; c = Client(sys.argv[1], sys.argv[2]);"
         "d = json.loads(sys.argv[4]); print(json.dumps(c.get(sys.argv[3]) if d is None else c.post(sys.argv[3], d)))"
     )
     line = ["ip", "netns", "exec", "tac-head", sys.executable, "-c", script, url, TOKEN, path, json.dumps(document)]

@@ -6,9 +6,9 @@ import threading
 
 import pytest
 
-from label_farm import environment
 from tacdata import cli, registry
 from tacdata.errors import UsageError
+from tacdata.label_farm import environment
 
 NOWHERE = "http://127.0.0.1:9"
 CASES = [

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from farm_examples import press_episode
 
-from label_farm.service import failed_press
-from label_farm.service.gauges import Gauges
-from label_farm.workers.usage import Usage, local_process, usage_of
+from tacdata.label_farm.service import failed_press
+from tacdata.label_farm.service.gauges import Gauges
+from tacdata.label_farm.workers.usage import Usage, local_process, usage_of
 
 HERE = f"{socket.gethostname()}/{os.getpid()}"
 

@@ -15,8 +15,8 @@ from farm_examples import HERE
 from gate import Gate
 from running.in_process import tacdata
 
-from label_farm.service.confined import confined
 from tacdata.errors import UsageError
+from tacdata.label_farm.service.confined import confined
 
 TOKEN = "0123456789abcdef0123"
 SECONDS = 0.05
@@ -289,7 +289,7 @@ class crew:
     ],
 )
 def test_what_may_not_be_served_is_said(tmp_path, monkeypatch, options, words):
-    from label_farm.service import up
+    from tacdata.label_farm.service import up
 
     names = {"--host": "host", "--token": "token", "--root": "root", "--device": "devices"}
     given = {names[key]: value for key, value in zip(options[::2], options[1::2], strict=True)}

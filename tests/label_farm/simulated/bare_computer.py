@@ -32,8 +32,8 @@ class Skin:
 
 if __name__ == "__main__":
     sys.meta_path.insert(0, Missing())
-    from label_farm.simulated import solving
     from tacdata import cli
+    from tacdata.label_farm.simulated import solving
 
     solving.specimen_model = lambda simulation, number, device: Skin(simulation.specimens[number])
     cli.main()

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from fast_model import path
 
-from label_farm.simulated.swallowed_shape import underside
 from tacdata.errors import SolveError
+from tacdata.label_farm.simulated.swallowed_shape import underside
 
 SMALL = {
     "version": "1.0",

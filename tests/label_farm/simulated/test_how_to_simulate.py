@@ -7,11 +7,11 @@ from running.in_process import tacdata
 from running.typed_pages import HOW_TO, blocks, commands
 from test_press_effects import entry, verdict
 
-from label_farm.simulated import solving
-from label_farm.simulated.plan import SimulationPlan
-from label_farm.simulated.press_effects import drawn_effects
 from tacdata import documents
 from tacdata.dataset import read_dataset
+from tacdata.label_farm.simulated import solving
+from tacdata.label_farm.simulated.plan import SimulationPlan
+from tacdata.label_farm.simulated.press_effects import drawn_effects
 from tacdata.sensor import default_sensor
 
 PAGE = HOW_TO / "simulate.md"

@@ -6,10 +6,10 @@ import pytest
 from bump_skin import BumpSkin
 from running.in_process import tacdata
 
-from label_farm.simulated import solving
 from tacdata.dataset import read_dataset
+from tacdata.label_farm.simulated import solving
 from tacdata.sensor import read_sensor
-from training.inference import checkpoint
+from tacdata.training.inference import checkpoint
 
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"

@@ -6,14 +6,13 @@ import yaml
 from bump_skin import SMALL, BumpSkin
 from running.in_process import tacdata
 
-import schemas
-from label_farm.simulated import press_effects, solving
-from label_farm.simulated.plan import SimulationPlan
-from label_farm.simulated.press_effects import drawn_effects, effects_of, specimen_effects
-from tacdata import documents
+from tacdata import documents, schemas
 from tacdata.dataset import read_dataset
 from tacdata.dataset.format import features
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm.simulated import press_effects, solving
+from tacdata.label_farm.simulated.plan import SimulationPlan
+from tacdata.label_farm.simulated.press_effects import drawn_effects, effects_of, specimen_effects
 from tacdata.sensor import Sensor, default_sensor
 
 SENSOR = default_sensor()

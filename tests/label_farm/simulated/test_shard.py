@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fast_model import path
 
-from label_farm.simulated.shard import GRAIN, Shard, read_about, read_shard, shard_files
 from tacdata.errors import FormatError
+from tacdata.label_farm.simulated.shard import GRAIN, Shard, read_about, read_shard, shard_files
 from tacdata.sensor import default_sensor
 
 SENSOR = default_sensor()

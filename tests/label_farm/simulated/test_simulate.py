@@ -15,15 +15,15 @@ from bump_skin import SMALL, BumpSkin
 from farm_examples import HERE
 from running.in_process import tacdata
 
-from label_farm import environment
-from label_farm.simulated import solving
-from label_farm.simulated.plan import DEFAULT, SimulationPlan, read_simulation_plan
-from label_farm.simulated.press_draw import draw_press
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.specimen import draw_specimen
 from tacdata.dataset import pack, read_dataset
 from tacdata.dataset.format import features
 from tacdata.errors import FormatError, UsageError
+from tacdata.label_farm import environment
+from tacdata.label_farm.simulated import solving
+from tacdata.label_farm.simulated.plan import DEFAULT, SimulationPlan, read_simulation_plan
+from tacdata.label_farm.simulated.press_draw import draw_press
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.specimen import draw_specimen
 from tacdata.recording.episode import PHASES
 from tacdata.sensor import default_sensor
 from tacdata.transduction import Loads, Transducer

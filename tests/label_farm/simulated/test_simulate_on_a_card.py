@@ -6,9 +6,9 @@ import pytest
 import torch
 from bump_skin import SMALL
 
-from label_farm.simulated.plan import SimulationPlan
-from label_farm.simulated.simulation import Simulation
-from label_farm.simulated.solving import solve
+from tacdata.label_farm.simulated.plan import SimulationPlan
+from tacdata.label_farm.simulated.simulation import Simulation
+from tacdata.label_farm.simulated.solving import solve
 from tacdata.sensor import default_sensor
 
 THREE_SKINS = {**{key: value for key, value in SMALL.items() if key != "mesh"}, "specimens": {"count": 3}}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from fast_model import path
 
-from label_farm.presses.job import Job
-from label_farm.simulated.swallowed_shape import swallowed_at
 from tacdata.indenters import from_document
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.simulated.swallowed_shape import swallowed_at
 from tacdata.sensor import default_sensor
 from tacdata.skin.contact.first_touch import rise, rotation
 from tacdata.skin.press import PressRequest

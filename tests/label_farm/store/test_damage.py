@@ -9,11 +9,11 @@ import pytest
 from farm_examples import HERE, SENSOR, label_episodes, press_episode
 from one_process import OneProcess
 
-from label_farm.labels.request import request
-from label_farm.ledger.ledger import DONE, Ledger
-from label_farm.presses.ladder import Ladder
-from label_farm.store.store import STALE_SECONDS, Store
 from tacdata.errors import TacdataError
+from tacdata.label_farm.labels.request import request
+from tacdata.label_farm.ledger.ledger import DONE, Ledger
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.store.store import STALE_SECONDS, Store
 
 
 def episodes(folder, count, **changes):
@@ -141,7 +141,7 @@ def test_a_wall_clock_that_jumps_changes_no_lease(tmp_path, monkeypatch):
 
 def test_a_writer_whose_file_was_swept_after_a_clock_jump_writes_again(tmp_path, label_all, monkeypatch):
     """Another process that believes it to be hours later takes the unfinished file for a dead writer's."""
-    from label_farm.store import store as module
+    from tacdata.label_farm.store import store as module
 
     label_all([press_episode(tmp_path)])
     store = Store(tmp_path / "labels" / "store")
@@ -168,7 +168,7 @@ def test_a_writer_whose_file_was_swept_after_a_clock_jump_writes_again(tmp_path,
         return true(path, beside, **how)
 
     monkeypatch.setattr(module, "replacement", sweeping)
-    from label_farm.store.failure import Failure
+    from tacdata.label_farm.store.failure import Failure
 
     store.put_failure(job, Failure("solve", "a reason"))
     assert swept and store.failure(job.key).reason == "a reason"
@@ -180,7 +180,7 @@ def test_a_second_run_reads_no_recording_and_no_label(tmp_path, solves, quick_ve
     reads = []
 
     def run(**settings):
-        from label_farm.labelling import FarmSettings, Labelling
+        from tacdata.label_farm.labelling import FarmSettings, Labelling
 
         chosen = FarmSettings(factory="fast_model:FastModel", engine=OneProcess, **settings)
         labelling = Labelling(tmp_path / "labels", Store(tmp_path / "store"), chosen)
@@ -206,7 +206,7 @@ def test_nothing_is_planned_twice_after_a_kill_in_mid_run(tmp_path, solves, monk
     monkeypatch.setenv("FAST_MODEL_SECONDS", "0.3")
     script = (
         "import sys, os, threading\nfrom pathlib import Path\nfrom farm_examples import press_episode\n"
-        "from label_farm.labelling import FarmSettings, Labelling\nfrom label_farm.store.store import Store\n"
+        "from tacdata.label_farm.labelling import FarmSettings, Labelling\nfrom label_farm.store.store import Store\n"
         "folder = Path(sys.argv[1])\npresses = [press_episode(folder, k, x=float(k)) for k in range(6)]\n"
         "stop = lambda n, r: os.kill(os.getpid(), 9)\n"
         "run = Labelling(folder / 'labels', Store(folder / 'store'),\n"
@@ -216,7 +216,7 @@ def test_nothing_is_planned_twice_after_a_kill_in_mid_run(tmp_path, solves, monk
     path = os.pathsep.join([str(HERE), str(HERE.parent.parent)])
     killed = subprocess.run([sys.executable, "-c", script, str(tmp_path)], env={**os.environ, "PYTHONPATH": path})
     assert killed.returncode == -9
-    from label_farm.labels.label_index import LabelIndex
+    from tacdata.label_farm.labels.label_index import LabelIndex
 
     index = LabelIndex(tmp_path / "labels")
     assert index.open() and len(index.skins()) == 1

@@ -13,11 +13,11 @@ import pytest
 from farm_examples import SENSOR
 from fast_model import path
 
-from label_farm.presses.job import Job
-from label_farm.store import solution_file
-from label_farm.store.failure import Failure
-from label_farm.store.store import Store
 from tacdata.errors import FormatError, SolveError, UsageError
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.store import solution_file
+from tacdata.label_farm.store.failure import Failure
+from tacdata.label_farm.store.store import Store
 from tacdata.labels import columns
 
 JOB = Job(SENSOR.content_hash, "a" * 64, {"shape": "sphere", "radius": 2.0}, 0.5, 0.0, 0.0, (0.0, 0.3, 1.0, 0.4, 0.0))

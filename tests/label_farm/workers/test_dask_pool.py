@@ -12,10 +12,10 @@ from free_port import free_port
 from running.in_process import tacdata
 from session_examples import session
 
-from label_farm.ledger.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING
-from label_farm.presses.job import Job
-from label_farm.store.store import Store
-from label_farm.workers.dask_pool import DaskPool, _Task
+from tacdata.label_farm.ledger.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING
+from tacdata.label_farm.presses.job import Job
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.dask_pool import DaskPool, _Task
 from tacdata.sensor import default_sensor
 
 pytest.importorskip("distributed")

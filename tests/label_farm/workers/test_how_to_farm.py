@@ -16,7 +16,7 @@ from running.in_process import tacdata
 from running.typed_pages import HOW_TO, blocks
 from session_examples import session
 
-from label_farm.remote.client import Client
+from tacdata.label_farm.remote.client import Client
 
 PAGE = HOW_TO / "label_farm.md"
 ROOT = HOW_TO.parents[1]

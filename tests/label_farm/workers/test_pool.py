@@ -5,13 +5,13 @@ import sys
 import pytest
 from farm_examples import SENSOR, label_episodes, press_episode
 
-from label_farm.labels.request import request
-from label_farm.ledger.ledger import WAITING, Ledger
-from label_farm.presses import model
-from label_farm.presses.ladder import Ladder
-from label_farm.store.store import Store
-from label_farm.workers.pool import Pool
 from tacdata.errors import SolveError, UsageError
+from tacdata.label_farm.labels.request import request
+from tacdata.label_farm.ledger.ledger import WAITING, Ledger
+from tacdata.label_farm.presses import model
+from tacdata.label_farm.presses.ladder import Ladder
+from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.pool import Pool
 
 
 def episodes(folder, count):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from google.protobuf.message import DecodeError
 
-from schemas import tacdata_pb2 as pb
 from tacdata.recording.files.taxel_arrays import taxel_frames
+from tacdata.schemas import tacdata_pb2 as pb
 
 START = 1_760_000_000_000_000_000
 

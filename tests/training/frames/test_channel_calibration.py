@@ -9,9 +9,9 @@ from training_frames import build_frames
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import default_sensor
-from training.frames.channel_calibration import FARTHEST, SPREAD, ChannelCalibration, calibrate, doubts
-from training.frames.spreading import spreading
-from training.networks.network import create
+from tacdata.training.frames.channel_calibration import FARTHEST, SPREAD, ChannelCalibration, calibrate, doubts
+from tacdata.training.frames.spreading import spreading
+from tacdata.training.networks.network import create
 
 
 def unit(gains, seed=0, episodes=12, exponent=1.5, noise=2.0):

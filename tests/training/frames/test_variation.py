@@ -5,9 +5,9 @@ import pytest
 import torch
 
 from tacdata.sensor import default_sensor
-from training.frames.variation import Variation
-from training.networks.network import create
-from training.settings import TrainingSettings
+from tacdata.training.frames.variation import Variation
+from tacdata.training.networks.network import create
+from tacdata.training.settings import TrainingSettings
 
 
 def prepared(**settings):

@@ -3,8 +3,8 @@
 import numpy as np
 import torch
 
-from training.frames.windows import Windows
-from training.networks.paper import Paper
+from tacdata.training.frames.windows import Windows
+from tacdata.training.networks.paper import Paper
 
 
 def reference(start, stop, frame):

@@ -7,13 +7,13 @@ import pytest
 
 from tacdata import registry
 from tacdata.errors import FormatError, UsageError
-from training.inference import onnx_export
-from training.inference.onnx_export import export
-from training.inference.sequence import window_map
-from training.networks.network import BASE, ROOM
-from training.pretraining.recipe import recipe
-from training.settings import TrainingSettings
-from training.train import train
+from tacdata.training.inference import onnx_export
+from tacdata.training.inference.onnx_export import export
+from tacdata.training.inference.sequence import window_map
+from tacdata.training.networks.network import BASE, ROOM
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import train
 
 onnxruntime = pytest.importorskip("onnxruntime")
 onnx = pytest.importorskip("onnx")

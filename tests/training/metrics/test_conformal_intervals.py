@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tacdata.errors import FormatError, UsageError
-from training.metrics import conformal_intervals
-from training.metrics.conformal_intervals import LEVELS, calibrate, reliability
+from tacdata.training.metrics import conformal_intervals
+from tacdata.training.metrics.conformal_intervals import LEVELS, calibrate, reliability
 
 PITCH = 0.4
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tacdata import documents
-from training.metrics.contacts import LONG, PROMINENCE, centroids, elongation, hills, match, predicted_centroids
-from training.reports.score_sheet import markdown
-from training.scoring.contact_scores import contact_rows
+from tacdata.training.metrics.contacts import LONG, PROMINENCE, centroids, elongation, hills, match, predicted_centroids
+from tacdata.training.reports.score_sheet import markdown
+from tacdata.training.scoring.contact_scores import contact_rows
 
 PITCH = 0.4
 
@@ -94,7 +94,7 @@ def test_rows_by_distance():
 
 
 def test_scores_state_contacts(frames, trained_briefly):
-    from training.scoring.evaluate import evaluate
+    from tacdata.training.scoring.evaluate import evaluate
 
     document = evaluate(trained_briefly, frames, "cpu", threads=1).document
     documents.check(document, "scores", "scores")
@@ -106,8 +106,8 @@ def test_scores_state_contacts(frames, trained_briefly):
 
 @pytest.fixture(scope="module")
 def trained_briefly(frames, tmp_path_factory):
-    from training.settings import TrainingSettings
-    from training.train import train
+    from tacdata.training.settings import TrainingSettings
+    from tacdata.training.train import train
 
     settings = TrainingSettings(arguments={"hidden": 16, "channels": 4}, epochs=1)
     return train(replace(frames), settings, tmp_path_factory.mktemp("contacts") / "run", device="cpu", threads=1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from training.metrics.depth_maps import centroid, score_frames, summarize
+from tacdata.training.metrics.depth_maps import centroid, score_frames, summarize
 
 
 def one(prediction, label):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tacdata.errors import FormatError
-from training.metrics import novelty
-from training.settings import TrainingSettings
-from training.train import train
+from tacdata.training.metrics import novelty
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import train
 
 LEARNED, VALIDATED, KEPT_APART = slice(0, 60), slice(60, 80), slice(80, 100)
 

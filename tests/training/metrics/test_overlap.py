@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from training.metrics.overlap import aligned_iou
+from tacdata.training.metrics.overlap import aligned_iou
 
 
 def disc(cx, cy, radius):

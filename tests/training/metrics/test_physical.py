@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tacdata.sensor import DepthMap
-from training.metrics.physical import bilinear, score_press
+from tacdata.training.metrics.physical import bilinear, score_press
 
 GRID = DepthMap(pixels_x=35, pixels_y=26, pixel_pitch=0.4, depth_max=3.0)
 

@@ -8,7 +8,7 @@ import torch
 from tacdata import registry
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import default_sensor
-from training.networks.network import BASE, ROOM, create
+from tacdata.training.networks.network import BASE, ROOM, create
 
 NETWORKS = registry.names(ROOM, BASE)
 

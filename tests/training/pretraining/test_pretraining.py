@@ -8,12 +8,12 @@ from torch.optim import AdamW
 from training_frames import build_frames
 
 from tacdata.errors import FormatError, UsageError
-from training.inference import checkpoint
-from training.pretraining import curve_picture
-from training.pretraining.learning_curve import learning_curve
-from training.pretraining.recipe import FITTING, PULL, recipe
-from training.pretraining.shipped import pretrained, unfitted
-from training.train import _Run, train
+from tacdata.training.inference import checkpoint
+from tacdata.training.pretraining import curve_picture
+from tacdata.training.pretraining.learning_curve import learning_curve
+from tacdata.training.pretraining.recipe import FITTING, PULL, recipe
+from tacdata.training.pretraining.shipped import pretrained, unfitted
+from tacdata.training.train import _Run, train
 
 
 @pytest.fixture(scope="module")

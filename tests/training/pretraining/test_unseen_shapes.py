@@ -7,12 +7,12 @@ import pytest
 from training_frames import build_frames
 
 from tacdata.errors import UsageError
-from training.inference import checkpoint
-from training.metrics import conformal_intervals
-from training.metrics.conformal_intervals import reliability
-from training.pretraining.recipe import recipe
-from training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
-from training.train import train
+from tacdata.training.inference import checkpoint
+from tacdata.training.metrics import conformal_intervals
+from tacdata.training.metrics.conformal_intervals import reliability
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
+from tacdata.training.train import train
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +36,8 @@ def test_intervals_hold_what_networks_without_the_shape_err(odd, tmp_path):
         shapes = {part: {s.shape for s in odd.spans(getattr(division, part))} for part in ("train", "test")}
         assert not shapes["train"] & shapes["test"]
         assert not set(division.test) & set(run.split.test), "what is scored calibrates nothing"
-    from training.frames.windows import Windows
-    from training.inference.predictor import predict
+    from tacdata.training.frames.windows import Windows
+    from tacdata.training.inference.predictor import predict
 
     spans = odd.spans(run.split.test)
     windows = Windows(odd, run.network.offsets)

@@ -8,17 +8,17 @@ import torch
 
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
-from training.inference import checkpoint
-from training.inference.prediction import read_prediction, write_prediction
-from training.networks.network import Network
-from training.reports import report
-from training.reports.score_sheet import markdown
-from training.scoring import baselines
-from training.scoring.evaluate import METRICS
-from training.scoring.evaluate import evaluate as evaluate_on
-from training.scoring.published import TABLE_1
-from training.settings import TrainingSettings
-from training.train import train
+from tacdata.training.inference import checkpoint
+from tacdata.training.inference.prediction import read_prediction, write_prediction
+from tacdata.training.networks.network import Network
+from tacdata.training.reports import report
+from tacdata.training.reports.score_sheet import markdown
+from tacdata.training.scoring import baselines
+from tacdata.training.scoring.evaluate import METRICS
+from tacdata.training.scoring.evaluate import evaluate as evaluate_on
+from tacdata.training.scoring.published import TABLE_1
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import train
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,12 @@ import torch
 
 from tacdata import documents
 from tacdata.errors import FormatError, UsageError
-from training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, trials
-from training.networks.network import Network
-from training.reports.protocol_sheet import markdown
-from training.scoring.protocols import protocols
-from training.settings import TrainingSettings
-from training.train import train
+from tacdata.training.frames.trials import DEPTH_TRIAL, POSITION_TRIAL, WEARING_TRIAL, trials
+from tacdata.training.networks.network import Network
+from tacdata.training.reports.protocol_sheet import markdown
+from tacdata.training.scoring.protocols import protocols
+from tacdata.training.settings import TrainingSettings
+from tacdata.training.train import train
 
 PURPOSES = [DEPTH_TRIAL] * 4 + [POSITION_TRIAL] * 4 + [WEARING_TRIAL] * 4
 

@@ -3,8 +3,8 @@
 import pytest
 
 from tacdata.errors import FormatError, UsageError
-from training.scoring import published
-from training.scoring.success import counted, markdown, published_rates, rates, read_attempts
+from tacdata.training.scoring import published
+from tacdata.training.scoring.success import counted, markdown, published_rates, rates, read_attempts
 
 
 def written(tmp_path, text):

@@ -7,7 +7,7 @@ import pytest
 
 from tacdata import registry
 from tacdata.errors import FormatError, UsageError
-from training.splits.split import BASE, ROOM, Split, divide
+from tacdata.training.splits.split import BASE, ROOM, Split, divide
 
 
 @pytest.mark.parametrize("name", registry.names(ROOM, BASE))

@@ -13,12 +13,12 @@ from tacdata.dataset.frames import recording_hash
 from tacdata.dataset.pack import pack
 from tacdata.dataset.reader import read_dataset
 from tacdata.errors import UsageError
-from training.frames.data import frames_of
-from training.inference.prediction import write_prediction
-from viewers.browse.list_sources import episodes_at
-from viewers.parts.prediction_files import first_predicted
-from viewers.scenes import single_episode
-from viewers.source import scene_at
+from tacdata.training.frames.data import frames_of
+from tacdata.training.inference.prediction import write_prediction
+from tacdata.viewers.browse.list_sources import episodes_at
+from tacdata.viewers.parts.prediction_files import first_predicted
+from tacdata.viewers.scenes import single_episode
+from tacdata.viewers.source import scene_at
 
 APART = 10**11
 DEPTHS = (0.4, 1.1, 0.7)

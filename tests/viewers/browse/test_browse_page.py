@@ -10,8 +10,8 @@ from running.chromium import needs_chromium
 
 from tacdata.dataset.flags import read_flags, read_history
 from tacdata.dataset.notes import read_notes
-from viewers.browse.episode_list import Entry, EpisodeList
-from viewers.browse.server import Pages, Times, serving
+from tacdata.viewers.browse.episode_list import Entry, EpisodeList
+from tacdata.viewers.browse.server import Pages, Times, serving
 
 pytestmark = needs_chromium
 COUNT, BEGIN = 30, 1_795_674_713_000_000_000

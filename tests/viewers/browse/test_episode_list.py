@@ -10,11 +10,11 @@ import pytest
 
 from tacdata import documents
 from tacdata.errors import UsageError
-from viewers.browse.episode_list import Entry, EpisodeList, errors_of
-from viewers.browse.flagging import flag_episode, unflag_episode
-from viewers.browse.list_table import list_table
-from viewers.browse.noting import note_stretch, notes_of, unnote_stretch
-from viewers.browse.server import Pages, serving
+from tacdata.viewers.browse.episode_list import Entry, EpisodeList, errors_of
+from tacdata.viewers.browse.flagging import flag_episode, unflag_episode
+from tacdata.viewers.browse.list_table import list_table
+from tacdata.viewers.browse.noting import note_stretch, notes_of, unnote_stretch
+from tacdata.viewers.browse.server import Pages, serving
 
 ENTRIES = (
     Entry(0, "episode-000000.mcap", "ball", "sphere", 0, 0, 0.4, 1.0, 1.0, "complete", "test", 0.01),

@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "docs"))
 from example_folder import fill
 
 from tacdata.errors import UsageError
-from viewers.browse.catalogue import Catalogue, catalogue_server
-from viewers.browse.list_sources import episodes_at
+from tacdata.viewers.browse.catalogue import Catalogue, catalogue_server
+from tacdata.viewers.browse.list_sources import episodes_at
 
 
 @pytest.fixture(scope="module")

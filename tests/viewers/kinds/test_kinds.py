@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-import schemas
-from tacdata import documents, registry
+from tacdata import documents, registry, schemas
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.paths.tracks_file import read_tracks, write_tracks
 from tacdata.discrepancy.verdict.residual_table import Residuals
@@ -16,15 +15,15 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import exporter
 from tacdata.replay.targets import targets_of
 from tacdata.sensor import default_sensor
-from training.inference.prediction import write_prediction
-from viewers.kinds.kind import BASE, ROOM, kinds
-from viewers.pictures.backend import PictureBackend
-from viewers.rerun.backend import LAYOUTS, RerunBackend
-from viewers.rerun.bar_table import bar_table
-from viewers.rerun.gap_recording import write as write_gap
-from viewers.scene.scene import Bars, MotionTrail
-from viewers.scenes.prediction import prediction_scene
-from viewers.source import scene_at
+from tacdata.training.inference.prediction import write_prediction
+from tacdata.viewers.kinds.kind import BASE, ROOM, kinds
+from tacdata.viewers.pictures.backend import PictureBackend
+from tacdata.viewers.rerun.backend import LAYOUTS, RerunBackend
+from tacdata.viewers.rerun.bar_table import bar_table
+from tacdata.viewers.rerun.gap_recording import write as write_gap
+from tacdata.viewers.scene.scene import Bars, MotionTrail
+from tacdata.viewers.scenes.prediction import prediction_scene
+from tacdata.viewers.source import scene_at
 
 START = 1_760_000_000_000_000_000
 GRID = 60
@@ -226,7 +225,7 @@ def test_damaged_files_are_named(verdict, tracks, tmp_path):
 def test_the_curves_of_a_revision_are_read_back(tmp_path):
     from types import SimpleNamespace
 
-    from viewers.rerun.gap_curves import read_gap_curves
+    from tacdata.viewers.rerun.gap_curves import read_gap_curves
 
     time = np.linspace(0, 2, 30)
     values = np.outer(np.sin(time), [1.0, 2.0])
@@ -272,9 +271,9 @@ def test_the_layout_for_foxglove_names_only_what_the_recording_has(episode, imag
 
     from recorded_press import write_recording
 
-    from schemas import tacdata_pb2
     from tacdata.recording.files.mcap_records import read_records
-    from viewers.foxglove_layout import write_foxglove_layout
+    from tacdata.schemas import tacdata_pb2
+    from tacdata.viewers.foxglove_layout import write_foxglove_layout
 
     recording = write_recording(tmp_path / "episode-000003.mcap", episode, images)
     write_foxglove_layout(recording, tmp_path / "layout.json")

@@ -16,7 +16,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.recording.files import chunked_file
 from tacdata.recording.files.growing_file import GrowingFile
 from tacdata.recording.files.reader import read_recording, recording_of
-from viewers.live.following import Follower, is_growing, meant
+from tacdata.viewers.live.following import Follower, is_growing, meant
 
 
 @pytest.fixture(scope="module")

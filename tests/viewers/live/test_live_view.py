@@ -9,8 +9,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tacdata.errors import UsageError
-from viewers.live import window as room
-from viewers.live.window import live_view
+from tacdata.viewers.live import window as room
+from tacdata.viewers.live.window import live_view
 
 
 def test_what_is_shown_is_in_the_file(tmp_path):

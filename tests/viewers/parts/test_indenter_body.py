@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from viewers.parts.skin_surface import indenter_body
-from viewers.parts.summary import of_press
+from tacdata.viewers.parts.skin_surface import indenter_body
+from tacdata.viewers.parts.summary import of_press
 
 
 @pytest.mark.parametrize("angles", [{}, {"tilt_x": 12.0}, {"yaw": 30.0, "tilt_x": -5.0, "tilt_y": 20.0}])

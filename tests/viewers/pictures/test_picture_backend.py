@@ -12,8 +12,8 @@ from matplotlib.text import Text
 from PIL import Image
 
 from tacdata.errors import UsageError
-from viewers.pictures.backend import STYLE, PictureBackend, page
-from viewers.scenes.episode import episode_scene
+from tacdata.viewers.pictures.backend import STYLE, PictureBackend, page
+from tacdata.viewers.scenes.episode import episode_scene
 
 
 def drawn(scene):

@@ -9,9 +9,9 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tacdata.errors import UsageError
-from viewers.rerun.backend import RerunBackend
-from viewers.rerun.window import executable
-from viewers.scenes.episode import episode_scene
+from tacdata.viewers.rerun.backend import RerunBackend
+from tacdata.viewers.rerun.window import executable
+from tacdata.viewers.scenes.episode import episode_scene
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 
 from tacdata.errors import UsageError
-from viewers.rerun import window
-from viewers.rerun.backend import RerunBackend
-from viewers.scenes.episode import episode_scene
+from tacdata.viewers.rerun import window
+from tacdata.viewers.rerun.backend import RerunBackend
+from tacdata.viewers.scenes.episode import episode_scene
 
 
 def listens(host, port):
@@ -66,7 +66,7 @@ SERVED = """
 import sys
 from contextlib import suppress
 from pathlib import Path
-from viewers.rerun import window
+from tacdata.viewers.rerun import window
 with window.web_server(Path(sys.argv[1])) as (server, _), suppress(KeyboardInterrupt):
     print(server.pid, flush=True)
     window.until_interrupted()

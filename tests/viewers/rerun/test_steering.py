@@ -6,10 +6,10 @@ import threading
 import numpy as np
 import pytest
 
-from viewers.rerun.shield import shielded
-from viewers.rerun.steering import Moment, deepest_moment, script, steer
-from viewers.rerun.timelines import HOST
-from viewers.scenes.episode import episode_scene
+from tacdata.viewers.rerun.shield import shielded
+from tacdata.viewers.rerun.steering import Moment, deepest_moment, script, steer
+from tacdata.viewers.rerun.timelines import HOST
+from tacdata.viewers.scenes.episode import episode_scene
 
 pytest.importorskip("rerun.experimental")
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from viewers.scene.color_scale import ColorScale, round_up, scale_of, taxel_colors
+from tacdata.viewers.scene.color_scale import ColorScale, round_up, scale_of, taxel_colors
 
 
 def lightness(rgb):

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewers.scene.moments import moments, nearest
-from viewers.scenes.episode import episode_scene
+from tacdata.viewers.scene.moments import moments, nearest
+from tacdata.viewers.scenes.episode import episode_scene
 
 
 def test_the_moments_of_a_press_lie_before_in_and_after_its_hold(episode, label):

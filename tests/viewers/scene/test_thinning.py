@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from tacdata.labels import write_label
-from viewers.parts import label as room
-from viewers.parts.label import shown_label
-from viewers.scene.thinning import evenly, extremes, strongest
+from tacdata.viewers.parts import label as room
+from tacdata.viewers.parts.label import shown_label
+from tacdata.viewers.scene.thinning import evenly, extremes, strongest
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import pytest
 
 from tacdata.errors import FormatError
 from tacdata.recording.episode import CncStream, TaxelStream
-from viewers.pictures.backend import PictureBackend, page
-from viewers.rerun.backend import RerunBackend
-from viewers.scenes.episode import episode_scene
+from tacdata.viewers.pictures.backend import PictureBackend, page
+from tacdata.viewers.rerun.backend import RerunBackend
+from tacdata.viewers.scenes.episode import episode_scene
 
 DEEPEST = 1.2
 

@@ -8,11 +8,11 @@ import pytest
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.replay.targets import targets_of
 from tacdata.sensor import default_sensor
-from viewers.pictures import film
-from viewers.pictures.hand_film import HandPage, apart
-from viewers.pictures.pages import other_page
-from viewers.scene.scene import CameraView
-from viewers.scenes.hand import demonstration_scene, targets_scene
+from tacdata.viewers.pictures import film
+from tacdata.viewers.pictures.hand_film import HandPage, apart
+from tacdata.viewers.pictures.pages import other_page
+from tacdata.viewers.scene.scene import CameraView
+from tacdata.viewers.scenes.hand import demonstration_scene, targets_scene
 
 FINGERS = ("thumb", "index", "middle")
 COUNT = 60
