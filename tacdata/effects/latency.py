@@ -38,9 +38,7 @@ class Latency(Effect):
         if abs(delay) <= LONG:
             return ""
         if delay < 0:
-            return (
-                f"readings are {-delay:.2f} s early, impossible for a sensor: skin relaxing, or a clock wrong?"
-            )
+            return f"readings are {-delay:.2f} s early, impossible for a sensor: skin relaxing, or a clock wrong?"
         return f"readings are {delay:.2f} s late: more than a sensor is; were the clocks of path and readings one?"
 
 
