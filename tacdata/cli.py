@@ -14,12 +14,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
 
-import typer
+try:
+    import typer
 
-from tacdata import progress, registry, stages
-from tacdata.commands.command import Result
-from tacdata.errors import Exit, TacdataError, UsageError, refused_by_system
-from tacdata.extras import missing_package
+    from tacdata import progress, registry, stages
+    from tacdata.commands.command import Result
+    from tacdata.errors import Exit, TacdataError, UsageError, refused_by_system
+    from tacdata.extras import missing_package
+except KeyboardInterrupt:  # these imports take most of the first half second
+    print("interrupted", file=sys.stderr)
+    raise SystemExit(130) from None
 
 ROOM, BASE = "tacdata.commands", "command"
 QUIET, JSON = "quiet", "as_json"
@@ -212,6 +216,7 @@ def main() -> None:
         print(f"error: {in_words(error)}", file=sys.stderr)
         raise SystemExit(int(Exit.USAGE)) from None
     except typer.Abort:
+        print("interrupted", file=sys.stderr)
         raise SystemExit(int(Exit.INTERRUPTED)) from None
     except TacdataError as error:
         print("\n".join([f"error: {error}", *last_words(error)]), file=sys.stderr)

@@ -160,9 +160,47 @@ def _content(text: str, origin: str) -> Any:
 def _loaded(loader: Any, origin: str) -> Any:
     loader.origin = origin
     try:
-        return loader.get_single_data()
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _refuse_growth(node, origin)
+        return loader.construct_document(node)
     finally:
         loader.dispose()
+
+
+def _refuse_growth(node: yaml.Node, origin: str) -> None:
+    """Refuse aliases that multiply a document beyond `LARGEST`, and an alias inside its own anchor.
+
+    Raises:
+        FormatError: With the line of the anchor.
+    """
+    sizes: dict[int, int | None] = {}
+
+    def size(part: yaml.Node) -> int:
+        """Return the number of nodes that a node becomes with its aliases written out."""
+        if isinstance(part, yaml.ScalarNode):
+            return 1
+        known = sizes.get(id(part), 0)
+        line = part.start_mark.line + 1
+        if known is None:
+            raise FormatError(f"{origin}: line {line} contains itself by an alias", "a finite document", "write it out")
+        if not known:
+            sizes[id(part)] = None
+            inside = (
+                part.value if isinstance(part, yaml.SequenceNode) else [node for pair in part.value for node in pair]
+            )
+            known = 1 + sum(map(size, inside))
+            sizes[id(part)] = known
+        if known > LARGEST:
+            raise FormatError(
+                f"{origin}: with its aliases the document has {known:.3g} values from line {line} on",
+                f"at most {LARGEST:,} values",
+                "write the values without aliases inside aliases",
+            )
+        return known
+
+    size(node)
 
 
 def _nested(text: str) -> int:
@@ -279,6 +317,8 @@ _QuickLoader: Any = None
 if yaml.__with_libyaml__:
     _QuickLoader = _with_numbers(type("_QuickLoader", (_Constructor, yaml.CSafeLoader), {}))
 """The same by libyaml, where PyYAML was built with it."""
+LARGEST = 1_000_000
+"""Most values of a document with its aliases written out."""
 DEEP = 200
 """Levels from which libyaml could run out of stack; the loader in Python ends in words."""
 _BRACKETS, _DASHES = re.compile(r"[\[{}\]]"), re.compile(r"(?:[-?] +)+")
@@ -306,10 +346,19 @@ def check(document: Any, schema: str, origin: str) -> None:
         unit = first.schema.get("unit", "") if isinstance(first.schema, dict) else ""
         hint = first.schema.get("description", "") if isinstance(first.schema, dict) else ""
         raise FormatError(
-            f"{origin}: {field}: {first.message}" + (f" [{unit}]" if unit else ""),
+            f"{origin}: {field}: {_shortened(first.message)}" + (f" [{unit}]" if unit else ""),
             hint or f"what schemas/{schema}.schema.json says of {field}",
             f"change {field} and run again",
         )
+
+
+LONGEST = 300
+"""Most letters of a validator's message that an error repeats."""
+
+
+def _shortened(text: str) -> str:
+    """Return a message without its middle, where it quotes a long value."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 def write_text(path: Path, text: str) -> None:

@@ -71,6 +71,22 @@ def is_one(path: Path) -> bool:
     return path.is_file() or (path.is_dir() and path.suffix in FOLDERS)
 
 
+def check_source(source: Path) -> None:
+    """Refuse a source that is neither a file nor a folder.
+
+    Raises:
+        UsageError: If it does not exist, or is a pipe, a socket or a device.
+    """
+    if not source.exists():
+        raise UsageError(f"no file or folder {source}", "measured data", "check the path")
+    if not source.is_file() and not source.is_dir():
+        raise UsageError(
+            f"{source} is a pipe or a device, which cannot be read twice",
+            "a file or a folder",
+            "save it as a file first",
+        )
+
+
 def files_below(folder: Path) -> list[Path]:
     """Return the files below a folder, sorted; a folder that counts as one stands for all that is in it."""
     found = []
@@ -97,8 +113,7 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     Raises:
         UsageError: If the source does not exist or no file fits.
     """
-    if not source.exists():
-        raise UsageError(f"no file or folder {source}", "measured data", "check the path")
+    check_source(source)
     if is_one(source):
         if len({entry["path"] for entry in files.values()}) != 1:
             raise UsageError(

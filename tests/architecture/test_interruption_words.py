@@ -1,8 +1,14 @@
 """Ctrl-C in any verb ends in words and 130, never in a traceback or in silence."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 import typer
 
+import tacdata
 from tacdata.cli import answering
 
 
@@ -26,3 +32,12 @@ def test_a_verb_keeps_its_options_and_its_answer():
     app.command()(answering("tacdata verb", verb))
     assert answering("tacdata verb", verb)(5) == 5
     assert answering("tacdata verb", verb).__doc__ == "Say a number."
+
+
+def test_ctrl_c_while_the_command_line_is_imported_ends_in_a_word(tmp_path):
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(tacdata.__file__).parents[1])])}
+    ended = subprocess.run(
+        [sys.executable, "-m", "tacdata.cli", "--help"], env=environment, capture_output=True, text=True
+    )
+    assert (ended.returncode, ended.stderr) == (130, "interrupted\n")

@@ -104,7 +104,7 @@ def _lag(axes, report: Report) -> None:
 
 def _words(axes, report: Report) -> None:
     axes.axis("off")
-    lines = report.text.splitlines()
+    lines = report.text.encode("utf-8", "replace").decode().splitlines()  # a path may hold bytes that are no text
     shown = lines if len(lines) <= 24 else [*lines[:23], f"... {len(lines) - 23} more, see check.json"]
     axes.text(0.0, 1.0, "\n".join(_wrapped(shown)), va="top", fontsize=7, transform=axes.transAxes)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import rows_of
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth
 
 
 class Mat(SourceFormat):
@@ -25,10 +26,8 @@ class Mat(SourceFormat):
 
     def tables(self, path: Path) -> tuple[str, ...]:
         """Return the variables if they are trials: tables or structures, named alike but for a number; see the base."""
-        from scipy.io import loadmat
-
         try:
-            loaded = loadmat(path, simplify_cells=True)
+            loaded = _loaded(path)
         except NotImplementedError:
             return ("",)  # `read` says what to do
         names = [name for name in loaded if not name.startswith("__")]
@@ -38,10 +37,8 @@ class Mat(SourceFormat):
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the variables; ``table`` in the options selects one. See the base class."""
-        from scipy.io import loadmat
-
         try:
-            loaded = loadmat(path, simplify_cells=True)
+            loaded = _loaded(path)
         except NotImplementedError:
             raise FormatError(
                 f"{path} is a MATLAB 7.3 file (HDF5)",
@@ -66,6 +63,19 @@ class Mat(SourceFormat):
         table = rows_of(path, arrays, options)
         notes = [f"{path.name}: neither numbers nor texts, left out: {', '.join(lost)}"] if lost else []
         return replace(table, notes=(*notes, *table.notes))
+
+
+def _loaded(path: Path) -> dict[str, Any]:
+    """Return a file's variables by name.
+
+    Raises:
+        NotImplementedError: For a file of version 7.3.
+        FormatError: If its variables would fill the memory.
+    """
+    from scipy.io import loadmat, whosmat
+
+    refuse_growth(path, sum(8.0 * math.prod(shape) for _, shape, _ in whosmat(path)))
+    return loadmat(path, simplify_cells=True)
 
 
 def _readable(variables: dict[str, Any]) -> bool:

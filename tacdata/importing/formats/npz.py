@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth, zipped_size
 
 LONG = 10
 """A lone array whose second axis is longer by this factor than its first has time along it [1]."""
@@ -25,6 +25,7 @@ class Npz(SourceFormat):
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the arrays; nothing pickled is ever loaded. See the base."""
+        refuse_growth(path, zipped_size(path))
         # numpy leaves a damaged archive open that it opened itself.
         with path.open("rb") as stream:
             try:

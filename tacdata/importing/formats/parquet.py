@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth
 
 
 class Parquet(SourceFormat):
@@ -21,7 +21,12 @@ class Parquet(SourceFormat):
         import pyarrow as pa
         from pyarrow import feather, parquet
 
-        table = feather.read_table(path) if path.suffix == ".feather" else parquet.ParquetFile(path).read()
+        if path.suffix == ".feather":
+            table = feather.read_table(path)
+        else:
+            file = parquet.ParquetFile(path)
+            refuse_growth(path, 8.0 * file.metadata.num_rows * file.metadata.num_columns)
+            table = file.read()
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
         names = [str(name) for name in table.column_names]

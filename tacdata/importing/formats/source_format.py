@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import re
 import traceback
+import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,6 +27,8 @@ INNER = re.compile(r"(.+)\[(\d+)\]")
 ROOM, BASE = "tacdata.importing.formats", "source_format"
 LONGEST = 300
 """Letters of a library's words that an error repeats."""
+LARGEST, DENSEST = 256 * 1024 * 1024, 100
+"""Bytes that a file may become when it is read [byte], and how often its own size it may become beyond them [1]."""
 MAGIC = {
     b"\x1f\x8b": "gzip (.gz)",
     b"PK\x03\x04": "a zip archive (such as .zip, .npz or .xlsx)",
@@ -137,6 +140,35 @@ def _kind(path: Path, options: dict[str, Any]) -> tuple[SourceFormat, str]:
     name = options.get("format") or _by_ending(path)
     kind: type[Any] = registry.load(ROOM, BASE, name, SourceFormat)
     return kind(), name
+
+
+def refuse_growth(path: Path, size: float, largest: int = LARGEST) -> None:
+    """Refuse a file that is small on the disk and would fill the memory.
+
+    Args:
+        path: A file, or a folder that counts as one.
+        size: Size of its content once it is read [byte].
+        largest: Size that is always read [byte].
+
+    Raises:
+        FormatError: With both sizes.
+    """
+    files = [path] if path.is_file() else [inside for inside in path.rglob("*") if inside.is_file()]
+    packed = sum(inside.stat().st_size for inside in files)
+    if size > max(largest, DENSEST * packed):
+        raise FormatError(
+            f"{path} of {packed / 1e6:,.1f} MB grows to {size / 1e6:,.0f} MB when it is read",
+            f"at most {DENSEST} times its size, or {largest / 1e6:,.0f} MB",
+            "if it is what you recorded, save it without compression, or in parts",
+        )
+
+
+def zipped_size(path: Path) -> int:
+    """Return the size of a zip archive's content as its directory states it [byte]; 0 for another file."""
+    if not zipfile.is_zipfile(path):
+        return 0
+    with zipfile.ZipFile(path) as archive:
+        return sum(entry.file_size for entry in archive.infolist())
 
 
 def kind_of_bytes(data: bytes) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.csv import table_of
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth, zipped_size
 
 TABS = {"delimiter": "tab", "decimal": "."}
 MERGED = re.compile(rb'<(?:\w+:)?mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
@@ -25,6 +25,8 @@ NUMBERED = re.compile(rb'\br="(\d+)"')
 """How a sheet marks merged ranges, hidden rows and the number of a row."""
 MOST_MARKED = 300_000_000
 """Largest sheet whose marks are read [byte]."""
+LARGEST_SHEETS = 32 * 1024 * 1024
+"""Size of sheets that are always read [byte]; larger ones may be compressed as far as real ones are."""
 HEAD = 60
 """Rows of a sheet that tell whether it holds numbers."""
 
@@ -38,6 +40,7 @@ class Xlsx(SourceFormat):
         """Return the sheets whose first rows hold numbers, if there are several; see the base."""
         from openpyxl import load_workbook
 
+        refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
         book, found = load_workbook(path, read_only=True, data_only=True), []
         try:
             for sheet in [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]:
@@ -53,6 +56,7 @@ class Xlsx(SourceFormat):
         """Read a sheet; dates come as ISO 8601. See the base."""
         from openpyxl import load_workbook
 
+        refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
         book = load_workbook(path, read_only=True, data_only=True)
         try:
             if (wanted := options.get("table")) and wanted not in book.sheetnames:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import rows_of
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth
 
 DESCRIBED = (".zarray", ".zattrs", ".zgroup", "zarr.json")
 """Files that hold no chunk."""
@@ -47,6 +48,7 @@ class Zarr(SourceFormat):
                 shape = " x ".join(map(str, found.shape[1:]))
                 notes.append(f"{path.name}: {name} of {shape} values a row is left out")
                 continue
+            refuse_growth(path, float(math.prod(found.shape)) * found.dtype.itemsize)
             _refuse_cut_chunks(folder)
             values = np.asarray(found[:])
             if found.nchunks > found.nchunks_initialized:

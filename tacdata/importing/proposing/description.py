@@ -12,7 +12,7 @@ from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
 from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
 from tacdata.importing.proposing.roles import is_whole, roles_of
-from tacdata.importing.source_files import files_below, is_one
+from tacdata.importing.source_files import check_source, files_below, is_one
 
 SHOWN = 30
 """Columns that are listed per file."""
@@ -41,8 +41,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     Raises:
         UsageError: If nothing there can be read.
     """
-    if not source.exists():
-        raise UsageError(f"no file or folder {source}", "measured data", "check the path")
+    check_source(source)
     paths = [source] if is_one(source) else files_below(source)
     found: dict[str, FoundKind] = {}
     refused = []
