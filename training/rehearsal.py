@@ -52,14 +52,14 @@ class Rehearsal:
         source = create(network.name, frames.sensor, network.arguments).to(place)
         source.set_normalization(network.get_buffer("mean").cpu().numpy(), network.get_buffer("sd").cpu().numpy())
         if network.is_calibrated:
-            known = pretrained.calibration if pretrained else None
-            known = known or calibrate(frames, tuple(span.number for span in frames.episodes))
-            source.set_calibration(known.gain, known.exponent, known.mixing)
+            calibration = pretrained.calibration if pretrained else None
+            calibration = calibration or calibrate(frames, tuple(span.number for span in frames.episodes))
+            source.set_calibration(calibration.gain, calibration.exponent, calibration.mixing)
         settings = pretrained.settings if pretrained else TrainingSettings()
         self._source, self._varied = source, Variation(source, frames.sensor, settings)
 
     def batch(self, size: int) -> tuple[torch.Tensor, torch.Tensor]:
         """Return signals [counts or N], (size, T, taxels), and labels over D_max, (size, pixels_x, pixels_y)."""
-        chosen = self._usable[torch.randint(len(self._usable), (size,))]
-        label = normalized(self._depth[chosen.to(self._depth.device)].to(self._place).float(), self._depth_max)
-        return self._varied(self._source.calibrated(self._windows.batch(chosen.to(self._place))), label)
+        indices = self._usable[torch.randint(len(self._usable), (size,))]
+        label = normalized(self._depth[indices.to(self._depth.device)].to(self._place).float(), self._depth_max)
+        return self._varied(self._source.calibrated(self._windows.batch(indices.to(self._place))), label)

@@ -76,8 +76,8 @@ class ChannelCalibration:
 
     def force(self, counts: np.ndarray) -> np.ndarray:
         """Return forces [N] of tared readings [counts], shapes (n, taxels)."""
-        own = _power(counts, self.exponent) * self.gain
-        return own if self.mixing is None else own @ self.mixing.T
+        force = _power(counts, self.exponent) * self.gain
+        return force if self.mixing is None else force @ self.mixing.T
 
     @property
     def document(self) -> dict[str, Any]:
@@ -128,11 +128,11 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
         )
     presses = []
     for span in frames.spans(episodes):
-        here = np.arange(span.start, span.stop)
+        indices = np.arange(span.start, span.stop)
         force = np.asarray(frames.taxel_force[span.start : span.stop], float)
-        kept = here[frames.valid[span.start : span.stop] & (np.abs(force).max(axis=1) > 0)]
-        if len(kept):
-            presses.append((np.asarray(frames.taxels[kept], float), np.asarray(frames.taxel_force[kept], float)))
+        loaded = indices[frames.valid[span.start : span.stop] & (np.abs(force).max(axis=1) > 0)]
+        if len(loaded):
+            presses.append((np.asarray(frames.taxels[loaded], float), np.asarray(frames.taxel_force[loaded], float)))
     if not presses and not frames.sensor.skin.protrusion_radius:
         raise UsageError(
             f"{frames.origin} is of {frames.sensor.name}, a flat skin: the model knows no force on its taxels",
@@ -209,7 +209,7 @@ def _spread(presses: list[tuple[np.ndarray, np.ndarray]], taxels: Taxels, expone
     Gains are fitted to forces without spreading, the variance to the residual of the spread forces. The exponent
     stays that without spreading: a joint fit would trade a steeper law for a wider skin.
     """
-    change, variance, before = laplacian(taxels) / 2, 0.0, 0.0
+    change, variance, previous = laplacian(taxels) / 2, 0.0, 0.0
     product, square = np.zeros(len(presses)), np.zeros(len(presses))
     if len(presses) == 1:  # its place errs as much as a skin differs
         return 0.0, FARTHEST
@@ -220,9 +220,9 @@ def _spread(presses: list[tuple[np.ndarray, np.ndarray]], taxels: Taxels, expone
             spread = (_power(counts, exponent) * gain) @ mixing.T
             slope = spread @ change
             product[k], square[k] = (slope * (force - spread)).mean(), (slope * slope).mean()
-        before = variance
-        variance = float(np.clip(before + product.sum() / max(square.sum(), 1e-300), -FARTHEST, FARTHEST))
-    left_out = before + (product.sum() - product) / np.maximum(square.sum() - square, 1e-300)
+        previous = variance
+        variance = float(np.clip(previous + product.sum() / max(square.sum(), 1e-300), -FARTHEST, FARTHEST))
+    left_out = previous + (product.sum() - product) / np.maximum(square.sum() - square, 1e-300)
     return variance, _jackknifed(left_out)
 
 
@@ -271,9 +271,9 @@ def _fitted(sums: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
     exponent = EXPONENTS[best]
     if 0 < best < len(EXPONENTS) - 1:
         # The vertex of the parabola through the best exponent and its neighbours.
-        below, here, above = loss[best - 1 : best + 2]
-        exponent += 0.5 * (EXPONENTS[1] - EXPONENTS[0]) * (below - above) / max(below - 2 * here + above, 1e-300)
-    at = [np.array([np.interp(exponent, EXPONENTS, one) for one in values.T]) for values in (gains, errors)]
+        below, center, above = loss[best - 1 : best + 2]
+        exponent += 0.5 * (EXPONENTS[1] - EXPONENTS[0]) * (below - above) / max(below - 2 * center + above, 1e-300)
+    at = [np.array([np.interp(exponent, EXPONENTS, value) for value in values.T]) for values in (gains, errors)]
     return at[0], at[1], float(exponent)
 
 
@@ -290,23 +290,23 @@ def _shrunk(square: np.ndarray, product: np.ndarray) -> tuple[np.ndarray, np.nda
     """
     weight = square.sum(axis=0)
     mean = product.sum() / weight.sum()
-    own = np.divide(product, square, out=np.full_like(square, mean), where=square > 0)
-    gain = np.divide((square * own).sum(axis=0), weight, out=np.full(len(weight), mean), where=weight > 0)
-    alone = np.divide((square**2).sum(axis=0), weight, out=np.zeros_like(weight), where=weight > 0)
-    free = (weight - alone).sum()
+    channel_gain = np.divide(product, square, out=np.full_like(square, mean), where=square > 0)
+    gain = np.divide((square * channel_gain).sum(axis=0), weight, out=np.full(len(weight), mean), where=weight > 0)
+    concentration = np.divide((square**2).sum(axis=0), weight, out=np.zeros_like(weight), where=weight > 0)
+    degrees_of_freedom = (weight - concentration).sum()
     # Where each channel was touched by one press alone, nothing tells how far two presses disagree.
-    several = free > 1e-9 * weight.sum()
-    within = (square * (own - gain) ** 2).sum() / free if several else np.inf
+    several = degrees_of_freedom > 1e-9 * weight.sum()
+    within = (square * (channel_gain - gain) ** 2).sum() / degrees_of_freedom if several else np.inf
     # Of how many equal presses a channel's estimate is worth, and how much they tell.
-    count = np.divide(weight, alone, out=np.zeros_like(weight), where=alone > 0)
+    count = np.divide(weight, concentration, out=np.zeros_like(weight), where=concentration > 0)
     precision = count / within if within > 0 else np.where(count > 0, 1e300, 0.0)
     sampling = np.divide(1.0, precision, out=np.zeros_like(weight), where=precision > 0)
-    over = (weight * ((gain - mean) ** 2 - sampling)).sum() / weight.sum()
-    between = max(float(over), 0.0) if several else 0.0
-    kept = between * precision / (1.0 + between * precision)
+    excess = (weight * ((gain - mean) ** 2 - sampling)).sum() / weight.sum()
+    between = max(float(excess), 0.0) if several else 0.0
+    reliability = between * precision / (1.0 + between * precision)
     # The statement of the error allows a spread that few presses cannot tell.
     error = np.sqrt(1.0 / (1.0 / max(between, (SPREAD * mean) ** 2) + precision))
-    return mean + kept * (gain - mean), error
+    return mean + reliability * (gain - mean), error
 
 
 def _check_order(presses: list[tuple[np.ndarray, np.ndarray]], origin: str) -> None:
@@ -317,15 +317,15 @@ def _check_order(presses: list[tuple[np.ndarray, np.ndarray]], origin: str) -> N
     """
     counts, force = (np.concatenate([press[k] for press in presses]) for k in (0, 1))
     with np.errstate(invalid="ignore", divide="ignore"):
-        both = np.nan_to_num(np.corrcoef(counts.T, force.T))
-    across = both[: counts.shape[1], counts.shape[1] :]
-    own = np.diag(across)
-    for k in range(len(own)):
-        j = int(across[k].argmax())
-        if j > k and across[k, j] > own[k] + _SWAPPED and across[j, k] > own[j] + _SWAPPED:
+        correlation = np.nan_to_num(np.corrcoef(counts.T, force.T))
+    crossed = correlation[: counts.shape[1], counts.shape[1] :]
+    diagonal = np.diag(crossed)
+    for k in range(len(diagonal)):
+        j = int(crossed[k].argmax())
+        if j > k and crossed[k, j] > diagonal[k] + _SWAPPED and crossed[j, k] > diagonal[j] + _SWAPPED:
             raise UsageError(
                 f"{origin}: channel {k} reads what channel {j} should, and channel {j} what channel {k} should "
-                f"(correlation with the model's forces {across[k, j]:.2f} and {across[j, k]:.2f})",
+                f"(correlation with the model's forces {crossed[k, j]:.2f} and {crossed[j, k]:.2f})",
                 "channels in the order of the sensor file",
                 "correct the wiring or the order, and record again",
             )

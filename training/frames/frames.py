@@ -118,16 +118,16 @@ class Frames:
         Raises:
             FormatError: If one of them is not in the dataset.
         """
-        known = {e.number for e in self.episodes}
-        missing = sorted(set(numbers) - known)
+        present = {e.number for e in self.episodes}
+        missing = sorted(set(numbers) - present)
         if missing:
             raise FormatError(
                 f"{self.origin} lacks episodes {missing}",
                 "every episode of the split",
                 "use the dataset that the network was trained on",
             )
-        wanted = set(numbers)
-        return tuple(e for e in self.episodes if e.number in wanted)
+        requested = set(numbers)
+        return tuple(e for e in self.episodes if e.number in requested)
 
     def indices(self, numbers: tuple[int, ...]) -> np.ndarray:
         """Return the valid frames of the given episodes, ascending, shape (m,), int64.
@@ -138,11 +138,11 @@ class Frames:
         inside = np.zeros(len(self.taxels), dtype=bool)
         for span in self.spans(numbers):
             inside[span.start : span.stop] = True
-        found = np.flatnonzero(inside & self.valid)
-        if not len(found):
+        indices = np.flatnonzero(inside & self.valid)
+        if not len(indices):
             raise FormatError(
                 f"{self.origin}: none of {inside.sum()} frames of episodes {list(numbers)} is valid",
                 "at least one valid frame",
                 "record these episodes again, or leave them out",
             )
-        return found
+        return indices

@@ -33,9 +33,9 @@ def at_full_depth(frames: Frames, span: EpisodeSpan) -> np.ndarray:
 
     These are the frames of the hold; where a press has none, those within 0.01 mm of the deepest.
     """
-    here = slice(span.start, span.stop)
-    valid, tip = frames.valid[here], frames.tip[here, 2]
-    full = valid & (frames.phase[here] == PHASES.index("hold"))
+    frame_slice = slice(span.start, span.stop)
+    valid, tip = frames.valid[frame_slice], frames.tip[frame_slice, 2]
+    full = valid & (frames.phase[frame_slice] == PHASES.index("hold"))
     return full if full.any() else valid & (tip >= tip.max() - 0.01)
 
 
@@ -45,26 +45,26 @@ def trials(frames: Frames, purpose: str) -> tuple[PressTrial, ...]:
     Presses into the air and presses without a valid frame at full depth are left out.
     """
     named = any(span.purpose for span in frames.episodes)
-    chosen = [span for span in frames.episodes if span.depth > 0 and (span.purpose == purpose or not named)]
-    found = []
-    for span in chosen:
+    spans = [span for span in frames.episodes if span.depth > 0 and (span.purpose == purpose or not named)]
+    results = []
+    for span in spans:
         full = span.start + np.flatnonzero(at_full_depth(frames, span))
         if len(full):
             label = np.clip(frames.depth[full], 0.0, frames.sensor.map.depth_max).mean(axis=0)
-            found.append(PressTrial(span, frames.tip[full].mean(axis=0), label, full))
-    return tuple(found)
+            results.append(PressTrial(span, frames.tip[full].mean(axis=0), label, full))
+    return tuple(results)
 
 
-def some(found: tuple[PressTrial, ...], purpose: str, origin: str) -> tuple[PressTrial, ...]:
+def some(candidates: tuple[PressTrial, ...], purpose: str, origin: str) -> tuple[PressTrial, ...]:
     """Return trials, of which there must be one.
 
     Raises:
         UsageError: If there is none.
     """
-    if not found:
+    if not candidates:
         raise UsageError(
             f"{origin} holds no {purpose}",
             f"presses whose purpose in the plan is {purpose!r}",
             "record such a plan (`tacdata plan evaluation` writes depth and position trials)",
         )
-    return found
+    return candidates

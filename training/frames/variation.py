@@ -52,8 +52,8 @@ class Variation:
         standard = signals if self.calibrated else (signals - self.mean) / self.sd
         way = torch.randint(4, (len(signals),), device=signals.device)
         order = torch.stack(self.orders)[way]
-        turned = standard.gather(2, order[:, None, :].expand(-1, signals.shape[1], -1))
+        mirrored = standard.gather(2, order[:, None, :].expand(-1, signals.shape[1], -1))
         x, y = (way % 2 == 1)[:, None, None], (way >= 2)[:, None, None]
         label = torch.where(x, label.flip(1), label)
-        turned = turned if self.calibrated else turned * self.sd + self.mean
-        return turned, torch.where(y, label.flip(2), label)
+        mirrored = mirrored if self.calibrated else mirrored * self.sd + self.mean
+        return mirrored, torch.where(y, label.flip(2), label)

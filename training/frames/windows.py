@@ -30,8 +30,8 @@ class Windows:
 
     def index(self, frames: torch.Tensor) -> torch.Tensor:
         """Return the frame numbers of the windows around ``frames``, shapes (b,) -> (b, T), int64."""
-        wanted = frames[:, None] + self.offsets
-        return torch.minimum(torch.maximum(wanted, self.first[frames, None]), self.last[frames, None])
+        indices = frames[:, None] + self.offsets
+        return torch.minimum(torch.maximum(indices, self.first[frames, None]), self.last[frames, None])
 
     def batch(self, frames: torch.Tensor) -> torch.Tensor:
         """Return the windows around ``frames`` [counts], shapes (b,) -> (b, T, taxels), float32."""

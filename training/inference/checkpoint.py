@@ -57,8 +57,8 @@ class Checkpoint:
     @property
     def calibration(self) -> ChannelCalibration | None:
         """How it turns readings into forces; None if it takes readings as they are."""
-        found = self.document.get("calibration")
-        return ChannelCalibration.from_document(found, self.sensor.taxels) if found else None
+        document = self.document.get("calibration")
+        return ChannelCalibration.from_document(document, self.sensor.taxels) if document else None
 
     @property
     def content_hash(self) -> str:
@@ -146,8 +146,8 @@ def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
         )
     network.set_normalization(mean, sd)
     if calibration := document.get("calibration"):
-        known = ChannelCalibration.from_document(calibration, sensor.taxels)
-        network.set_calibration(known.gain, known.exponent, known.mixing)
+        channel_calibration = ChannelCalibration.from_document(calibration, sensor.taxels)
+        network.set_calibration(channel_calibration.gain, channel_calibration.exponent, channel_calibration.mixing)
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
     return Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
 
@@ -174,12 +174,12 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
         ) from None
 
 
-def _differences(trained: Sensor, given: Sensor) -> str:
-    ours, theirs = trained.document, given.document
-    found = [
+def _differences(trained: Sensor, sensor: Sensor) -> str:
+    ours, theirs = trained.document, sensor.document
+    differences = [
         f"{part}/{key} {value} against {theirs[part].get(key)}"
         for part in ("taxels", "skin", "material", "contact", "map")
         for key, value in ours[part].items()
         if theirs[part].get(key) != value
     ]
-    return "; ".join(found[:3])
+    return "; ".join(differences[:3])

@@ -36,7 +36,7 @@ def reproducible(threads: int | None = None) -> Iterator[None]:
     Args:
         threads: CPU threads; by default one for each core that this process may use, at most `THREADS`.
     """
-    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    previous = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     # cuBLAS is deterministic only with a workspace of fixed size (cuBLAS manual, "Results reproducibility").
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     torch.set_num_threads(threads or min(len(os.sched_getaffinity(0)), THREADS))
@@ -44,5 +44,5 @@ def reproducible(threads: int | None = None) -> Iterator[None]:
     try:
         yield
     finally:
-        torch.set_num_threads(before[0])
-        torch.use_deterministic_algorithms(before[1])
+        torch.set_num_threads(previous[0])
+        torch.use_deterministic_algorithms(previous[1])

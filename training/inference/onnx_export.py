@@ -66,18 +66,18 @@ def export(trained: Checkpoint, path: Path, windows: np.ndarray | None = None) -
         raise UsageError(f"{path} exists", "a new file; nothing is overwritten", "choose another name")
     onnx, runtime = _packages()
     network = trained.network.to("cpu").eval()
-    given = random_windows(trained) if windows is None else np.ascontiguousarray(windows, np.float32)
+    inputs = random_windows(trained) if windows is None else np.ascontiguousarray(windows, np.float32)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     os.close(handle)
     try:
-        _write(onnx, trained, DepthNetwork(trained).eval(), torch.from_numpy(given[:2]), temporary)
+        _write(onnx, trained, DepthNetwork(trained).eval(), torch.from_numpy(inputs[:2]), temporary)
         session = runtime.InferenceSession(temporary, providers=["CPUExecutionProvider"])
         with torch.inference_mode():
-            wanted = DepthNetwork(trained).eval()(torch.from_numpy(given)).numpy()
-        whole = session.run(None, {"windows": given})[0]
-        single = np.concatenate([session.run(None, {"windows": one[None]})[0] for one in given[:16]])
-        difference = float(max(np.abs(whole - wanted).max(), np.abs(single - wanted[:16]).max()))
+            reference = DepthNetwork(trained).eval()(torch.from_numpy(inputs)).numpy()
+        batch_output = session.run(None, {"windows": inputs})[0]
+        single = np.concatenate([session.run(None, {"windows": window[None]})[0] for window in inputs[:16]])
+        difference = float(max(np.abs(batch_output - reference).max(), np.abs(single - reference[:16]).max()))
         if not difference <= TOLERANCE:
             raise FormatError(
                 f"the exported {network.name} differs from torch by {difference:.2g} mm",
@@ -88,7 +88,7 @@ def export(trained: Checkpoint, path: Path, windows: np.ndarray | None = None) -
         os.replace(temporary, path)
     finally:
         Path(temporary).unlink(missing_ok=True)
-    return Exported(path, difference, len(given))
+    return Exported(path, difference, len(inputs))
 
 
 def random_windows(trained: Checkpoint, count: int = 64, seed: int = 0) -> np.ndarray:
@@ -122,7 +122,7 @@ def _write(onnx: Any, trained: Checkpoint, estimator: DepthNetwork, example: tor
         )
     model = onnx.load(path)
     onnx.checker.check_model(model)
-    told = {
+    metadata = {
         "checkpoint": trained.content_hash,
         "network": trained.network.name,
         "offsets": list(trained.network.offsets),
@@ -132,5 +132,5 @@ def _write(onnx: Any, trained: Checkpoint, estimator: DepthNetwork, example: tor
         "depth": "[mm], (frames, pixels_x, pixels_y)",
     }
     entry = model.metadata_props.add()
-    entry.key, entry.value = KEY, json.dumps(told)
+    entry.key, entry.value = KEY, json.dumps(metadata)
     onnx.save(model, path)

@@ -25,8 +25,8 @@ def predict(network: Network, windows: Windows, frames: np.ndarray, depth_max: f
     device = windows.taxels.device
     result = np.empty((len(frames), *network.map_shape), dtype=np.float32)
     for start in range(0, len(frames), BATCH):
-        chosen = torch.as_tensor(frames[start : start + BATCH]).to(device)
-        maps = network(windows.batch(chosen)).clamp(0.0, 1.0) * depth_max
+        batch = torch.as_tensor(frames[start : start + BATCH]).to(device)
+        maps = network(windows.batch(batch)).clamp(0.0, 1.0) * depth_max
         result[start : start + BATCH] = maps.cpu().numpy()
     return result
 

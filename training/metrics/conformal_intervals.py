@@ -125,17 +125,17 @@ def calibrate(
     if len(maps) < 2:
         raise UsageError(f"{len(maps)} validation episodes", "two or more, to calibrate intervals", "record more")
     parts = np.arange(len(maps)) % min(len(maps), _PARTS)
-    own = [_sums(depth, label, pitch) for depth, label in zip(maps, labels, strict=True)]
+    episode_sums = [_sums(depth, label, pitch) for depth, label in zip(maps, labels, strict=True)]
     sums = [
-        np.sum([one for one, at in zip(own, parts, strict=True) if at == part], axis=0)
+        np.sum([episode_sum for episode_sum, at in zip(episode_sums, parts, strict=True) if at == part], axis=0)
         for part in range(parts.max() + 1)
     ]
-    whole = np.sum(sums, axis=0)
-    deviation, quotients = _filled(*whole), []
+    total = np.sum(sums, axis=0)
+    deviation, quotients = _filled(*total), []
     for depth, label, part in zip(maps, labels, parts, strict=True):
-        others = ConformalIntervals(_filled(*(whole - sums[part])), (), checkpoint)
-        chosen = _interesting(depth, label)
-        quotients.append(np.abs(depth - label)[chosen] / others.sigma(depth, pitch)[chosen])
+        remaining = ConformalIntervals(_filled(*(total - sums[part])), (), checkpoint)
+        mask = _interesting(depth, label)
+        quotients.append(np.abs(depth - label)[mask] / remaining.sigma(depth, pitch)[mask])
     together = np.concatenate(quotients)
     if not len(together):
         # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
@@ -164,12 +164,12 @@ def reliability(
     """
     inside, width, total = np.zeros(len(LEVELS)), np.zeros(len(LEVELS)), 0
     for depth, label in zip(maps, labels, strict=True):
-        chosen = _interesting(depth, label)
-        sigma, error = intervals.sigma(depth, pitch)[chosen], np.abs(depth - label)[chosen]
+        mask = _interesting(depth, label)
+        sigma, error = intervals.sigma(depth, pitch)[mask], np.abs(depth - label)[mask]
         for k, factor in enumerate(intervals.factors):
             inside[k] += (error <= factor * sigma).sum()
             width[k] += (2 * factor * sigma).sum()
-        total += int(chosen.sum())
+        total += int(mask.sum())
     return [
         {
             "level": level,
@@ -197,9 +197,9 @@ def read(run: Path, checkpoint: str) -> ConformalIntervals | None:
         return None
     document = documents.read(path, "spread")
     deviation = np.array(document["deviation"])
-    wanted = (len(DEPTHS) + 1, len(SLOPES) + 1)
+    shape = (len(DEPTHS) + 1, len(SLOPES) + 1)
     same = (tuple(document[k]) for k in ("depths", "slopes", "levels"))
-    if deviation.shape != wanted or tuple(same) != (DEPTHS, SLOPES, LEVELS):
+    if deviation.shape != shape or tuple(same) != (DEPTHS, SLOPES, LEVELS):
         raise FormatError(f"{path}: cells of another release", "cells of this release", "remove it and train again")
     if document["checkpoint"] != checkpoint:
         return None
@@ -216,10 +216,10 @@ def _interesting(depth: np.ndarray, label: np.ndarray) -> np.ndarray:
 def _filled(square: np.ndarray, count: np.ndarray) -> np.ndarray:
     rows = square.sum(axis=1, keepdims=True) / np.maximum(count.sum(axis=1, keepdims=True), 1)
     enough = count.sum(axis=1) >= LEAST
-    known = np.flatnonzero(enough)
-    if not len(known):
+    occupied = np.flatnonzero(enough)
+    if not len(occupied):
         rows[:] = square.sum() / max(count.sum(), 1)
-    for k in np.flatnonzero(~enough) if len(known) else ():
-        rows[k] = rows[known[np.argmin(np.abs(known - k))]]
-    own = square / np.maximum(count, 1)
-    return np.sqrt(np.where(count >= LEAST, own, np.broadcast_to(rows, count.shape))).clip(FLOOR)
+    for k in np.flatnonzero(~enough) if len(occupied) else ():
+        rows[k] = rows[occupied[np.argmin(np.abs(occupied - k))]]
+    mean_square = square / np.maximum(count, 1)
+    return np.sqrt(np.where(count >= LEAST, mean_square, np.broadcast_to(rows, count.shape))).clip(FLOOR)

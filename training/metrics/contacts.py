@@ -141,11 +141,11 @@ def elongation(depth: np.ndarray, inside: np.ndarray) -> float:
 def _centroids(depth: np.ndarray, owner: np.ndarray) -> np.ndarray:
     i, j = np.nonzero(owner >= 0)
     where, weight = owner[i, j], depth[i, j].astype(np.float64)
-    kept, where = np.unique(where, return_inverse=True)
-    top = np.zeros(len(kept))
+    labels, where = np.unique(where, return_inverse=True)
+    top = np.zeros(len(labels))
     np.maximum.at(top, where, weight)
-    moments = np.column_stack([np.bincount(where, weight * axis, len(kept)) for axis in (i, j)])
-    return (moments / np.bincount(where, weight, len(kept))[:, None])[np.argsort(-top, kind="stable")]
+    moments = np.column_stack([np.bincount(where, weight * axis, len(labels)) for axis in (i, j)])
+    return (moments / np.bincount(where, weight, len(labels))[:, None])[np.argsort(-top, kind="stable")]
 
 
 def hills(
@@ -188,11 +188,11 @@ def hills(
             tops.append(height)
             continue
         flooded[pixel] = flooded[max(higher, key=values.__getitem__)]
-        beside = {standing(flooded[other]) for other in higher}
-        highest = min(beside)  # hills are numbered from the deepest
-        for hill in beside - {highest}:
+        neighbours = {standing(flooded[neighbour]) for neighbour in higher}
+        highest = min(neighbours)  # hills are numbered from the deepest
+        for hill in neighbours - {highest}:
             if tops[hill] - height < max(prominence * tops[hill], least):
                 joined[hill] = highest
-    found = np.array([standing(hill) if hill >= 0 else -1 for hill in flooded])
-    _, numbered = np.unique(np.append(found, -1), return_inverse=True)
+    assigned = np.array([standing(hill) if hill >= 0 else -1 for hill in flooded])
+    _, numbered = np.unique(np.append(assigned, -1), return_inverse=True)
     return (numbered[:-1] - 1).reshape(rows + 2, width)[1:-1, 1:-1]

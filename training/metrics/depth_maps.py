@@ -39,9 +39,9 @@ class FrameScores:
     predicted: np.ndarray
     """The prediction has contact [bool], shape (n,)."""
 
-    def where(self, chosen: np.ndarray) -> FrameScores:
-        """Return the scores of the frames that ``chosen`` picks (mask or indices)."""
-        return FrameScores(*(getattr(self, f.name)[chosen] for f in fields(self)))
+    def where(self, mask: np.ndarray) -> FrameScores:
+        """Return the scores of the frames that ``mask`` picks (mask or indices)."""
+        return FrameScores(*(getattr(self, f.name)[mask] for f in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -119,11 +119,11 @@ def centroid(depth: np.ndarray, threshold: float, weighted: bool = True) -> np.n
 
 def summarize(values: np.ndarray) -> MetricSummary:
     """Summarize a metric, shape (n,); frames where it is NaN are left out and counted."""
-    kept = values[np.isfinite(values)]
-    left_out = len(values) - len(kept)
-    if not len(kept):
+    finite = values[np.isfinite(values)]
+    left_out = len(values) - len(finite)
+    if not len(finite):
         return MetricSummary(None, None, None, None, 0, left_out)
-    sd = float(kept.std(ddof=1)) if len(kept) > 1 else None
+    sd = float(finite.std(ddof=1)) if len(finite) > 1 else None
     return MetricSummary(
-        float(np.median(kept)), float(np.percentile(kept, 90)), float(kept.mean()), sd, len(kept), left_out
+        float(np.median(finite)), float(np.percentile(finite, 90)), float(finite.mean()), sd, len(finite), left_out
     )

@@ -81,17 +81,17 @@ def gathered(
     pressed = np.array([n for n in validated if frames.depth[n].max() > CONTACT_THRESHOLD], int)
     if len(pressed) < FEWEST or not len(learned):
         return None
-    known = frames.taxels[learned[:: -(-len(learned) // LOOKED_AT)]].astype(np.float64)
+    readings = frames.taxels[learned[:: -(-len(learned) // LOOKED_AT)]].astype(np.float64)
     if mirror:
-        known = np.concatenate(_mirrored(known, frames.sensor.taxels.rows, frames.sensor.taxels.columns))
-    chosen = np.round(known[_covering(_root(known))], 1)
-    far = float(np.quantile(_nearest(_root(frames.taxels[pressed]), _root(chosen)), SHARE))
-    return TrainingReadings(chosen, max(far, 1e-6), checkpoint)
+        readings = np.concatenate(_mirrored(readings, frames.sensor.taxels.rows, frames.sensor.taxels.columns))
+    representatives = np.round(readings[_covering(_root(readings))], 1)
+    far = float(np.quantile(_nearest(_root(frames.taxels[pressed]), _root(representatives)), SHARE))
+    return TrainingReadings(representatives, max(far, 1e-6), checkpoint)
 
 
-def write(run: Path, known: TrainingReadings) -> None:
+def write(run: Path, readings: TrainingReadings) -> None:
     """Write RUN/seen.json; an older one is replaced, as it belongs to an older checkpoint."""
-    documents.write(run / FILE, known.document, "seen")
+    documents.write(run / FILE, readings.document, "seen")
 
 
 def read(run: Path, checkpoint: str) -> TrainingReadings | None:
@@ -113,24 +113,24 @@ def _root(taxels: np.ndarray) -> np.ndarray:
     return np.sign(values) * np.sqrt(np.abs(values))
 
 
-def _nearest(points: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _nearest(points: np.ndarray, readings: np.ndarray) -> np.ndarray:
     """Return the distance of each point, shape (m, d), from the nearest known one, shape (k, d)."""
-    found = np.empty(len(points))
-    squares = (known**2).sum(axis=1)
+    distances = np.empty(len(points))
+    squares = (readings**2).sum(axis=1)
     for start in range(0, len(points), BLOCK):
         block = points[start : start + BLOCK]
-        square = (block**2).sum(axis=1)[:, None] + squares - 2 * block @ known.T
-        found[start : start + BLOCK] = np.sqrt(np.maximum(square.min(axis=1), 0.0))
-    return found
+        square = (block**2).sum(axis=1)[:, None] + squares - 2 * block @ readings.T
+        distances[start : start + BLOCK] = np.sqrt(np.maximum(square.min(axis=1), 0.0))
+    return distances
 
 
 def _covering(points: np.ndarray) -> np.ndarray:
     """Return the rows of at most `KEPT` points, shape (n, d), each the farthest from those before it."""
-    chosen, distance = [0], np.full(len(points), np.inf)
-    while len(chosen) < min(KEPT, len(points)):
-        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
-        chosen.append(int(distance.argmax()))
-    return np.array(chosen)
+    selection, distance = [0], np.full(len(points), np.inf)
+    while len(selection) < min(KEPT, len(points)):
+        distance = np.minimum(distance, ((points - points[selection[-1]]) ** 2).sum(axis=1))
+        selection.append(int(distance.argmax()))
+    return np.array(selection)
 
 
 def _mirrored(taxels: np.ndarray, rows: int, columns: int) -> list[np.ndarray]:

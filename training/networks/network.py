@@ -77,8 +77,8 @@ class Network(nn.Module, ABC):
         if not self.is_calibrated:
             return windows
         size = (windows.abs() / CALIBRATION_UNIT).clamp(min=1e-9)
-        own = self.get_buffer("gain") * torch.sign(windows) * size.pow(self.get_buffer("exponent"))
-        return own @ self.get_buffer("mixing").T
+        force = self.get_buffer("gain") * torch.sign(windows) * size.pow(self.get_buffer("exponent"))
+        return force @ self.get_buffer("mixing").T
 
     def respond(self, signals: torch.Tensor) -> torch.Tensor:
         """Return maps over D_max from the output of `calibrated`; (b, T, taxels) -> (b, pixels_x, pixels_y)."""

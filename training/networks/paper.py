@@ -62,5 +62,5 @@ class Paper(Network):
 
 def _crop(maps: torch.Tensor, shape: tuple[int, int]) -> torch.Tensor:
     """Cut maps (b, c, h, w) about their centre to ``shape``; an odd surplus goes off the far end."""
-    top, left = (maps.shape[2] - shape[0]) // 2, (maps.shape[3] - shape[1]) // 2
-    return maps[:, :, top : top + shape[0], left : left + shape[1]]
+    top, start = (maps.shape[2] - shape[0]) // 2, (maps.shape[3] - shape[1]) // 2
+    return maps[:, :, top : top + shape[0], start : start + shape[1]]

@@ -114,8 +114,8 @@ def learning_curve(
             "leave --simulated out, or name a pretrained network by --from",
         )
     parents |= {"simulated": simulated.dataset_hash} if simulated else {}
-    held = divide(frames, split, seeds[0])
-    pool = tuple(sorted({*held.train, *held.validation}))
+    held_out = divide(frames, split, seeds[0])
+    pool = tuple(sorted({*held_out.train, *held_out.validation}))
     possible = [count for count in presses if count <= len(pool) and count != 1 and (count or pretrained)]
     if not possible:
         raise UsageError(
@@ -123,20 +123,20 @@ def learning_curve(
             f"{'0, or ' if pretrained else ''}2 to {len(pool)} presses",
             "record more presses, or ask for fewer",
         )
-    document = _document(out, split, held, parents)
+    document = _document(out, split, held_out, parents)
     done = {(point["start"], point["presses"], point["seed"]) for point in document["points"]}
     for count in possible:
         for seed in seeds:
             for start in (*(("pretrained",) if pretrained else ()), *networks):
                 if (start, count, seed) in done or (count == 0 and start != "pretrained"):
                     continue
-                chosen = np.random.default_rng(seed).permutation(pool)[:count].tolist()
+                numbers = np.random.default_rng(seed).permutation(pool)[:count].tolist()
                 network = pretrained.network if pretrained else None
                 if count:
                     settings = _settings(start, seed, pretrained, simulated)
                     run = out / f"{start}-{count}-{seed}"
                     from_start, mixed = (pretrained, simulated) if start == "pretrained" else (None, None)
-                    division = _division(held, chosen, seed)
+                    division = _division(held_out, numbers, seed)
                     listener = begun(start, count, seed)
                     network = train(
                         frames,
@@ -151,7 +151,7 @@ def learning_curve(
                         split=division,
                     ).network
                 with reproducible(threads):
-                    point = _scored(network, frames, held.test, start, count, seed)
+                    point = _scored(network, frames, held_out.test, start, count, seed)
                 document["points"].append(asdict(point))
                 documents.write(out / FILE, document, "learning_curve")
                 told(point)
@@ -164,19 +164,23 @@ def _settings(start: str, seed: int, pretrained: Checkpoint | None, simulated: F
     return recipe({"seed": seed, "network": start, "epochs": SCRATCH_EPOCHS, "batch_size": 64})
 
 
-def _division(held: Split, chosen: list[int], seed: int) -> Split:
+def _division(held_out: Split, numbers: list[int], seed: int) -> Split:
     """Return the presses that a run trains on, those that choose its epoch, and those held out."""
-    count = share(len(chosen), VALIDATION_SHARE)
+    count = share(len(numbers), VALIDATION_SHARE)
     return replace(
-        held, seed=seed, train=tuple(sorted(chosen[count:])), validation=tuple(sorted(chosen[:count])), test=held.test
+        held_out,
+        seed=seed,
+        train=tuple(sorted(numbers[count:])),
+        validation=tuple(sorted(numbers[:count])),
+        test=held_out.test,
     )
 
 
 def _scored(network: Any, frames: Frames, test: tuple[int, ...], start: str, presses: int, seed: int) -> CurvePoint:
     network = network.to("cpu")
-    windows, chosen = Windows(frames, network.offsets), frames.indices(test)
-    label = np.clip(frames.depth[chosen], 0.0, frames.sensor.map.depth_max)
-    scores = score_frames(predict(network, windows, chosen, frames.sensor.map.depth_max), label)
+    windows, indices = Windows(frames, network.offsets), frames.indices(test)
+    label = np.clip(frames.depth[indices], 0.0, frames.sensor.map.depth_max)
+    scores = score_frames(predict(network, windows, indices, frames.sensor.map.depth_max), label)
     touching, deep = scores.labelled, label.max(axis=(1, 2)) > DEEP
     if not deep.any():
         raise FormatError(
@@ -184,34 +188,36 @@ def _scored(network: Any, frames: Frames, test: tuple[int, ...], start: str, pre
             "presses into the skin",
             "record deeper presses, or hold out others by --split",
         )
-    seen = touching & scores.predicted
+    detected = touching & scores.predicted
     return CurvePoint(
         start,
         presses,
         seed,
-        centroid_error=float(np.median(scores.centroid_error[seen]) if seen.any() else np.hypot(*network.map_shape)),
+        centroid_error=float(
+            np.median(scores.centroid_error[detected]) if detected.any() else np.hypot(*network.map_shape)
+        ),
         contact_rmse=float(np.median(scores.contact_rmse[touching])),
         iou=float(np.median(scores.iou[touching])),
         iou_deep=float(scores.iou[deep].mean()),
-        missed=float(1 - seen.sum() / touching.sum()),
+        missed=float(1 - detected.sum() / touching.sum()),
     )
 
 
-def _document(out: Path, split: str, held: Split, parents: dict[str, str]) -> dict[str, Any]:
+def _document(out: Path, split: str, held_out: Split, parents: dict[str, str]) -> dict[str, Any]:
     fresh = {
         "version": schemas.version("learning_curve"),
         "split": split,
-        "held_out": list(held.test),
+        "held_out": list(held_out.test),
         "points": [],
         "provenance": provenance.stamp("training.pretraining.learning_curve", parents, {"deep": DEEP}),
     }
     if not (out / FILE).is_file():
         return fresh
-    kept = documents.read(out / FILE, "learning_curve")
-    if kept["provenance"]["parents"] != fresh["provenance"]["parents"] or kept["split"] != split:
+    stored = documents.read(out / FILE, "learning_curve")
+    if stored["provenance"]["parents"] != fresh["provenance"]["parents"] or stored["split"] != split:
         raise UsageError(
             f"{out} holds the learning curve of another dataset, network or split",
             "the same ones, to go on with it",
             "choose another --out",
         )
-    return kept
+    return stored

@@ -19,13 +19,15 @@ PULL = 1e-3
 """Weight of the pull towards the pretrained weights where no simulated frames are mixed in [1]."""
 
 
-def recipe(asked: Mapping[str, Any], pretrained: Checkpoint | None = None, simulated: bool = False) -> TrainingSettings:
+def recipe(
+    options: Mapping[str, Any], pretrained: Checkpoint | None = None, simulated: bool = False
+) -> TrainingSettings:
     """Return the settings of a run.
 
     Order of precedence: options, settings of a pretrained start, those of the network, the paper's.
 
     Args:
-        asked: Settings by name; None where not given.
+        options: Settings by name; None where not given.
         pretrained: Start of the run.
         simulated: Whether simulated frames are mixed in.
 
@@ -37,7 +39,7 @@ def recipe(asked: Mapping[str, Any], pretrained: Checkpoint | None = None, simul
         >>> recipe({"network": "pattern"}).batch_size, recipe({"network": "pattern", "batch_size": 32}).batch_size
         (128, 32)
     """
-    wishes = {name: value for name, value in asked.items() if value is not None}
+    wishes = {name: value for name, value in options.items() if value is not None}
     name = wishes.setdefault("network", pretrained.network.name if pretrained else TrainingSettings.network)
     kind: type[Network] = registry.load(ROOM, BASE, name, Network)
     if pretrained is None:

@@ -53,13 +53,13 @@ def calibrate_on_unseen_shapes(
     Raises:
         UsageError: If the training episodes have fewer shapes than groups.
     """
-    known = frames.spans((*trained.split.train, *trained.split.validation))
+    spans = frames.spans((*trained.split.train, *trained.split.validation))
     maps, labels = [], []
-    for number, held in enumerate(_dealt(known, groups, frames.origin)):
-        division = _without(held, known, trained.split)
+    for number, held in enumerate(_dealt(spans, groups, frames.origin)):
+        division = _without(held, spans, trained.split)
         run = trained.path.parent / f"without-{number}"
         resume = (run / checkpoint.LAST).is_file()
-        other = train(
+        network = train(
             frames,
             trained.settings,
             run,
@@ -71,17 +71,17 @@ def calibrate_on_unseen_shapes(
             simulated=simulated,
             split=division,
         )
-        windows, top = Windows(frames, other.network.offsets), frames.sensor.map.depth_max
+        windows, top = Windows(frames, network.network.offsets), frames.sensor.map.depth_max
         with reproducible(threads):
             for episode in division.test:
-                chosen = frames.indices((episode,))
-                maps.append(predict(other.network, windows, chosen, top))
-                labels.append(np.clip(frames.depth[chosen], 0.0, top))
-    found = conformal_intervals.calibrate(
+                indices = frames.indices((episode,))
+                maps.append(predict(network.network, windows, indices, top))
+                labels.append(np.clip(frames.depth[indices], 0.0, top))
+    intervals = conformal_intervals.calibrate(
         maps, labels, frames.sensor.map.pixel_pitch, trained.content_hash, "presses of shapes left out of training"
     )
-    conformal_intervals.write(trained.path.parent, found)
-    return found
+    conformal_intervals.write(trained.path.parent, intervals)
+    return intervals
 
 
 def _dealt(spans: tuple[EpisodeSpan, ...], groups: int, origin: str) -> list[tuple[EpisodeSpan, ...]]:
@@ -96,11 +96,11 @@ def _dealt(spans: tuple[EpisodeSpan, ...], groups: int, origin: str) -> list[tup
     return [tuple(span for span in spans if turn[shapes.index(span.shape)] == group) for group in range(groups)]
 
 
-def _without(held: tuple[EpisodeSpan, ...], known: tuple[EpisodeSpan, ...], split: Split) -> Split:
+def _without(group: tuple[EpisodeSpan, ...], spans: tuple[EpisodeSpan, ...], split: Split) -> Split:
     """Return a division whose test episodes are those held out; some of the others choose the epoch."""
-    numbers = {span.number for span in held}
-    rest = [span.number for span in known if span.number not in numbers]
-    order = np.random.default_rng([_SEED, split.seed]).permutation(rest)
-    chosen = set(order[: share(len(rest), VALIDATION_SHARE)].tolist())
-    train_on = tuple(n for n in rest if n not in chosen)
-    return Split(split.name, split.seed, train_on, tuple(sorted(chosen)), tuple(sorted(numbers)))
+    numbers = {span.number for span in group}
+    remaining = [span.number for span in spans if span.number not in numbers]
+    order = np.random.default_rng([_SEED, split.seed]).permutation(remaining)
+    validation = set(order[: share(len(remaining), VALIDATION_SHARE)].tolist())
+    train_on = tuple(n for n in remaining if n not in validation)
+    return Split(split.name, split.seed, train_on, tuple(sorted(validation)), tuple(sorted(numbers)))

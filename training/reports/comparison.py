@@ -103,9 +103,9 @@ def _mean(document: dict[str, Any], metric: str, predictor: str = "") -> float:
     return np.nan if value is None else float(value)
 
 
-def verdicts(found: list[Group]) -> list[str]:
+def verdicts(group_list: list[Group]) -> list[str]:
     """Return one sentence a group: in which metrics it beats the paper and the baselines, and in which not."""
-    return [_verdict(group) for group in found]
+    return [_verdict(group) for group in group_list]
 
 
 def _verdict(group: Group) -> str:

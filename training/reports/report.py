@@ -32,10 +32,10 @@ class EvaluationPaths:
         Raises:
             UsageError: If there are scores in the folder already.
         """
-        taken = [name for name in (JSON, SHEET, PICTURE) if (self.scores / name).exists()]
-        if taken:
+        existing = [name for name in (JSON, SHEET, PICTURE) if (self.scores / name).exists()]
+        if existing:
             raise UsageError(
-                f"{self.scores} already holds {', '.join(taken)}",
+                f"{self.scores} already holds {', '.join(existing)}",
                 "a folder without scores",
                 "choose another --out, or move these away",
             )

@@ -38,28 +38,28 @@ def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None
     """
     result = HtmlPage("Scores by split")
     runs, settings = _briefly(runs)
-    found = groups((run.name, run.evaluation.document) for run in runs)
+    group_list = groups((run.name, run.evaluation.document) for run in runs)
     result.paragraph(runs[0].evaluation.document["statement"])
-    _overview(result, found, impossible or {})
+    _overview(result, group_list, impossible or {})
     for sentence in settings:
         result.paragraph(sentence, note=True)
     _data(result, runs[0].frames)
-    if any(group.reliability for group in found):
+    if any(group.reliability for group in group_list):
         result.heading("Reliability of the pixels' uncertainty")
         words = (
             "Share of errors inside intervals that were calibrated on validation episodes, against what should "
             "lie there: on the diagonal the uncertainty is right, below it too small."
         )
-        result.picture(lambda stream: _draw_reliability(stream, found), words)
+        result.picture(lambda stream: _draw_reliability(stream, group_list), words)
     if trials:
         result.markdown(trials)
-    seen: set[tuple[str, str]] = set()
+    shown_pairs: set[tuple[str, str]] = set()
     for run in runs:
         document = run.evaluation.document
         key = run.name, document["split"]["name"]
-        if key in seen:
+        if key in shown_pairs:
             continue  # of several seeds the first is shown; their figures are in the first table
-        seen.add(key)
+        shown_pairs.add(key)
         _run(result, run, document)
     return result.text
 
@@ -69,14 +69,14 @@ def _briefly(runs: list[Scored]) -> tuple[list[Scored], list[str]]:
     names = list(dict.fromkeys(run.name for run in runs))
     bare = [name.partition(" (")[0] for name in names]
     short = {
-        name: own if bare.count(own) == 1 else f"{own} {bare[: k + 1].count(own)}"
-        for k, (name, own) in enumerate(zip(names, bare, strict=True))
+        name: words if bare.count(words) == 1 else f"{words} {bare[: k + 1].count(words)}"
+        for k, (name, words) in enumerate(zip(names, bare, strict=True))
     }
     recipes = [f"{short[name]}: {name.partition(' (')[2].removesuffix(')')}." for name in names if " (" in name]
     return [replace(run, name=short[run.name]) for run in runs], recipes
 
 
-def _overview(result: HtmlPage, found: list[Group], impossible: dict[str, str]) -> None:
+def _overview(result: HtmlPage, group_list: list[Group], impossible: dict[str, str]) -> None:
     result.heading("Splits, networks and seeds")
     result.paragraph(
         "Mean over the frames in contact, then mean ± SD over seeds. Bold: better than the paper's mean and than every "
@@ -85,24 +85,26 @@ def _overview(result: HtmlPage, found: list[Group], impossible: dict[str, str]) 
     heads = ["Network", "Split", "Seeds", "Frames", *(title(m) for m in METRICS), "ms a frame"]
     rows = [
         [g.name, g.split, str(len(g.seeds)), str(g.frames), *(_cell(g, m) for m in METRICS), f"{g.pace:.2f}"]
-        for g in found
+        for g in group_list
     ]
     paper = ["The paper, its own data", "not said", "", "", *(number(TABLE_1[m]["mean"]) for m in METRICS), ""]
     metrics = list(METRICS)
     result.table(
         heads,
-        [*rows, *_baseline_rows(found), paper],
-        lambda row, column: row < len(found) and 4 <= column < 9 and found[row].stands_out(metrics[column - 4]),
+        [*rows, *_baseline_rows(group_list), paper],
+        lambda row, column: (
+            row < len(group_list) and 4 <= column < 9 and group_list[row].stands_out(metrics[column - 4])
+        ),
     )
-    for sentence in verdicts(found):
+    for sentence in verdicts(group_list):
         result.paragraph(sentence, note=True)
     for split, reason in impossible.items():
         result.paragraph(f"Split {split} was not possible: {reason}", note=True)
 
 
-def _baseline_rows(found: list[Group]) -> list[list[str]]:
+def _baseline_rows(group_list: list[Group]) -> list[list[str]]:
     """Return a row for each predictor without a network and split; networks on one split share their frames."""
-    splits = {group.split: group for group in found if group.baselines}
+    splits = {group.split: group for group in group_list if group.baselines}
     return [
         [
             f"without a network: {name}",
@@ -150,9 +152,13 @@ def _draw_coverage(stream: BinaryIO, frames: Frames) -> None:
     plane, depths = figure.subplots(1, 2, width_ratios=[1.3, 1])
     names = sorted({e.indenter for e in frames.episodes})
     for name in names:
-        mine = [e for e in frames.episodes if e.indenter == name]
+        spans = [e for e in frames.episodes if e.indenter == name]
         plane.scatter(
-            [e.x for e in mine], [e.y for e in mine], s=[8 + 20 * max(e.depth, 0) for e in mine], label=name, alpha=0.7
+            [e.x for e in spans],
+            [e.y for e in spans],
+            s=[8 + 20 * max(e.depth, 0) for e in spans],
+            label=name,
+            alpha=0.7,
         )
     half_x, half_y = (n * frames.sensor.map.pixel_pitch / 2 for n in frames.sensor.map.shape)
     plane.set(xlim=(-half_x, half_x), ylim=(-half_y, half_y), xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
@@ -162,12 +168,12 @@ def _draw_coverage(stream: BinaryIO, frames: Frames) -> None:
     figure.savefig(stream, format="png")
 
 
-def _draw_reliability(stream: BinaryIO, found: list[Group]) -> None:
+def _draw_reliability(stream: BinaryIO, group_list: list[Group]) -> None:
     figure = Figure(figsize=(8.4, 4.6), dpi=90, layout="constrained")
     axes = figure.subplots()
     axes.plot([0.4, 1], [0.4, 1], color="black", linewidth=0.8, linestyle="--")
-    several = len({group.name for group in found}) > 1
-    for group in (g for g in found if g.reliability):
+    several = len({group.name for group in group_list}) > 1
+    for group in (g for g in group_list if g.reliability):
         levels = sorted(group.reliability)
         inside = [float(np.mean(group.reliability[level])) for level in levels]
         words = f"{group.name}, {group.split}" if several else group.split

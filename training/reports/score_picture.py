@@ -140,9 +140,9 @@ def _draw_cases(figure: Any, cases: list[tuple[str, EpisodeResult, int, float]],
 
 
 def _draw_signals(axes: Axes, frames: Frames, episode: EpisodeResult, frame: int) -> None:
-    here = slice(episode.span.start, episode.span.stop)
-    seconds = (frames.time_ns[here] - frames.time_ns[episode.span.start]) * 1e-9
-    axes.plot(seconds, frames.taxels[here], linewidth=0.7)
+    frame_slice = slice(episode.span.start, episode.span.stop)
+    seconds = (frames.time_ns[frame_slice] - frames.time_ns[episode.span.start]) * 1e-9
+    axes.plot(seconds, frames.taxels[frame_slice], linewidth=0.7)
     axes.axvline(float(seconds[frame]), color="black", linewidth=0.8, linestyle="--")
     axes.set_xlabel("t [s]", fontsize=8)
     axes.set_ylabel("signals [counts]", fontsize=8)

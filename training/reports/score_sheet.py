@@ -110,8 +110,8 @@ def _baselines(document: dict[str, Any]) -> list[str]:
 
 
 def _reliability(document: dict[str, Any]) -> list[str]:
-    known = document.get("uncertainty")
-    if known is None:
+    uncertainty = document.get("uncertainty")
+    if uncertainty is None:
         return []
     lines = [
         "## Reliability of the pixels' intervals",
@@ -119,11 +119,11 @@ def _reliability(document: dict[str, Any]) -> list[str]:
         row(["Should lie inside (%)", "Does (%)", "Mean width (mm)"]),
     ]
     lines.append(rule(3, 0))
-    for entry in known["levels"]:
+    for entry in uncertainty["levels"]:
         lines.append(
             row([f"{100 * entry['level']:.0f}", f"{100 * entry['inside']:.1f}", number(entry["mean_width_mm"])])
         )
-    return [*lines, "", f"Counted is the {known['definition']}.", ""]
+    return [*lines, "", f"Counted is the {uncertainty['definition']}.", ""]
 
 
 def _indenters(rows: list[dict[str, Any]]) -> list[str]:
@@ -145,24 +145,24 @@ def _depths(rows: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _contacts(known: dict[str, Any] | None) -> list[str]:
-    if known is None:
+def _contacts(contacts: dict[str, Any] | None) -> list[str]:
+    if contacts is None:
         return []
     heads = ["Contacts at once", "Presses", "All found (%)", "Missed", "Invented", "Centroid error (px): median", "P90"]
     lines = ["## Single contacts, one value a press at full depth", "", row(heads), rule(len(heads), 1)]
-    for entry in known["presses"]:
+    for entry in contacts["presses"]:
         words = "one"
         if entry["contacts"] == "several":
             upper = f" to {entry['up_to_mm']:g}" if entry["up_to_mm"] is not None else " or more"
             words = f"several, {entry['above_mm']:g}{upper} mm apart"
-        found, error = entry["all_found"], entry["centroid_error"]
-        values = [f"{100 * found['count'] / found['of']:.1f}", str(entry["missed"]), str(entry["invented"])]
+        all_found, error = entry["all_found"], entry["centroid_error"]
+        values = [f"{100 * all_found['count'] / all_found['of']:.1f}", str(entry["missed"]), str(entry["invented"])]
         lines.append(row([words, str(entry["presses"]), *values, number(error["median"], 2), number(error["p90"], 2)]))
     words = (
-        f"A contact is a hill of depth that stands out by {100 * known['prominence']:g} % of its depth. Distances are "
-        f"between labelled centroids. Contacts more than {known['reach_mm']:g} mm apart are not matched."
+        f"A contact is a hill of depth that rises by {100 * contacts['prominence']:g} % of its depth. Distances are "
+        f"between labelled centroids. Contacts more than {contacts['reach_mm']:g} mm apart are not matched."
     )
-    if rule_of := known.get("predicted"):
+    if rule_of := contacts.get("predicted"):
         words += (
             f" A predicted hill stands out by {100 * rule_of['prominence_long']:g} % in a region at least "
             f"{rule_of['long']:g} times as long as wide, and by {100 * rule_of['prominence_round']:g} % in another."
@@ -207,6 +207,6 @@ def row(cells: list[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def rule(columns: int, left: int) -> str:
-    """Return the line below a table's head; the first ``left`` columns are aligned left, the others right."""
-    return "|" + "|".join([" --- "] * left + [" ---: "] * (columns - left)) + "|"
+def rule(columns: int, text_columns: int) -> str:
+    """Return the line below a table's head; the first ``text_columns`` columns are aligned left, the others right."""
+    return "|" + "|".join([" --- "] * text_columns + [" ---: "] * (columns - text_columns)) + "|"

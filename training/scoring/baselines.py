@@ -11,8 +11,8 @@ RIDGE = 1e-3
 """Ridge of the linear predictor, as a share of the mean variance of the signals [1]."""
 
 
-def predictions(frames: Frames, split: Split, wanted: np.ndarray) -> dict[str, np.ndarray]:
-    """Return each baseline's maps [mm], (m, pixels_x, pixels_y), of the frames ``wanted`` (m,).
+def predictions(frames: Frames, split: Split, indices: np.ndarray) -> dict[str, np.ndarray]:
+    """Return each baseline's maps [mm], (m, pixels_x, pixels_y), of the frames ``indices`` (m,).
 
     ``mean`` answers with the mean training label; ``linear`` regresses each pixel on the taxels of the one
     frame, with a small ridge. Both are clipped to 0 ... D_max like a network's maps.
@@ -26,9 +26,9 @@ def predictions(frames: Frames, split: Split, wanted: np.ndarray) -> dict[str, n
     ridge = RIDGE * np.trace(covariance) / len(covariance) + 1e-12
     mean, cross = _moments(frames, learned, signals)
     slope = np.linalg.solve(covariance + ridge * np.eye(len(covariance)), cross / len(learned))
-    linear = (frames.taxels[wanted] - offset) @ slope + mean
-    shape = (len(wanted), *frames.sensor.map.shape)
-    maps = {"mean": np.broadcast_to(mean, (len(wanted), len(mean))), "linear": linear}
+    linear = (frames.taxels[indices] - offset) @ slope + mean
+    shape = (len(indices), *frames.sensor.map.shape)
+    maps = {"mean": np.broadcast_to(mean, (len(indices), len(mean))), "linear": linear}
     return {name: np.clip(values, 0.0, top).reshape(shape).astype(np.float32) for name, values in maps.items()}
 
 

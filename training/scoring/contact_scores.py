@@ -34,7 +34,7 @@ def scored(presses: Iterable[tuple[np.ndarray, np.ndarray]], pitch: float) -> di
         presses: Predicted and labelled map of each press at full depth [mm], shapes (pixels_x, pixels_y).
         pitch: Distance of pixels [mm].
     """
-    found = [match(depth, label, pitch) for depth, label in presses]
+    matches = [match(depth, label, pitch) for depth, label in presses]
     return {
         "prominence": PROMINENCE,
         "least_prominence_mm": LEAST_PROMINENCE,
@@ -45,29 +45,29 @@ def scored(presses: Iterable[tuple[np.ndarray, np.ndarray]], pitch: float) -> di
             "prominence_round": ROUND_PROMINENCE,
             "least_prominence_mm": PREDICTED_LEAST,
         },
-        "presses": contact_rows(found, pitch),
+        "presses": contact_rows(matches, pitch),
     }
 
 
-def contact_rows(found: Sequence[ContactMatch], pitch: float) -> list[dict[str, Any]]:
+def contact_rows(matches: Sequence[ContactMatch], pitch: float) -> list[dict[str, Any]]:
     """Return a row for presses with one contact, and rows for those with several by their least distance [mm]."""
-    rows = [_row([m for m in found if len(m.labelled) == 1], "one", None, None)]
+    rows = [_row([m for m in matches if len(m.labelled) == 1], "one", None, None)]
     for low, high in itertools.pairwise((0.0, *DISTANCES, np.inf)):
-        chosen = [m for m in found if len(m.labelled) > 1 and low <= pitch * m.apart < high]
-        rows.append(_row(chosen, "several", low, None if high == np.inf else high))
+        group = [m for m in matches if len(m.labelled) > 1 and low <= pitch * m.apart < high]
+        rows.append(_row(group, "several", low, None if high == np.inf else high))
     return [row for row in rows if row["presses"]]
 
 
 def _row(chosen: list[ContactMatch], contacts: str, low: float | None, high: float | None) -> dict[str, Any]:
-    every = sum(not m.missed for m in chosen)
-    interval = binomtest(every, len(chosen)).proportion_ci(method="wilson") if chosen else (None, None)
+    complete = sum(not m.missed for m in chosen)
+    interval = binomtest(complete, len(chosen)).proportion_ci(method="wilson") if chosen else (None, None)
     errors = np.concatenate([m.error for m in chosen]) if chosen else np.zeros(0)
     return {
         "contacts": contacts,
         "above_mm": low,
         "up_to_mm": high,
         "presses": len(chosen),
-        "all_found": {"count": every, "of": len(chosen), "wilson_95": list(interval)},
+        "all_found": {"count": complete, "of": len(chosen), "wilson_95": list(interval)},
         "missed": sum(m.missed for m in chosen),
         "invented": sum(m.invented for m in chosen),
         "centroid_error": asdict(summarize(errors)),
