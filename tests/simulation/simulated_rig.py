@@ -96,6 +96,7 @@ class World:
         """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
         self.stops = []
         """Times at which the recorder stopped the motion [s]."""
+        self._awaited = []
         self.camera = CameraDevice() if camera else None
         self.asked, self.answer, self.said = [], lambda question: False, []
         self.controller.start()
@@ -212,9 +213,16 @@ class World:
         depth = max(ORIGIN[2] - self.controller.position_at(sampled_ns)[2], 0.0)
         return np.round(9000 + 800 * depth + self._noise.normal(0, 5, 24))
 
+    def when_down_at(self, height, action, after=0.0):
+        """Do something so many seconds after the tip is first down at a machine height [mm]."""
+        self._awaited.append((height, action, after))
+
     def _watch(self):
         while True:
             now = self.clock.now_ns()
             x, y, z = self.controller.position_at(now).tolist()
+            for reached in [entry for entry in self._awaited if z <= entry[0]]:
+                self._awaited.remove(reached)
+                self.schedule.at(self.schedule.now_ns + round(reached[2] * SECOND), reached[1])
             self.path.append((self.schedule.now_ns / SECOND, x, y, z, self.controller.planner.moving(now), self.lost))
             self.bench.sleep(WATCHED)

@@ -11,17 +11,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from simulated_rig import World
+from simulated_rig import ORIGIN, PARKED, World
 from simulated_run import Run
 
 from tacdata.errors import DeviceError
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "recording_faults.md"
 MS = 1_000_000
-TAPPING = 3900
-"""Time at which the tip is in the skin in a sync tap [ms]."""
-PRESSING, TRAVELLING = 5.2, 0.6
-"""Times at which the tip is in the skin, and high above it on its way [s]."""
+DEEPEST, HELD = ORIGIN[2] - 0.7999, 0.5
+"""Height of the first press's hold [mm], and a time in the hold [s]: reports then state this height."""
+TAPPING = ORIGIN[2] - 0.3
+"""Height on the way down of a sync tap [mm]; the report before is from within the skin, too."""
+TRAVELLING = ORIGIN[2] + 10.0
+"""Height of the first travel [mm], far above the skin."""
 HERE = r"\(-\d+\.\d\d, -\d+\.\d\d, -38\.80\) mm"
 LIFTED = r"the indenter was lifted off the skin, straight up from -38\.80\d to -35\.000 mm"
 LEFT = "the indenter was not lifted; leave it, the next start lifts it straight up"
@@ -161,10 +163,10 @@ ENDINGS = {
 }
 
 
-def ended(folder, act, at, **world):
-    """Play a run in which something happens at a time [s]; return the run, and its last lines by their tags."""
-    made = World(3, folder / "session", **world)
-    made.schedule.at(round(at * 1000) * MS, lambda: act(made))
+def ended(folder, act, height=DEEPEST, after=HELD):
+    """Play a run in which something happens once the tip is down at a height; return it, and its last lines by tag."""
+    made = World(3, folder / "session")
+    made.when_down_at(height, lambda: act(made), after)
     try:
         run = Run(made)
     finally:
@@ -185,7 +187,7 @@ def pressed(tmp_path_factory):
     def played(name):
         if name not in known:
             folder = tmp_path_factory.mktemp("ending")
-            known[name] = *ended(folder, ENDINGS[name][0], PRESSING), folder
+            known[name] = *ended(folder, ENDINGS[name][0]), folder
         return known[name]
 
     return played
@@ -217,7 +219,7 @@ TAPPED = ("hard limit", "cable", "door", "pendant", "foreign hold", "board unplu
 def test_a_sync_tap_ends_in_the_same_words(tmp_path, name):
     act, error, motion, tip, zero, then = ENDINGS[name]
     made = World(3, tmp_path / "session")
-    made.schedule.at(TAPPING * MS, lambda: act(made))
+    made.when_down_at(TAPPING, lambda: act(made))
     with pytest.raises((DeviceError, KeyboardInterrupt)) as raised:
         made.record(sync_tap=True)
     made.end()
@@ -231,7 +233,7 @@ def test_a_sync_tap_ends_in_the_same_words(tmp_path, name):
 
 
 def test_a_tip_high_above_the_skin_is_not_said_to_have_been_lifted(tmp_path):
-    run, lines = ended(tmp_path, interrupt(), TRAVELLING)
+    run, lines = ended(tmp_path, interrupt(), TRAVELLING, 0.0)
     assert lines["motion"][0].startswith("stopped at")
     stands = re.fullmatch(r"the indenter stands clear of the skin, at machine height (\S+) mm", lines["tip"][0])
     assert stands, lines
@@ -239,7 +241,7 @@ def test_a_tip_high_above_the_skin_is_not_said_to_have_been_lifted(tmp_path):
 
 
 def test_before_the_first_move_nothing_was_moved_or_written(tmp_path):
-    run, lines = ended(tmp_path, interrupt(), 0.05)
+    run, lines = ended(tmp_path, interrupt(), ORIGIN[2] + PARKED, 0.05)
     assert isinstance(run.error, KeyboardInterrupt)
     assert lines["motion"] == ["nothing was moved"]
     assert lines["data"] == ["nothing was written"]
@@ -269,7 +271,7 @@ def write_page():
     text = PAGE.read_text()
     for name in ENDINGS:
         with tempfile.TemporaryDirectory() as folder:
-            run, _ = ended(Path(folder), ENDINGS[name][0], PRESSING)
+            run, _ = ended(Path(folder), ENDINGS[name][0])
             block = sample(run, Path(folder))
         head = f"### {name[0].upper()}{name[1:]}\n\n"
         before, after = text.split(head)
