@@ -28,6 +28,8 @@ HALTING = {"alarm", "brown_out"}
 """Faults after which a controller moves nothing, and says so."""
 OFF = 0.06
 """Distance between the true path and the plan in a file that is complete [mm]: steps, reports, the judge's interval."""
+UNLOCKED = (None, 2)
+"""Alarms that a reset and ``$X`` end without a loss of the position: a soft limit is raised after braking to rest."""
 LIFTABLE = {
     "board_freezes",
     "board_saturates",
@@ -274,9 +276,10 @@ def _play(world, faults, anew=False, unlocks=False):
         return
     world.reboot()
     world.schedule.run_for(0.1, world.bench)  # what went wrong at the very end has its effect
-    lost = world.lost or world.controller.machine.alarm is not None
+    alarm = world.controller.machine.alarm
     cut = run.killed and run.here[2] < ORIGIN[2] + CLEARANCE - NEAR  # nobody saw its motion end
-    calm = world.repair(lost, unlocks)
+    calm = world.repair(world.lost or alarm is not None, unlocks)
+    lost = world.lost or alarm not in UNLOCKED  # a hard limit may have cost steps even where it did not
     resume = world.folder.exists()
     before = world.path[-1][1:4] if world.path else None
     if lost or cut:

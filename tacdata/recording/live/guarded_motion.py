@@ -208,29 +208,41 @@ class GuardedMotion:
         begun = self._rest[2]
         for attempt in range(1, LIFTS + 1):
             try:
-                self._rise_to(height, speed)
+                reached = self._rise_to(height, speed)
                 break
             except TacdataError as error:
                 if not self._came_to_rest() or attempt == LIFTS:
                     return f"the indenter was not lifted all the way: {error.given}{self._advice}"
-        x, y, z = self._rest
-        self._at, self._clear = (x, y, max(z, height)), True
+        self._at, self._clear = reached, True
         if begun >= height:
             return f"the indenter stands clear of the skin, at machine height {begun:.3f} mm"
         again = "" if attempt == 1 else f", at the attempt number {attempt}"
-        return f"the indenter was lifted off the skin, straight up from {z:.3f} to {height:.3f} mm{again}"
+        z, top = self._rest[2], reached[2]
+        return f"the indenter was lifted off the skin, straight up from {z:.3f} to {top:.3f} mm{again}"
 
-    def _rise_to(self, height: float, speed: float) -> None:
-        """Rise from rest to ``height`` [mm], slowly: a damaged line is then noticed near the place of rest."""
-        x, y, z = self._rest or (np.nan, np.nan, np.inf)
+    def _rise_to(self, height: float, speed: float) -> Position:
+        """Rise from rest to ``height`` [mm]; return where it ended by a report.
+
+        It rises slowly: a damaged line is then noticed near the place of rest. One that ends too low is on the path all
+        the way, so the end is compared with the wanted height.
+        """
+        x, y, z = start = self._rest or (np.nan, np.nan, np.inf)
         if z >= height:
-            return
+            return start
         self._rising, speed = height, min(speed, LIFT_SPEED)
         self._lifted = f"the indenter was not lifted all the way (interrupted){self._advice}"
         self._allowed.move((x, y, height), speed, self._clock.now_ns())
         self._cnc.rise((x, y, height), speed)
         self._cnc.wait_idle(MARGIN + (height - z) / speed)
+        reached = self._cnc.reported or (x, y, height)
+        if self._allowed.is_short((x, y, height), reached):
+            raise DeviceError(
+                f"the lift ended at {_text(reached)} mm, not at {_text((x, y, height))} mm",
+                "a lift that ends where it was sent",
+                "a line was damaged on its way: check cable and ground, then start again",
+            )
         self._rising = None
+        return reached
 
     def _came_to_rest(self) -> bool:
         """After a lift that failed: stop again; return whether the controller obeys and its place is known."""

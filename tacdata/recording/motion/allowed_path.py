@@ -154,6 +154,11 @@ class AllowedPath:
             "coordinates ($G), or steps were lost; home or touch off if it does not stand where it says",
         )
 
+    def is_short(self, target: tuple[float, float, float], position: tuple[float, float, float]) -> bool:
+        """Whether ``position`` [mm] lies below or beside the end of a way straight up; higher is clear as well."""
+        x, y, z = np.subtract(position, target)
+        return float(np.hypot(x, y)) > self._tolerance or z < -self._tolerance
+
     def _believed_ended(self, sent: list[_Leg], status: CncStatus) -> _Leg | None:
         """Return the latest move with the reported place on its way, though an answer said that it had ended."""
         for leg in reversed(sent[:-1]):

@@ -13,6 +13,7 @@ from tacdata.clock import Clock
 from tacdata.virtual_rig.firmware import texts
 from tacdata.virtual_rig.firmware.dialect import NAMES
 from tacdata.virtual_rig.firmware.interpreter import Interpreter
+from tacdata.virtual_rig.firmware.machine import SOFT_LIMIT
 from tacdata.virtual_rig.firmware.planner import Planner
 from tacdata.virtual_rig.port import VirtualPort
 
@@ -95,8 +96,11 @@ class Controller:
         return self.planner.position(time_ns)
 
     def inject_alarm(self, code: int = 1) -> None:
-        """Fault: a limit switch closes (1), or another alarm stops the machine at once."""
-        self._faults.put(lambda now: self._wiped(lambda: self.machine.stop_dead(now, code)))
+        """Fault: a soft limit ends the motion after braking (2), a limit switch (1) or another alarm at once."""
+        if code == SOFT_LIMIT:
+            self._faults.put(self.machine.overtravel)
+        else:
+            self._faults.put(lambda now: self._wiped(lambda: self.machine.stop_dead(now, code)))
 
     def inject_brown_out(self) -> None:
         """Fault: the supply voltage drops; the firmware restarts and assumes position zero."""

@@ -16,7 +16,9 @@ NS = 1_000_000_000
 ALWAYS_ON = 255
 OVERRIDES = {0x90: None, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
 """Real-time byte -> change of the feed override [%]; None resets it to 100."""
-CRITICAL = (1, 2)
+SOFT_LIMIT = 2
+"""Alarm for a target beyond the travel; raised at rest, after a hold (Grbl's `limits_soft_check`)."""
+CRITICAL = (1, SOFT_LIMIT)
 """Alarms after which only a reset is accepted."""
 LOST = 0.02
 """Steps lost when motors are cut off in motion, standard deviation [mm]."""
@@ -124,7 +126,7 @@ class Machine:
             self.planner.stop(now)
         if self._limit_hit and not self.moving(now):
             self._limit_hit = False
-            self.stop_dead(now, 2)
+            self.stop_dead(now, SOFT_LIMIT)
         if self.dwell_ns is not None and now >= self.dwell_ns and not self._suspended(now):
             self.dwell_ns = None
             self._say(now, "ok")
@@ -233,6 +235,11 @@ class Machine:
         if self.critical:
             self._say(now, "[MSG:Reset to continue]")
 
+    def overtravel(self, now: int) -> None:
+        """Brake; at rest the alarm of the soft limits is raised."""
+        self._hold(now)
+        self._limit_hit = True
+
     def power_on(self, now: int, fresh: bool) -> None:
         """Send what a board sends when it is switched on; ``fresh``: with empty memory."""
         if fresh:
@@ -306,8 +313,8 @@ class Machine:
             raise gcode.Refused(20)
         action = gcode.interpret(line, self.modal, self.planner.target - self.error, self.offset)
         if action.target is not None and self._outside(action.target):
-            self._hold(now)
-            self._limit_hit = self.reading = True
+            self.overtravel(now)
+            self.reading = True
             return False
         if self.check:
             return True

@@ -13,6 +13,8 @@ DEEP = 0.8
 """Depth of the press [mm]."""
 RISE = re.compile(r"G1Z-(\d)(\d)")
 """A line of a lift: it names no x and y."""
+DEEPER, SHORT = (10, 1)
+"""Changes of a lift's target by one digit [mm, downwards]: into the skin, and 2 mm above it."""
 
 
 @pytest.fixture
@@ -20,7 +22,7 @@ def lifted(tmp_path):
     """Breaks a press off; the lifts' lines of the given numbers are damaged. Returns world and words."""
     made = []
 
-    def play(damaged):
+    def play(damaged, change=DEEPER):
         world = World(1, tmp_path / "session")
         made.append(world)
         count = []
@@ -30,7 +32,7 @@ def lifted(tmp_path):
                 return line
             count.append(line)
             if len(count) in damaged:
-                return RISE.sub(lambda match: f"G1Z-{int(match[1]) + 1}{match[2]}", line)
+                return RISE.sub(lambda match: f"G1Z-{int(match[1] + match[2]) + change}", line)
             return line
 
         world.controller.inject_wire(to_controller=wire)
@@ -72,6 +74,22 @@ def test_a_lift_that_never_goes_up_is_reported_where_it_stands(lifted):
     stands = re.search(r"motion: stopped at \((\S+), (\S+), (\S+)\) mm", words)
     assert [float(value) for value in stands.groups()] == pytest.approx(place.tolist(), abs=0.02), words
     assert "on its way" not in words.split("motion:")[1].splitlines()[0]
+
+
+def test_a_lift_that_ends_too_low_is_noticed_and_tried_again(lifted):
+    world, words = lifted({1}, SHORT)
+    assert world.position()[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
+    assert "straight up from -36.000 to -35.000 mm, at the attempt number 2" in words
+
+
+def test_lifts_that_all_end_too_low_are_reported_where_they_ended(lifted):
+    world, words = lifted(set(range(1, 20)), SHORT)
+    assert world.position()[2] == pytest.approx(ORIGIN[2] + 2.0, abs=0.01)
+    assert (
+        "not lifted all the way: the lift ended at (-95.05, -60.91, -36.00) mm, not at (-95.05, -60.91, -35.00)"
+        in words
+    )
+    assert "motion: stopped at (-95.05, -60.91, -36.00) mm" in words
 
 
 def test_an_undamaged_lift_is_one_attempt(lifted):
