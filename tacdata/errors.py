@@ -88,7 +88,10 @@ REFUSALS = {
     errno.ENOENT: ("a path that exists", "check the path; make the folder first if it is to be written to"),
     errno.ENAMETOOLONG: ("a shorter name", "choose a shorter name"),
     errno.EMFILE: ("fewer open files", "raise the limit of open files (ulimit -n)"),
-    errno.EFBIG: ("a file that the disk can hold", "choose a disk whose files may be larger (FAT holds 4 GB)"),
+    errno.EFBIG: (
+        "a file that the disk can hold",
+        "make room, raise the limit of file sizes (ulimit -f), or choose a disk for larger files (FAT holds 4 GB)",
+    ),
     errno.ESTALE: ("a drive that answers", "mount the network drive again, or choose a local disk"),
     errno.ENOTCONN: ("a drive that answers", "connect the drive again, or choose a local disk"),
     errno.ETIMEDOUT: ("a drive that answers", "connect the drive again, or choose a local disk"),

@@ -49,11 +49,13 @@ class Controller(MotionController):
     def max_rate(self):
         return LIMITS.max_rate
 
-    def position(self):
+    def position(self, time_ns=None):
+        """Where it is now, or was at a time since the present move was sent [ns]."""
         with self._lock:
             if self._move is None:
                 return self._at.copy()
-            share = self._move.distance((self.clock.now_ns() - self._begin) / 1e9) / max(self._move.length, 1e-12)
+            seconds = ((time_ns or self.clock.now_ns()) - self._begin) / 1e9
+            share = self._move.distance(max(seconds, 0.0)) / max(self._move.length, 1e-12)
             return self._move.start + share * (self._move.target - self._move.start)
 
     def _wait(self, until_ns):
@@ -120,7 +122,7 @@ class Board(TaxelBoard):
 
     def __init__(self, clock, cnc, surface=-30.0):
         super().__init__(clock)
-        self.counts, self._cnc, self._surface = StreamCounts(), cnc, surface
+        self.counts, self._cnc, self.surface = StreamCounts(), cnc, surface
         self._rng, self._next, self.broken = np.random.default_rng(0), 0, None
 
     def describe(self):
@@ -137,8 +139,8 @@ class Board(TaxelBoard):
         if self.broken:
             raise self.broken
         frames, now = [], self.clock.now_ns()
-        while self._start + self._next * 33_333_333 <= now:
-            depth = max(self._surface - self._cnc.position()[2], 0.0)
+        while (sampled_ns := self._start + self._next * 33_333_333) <= now:
+            depth = max(self.surface - self._cnc.position(sampled_ns)[2], 0.0)
             counts = np.round(9000 + 800 * depth + self._rng.normal(0, 5, 24))
             frames.append(TaxelFrame(now, self._next, counts))
             self._next += 1

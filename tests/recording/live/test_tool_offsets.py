@@ -37,13 +37,19 @@ def plan():
 def test_a_longer_tool_is_driven_higher_and_its_tip_recorded_where_it_is(plan, tmp_path):
     clock = Clock.start(10.0)
     cnc, heights = Controller(clock), []
+    board = Board(clock, cnc)
+
+    def mount(press):
+        heights.append((press.indenter_name, cnc.position()[2]))
+        board.surface = rig(tools=TOOLS).registration_for(press.indenter_name).origin[2]
+
     recorder = Recorder(
         replace(rig(tools=TOOLS), clock=clock),
         SENSOR,
         plan,
         tmp_path / "session",
-        devices=RigDevices(cnc, Board(clock, cnc)),
-        mount=lambda press: heights.append((press.indenter_name, cnc.position()[2])),
+        devices=RigDevices(cnc, board),
+        mount=mount,
     )
     session = recorder.run(lambda summary: True)
     # Both are mounted where the longer one clears the skin, at -30 mm, by 3 mm.
