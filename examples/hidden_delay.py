@@ -23,7 +23,7 @@ MAPPING = {
 
 
 def write_presses(folder: Path, count: int = 24) -> None:
-    """Write presses at three rates and two depths as CSV files, and the mapping that says what they are."""
+    """Write presses at three rates and two depths as CSV files, and the mapping that describes them."""
     rng, clock = np.random.default_rng(3), 0.0
     for k in range(count):
         deepest = (0.7, 1.0)[k % 2]

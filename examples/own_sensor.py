@@ -1,4 +1,4 @@
-"""Describe a taxel skin of your own by a file, and ask what was made of it."""
+"""Describe a taxel skin of your own by a file, and show the interpreted sensor."""
 
 from pathlib import Path
 

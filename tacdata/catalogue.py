@@ -23,7 +23,7 @@ class Registry:
     room: str
     """Dotted package name."""
     base: str
-    """File name of the base class, whose docstring says what a member's file holds."""
+    """File name of the base class, whose docstring describes the contents of a member's file."""
     meaning: str
     """First line of the package's docstring."""
 

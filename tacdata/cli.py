@@ -31,7 +31,7 @@ OPTIONS = {
     QUIET: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no hints: only results and errors.")],
     JSON: Annotated[bool, typer.Option("--json", help="Print the result as JSON; words go to standard error.")],
 }
-"""What the command line adds to verbs: the first to all, the second to those that return a `Result`."""
+"""Options that the command line adds to verbs: the first to all, the second to those that return a `Result`."""
 
 
 def application() -> typer.Typer:
@@ -58,7 +58,7 @@ def _is_group(verb: ModuleType) -> bool:
 
 
 def _verbs(room: str = ROOM) -> tuple[Callable[..., Any], ...]:
-    """Return what the verbs of a room run, those of its groups among them."""
+    """Return the functions of a room's verbs, those of its groups among them."""
     modules = [module for module, _ in _members(room)]
     below = [_verbs(module.__name__) for module in modules if _is_group(module)]
     return (*(module.run for module in modules), *itertools.chain(*below))
@@ -66,7 +66,7 @@ def _verbs(room: str = ROOM) -> tuple[Callable[..., Any], ...]:
 
 @functools.lru_cache(maxsize=1)
 def _command(verbs: tuple[Callable[..., Any], ...]) -> Any:
-    """Return the command line as it is run, built once for a process that runs several verbs, or anew for others."""
+    """Return the command line as it is run, built once for a process that runs several verbs, or again for others."""
     return typer.main.get_command(application())
 
 
@@ -143,7 +143,7 @@ def answering(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def last_words(error: BaseException | None) -> list[str]:
-    """Return what an error says of its end: its own notes, or those of the error that it came upon.
+    """Return an error's notes on its end: its own, or those of the error that it came upon.
 
     A second Ctrl-C takes the place of the error that is on its way to the screen.
     """
@@ -155,7 +155,7 @@ def last_words(error: BaseException | None) -> list[str]:
 
 
 def _end(result: Result, as_json: bool) -> None:
-    """Print a result as JSON if that was asked for, and end as the verb says."""
+    """Print a result as JSON if that was asked for, and end with the verb's exit code."""
     if as_json:
         print(result.text, flush=True)
     if isinstance(result.ends, TacdataError):
@@ -165,11 +165,11 @@ def _end(result: Result, as_json: bool) -> None:
 
 
 MISTYPED: Any = typer.BadParameter.__mro__[1]
-"""What typer raises for a line that does not fit a verb."""
+"""Typer's errors for a line that does not fit a verb."""
 
 
 def in_words(error: Any) -> UsageError:
-    """Return what is wrong with a line that was typed, in our words: what was given, what is allowed, what is next."""
+    """Return the fault of a typed line in three parts: given, allowed, remedy."""
     context, kind = error.ctx, type(error).__name__
     path = context.command_path if context else "tacdata"
     allowed = context.get_usage().removeprefix("Usage: ") if context else "tacdata VERB"

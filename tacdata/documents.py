@@ -71,7 +71,7 @@ def read(path: StrPath, schema: str) -> dict[str, Any]:
 
 
 def content_of(path: StrPath, schema: str) -> Any:
-    """Return what a YAML or JSON file holds, unchecked; ``schema`` names its kind in errors.
+    """Return the contents of a YAML or JSON file, unchecked; ``schema`` names its kind in errors.
 
     Raises:
         UsageError: If there is no such file.
@@ -109,7 +109,7 @@ def _decoded(path: Path, schema: str) -> str:
 
 
 def _json_fault(text: str) -> str:
-    """Return what is wrong with a JSON text, with its line; "" if nothing is."""
+    """Return the fault of a JSON text, with its line; "" if nothing is."""
     try:
         json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -150,9 +150,9 @@ def parsed(text: str, origin: str) -> Any:
 
 
 def _content(text: str, origin: str) -> Any:
-    """Return what a YAML text holds: by libyaml, ten times as fast, unless it stumbles or could run out of stack."""
+    """Return the contents of a YAML text: by libyaml, ten times as fast, unless it fails or could run out of stack."""
     if _QuickLoader is not None and _nested(text) < DEEP:
-        with suppress(yaml.YAMLError):  # the loader in Python says it in its words
+        with suppress(yaml.YAMLError):  # the loader in Python reports it
             return _loaded(_QuickLoader(text), origin)
     return _loaded(_Loader(text), origin)
 
@@ -286,7 +286,7 @@ class _Constructor:
 
 
 class _Loader(_Constructor, yaml.SafeLoader):
-    """In Python: it says what is wrong."""
+    """In Python: its errors describe the fault."""
 
 
 _NUMBERS = list("-+0123456789.")
@@ -328,7 +328,7 @@ def check(document: Any, schema: str, origin: str) -> None:
     """Check a document against ``schemas/<schema>.schema.json``; ``origin`` names it in the error.
 
     Raises:
-        FormatError: Naming the first offending field, its value and what is allowed.
+        FormatError: Naming the first offending field, its value and the allowed ones.
     """
     definition = schemas.load(schema)
     if isinstance(document, dict) and "version" in document:

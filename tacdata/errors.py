@@ -1,4 +1,4 @@
-"""Errors for a person: what was given, what is allowed, what to do next."""
+"""Errors for a person in three parts: the given value, the allowed ones, the remedy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class Exit(IntEnum):
     """How a verb ends: the one table of exit codes (docs/reference/exit_codes.md)."""
 
     meaning: str
-    """What the code means, for a script."""
+    """Meaning of the code, for a script."""
 
     def __new__(cls, code: int, meaning: str) -> Exit:
         """Make a member of its code and its meaning."""
@@ -33,8 +33,8 @@ class TacdataError(Exception):
     """Base class of every error that is meant for a person.
 
     Args:
-        given: What was found or asked for, with its value and unit, naming the object as the user knows it.
-        allowed: What is accepted.
+        given: The value found or asked for, with its value and unit, naming the object as the user knows it.
+        allowed: Accepted values.
         remedy: The next thing to do.
     """
 
@@ -102,11 +102,11 @@ REFUSALS = {
     errno.EBUSY: ("a file that nobody else has open", "close the program that uses it"),
     errno.ETXTBSY: ("a file that nobody else has open", "close the program that uses it"),
     errno.ELOOP: ("a link that ends at a file", "check the link"),
-    errno.EINVAL: ("what the drive supports", "choose a local disk"),
-    errno.ENOTSUP: ("what the drive supports", "choose a local disk"),
-    errno.EIO: ("a disk without faults", "copy what is there to another disk and check this one"),
+    errno.EINVAL: ("operations that the drive supports", "choose a local disk"),
+    errno.ENOTSUP: ("operations that the drive supports", "choose a local disk"),
+    errno.EIO: ("a disk without faults", "copy its files to another disk and check this one"),
 }
-"""What the operating system refuses a file for: what is allowed, and what to do next."""
+"""Error number of the operating system for a file -> what is allowed, remedy."""
 
 
 def refused_by_system(error: OSError) -> DeviceError | None:

@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 from tacdata.errors import PackageError
 
 IMPORTED_AS = {"markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "warp": "warp-lang"}
-"""What is imported by another name than it is installed by."""
+"""Packages that are imported by another name than they are installed by."""
 ALL = "all"
 """The extra that brings everything: never the least that is needed."""
 ROOMS = {
@@ -27,12 +27,12 @@ ROOMS = {
 
 
 def missing_package(error: ImportError, asked: str, instead: str = "") -> PackageError | None:
-    """Return what to tell a person of a package that is not installed; None if no extra brings it.
+    """Return the message for a package that is not installed; None if no extra brings it.
 
     Args:
-        error: What the import raised.
+        error: Error of the import.
         asked: Who needs the package, for example ``"tacdata label"``.
-        instead: What else would do, beside installing it.
+        instead: Alternative to installing it.
     """
     if not isinstance(error, ModuleNotFoundError) or not error.name:
         return None

@@ -1,4 +1,4 @@
-"""What a process takes from its computer: time, threads, the disk and signals; a simulated world gives its own."""
+"""Services of the computer for a process: time, threads, the disk and signals; a simulated world gives its own."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Host:
         return path.open("xb")
 
     def sync(self, stream: BinaryIO) -> None:
-        """Write what the stream holds to the disk.
+        """Write the stream's contents to the disk.
 
         Raises:
             OSError: If the disk refuses it.

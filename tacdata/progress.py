@@ -1,4 +1,4 @@
-"""What a person sees while a verb works, and what it suggests next: all that ``--quiet`` leaves out."""
+"""Progress of a verb and its suggested next step: the output that ``--quiet`` leaves out."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def is_quiet() -> bool:
 
 
 def say(words: str) -> None:
-    """Print what happens meanwhile, or what to do next."""
+    """Print progress, or the next step."""
     if not _quiet:
         print(words, flush=True)
 

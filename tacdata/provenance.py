@@ -40,7 +40,7 @@ EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {
         _ALIKE,
     ),
 }
-"""Version of code -> (what an older release called it, how it was shown that their results are identical).
+"""Version of code -> (its name in an older release, how it was shown that their results are identical).
 
 Stored labels and solutions of the older release then stay current. An entry ends by itself: whoever changes the code
 changes its version."""
@@ -101,15 +101,15 @@ def _sources(name: str) -> dict[Path, str]:
 
 
 def _syntax(node: Any) -> Any:
-    """Return a syntax tree as nested lists: without positions, empty fields, and text that stands by itself."""
+    """Return a syntax tree as nested lists: without positions, empty fields, and docstrings."""
     if isinstance(node, list):
         # A docstring of a function or a field is such a text: it does nothing.
         return [_syntax(each) for each in node if not _stands_alone(each)]
     if isinstance(node, str):
-        # Their versions are those of releases that had these packages beside tacdata.
+        # Their versions are those of releases that had these packages outside tacdata.
         return re.sub(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)", "", node)
     if isinstance(node, str):
-        # Their versions are those of releases that had these packages beside tacdata.
+        # Their versions are those of releases that had these packages outside tacdata.
         return re.sub(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)", "", node)
     if not isinstance(node, ast.AST):
         return node
@@ -125,7 +125,7 @@ def _stands_alone(node: Any) -> bool:
 def code_version() -> str:
     """Return the release and its commit, for example ``0.1.0+g1a2b3c4`` (``.dirty`` if edited).
 
-    A clone is asked for the commit. A wheel carries what was said when it was built (.dev/commit_hook.py).
+    A clone is asked for the commit. A wheel carries the commit of its build (.dev/commit_hook.py).
     """
     try:
         release = version("tacdata")

@@ -1,4 +1,4 @@
-"""Replaces a file as a whole: written beside it, synced to the disk, renamed."""
+"""Replaces a file as a whole: written under a temporary name, synced to the disk, renamed."""
 
 from __future__ import annotations
 

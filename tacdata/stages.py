@@ -21,7 +21,7 @@ _YIELDING = 10
 """Niceness of a background verb that leaves the processor to others."""
 
 _TAIL = 40
-"""Lines shown of what a background verb said that has ended."""
+"""Lines shown of the output of a background verb that has ended."""
 
 PATIENCE = 60.0
 """Time for an interrupted verb to stop the motion and close its files [s]."""
@@ -54,7 +54,7 @@ class Line:
     """Runs verbs one after the other and shows each one's command, number and time."""
 
     def __init__(self, total: int, remains: str) -> None:
-        """Prepare for ``total`` stages; ``remains`` describes what is left if one fails."""
+        """Prepare for ``total`` stages; ``remains`` describes the remaining work if one fails."""
         self.total, self.kept = total, remains
         self.number = 0
         self.begin = time.monotonic()
@@ -62,7 +62,7 @@ class Line:
     def run(self, purpose: str, arguments: list[str], tolerated: int = 0) -> None:
         """Run ``tacdata ARGUMENTS``; ``purpose`` describes it.
 
-        An exit code in ``tolerated`` is shown and does not end the line: the next verb can use what there is.
+        An exit code in ``tolerated`` is shown and does not end the line: the next verb can use the files that exist.
 
         Raises:
             StageError: With the verb's exit code, if it fails.
@@ -73,7 +73,7 @@ class Line:
         self._end(arguments, _run(command_line(arguments)), tolerated, started)
 
     def join(self, purpose: str, background: Background, tolerated: int = 0) -> None:
-        """Wait for a verb that was begun in the background, and show what it says from here on; as `run`."""
+        """Wait for a verb that was begun in the background, and show its output from here on; as `run`."""
         started = self._announce(purpose)
         self._end(background.arguments, background.follow(), tolerated, started)
 
@@ -170,7 +170,7 @@ class Background:
         """Prepare.
 
         Args:
-            arguments: What would be typed behind ``tacdata``.
+            arguments: Command line behind ``tacdata``.
             log: File that it writes to.
             yielding: Whether it leaves the processor to others that want it.
         """
@@ -182,7 +182,7 @@ class Background:
         with self.log.open("wb") as stream:
             self.process = _start(command_line(self.arguments), stdout=stream, stderr=stream)
         if self._yielding:
-            # Gone already: then `follow` or `wait_until` says why.
+            # Gone already: then `follow` or `wait_until` reports the reason.
             with suppress(ProcessLookupError):
                 niceness = max(_YIELDING, os.getpriority(os.PRIO_PROCESS, 0))
                 os.setpriority(os.PRIO_PROCESS, self.process.pid, niceness)

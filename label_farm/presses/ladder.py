@@ -15,7 +15,7 @@ from tacdata.label_farm.presses.tolerance import Tolerance
 from tacdata.sensor.sensor import ContactProperties
 
 FINEST = 0.001
-"""Least step that may be requested [mm]: far below what any mesh resolves, and a path has few enough states."""
+"""Least step that may be requested [mm]: far below the resolution of any mesh, and a path has few enough states."""
 
 
 @dataclass(frozen=True)

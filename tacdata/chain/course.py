@@ -76,7 +76,7 @@ class Course:
     clipped: np.ndarray | None = None
     """Readings that a channel's range ends at: more would read the same, shape (n, channels), bool; None: none."""
     specimens: tuple[str, ...] = ()
-    """Name of what each episode pressed, by the source; empty: it names none."""
+    """Name of each episode's specimen, by the source; empty: it names none."""
     apart: bool = False
     """Whether episodes are so far apart that no memory lasts from one to the next, regardless of the clock."""
 

@@ -57,7 +57,7 @@ class Response(ABC):
             signal: Readings of all rows, shape (n, channels).
 
         Returns:
-            Of each row's place, in the readings' unit, shape (n, channels), or (1, channels) where all are alike.
+            Of each row's place, in the readings' unit, shape (n, channels), or (1, channels) where all are equal.
         """
         return np.ptp(signal, axis=0, keepdims=True)
 

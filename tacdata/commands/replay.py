@@ -128,7 +128,7 @@ def run(
 
 
 def _print_rows(rows: list[dict[str, Any]], first: str, task: str) -> None:
-    """Print what each arm held, a row for each stiffness or challenge, and what depth was worth there."""
+    """Print the outcomes of each arm, a row for each stiffness or challenge, and the benefit of depth there."""
     from tacdata.replay.comparison.trials import PUBLISHED, like_published
 
     kinds = list(rows[0]["rates"])

@@ -102,7 +102,7 @@ class Dataset(Displayed):
         return WindowDataset(self, offsets, keys)
 
     def description(self) -> Iterator[str]:
-        """Yield what it is: episodes, frames, sensors, columns."""
+        """Yield the lines of its description: episodes, frames, sensors, columns."""
         simulated = f", {self.simulated} of them simulated" if self.simulated else ""
         yield f"Dataset {self.root}: {len(self.episodes)} episodes{simulated}, {len(self)} frames at {self.fps} Hz"
         yield f"sensor {', '.join(sensor.name for sensor in self.sensors.values())}"

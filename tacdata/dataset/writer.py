@@ -77,7 +77,7 @@ class DatasetWriter:
         Args:
             root: The folder.
             sensor: Whose episodes.
-            extra: Optional columns of `features.EXTRA` it must have; None takes what it has.
+            extra: Optional columns of `features.EXTRA` it must have; None takes those present.
             simulated: Whether a dataset that has no finished episode yet is to hold simulated ones.
 
         Raises:

@@ -18,7 +18,7 @@ FARTHEST = 50.0
 REMEASURED = 0.02
 """Largest difference of a square's side that is one of measuring it [1]."""
 WORST = (0.1, "m", "are these millimetres?"), (0.35, "rad", "are these degrees?")
-"""Largest plausible standard uncertainty of position and rotation, its unit, and what more of it may be."""
+"""Largest plausible standard uncertainty of position and rotation, its unit, and the likely cause of a larger one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def check_worlds(worlds: dict[str, CameraWorld], origin: str) -> None:
     """Refuse a camera's file that is another camera's, or of another board.
 
     Args:
-        worlds: Camera -> what its file says.
+        worlds: Camera -> content of its file.
         origin: The rig file, for words.
 
     Raises:

@@ -35,7 +35,7 @@ def baseline(stream: TaxelStream) -> np.ndarray:
 
 
 def on_grid(stream: TaxelStream, values: np.ndarray, times_ns: np.ndarray) -> np.ndarray:
-    """Return the value of the nearest frame at each time; NaN where none lies within 1.5 periods.
+    """Return the value of the nearest frame at each time; NaN where none is within 1.5 periods.
 
     Args:
         stream: The board's frames, shape (m,).

@@ -1,1 +1,1 @@
-"""Drivers of real devices, one per file; see `device.py` for the three kinds and what a file must hold."""
+"""Drivers of real devices, one per file; see `device.py` for the three kinds and the contents of a file."""

@@ -105,7 +105,7 @@ class CapacitiveBoard(TaxelBoard):
             self._line = None
 
     def read(self, timeout: float) -> list[TaxelFrame]:
-        """Return what has arrived, waiting at most ``timeout`` [s of the clock] for something.
+        """Return the received frames, waiting at most ``timeout`` [s of the clock] for something.
 
         Raises:
             DeviceError: If the line broke and every frame before that has been handed out.
@@ -139,7 +139,7 @@ class CapacitiveBoard(TaxelBoard):
                 self._changed.notify_all()
 
     def _forget_partial_frame(self) -> None:
-        # The port is opened in the middle of a frame. What came before the first good one is no fault of the stream,
+        # The port is opened in the middle of a frame. Bytes before the first good one are no fault of the stream,
         # and
         # is reported only if it was longer than a frame.
         counts, rest = self.counts, 4 * self.format.size if self.format.encoding == "binary" else 4096

@@ -79,14 +79,14 @@ class Device(ABC):
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Return what the device delivers (channels, units, shapes, nominal rate), without opening it."""
+        """Return the device's streams (channels, units, shapes, nominal rate), without opening it."""
 
     @abstractmethod
     def open(self) -> None:
         """Open the device.
 
         Raises:
-            DeviceError: If the port is missing, busy or silent, or what answers is another device.
+            DeviceError: If the port is missing, busy or silent, or if another device answers.
         """
 
     @abstractmethod
@@ -143,7 +143,7 @@ class MotionController(Device):
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What a person should know about its settings before the first move."""
+        """Remarks on its settings before the first move."""
         return ()
 
     @property
@@ -153,7 +153,7 @@ class MotionController(Device):
 
     @property
     def alarm(self) -> str:
-        """What locked it, in words. Empty if it was merely switched on."""
+        """Reason of its lock, as a sentence. Empty if it was merely switched on."""
         return ""
 
     @property
@@ -189,7 +189,7 @@ class MotionController(Device):
     def rise(self, position: tuple[float, float, float], speed: float) -> Motion:
         """Queue a move straight up to ``position`` [mm, machine] at ``speed`` [mm/s].
 
-        Where a controller can, x and y are not stated: if what it says of them is wrong, a tip in the skin still moves
+        Where a controller can, x and y are not stated: if its report of them is wrong, a tip in the skin still moves
         up alone.
         """
         return self.move(position, speed)

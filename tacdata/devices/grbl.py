@@ -73,7 +73,7 @@ class Grbl(MotionController):
         self._ends_ns = 0  # when it has ended at the latest
 
     def describe(self) -> dict[str, Any]:
-        """Return what the status reports hold."""
+        """Return the contents of the status reports."""
         return {
             "kind": "motion controller",
             "driver": "grbl",
@@ -139,7 +139,7 @@ class Grbl(MotionController):
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What a person should know before the first move."""
+        """Remarks before the first move."""
         lost = (f"{self._lost}: touch off before moving",) if self._lost and self._link is not None else ()
         return (*lost, *self._answers.cautions, *self._cautions)
 
@@ -150,7 +150,7 @@ class Grbl(MotionController):
 
     @property
     def alarm(self) -> str:
-        """What locked it, in words. Empty if it was merely switched on."""
+        """Reason of its lock, as a sentence. Empty if it was merely switched on."""
         link = self._link
         if link is None or link.last is None or not link.last.state.startswith("Alarm"):
             return ""
@@ -229,7 +229,7 @@ class Grbl(MotionController):
         return self._send(f"G4P{max(seconds, 0.0):.3f}")
 
     def wait_idle(self, timeout: float) -> None:
-        """Return when the planner is empty (``G4 P0.01`` answered) and a fresh report says Idle."""
+        """Return when the planner is empty (``G4 P0.01`` answered) and a fresh report is Idle."""
         link = self._opened()
         link.command("G4P0.01", timeout, min(self._remaining, timeout))
         while link.fresh_status(timeout).state != "Idle":
@@ -267,7 +267,7 @@ class Grbl(MotionController):
         """Wait until the hold is complete, then soft-reset: the planner is emptied and the position kept.
 
         Returns:
-            Where the machine stands then [mm].
+            Position of the machine then [mm].
 
         Raises:
             DeviceError: If the machine does not come to rest, or does not come back from the reset.
@@ -352,7 +352,7 @@ class Grbl(MotionController):
         except DeviceError:
             if link.resets == resets:
                 raise
-            # Grbl with a fresh memory answers ? before its welcome and loses what is sent meanwhile.
+            # Grbl with a fresh memory answers ? before its welcome and loses bytes that are sent meanwhile.
             state = clear(link)
             self._read(link)
         return state
@@ -374,7 +374,7 @@ class Grbl(MotionController):
         answers.limits("$11", 60.0, self.port)
 
     def _remember_opening(self, link: GrblLink, state: str, homed: bool) -> None:
-        """Keep what was found; a board without homing that was just reset counts from an unknown place."""
+        """Keep the identified board; one without homing that was just reset counts from an unknown place."""
         position = link.last.position if link.last is not None else np.full(3, np.nan)
         version = self._answers.answers.get("VER", "nothing")
         self._found = {

@@ -97,7 +97,7 @@ class OpencvCamera(Camera):
         self.damaged = 0
         """Images that could not be decoded."""
         self.notes: list[str] = []
-        """What the camera did not do as asked, in words."""
+        """Settings that the camera did not take, as sentences."""
         self._live = isinstance(self.source, int) or "://" in str(self.source)
         self._ended = False
         self._fault: DeviceError | None = None
@@ -167,7 +167,7 @@ class OpencvCamera(Camera):
             self._thread = None
 
     def read(self, timeout: float) -> list[ImageFrame]:
-        """Return what has arrived, waiting at most ``timeout`` [s of the clock]; empty after a file's end.
+        """Return the received images, waiting at most ``timeout`` [s of the clock]; empty after a file's end.
 
         Raises:
             DeviceError: If the source broke or stalled, once everything before that has been handed out.

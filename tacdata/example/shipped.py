@@ -8,7 +8,7 @@ from pathlib import Path
 from tacdata.errors import DeviceError, UsageError
 
 SESSION = Path(__file__).with_name("session")
-"""What `.dev/example` recorded and labelled."""
+"""Files that `.dev/example` recorded and labelled."""
 DEEPEST = 1
 """Number of its deepest press."""
 

@@ -1,4 +1,4 @@
-"""Plain CSV, one file per demonstration, with a JSON file beside it that explains the columns."""
+"""Plain CSV, one file per demonstration, and a JSON file that explains the columns."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 ``tacdata/exporters/my_robot.py`` defines one class derived from `Exporter`; ``tacdata export --format my_robot`` finds
 it by its file's name. `write` makes a new folder from targets and `read` returns the same targets. So a person can look
-at what a robot will do, and the tests compare both for every format.
+at a robot's targets, and the tests compare both for every format.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Exporter(ABC):
         """Keep the robot file and the folder of the recordings, where there are any; the latter hold the images."""
         self.robot, self.recordings = robot, recordings
         self.tables: list[str] = []
-        """Tables for a person: what a robot does with each demonstration."""
+        """Tables for a person: a robot's targets of each demonstration."""
         self.remarks: list[str] = []
-        """What a person should know of what `write` made, though nothing of it is unfit."""
+        """Remarks on the files that `write` made; none of them makes a file unfit."""
 
     @abstractmethod
     def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
@@ -42,7 +42,7 @@ class Exporter(ABC):
             out: The folder; it does not exist.
 
         Returns:
-            What a robot cannot do, as sentences.
+            Impossible targets of a robot, as sentences.
 
         Raises:
             UsageError: If something that the format needs is missing.

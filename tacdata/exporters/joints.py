@@ -27,7 +27,7 @@ JOINT = "joint."
 
 
 class Joints(Exporter):
-    """``NAME.joints.parquet``: joint values beside the targets (`schemas/joint_trajectory.schema.json`)."""
+    """``NAME.joints.parquet``: joint values with the targets (`schemas/joint_trajectory.schema.json`)."""
 
     needs_robot = True
 
@@ -74,7 +74,7 @@ def read_joints(out: Path) -> list[tuple[FingertipTargets, dict[str, np.ndarray]
 
 
 def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) -> list[str]:
-    """Describe what the robot cannot do, with times; orientations too, where they are prescribed."""
+    """Describe the targets that the robot cannot reach, with times; orientations too, where they are prescribed."""
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     sentences = []
     for name, rows in path.unreached.items():

@@ -1,8 +1,8 @@
 """Open-X-Tactile: the Zarr layout that FTP-1 learns from, one store a task.
 
-As its public description says (ftp1-policy, data_processing): Zarr version 2, time first in every array of ``data/``,
+By its public description (ftp1-policy, data_processing): Zarr version 2, time first in every array of ``data/``,
 ``meta/episode_ends``, poses as xyz and rotation vector, four arrays for each group of tactile areas. A hand is
-described as a gripper: the middle of its fingertips, and how far they are open. The exact targets lie beside, in
+described as a gripper: the middle of its fingertips, and how far they are open. The exact targets are in
 ``tacdata/``.
 """
 

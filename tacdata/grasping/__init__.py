@@ -1,1 +1,1 @@
-"""Grasping by touch: two fingertips find out where an object lies between them, and move until it lies well."""
+"""Grasping by touch: two fingertips estimate the place of an object between them, and move until it is central."""

@@ -4,7 +4,7 @@ The simulation does not know the band. The hand lifts in another configuration t
 fingertips are turned and farther apart, and touch with the rounded ridge at the middle of their pads instead of the
 flat skin.
 
-Beside its largest section an orange is thinner and its faces lean outwards. Ridges at a given distance then press it
+Away from its largest section an orange is thinner and its faces lean outwards. Ridges at a given distance then press it
 less and push it out. Contact, friction and gravity decide the result.
 """
 
@@ -64,7 +64,7 @@ class Grip:
     friction: float = 0.2
     """Coulomb coefficient between skin and orange [1], the sensor file's."""
     squeeze: float = 0.001
-    """How far each fingertip's target lies beyond the surface of a centred orange [m]; fingertips farther apart squeeze
+    """Distance of each fingertip's target beyond the surface of a centred orange [m]; fingertips farther apart squeeze
     less.
     """
     stiffness: float = 3000.0
@@ -98,7 +98,7 @@ class Lift:
 
 
 def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
-    """Return the result for an orange that lies off the fingertips' middle.
+    """Return the result for an orange off the fingertips' middle.
 
     Args:
         grip: Hand and object.

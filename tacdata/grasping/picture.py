@@ -1,4 +1,4 @@
-"""Draws a study: success with intervals beside the paper's, by position, moves, and the centroids' bias."""
+"""Draws a study: success with intervals and the paper's, by position, moves, and the centroids' bias."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class PressSet:
     normal: np.ndarray
     """Normal force on the indenter [N], shape (n, k)."""
     provenance: dict[str, Any]
-    """Versions and hashes of what made it, the skin model's among them."""
+    """Versions and hashes of its sources, the skin model's among them."""
 
     def signals(self, sensor: Sensor) -> np.ndarray:
         """Return tared readings without noise [counts], shape (n, k, taxels), by the sensor's transduction."""

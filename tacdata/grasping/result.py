@@ -82,7 +82,7 @@ def _lifting(grip: Grip) -> dict[str, float]:
 
 
 def lines(found: dict[str, Any]) -> list[str]:
-    """Return a study's result as lines of text, beside the paper's figures."""
+    """Return a study's result as lines of text, with the paper's figures."""
     sentences = [
         f"{'':<13} {'held':>7}  {'Wilson 95 %':<14} {'paper':>6} | at the edge                   | moves where held"
     ]

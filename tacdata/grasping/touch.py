@@ -25,7 +25,7 @@ class OrangeTouch:
         self._signals = RegularGridInterpolator((x, y), presses.signals(sensor).reshape(*grid, -1))
 
     def reaches(self, x: float, y: float) -> bool:
-        """Return whether an orange at this position [mm] touches the skin inside what was solved."""
+        """Return whether an orange at this position [mm] touches the skin inside the solved area."""
         return abs(x) <= self.limit[0] and abs(y) <= self.limit[1]
 
     def depth(self, x: float, y: float, force: float) -> float:

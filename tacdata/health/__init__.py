@@ -1,1 +1,1 @@
-"""Says how a unit is: gains, drift, noise, hysteresis and wiring over its visits, and what to do."""
+"""Condition of a unit: gains, drift, noise, hysteresis and wiring over its visits, and the remedy."""

@@ -1,4 +1,4 @@
-"""What to do with a unit: nothing, tare, register, recalibrate, check the wiring of channels, replace."""
+"""Advice on a unit: nothing, tare, register, recalibrate, check the wiring of channels, replace."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ RECALIBRATE, WIRING, REPLACE = "recalibrate", "check wiring", "replace"
 MOST_FAULTY = 0.125
 """Share of channels without readings from which a unit is to be replaced [1]; three at least."""
 MANY = 0.5
-"""Share of the channels from which a change is said of all of them [1]."""
+"""Share of the channels from which a change is reported for all of them [1]."""
 PERCENT = {"common gain", "gain", "loop", "repeatability", "network error"}
-"""Quantities that are told in percent."""
+"""Quantities that are reported in percent."""
 CALLED = {
     "common gain": "gain of all channels",
     "gain": "gain",
@@ -47,10 +47,10 @@ class Advice:
 
 
 def advice(history: History) -> tuple[Advice, ...]:
-    """Return what to do, the gravest first."""
+    """Return the advice, the gravest first."""
     faults, changed = history.wiring, history.changed
     shifted = elsewhere(history)
-    if shifted:  # what gains change cannot be told from so large a shift
+    if shifted:  # gains cannot be distinguished from so large a shift
         changed = tuple(c for c in changed if c[1].quantity not in ("common gain", "gain"))
     advices = [*_wiring(history, faults), *_noise(history, [c for c in changed if c[1].quantity == "noise"])]
     for do, quantities in (
@@ -128,7 +128,7 @@ def _told(history: History, do: str, changed: list[tuple[int, Change]]) -> list[
 
 
 def _sentence(history: History, against: int, change: Change) -> str:
-    """Return a change in words, with its interval and what it is compared with."""
+    """Return a change as a sentence, with its interval and its reference."""
     of = "" if change.channel is None else f" of channel {change.channel}"
     reference = "" if change.quantity in ABSOLUTE else f" against {history.visits[against].name}"
     return f"{CALLED[change.quantity]}{of}: {told(change)}{reference}"

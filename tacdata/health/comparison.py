@@ -1,4 +1,4 @@
-"""One visit beside another: what changed beyond its tolerance, tested one by one and corrected for all tests."""
+"""Comparison of two visits: changes beyond their tolerance, tested one by one and corrected for all tests."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from tacdata.health.wiring import Wiring, wiring
 LEVEL = 0.01
 """Probability that any test of channels, or any of the unit, errs while nothing changed beyond its tolerance [1]."""
 COMMON, OWN = 0.04, 0.05
-"""Tolerance of the gain that all channels share, and of a channel's own beside it [1]."""
+"""Tolerance of the gain that all channels share, and of a channel's own relative to it [1]."""
 ZERO, DRIFT = 0.05, 0.02
 """Tolerance of a channel's zero, and of its drift in a minute: shares of its strongest answer [1]."""
 NOISE = 1.5
-"""Tolerance of noise: times what it was [1]."""
+"""Tolerance of noise, as a ratio [1]."""
 LOOP = 0.03
 """Tolerance of the loop's area [1]."""
 REPEATABLE = 0.02
@@ -36,7 +36,7 @@ NETWORK = 0.15
 
 @dataclass(frozen=True)
 class Change:
-    """One quantity of a visit beside an earlier one, with its test."""
+    """One quantity of a visit and of an earlier one, with its test."""
 
     quantity: str
     """One of: common gain, gain, zero, drift, noise, loop, repeatability, depth, x, y, network error."""
@@ -49,19 +49,19 @@ class Change:
     unit: str
     tolerance: float
     p: float
-    """p-value of "it lies within its tolerance"."""
+    """p-value of "it is within its tolerance"."""
     corrected: float = 1.0
     """p-value corrected for all tests of the visit that concern channels, or the unit, by Holm's method."""
 
     @property
     def changed(self) -> bool:
-        """Whether it lies beyond its tolerance, by the corrected test."""
+        """Whether it is beyond its tolerance, by the corrected test."""
         return self.corrected < LEVEL
 
 
 @dataclass(frozen=True)
 class VisitComparison:
-    """A visit beside an earlier one."""
+    """A visit compared with an earlier one."""
 
     against: int
     """Number of the earlier visit, from 0."""
@@ -96,7 +96,7 @@ def compare(
         network: Errors of one network at both.
     """
     pairs = matched(now, before)
-    # Labels of different presses, too, tell gains apart: both beside the model.
+    # Different presses with labels can be compared, too: both gains are relative to the model.
     enough = len(pairs) >= FEWEST
     measured = [now.responses[a] for a, _ in pairs]
     reference = [before.responses[b] for _, b in pairs]
@@ -117,7 +117,7 @@ def compare(
 
 
 def wiring_alone(visit: Visit) -> Wiring:
-    """Return the wiring of a visit by itself: beside predictions if it is labelled, else beside a round pattern."""
+    """Return the wiring of a single visit: compared with predictions if it is labelled, else with a round pattern."""
     return wiring(list(visit.entries), visit.responses, visit.predicted or None)
 
 
@@ -159,7 +159,7 @@ def _gains(
 
 
 def _by_labels(now: Visit, before: Visit, faults: Wiring) -> GainFit | None:
-    """Return the ratio of both visits' gains beside the model; None unless both are labelled."""
+    """Return the ratio of both visits' gains relative to the model; None unless both are labelled."""
     after, ahead = model_gains(now, faults), model_gains(before, wiring_alone(before))
     if after is None or ahead is None:
         return None
@@ -169,7 +169,7 @@ def _by_labels(now: Visit, before: Visit, faults: Wiring) -> GainFit | None:
 
 
 def model_gains(visit: Visit, faults: Wiring) -> GainFit | None:
-    """Return the gains of a labelled visit beside the model's predictions; None without labels."""
+    """Return the gains of a labelled visit relative to the model's predictions; None without labels."""
     if not visit.predicted:
         return None
     order = _order(faults, len(visit.noise))
@@ -198,7 +198,7 @@ def _less_one(gain: UncertainValue) -> UncertainValue:
 
 
 def _channel_changes(now: Visit, before: Visit, faults: Wiring, order: np.ndarray) -> list[Change]:
-    """Return what each channel did without contact, and how repeatable a press was."""
+    """Return the changes of noise, zero and drift of each channel, and of the repeatability of a press."""
     strongest = np.max([np.abs(press.hold) for press in before.responses], axis=0)
     zero, noise, drift, ahead, noisy = now.zero, now.noise, now.drift, before.zero, before.noise
     changes = []

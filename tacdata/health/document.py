@@ -15,7 +15,7 @@ from tacdata.health.gains import GainFit
 from tacdata.health.history import History
 
 DECIDING = ("tacdata.health", "tacdata.recording.check")
-"""Code that decides what is found."""
+"""Code that decides the findings."""
 
 
 def document(history: History) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def _number(value: float) -> float | None:
 
 
 def not_assessed(history: History) -> list[str]:
-    """Return what the visits cannot tell, and what to record, as sentences."""
+    """Return the quantities that the visits do not determine, and the missing recordings, as sentences."""
     last, lines = history.last, []
     if len(history.visits) > 1:
         fit = history.comparisons[-1][0].gains
@@ -129,7 +129,7 @@ def not_assessed(history: History) -> list[str]:
 
 
 def remarks(history: History) -> list[str]:
-    """Return what a reader should know of the sessions, as sentences."""
+    """Return remarks on the sessions, as sentences."""
     lines = []
     for visit in history.visits:
         lines += [f"{visit.name}: {file} is left out: {reason}" for file, reason in visit.left_out]

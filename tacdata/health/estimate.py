@@ -29,7 +29,7 @@ class UncertainValue:
         return self.value - half, self.value + half
 
     def p_beyond(self, tolerance: float) -> float:
-        """Return the p-value of "it lies within ± the tolerance" (minimum-effect test)."""
+        """Return the p-value of "it is within ± the tolerance" (minimum-effect test)."""
         if not np.isfinite(self.value):
             return 1.0
         return float(min(2 * stats.t.sf((abs(self.value) - tolerance) / max(self.error, 1e-12), self.freedom), 1.0))
@@ -54,7 +54,7 @@ class Spread:
         return float(stats.chi2.sf(self.freedom * (self.value / limit) ** 2, self.freedom))
 
     def p_louder(self, before: Spread, factor: float) -> float:
-        """Return the p-value of "it is at most so many times what it was before" (F test)."""
+        """Return the p-value of "its ratio to the value before is at most the tolerance" (F test)."""
         ratio = (self.value / max(before.value * factor, 1e-12)) ** 2
         return float(stats.f.sf(ratio, self.freedom, before.freedom))
 

@@ -1,4 +1,4 @@
-"""How answers fall off with the distance from the tip: what a tip that stands elsewhere changes, level by level."""
+"""How answers fall off with the distance from the tip: the effect of a displaced tip, level by level."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DEGREE = 2
 HELD = 2.0
 """How strongly a channel's own gain is held to 1 in the fit [1]: spread of the fit over that of gains."""
 STEEPEST = 1.0
-"""Largest logarithm of what a shift does to an answer [1]; beyond it the polynomial is not to be trusted."""
+"""Largest logarithm of an answer's ratio under a shift [1]; beyond it the polynomial is not to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class FallOff:
     """Coefficients of its powers from the first on [1], shape (levels, `DEGREE`)."""
 
     def shifted(self, away: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a shift of the tip does to answers, and how they change as it goes on.
+        """Return the effect of a shift of the tip on answers, and its derivative by the shift.
 
         Args:
             away: Taxels less the tip's place [mm], shape (taxels, 2).
-            shift: By how much the tip stands elsewhere [mm], shape (2,).
+            shift: Displacement of the tip [mm], shape (2,).
 
         Returns:
             Factor of each answer [1], shape (levels, taxels); its derivatives over itself [1/mm], shape (levels,
@@ -48,7 +48,7 @@ def fall_off(presses: Sequence[PressResponse], near: Sequence[Sequence[int]], ce
     """Fit the logarithms of answers: strength of each press, gain of each channel, a polynomial that all share.
 
     Args:
-        presses: What the channels answered.
+        presses: Answers of the channels.
         near: Channels that each press excites.
         centers: Places of the taxels [mm], shape (taxels, 2).
     """

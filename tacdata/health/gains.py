@@ -1,9 +1,9 @@
-"""Gains of the channels, from answers beside those to the same presses at another visit, or beside predicted ones.
+"""Gains of the channels, from answers relative to those to the same presses at another visit, or to predicted ones.
 
-    answer = gain * (reference at a tip that stands elsewhere by dx, dy, dz) + error
+    answer = gain * (reference at a tip displaced by dx, dy, dz) + error
 
 over presses, channels and levels, by generalized least squares, made linear about the shift (dx, dy, dz) in rounds.
-The shift of the whole visit is what a registration errs by. It has the sensor file's spread as its prior. Errors are
+The shift of the whole visit is the error of a registration. It has the sensor file's spread as its prior. Errors are
 noise of readings, of time, of the shift's own effect, and two relative ones (`mixed_model`).
 """
 
@@ -27,19 +27,19 @@ FEWEST = 3
 NEAR, CLEAR = 0.05, 10.0
 """Answer from which a channel counts as pressed: share of the press's strongest [1], and times the noise [1]."""
 FAINT = 0.05
-"""Part of the press's strongest answer that relative errors are taken of, beside the channel's own answer [1]."""
+"""Part of the press's strongest answer that relative errors are taken of, besides the channel's own answer [1]."""
 TIMING = 0.005
 """Error of the time between motion and readings in one recording [s]; it shifts the depth of the way in."""
 LEVEL = 0.003
-"""Relative error of each level by itself [1]: what straight lines and polynomials leave."""
+"""Relative error of each level by itself [1]: the residual of straight lines and polynomials."""
 ROUNDS = 3
-"""Rounds in which shift and gains are made linear anew [count]."""
+"""Rounds in which shift and gains are linearized again [count]."""
 MISFIT = 0.15
-"""Part of what a shift does to an answer that the fall-off errs by [1]."""
+"""Relative error of the fall-off's prediction of a shift [1]."""
 STEEPER = 0.05
-"""Part of what a shift of depth does to a level that its slope errs by [1]."""
+"""Relative error of the slope's prediction of a shift of depth [1]."""
 REMAINS, DEEPER = 0.005, 0.3
-"""Error of the common gain that stays [1], and that by a shift of depth [1/mm]: gain and depth are alike in part."""
+"""Error of the common gain that stays [1], and that by a shift of depth [1/mm]: gain and depth are partly collinear."""
 WEAKEST = 0.05
 """Smallest gain about which is made linear [1]."""
 AXES = ("depth", "x", "y")
@@ -47,12 +47,12 @@ AXES = ("depth", "x", "y")
 
 @dataclass(frozen=True)
 class GainFit:
-    """Gains of a visit beside a reference."""
+    """Gains of a visit relative to a reference."""
 
     channels: dict[int, UncertainValue]
     """Gain of each channel that was pressed [1]."""
     common: UncertainValue
-    """Their median: what all channels share [1]."""
+    """Their median, common to all channels [1]."""
     own: dict[int, UncertainValue] = field(default_factory=dict)
     """Gain of each channel over the common one [1]."""
     shift: dict[str, UncertainValue] = field(default_factory=dict)
@@ -167,10 +167,10 @@ def _rows(
 
 
 def _each(size: np.ndarray) -> np.ndarray:
-    """Return the covariance of an error that each channel has by itself, all its levels alike, shape (n, n).
+    """Return the covariance of an error that each channel has by itself, the same at all its levels, shape (n, n).
 
     Args:
-        size: What the error does to the answer [counts], shape (channels, levels).
+        size: Effect of the error on the answer [counts], shape (channels, levels).
     """
     return np.asarray(block_diag(*(np.outer(one, one) for one in size)))
 

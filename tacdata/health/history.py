@@ -1,4 +1,4 @@
-"""The visits of one unit in the order of time, each beside the one before it and beside the first."""
+"""The visits of one unit in the order of time, each compared with the one before it and with the first."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tacdata.health.wiring import Wiring
 
 @dataclass(frozen=True)
 class History:
-    """Visits and what changed between them."""
+    """Visits and the changes between them."""
 
     visits: tuple[Visit, ...]
     """In the order of time."""
     comparisons: tuple[tuple[VisitComparison, ...], ...]
-    """Of each visit: beside the one before it and, if that is another, beside the first. None for the first visit."""
+    """Comparisons of each visit with the one before it and, if different, with the first. None for the first visit."""
     model: tuple[GainFit | None, ...]
-    """Gains of each visit beside the model's predictions; None without labels."""
+    """Gains of each visit relative to the model's predictions; None without labels."""
     network: Mapping[int, NetworkError]
     """Number of a visit -> errors of the network."""
 
@@ -43,14 +43,14 @@ class History:
         return comparisons[-1].wiring if comparisons else wiring_alone(self.visits[number])
 
     def beside_first(self, number: int) -> VisitComparison | None:
-        """Return a visit beside the first one; None for the first."""
+        """Return the comparison of a visit with the first one; None for the first."""
         return self.comparisons[number][-1] if self.comparisons[number] else None
 
     @property
     def changed(self) -> tuple[tuple[int, Change], ...]:
-        """What is changed at the latest visit, each with the number of the visit that it is compared with.
+        """Changes at the latest visit, each with the number of the visit that it is compared with.
 
-        What is changed against the visit before and against the first stands once, against the visit before.
+        A change against both the visit before and the first is listed once, against the visit before.
         """
         found: dict[tuple[str, int | None], tuple[int, Change]] = {}
         for comparison in self.comparisons[-1]:

@@ -22,9 +22,9 @@ class SiteRows:
     """The observations at one site: levels of each pressed channel, one channel after the other."""
 
     design: np.ndarray
-    """What a parameter adds for each of its units [counts], shape (n, parameters)."""
+    """Contribution of a parameter for each of its units [counts], shape (n, parameters)."""
     answer: np.ndarray
-    """What was measured [counts], shape (n,)."""
+    """Measured values [counts], shape (n,)."""
     known: np.ndarray
     """Covariance by noise, time and shift [counts^2], shape (n, n)."""
     own: np.ndarray
@@ -38,7 +38,7 @@ def solve(rows: Sequence[SiteRows], precision: np.ndarray, errors: np.ndarray) -
 
     Args:
         rows: Observations.
-        precision: What is known of each parameter before, about 0: one over its variance, shape (p,).
+        precision: Prior precision of each parameter about 0: one over its variance, shape (p,).
         errors: The two relative errors [1], shape (2,).
     """
     information, score, _ = _sums(rows, precision, errors)

@@ -41,7 +41,7 @@ def draw(history: History, out: Path | BinaryIO) -> None:
 
 
 def reference(history: History) -> tuple[str, list[GainFit | None]]:
-    """Return what gains are drawn beside, and the gains of each visit: the first visit, or the model if alone."""
+    """Return the reference of the drawn gains, and the gains of each visit: the first visit, or the model if alone."""
     comparisons = [history.beside_first(k) for k in range(len(history.visits))]
     fits = [c.gains if c else None for c in comparisons]
     if any(fits):
@@ -69,7 +69,7 @@ def _gains(axes: Any, history: History) -> None:
 
 
 def _say_unknown(axes: Any) -> None:
-    """Write into an empty panel what it needs."""
+    """Write into an empty panel the recordings that it needs."""
     axes.text(
         0.5, 0.5, "known from a second visit on,\nor with labels", transform=axes.transAxes, ha="center", va="center"
     )
@@ -85,7 +85,7 @@ def _errors(axes: Any, series: list[tuple[int, UncertainValue]]) -> None:
 
 
 def _array(axes: Any, history: History) -> None:
-    """Draw the latest gain of each taxel where it lies."""
+    """Draw the latest gain of each taxel at its place."""
     _, fits = reference(history)
     fit, taxels = fits[-1], history.last.sensor.taxels
     values = np.full(taxels.count, np.nan)

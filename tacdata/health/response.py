@@ -1,4 +1,4 @@
-"""What the channels answered to one press: at shares of its depth on the way in, and at the end of the hold."""
+"""Answers of the channels to one press: at shares of its depth on the way in, and at the end of the hold."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class PressResponse:
 
 
 def unusable(figures: RecordingFigures) -> str:
-    """Return why a recording says nothing of the unit, in words; "" if it does."""
+    """Return why a recording carries no information on the unit, as a sentence; "" if it does."""
     episode = figures.recording.episode
     if not episode.complete:
         return "it was interrupted"

@@ -1,4 +1,4 @@
-"""What one session says of a unit by itself: noise, zero, drift, loop, repeatability."""
+"""Quantities of a unit from one session alone: noise, zero, drift, loop, repeatability."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class Visit:
     entries: tuple[RecordingFigures, ...]
     """Figures of the recordings that are used, in the plan's order."""
     responses: tuple[PressResponse, ...]
-    """What the channels answered, in the same order."""
+    """Answers of the channels, in the same order."""
     predicted: tuple[PressResponse, ...]
-    """What labels predict, in the same order; empty unless every one has a label with readings."""
+    """Predictions of labels, in the same order; empty unless every one has a label with readings."""
     left_out: tuple[tuple[str, str], ...]
     """Recordings that are not used, and why."""
     labels: dict[str, str]
@@ -167,7 +167,7 @@ def read_visit(folder: StrPath, done: Callable[[str], None] = lambda name: None)
 def _predicted(
     session: Session, entries: list[RecordingFigures]
 ) -> tuple[tuple[PressResponse, ...], dict[str, str], str]:
-    """Return what labels predict for each recording, which labels, and why they are not used if they are not."""
+    """Return the labels' predictions for each recording, which labels, and why they are not used if they are not."""
     present = file_names.present(file_names.folder(session.folder))
     if not present:
         return (), {}, ""

@@ -23,7 +23,7 @@ from tacdata.recording.check.figures import RecordingFigures
 EXPECTED = 30.0
 """Answer that must be expected of a channel before its silence counts [times the noise]."""
 SHARE = 0.05
-"""Part of what is expected that a dead channel does not reach [1]: a neighbour's crosstalk may."""
+"""Part of the expected answer that a dead channel does not reach [1]: a neighbour's crosstalk may."""
 MOST = 0.5
 """Share of the recordings that must show a fault of the wiring [1]: it lasts."""
 
@@ -45,7 +45,7 @@ class Wiring:
 
     @property
     def unfit(self) -> frozenset[int]:
-        """Channels whose gain says nothing."""
+        """Channels whose gain carries no information."""
         return frozenset({*self.dead, *self.undefined, *(k for pair in self.tied for k in pair)})
 
 
@@ -56,8 +56,8 @@ def wiring(
 
     Args:
         entries: Figures of the recordings that are used.
-        measured: What the channels answered to each.
-        reference: What they answered before, or are predicted to; None to compare with a round pattern alone.
+        measured: Answers of the channels to each.
+        reference: Their earlier or predicted answers; None to compare with a round pattern alone.
     """
     found = answers(entries)
     if found is None:

@@ -127,8 +127,8 @@ class Label(Displayed):
     """Pressure of each protrusion on the board, by area of its pixels (`tacdata.sensor.protrusion_pixels`) [MPa], shape
     (n, taxels, 10, 10), float16. None without a board, and in labels of older releases."""
     interpolation_error: Annotated[np.ndarray | None, Quantity("mm", "scalar")] = None
-    """How far, at the pixel where it is most, the states beside each frame lie from what their neighbours say of them
-    [mm], shape (n,), float32. A state is left out at twice the distance, so this bounds what is lost at the frame."""
+    """Largest distance of the states around each frame from the interpolation of their neighbours [mm], shape (n,),
+    float32. A state is left out at twice the distance, so this bounds the error at the frame."""
     uncertainty: Annotated[np.ndarray | None, Quantity("mm", "map", "float16", needs="spreads")] = None
     """One standard deviation of each pixel by the spreads that the sensor file states [mm], shape (n, pixels_x,
     pixels_y), float16; None where the label knows of none. So are the three below."""

@@ -76,7 +76,7 @@ class DepthStream:
             estimate: Window of tared readings [counts], shape (len(offsets), taxels) -> map [mm].
             offsets: Frames of the window relative to its target, ascending.
             grid: The sensor's pixels.
-            clock: The board's clock, which says when frames were sampled.
+            clock: The board's clock, from which the frames' sampling times follow.
             tare_frames: Frames at rest over which the reading without contact is averaged.
             causal: Whether to estimate the newest frame.
             novelty: Tared readings (m, taxels) -> novelty [1], shape (m,).

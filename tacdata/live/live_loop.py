@@ -17,7 +17,7 @@ PATIENCE = 0.05
 LATE = 2.0
 """A frame that waited longer [frame periods] is estimated only if no newer one is there."""
 TOUCHED = "the skin was touched while it was tared; lift what touches it and tare again (Enter, or tare on the socket)"
-"""What a reading below the tare means."""
+"""Meaning of a reading below the tare."""
 SAID_EVERY = 1.0
 """Interval between status lines for a person [s of real time]."""
 

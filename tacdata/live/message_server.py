@@ -1,6 +1,6 @@
 """Sends one line of JSON per estimate to every reader of a socket (`schemas/live_message.schema.json`); never waits.
 
-A reader may write a line `tare`, which tares anew.
+A reader may write a line `tare`, which repeats the tare.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tacdata.live.depth_stream import Estimate
 
 LOOPBACK = "127.0.0.1"
 TARE = b"tare"
-"""What a reader writes to have the skin tared anew."""
+"""Command of a reader that repeats the tare."""
 WAITING = 4
 """Messages that wait for a slow reader; beyond that the oldest are dropped [count]."""
 

@@ -1,4 +1,4 @@
-"""Any path as the noun that lies there."""
+"""Opens any path as its kind of object."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ALLOWED = (
 
 
 def open(path: StrPath) -> Session | Episode | Label | Dataset | TrainedNetwork | VerdictFolder:
-    """Open a path as what lies there: a session, an episode, a label, a dataset, a network or a verdict.
+    """Open a path as its kind of object: a session, an episode, a label, a dataset, a network or a verdict.
 
     Raises:
         UsageError: If there is nothing, or nothing of these kinds.

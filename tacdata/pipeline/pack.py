@@ -54,7 +54,7 @@ def pack(
         session: The session folder.
         out: Folder of the dataset; must not exist, unless ``append``.
         labels: Folder of labels; None takes the session's.
-        append: Add to the dataset what it does not hold.
+        append: Add the episodes that the dataset does not hold.
         sensor: Sensor of the labels or its file, if not the recorded one.
         columns: Optional columns of the labels to add, such as "uncertainty".
         model: Content hash of the skin model that all labels must be made with.

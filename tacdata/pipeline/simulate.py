@@ -20,7 +20,7 @@ from tacdata.sensor import Sensor, default_sensor, read_sensor
 if TYPE_CHECKING:
     from tacdata.dataset.reader import Dataset
 
-# A computer that only solves needs no recorder: what packs a dataset is imported when one is asked for.
+# A computer that only solves needs no recorder: the packer of datasets is imported when one is asked for.
 SOLVE, WRITE = "solve", "write"
 """Stages."""
 

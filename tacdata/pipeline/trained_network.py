@@ -86,7 +86,7 @@ class TrainedNetwork(Displayed):
         return sequence_maps(self.checkpoint, readings)
 
     def description(self) -> Iterator[str]:
-        """Yield what it is: architecture, sensor, training."""
+        """Yield the lines of its description: architecture, sensor, training."""
         document = self.checkpoint.document
         yield f"Network {self.name} ({self.path})"
         yield f"sensor {self.sensor.name}, window of {len(self.checkpoint.network.offsets)} readings"

@@ -1,4 +1,4 @@
-"""Press plans: what will be pressed where, how deep and how fast, as files."""
+"""Press plans: indenter, place, depth and speed of each press, as files."""
 
 from tacdata.plans.plan import Plan, Press, read_plan
 

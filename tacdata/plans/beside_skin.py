@@ -1,4 +1,4 @@
-"""Shapes that press beside the skin, or beside their own axis: said before a press is recorded or solved."""
+"""Shapes that miss the skin, or touch it off their own axis: reported before a press is recorded or solved."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tacdata.indenters.mesh import Mesh
 _LEVEL = 0.02
 """Vertices within this height above the lowest one [mm] belong to the tip."""
 _ASIDE = 0.1
-"""A tip farther than this from the axis [mm], and than this share of the extent, is said."""
+"""A tip farther than this from the axis [mm], and than this share of the extent, is reported."""
 
 
 def check_touch(
@@ -28,13 +28,13 @@ def check_touch(
         origin: Names the press in errors.
 
     Raises:
-        FormatError: If nothing of the shape that is so low lies over the skin.
+        FormatError: If nothing of the shape that is so low is over the skin.
     """
     try:
         if indenter.profile(*np.zeros((2, 1)))[0] <= depth:
             return  # over its axis, as most shapes do
     except UsageError:
-        return  # of a session whose surface file lies on another machine
+        return  # of a session whose surface file is on another machine
     reach = indenter.extent
     spans = [np.linspace(max(-s / 2 - c, -reach), min(s / 2 - c, reach), 129) for s, c in zip(size, place, strict=True)]
     x, y = (axis.ravel() for axis in np.meshgrid(*spans, indexing="ij"))
@@ -52,7 +52,7 @@ def check_touch(
 
 
 def tip_aside(indenter: Indenter) -> str:
-    """Return in words where a solid from a file touches first, if that is beside its axis; else ""."""
+    """Return as a sentence where a solid from a file touches first, if that is off its axis; else ""."""
     if not isinstance(indenter, Mesh):
         return ""
     vertices = np.asarray(indenter.solid.mesh.vertices)

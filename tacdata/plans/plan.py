@@ -32,7 +32,7 @@ class Press:
     """Depth of the lowest point below the undeformed outer face at (x, y) [mm]; negative passes above without contact.
     """
     x: float = 0.0
-    """Location of the indenter's tip [mm]: its lowest point, if it stands upright."""
+    """Location of the indenter's tip [mm]: its lowest point, if it is upright."""
     y: float = 0.0
     """Location of the indenter's tip [mm]."""
     yaw: float = 0.0
@@ -155,7 +155,7 @@ class Plan:
     presses: tuple[Press, ...]
     purpose: str = ""
     on_bad_readings: str = "stop"
-    """What happens when the board freezes, saturates or becomes slow: "stop", "pause" or "go on"."""
+    """Reaction when the board freezes, saturates or becomes slow: "stop", "pause" or "go on"."""
     document: dict[str, Any] | None = None
     """The file's document, unchanged."""
 

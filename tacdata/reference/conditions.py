@@ -26,7 +26,7 @@ class PressKind:
     """All presses of one kind, on one clock."""
 
     name: str
-    """What distinguishes it: its specimen or place, its depth, its speed."""
+    """Its factors: specimen or place, its depth, its speed."""
     time: np.ndarray
     """Since the start of the press [s], shape (t,)."""
     depth: np.ndarray
@@ -71,7 +71,7 @@ def matched(course: Course, names: Sequence[str], measured: np.ndarray) -> Match
 
     Args:
         course: Healthy and other recordings, read together.
-        names: What the source calls each episode's specimen; empty where it names none.
+        names: Specimen of each episode as the source names it; empty where it names none.
         measured: Whether an episode is of the other machine, shape (episodes,), bool.
     """
     rows = [np.flatnonzero((course.episode == e) & (course.averaged > 0)) for e in range(course.episodes)]

@@ -1,4 +1,4 @@
-"""How a machine differs from a healthy one: mechanisms with their sizes, what has no name, and a control."""
+"""How a machine differs from a healthy one: mechanisms with their sizes, the unnamed remainder, and a control."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEVEL = 0.01
 LEAST = 0.02
 """A change of the readings below this share of their range counts as none [1]."""
 REPEATED = 2.0
-"""A change counts from so many times what the control shows [1]."""
+"""A change counts from so many times that of the control [1]."""
 EXPLAINED = 0.5
 """A name explains at least this share of the difference where it is [1]."""
 FAINT = 1e-3
@@ -33,7 +33,7 @@ NEEDED = 0.15
 WINDOWS = 20
 """Parts of a press whose means are compared, whatever the name."""
 CLEAR = 0.9
-"""A zero that is off explains at least this share by itself: it is what remains where nothing else fits [1]."""
+"""A zero that is off explains at least this share by itself: it fits any remainder in part [1]."""
 Z90 = 1.645
 """Standard errors either way of a 90 % interval."""
 
@@ -72,7 +72,7 @@ class Mechanism:
     name: str
     form: str
     unit: str
-    """Unit of its sizes; "reading" stands for the readings' unit."""
+    """Unit of its sizes; "reading" is the readings' unit."""
     probability: float
     sizes: tuple[Size, ...]
     rival: str = ""
@@ -108,7 +108,7 @@ class Difference:
     explained: float
     """Share of the difference that the mechanisms explain where they are a change [1]."""
     differs: bool
-    """Whether the readings differ beyond what the healthy machine scatters, whatever the name."""
+    """Whether the readings differ beyond the healthy machine's scatter, whatever the name."""
     largest: float
     """Largest difference of the readings [the source's unit]."""
     where: str
@@ -137,7 +137,7 @@ def difference(course: Course, names: Sequence[str], measured: np.ndarray) -> Di
 
     Args:
         course: Both machines' recordings, read together.
-        names: What the source calls each episode's specimen; empty where it names none.
+        names: Specimen of each episode as the source names it; empty where it names none.
         measured: Whether an episode is of the other machine, shape (episodes,), bool.
 
     Raises:
@@ -163,7 +163,7 @@ def difference(course: Course, names: Sequence[str], measured: np.ndarray) -> Di
         most = {key: max(most.get(key, 0.0), peaks.get(key, 0.0)) for key in {*most, *peaks}}
         quiet = _compared(replace(pairs, conditions=halves)).status == "none"
         controls.append(Control(split, quiet, max(peaks.values(), default=0.0)))
-    # What the healthy machine shows of itself is no change of the other one.
+    # A change within the healthy machine is no change of the other one.
     answer = _compared(pairs, most)
     if answer.named and not all(c.quiet for c in controls):
         answer = replace(answer, status="unknown")
@@ -208,7 +208,7 @@ def _compared(pairs: Matched, control: dict[tuple[str, str, int], float] | None 
     mechanisms = _mechanisms(conditions, columns, found, chosen, control or {})
     changed = tuple(k for k, m in zip(chosen, mechanisms, strict=False) if m.changed)
     needed = _needed(conditions, columns, changed, mechanisms)
-    if needed and needed != chosen:  # sizes are without what is too small to count
+    if needed and needed != chosen:  # sizes are fitted without the shapes that are too small to count
         chosen = needed
         mechanisms = _mechanisms(conditions, columns, found, chosen, control or {})
     explained = _explained(conditions, columns, chosen, mechanisms)
@@ -269,7 +269,7 @@ def _mechanisms(
         for channel in range(condition.base.shape[1]):
             value, healthy, other = _solved(condition, shapes_of, chosen, channel)
             freedom = healthy.shape[1] + other.shape[1] - 2
-            # A session is one draw of what wanders from block to block: averaging does not make it smaller.
+            # A session is one draw of the effect that varies from block to block: averaging does not make it smaller.
             spread = np.square(healthy - healthy.mean(axis=1, keepdims=True)).sum(axis=1)
             spread += np.square(other - other.mean(axis=1, keepdims=True)).sum(axis=1)
             error = np.sqrt(2 * spread / freedom)

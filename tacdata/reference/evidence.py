@@ -1,4 +1,4 @@
-"""Probabilities of mechanisms: Gaussian evidence of each set of shapes, beside a remainder of unknown size.
+"""Probabilities of mechanisms: Gaussian evidence of each set of shapes, with a remainder of unknown size.
 
 The difference of a condition is a sum of shapes, an offset, a smooth remainder and noise. Sizes have Gaussian priors,
 so the evidence of a set is exact; the remainder's size is integrated over a grid. The posterior is averaged over
@@ -41,14 +41,14 @@ EXCLUSIVE = (frozenset({"latency", "low_pass_filter"}), frozenset({"z_offset", "
 DRAWS = 24
 """Bootstrap samples of the presses."""
 BLOCKS = 5
-"""Blocks of consecutive presses: their scatter holds what wanders from press to press."""
+"""Blocks of consecutive presses: their scatter contains the variation from press to press."""
 OFFSET = 1.0
 """Prior size of the offset of a condition, in ranges of the base [1]."""
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """What the difference consists of."""
+    """Components of the difference."""
 
     mechanisms: dict[str, float]
     """Probability that a mechanism is in the set [1]."""
@@ -75,7 +75,7 @@ def posterior(conditions: tuple[PressKind, ...], columns: list[list[Shape]]) -> 
     evidence = np.zeros((len(sets), DRAWS + 1))
     for condition, shapes_of in zip(conditions, columns, strict=True):
         for channel in range(condition.base.shape[1]):
-            # What is left without a name has a size of its own in each condition and channel.
+            # The unnamed remainder has a size of its own in each condition and channel.
             sizes = np.stack([system.evidence(sets) for system in _systems(condition, shapes_of, channel)])
             evidence += logsumexp(sizes, axis=0) - np.log(len(REMAINDERS))
     weights = softmax(evidence + np.log(mass)[:, None], axis=0)

@@ -22,7 +22,7 @@ def draw(found: Difference, unit: str, title: str, out: Path | BinaryIO) -> None
     Args:
         found: The difference.
         unit: Unit of the readings.
-        title: What was compared.
+        title: Names of the compared machines.
         out: File to write.
     """
     import textwrap

@@ -21,7 +21,7 @@ LISTED = 4
 
 @dataclass(frozen=True)
 class Heading:
-    """What was compared."""
+    """Names of the compared machines."""
 
     measured: tuple[str, ...]
     """Folders of the machine that is judged."""
@@ -121,7 +121,7 @@ def controls(found: Difference, unit: str) -> list[str]:
 
 
 def remarks(found: Difference) -> list[str]:
-    """Return what limits the answer."""
+    """Return the limits of the answer."""
     lines = []
     if any(m.name == "dry_friction" for m in found.named):
         lines.append("friction: presses of one speed do not distinguish dry from viscous friction")
@@ -163,7 +163,7 @@ def document(found: Difference, heading: Heading, parents: dict[str, str]) -> di
 
     Args:
         found: The difference.
-        heading: What was compared.
+        heading: Names of the compared machines.
         parents: Name to content hash of the sessions.
     """
     return {

@@ -31,7 +31,7 @@ class Shape:
     form: str
     """Which form of it."""
     unit: str
-    """Unit of its size; "reading" stands for the readings' unit."""
+    """Unit of its size; "reading" is the readings' unit."""
     curves: np.ndarray
     """Change of the readings for a size of 1 [the source's unit], shape (t, channels)."""
     typical: np.ndarray

@@ -1,4 +1,4 @@
-"""Registration: finds where the sensor lies in the guide's frame, by touching it."""
+"""Registration: finds the sensor's pose in the guide's frame, by touching it."""
 
 from tacdata.registration.procedure import register
 from tacdata.registration.result import Found, document_of

@@ -12,7 +12,7 @@ from tacdata.rig import Rig
 from tacdata.sensor import Sensor
 
 FILE = "registration.yaml"
-"""File name of a registration beside a rig file, and of its copy in a session."""
+"""File name of a registration in the folder of a rig file, and of its copy in a session."""
 OLD_DAYS = 30
 """Age from which a warning is given [days]."""
 
@@ -34,12 +34,12 @@ class Chosen:
 
 
 def chosen_registration(rig: Rig, rig_path: Path, path: Path | None, sensor: Sensor) -> Chosen:
-    """Return the rig with a measured registration: the named file, or the one beside the rig file.
+    """Return the rig with a measured registration: the named file, or the one in the rig file's folder.
 
     Args:
         rig: The rig, with the registration of its own file.
         rig_path: That file.
-        path: A registration file; None: `FILE` beside the rig file, if there is one.
+        path: A registration file; None: `FILE` in the rig file's folder, if there is one.
         sensor: The sensor that will be pressed.
 
     Raises:

@@ -20,7 +20,7 @@ from tacdata.rig import Registration, Rig
 from tacdata.sensor import Sensor
 
 PROVED = 0.02
-"""Agreement of touch and registration that proves the height [mm], beside the registration's own uncertainty."""
+"""Agreement of touch and registration that proves the height [mm], besides the registration's own uncertainty."""
 UNSTATED = 0.05
 """Standard uncertainty of a registration that states none [mm]."""
 HALF_WIDTH = 4.0
@@ -37,7 +37,7 @@ IDLE_FRAMES = 30
 
 @dataclass(frozen=True)
 class Evidence:
-    """Height of the skin by a touch, beside the registration's."""
+    """Height of the skin by a touch, and by the registration."""
 
     expected: float
     """Depth zero at the touched place by the registration [mm, machine]."""
@@ -66,7 +66,7 @@ def difference_limit(registration: Registration, document: dict[str, object]) ->
     """Return the largest difference between touch and registration that is no contradiction [mm].
 
     Args:
-        registration: Where the sensor lies.
+        registration: Pose of the sensor.
         document: The rig file's entry, with its stated ``uncertainty`` or ``residual``.
     """
     stated = document.get("uncertainty")
@@ -94,7 +94,7 @@ def touch_evidence(
 
     Args:
         probe: The indenter.
-        start: Where it stands [mm, machine].
+        start: Its position [mm, machine].
         place: x and y of the touch [mm, machine].
         expected: Height of the skin there [mm, machine].
         limit: Largest difference that is no contradiction [mm].
@@ -138,7 +138,7 @@ def prove_zero(
     position: Position,
     doubtful: bool,
 ) -> Position:
-    """Touch the skin with the mounted indenter before the first press; return where the guide stands then [mm].
+    """Touch the skin with the mounted indenter before the first press; return the guide's position then [mm].
 
     Args:
         rig: The rig.
@@ -146,11 +146,11 @@ def prove_zero(
         press: The first press; its indenter is mounted.
         devices: The open devices.
         streams: Their running streams.
-        motion: What moves.
+        motion: Guide that moves.
         interruption: Holds Ctrl-C back.
         height: Safe machine height [mm].
         say: Called with the result in words.
-        position: Where the guide stands [mm, machine].
+        position: Position of the guide [mm, machine].
         doubtful: Whether the machine's position had been lost.
 
     Raises:

@@ -30,7 +30,7 @@ LOOK = 0.002
 
 
 class _Sink:
-    """Receives what the streams deliver, in place of a recording's writer."""
+    """Receives the streams' data, in place of a recording's writer."""
 
     failure: Exception | None = None
 
@@ -71,7 +71,7 @@ class GuardedProbe(Probe):
     ) -> None:
         """Use open devices and running streams; ``height`` [mm, machine] is a safe height.
 
-        ``position`` is where the guide stands [mm, machine]; by default where it reports to be.
+        ``position`` is the guide's position [mm, machine]; by default the reported one.
         """
         self._rig, self._devices, self._streams, self._motion = rig, devices, streams, motion
         self._height, self._sink, self._interruption = height, _Sink(), interruption
@@ -196,7 +196,7 @@ def guarded_probe(
     """Yield a probe on open devices, lifted to ``height`` [mm, machine] at ``speed`` [mm/s].
 
     On any fault the motion stops first; then the indenter is lifted straight up. A Ctrl-C held back by ``interruption``
-    is noticed within 20 ms. What came of it is said by the ``motion``'s `ending`.
+    is noticed within 20 ms. The ``motion``'s `ending` describes the outcome.
     """
     interruption = interruption or Interruption()
     motion = motion or GuardedMotion(devices.cnc, rig.clock, interruption)

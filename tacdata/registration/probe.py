@@ -1,4 +1,4 @@
-"""What the procedure needs of a rig: go to a position, and read the channels there."""
+"""Interface of a rig that the procedure needs: go to a position, and read the channels there."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Position = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class StillReading:
-    """Channels averaged while the indenter stands still."""
+    """Channels averaged while the indenter is at rest."""
 
     mean: np.ndarray
     """Mean reading [counts], shape (channels,)."""
@@ -27,11 +27,11 @@ class Probe(ABC):
 
     @abstractmethod
     def go(self, position: Position, speed: float) -> None:
-        """Go straight to a machine position [mm] at ``speed`` [mm/s]; returns when the guide stands there.
+        """Go straight to a machine position [mm] at ``speed`` [mm/s]; returns when the guide is there.
 
         Raises:
             DeviceError: On a fault; the motion has been stopped and the indenter lifted.
-            FormatError: If the position is outside what is allowed; nothing has moved.
+            FormatError: If the position is outside the allowed volume; nothing has moved.
         """
 
     @abstractmethod

@@ -45,7 +45,7 @@ def touch_sites(sensor: Sensor) -> dict[str, tuple[float, float]]:
 
 
 def described(sensor: Sensor, guess: Registration, settings: RegistrationSettings) -> str:
-    """Describe what the procedure is going to do."""
+    """Describe the steps of the procedure."""
     half = np.abs(sensor.taxels.centers).max(axis=0)
     x, y, z = guess.origin
     taxels = settings.taxels or reference_taxels(sensor)
@@ -67,7 +67,7 @@ def register(
     settings: RegistrationSettings,
     say: Callable[[str], None] = lambda t: None,
 ) -> Found:
-    """Find where the sensor lies.
+    """Find the pose of the sensor.
 
     Args:
         probe: A spherical indenter, somewhere above the sensor.
@@ -77,7 +77,7 @@ def register(
         say: Called with a line of progress.
 
     Raises:
-        DeviceError: If the sensor does not answer, is too noisy, not flat, too tilted, or not what its file says.
+        DeviceError: If the sensor does not answer, is too noisy, not flat, too tilted, or not the one of its file.
     """
     noise = _noise(probe, guess, settings)
     say(f"noise without contact: {np.median(noise):.1f} counts (median of {len(noise)} channels)")
@@ -141,7 +141,7 @@ def _touches(
 
 
 def _with_one_power(touches: list[Touch]) -> list[Touch]:
-    """Fit the onsets again with one common power; its error moves all heights alike (`model`)."""
+    """Fit the onsets again with one common power; its error moves all heights by the same amount (`model`)."""
     power, doubt = shared_power([(t.height, t.answer) for t in touches])
     powers = np.clip([power, power - doubt, power + doubt], POWERS[0], POWERS[-1]).tolist()
     fits = [[onset(t.height, t.answer, p) for p in powers] for t in touches]

@@ -31,7 +31,7 @@ class Found:
 
     @property
     def registration(self) -> Registration:
-        """Where the sensor lies."""
+        """Pose of the sensor."""
         x, y = self.motion.shift
         return Registration((x, y, self.plane.at(x, y)), self.motion.yaw, self.tilt)
 

@@ -48,7 +48,7 @@ class Touch:
 def touch_off(
     probe: Probe, site: str, place: tuple[float, float], top: float, lowest: float, noise: np.ndarray, repeats: int
 ) -> list[Touch]:
-    """Touch the skin at one place; the indenter stands above it before and afterwards.
+    """Touch the skin at one place; the indenter is above it before and afterwards.
 
     Args:
         probe: The indenter.

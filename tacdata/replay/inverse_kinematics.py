@@ -42,7 +42,7 @@ class JointPath:
     unreached: dict[str, tuple[int, ...]]
     """Finger -> rows whose target is missed by more than the tolerance."""
     outside_workspace: dict[str, tuple[int, ...]]
-    """Finger -> rows whose target lies outside the robot's workspace."""
+    """Finger -> rows whose target is outside the robot's workspace."""
     too_fast: dict[str, tuple[int, ...]]
     """Joint -> rows that need more speed than the joint's limit."""
     too_abrupt: dict[str, tuple[int, ...]]

@@ -79,7 +79,7 @@ class ReplayOutcome:
 def object_centre(targets: FingertipTargets, touch: int, reach: float) -> np.ndarray:
     """Return an object's centre in a row in which all fingers touch it [m], shape (3,).
 
-    Each pad touches the object, so the centre lies ``reach`` [m] along its normal, less the depth that it felt.
+    Each pad touches the object, so the centre is ``reach`` [m] along its normal, less the depth that it felt.
     """
     distance = (reach - np.nan_to_num(targets.depth[touch]) / 1000)[:, None]
     return (targets.seen[touch] + distance * normals(targets)[touch]).mean(axis=0)
@@ -96,7 +96,7 @@ def replay_targets(
 ) -> ReplayOutcome:
     """Return the outcome of a replay for an object whose centre starts at ``centre`` [m].
 
-    With ``feedback``, a controller moves the targets by what the simulated skin feels.
+    With ``feedback``, a controller moves the targets by the readings of the simulated skin.
 
     An object that is lifted is held if it stays high while the fingers are. An eraser is held if it never falls behind
     the fingers' strokes.

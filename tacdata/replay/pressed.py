@@ -9,7 +9,7 @@ from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.recording.episode import Episode
 
 FINGER = "index"
-"""What the sensor is called: formats for hands know no other pad."""
+"""Name of the sensor: formats for hands know no other pad."""
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -20,7 +20,7 @@ def pressed(episode: Episode) -> Demonstration:
         episode: A recording of `tacdata record`.
 
     Raises:
-        FormatError: If no frame lies at rest, so that the readings cannot be tared.
+        FormatError: If no frame is at rest, so that the readings cannot be tared.
     """
     times, count = episode.taxels.sample_ns, len(episode.taxels.sample_ns)
     place = episode.tip_at(times) * (1, 1, -1) / 1000  # a depth is a way down

@@ -1,4 +1,4 @@
-"""Robot and object of a replay: what lies on the support, and fingertips on springs."""
+"""Robot and object of a replay: a support, an object on it, and fingertips on springs."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ SPREADS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class ReplayObject:
-    """What is lifted or wiped with."""
+    """Object that is lifted or wiped with."""
 
     geometry: str
     """MuJoCo's name of its shape."""
     sizes: tuple[float, ...]
-    """MuJoCo's sizes [m]: radius, radius and half the height, or half the sizes; the first lies between the fingers."""
+    """MuJoCo's sizes [m]: radius, radius and half the height, or half the sizes; the first is between the fingers."""
     mass: float
     """[kg]"""
     pull: float = 0.0
-    """Force that pulls it onto its support, beside its weight [N]."""
+    """Force that pulls it onto its support, in addition to its weight [N]."""
 
     @property
     def height(self) -> float:
@@ -70,7 +70,7 @@ class ReplayScene:
     task: str = "grasp"
     """"grasp": the object is lifted; "wipe": it is moved to and fro on its support."""
     board_friction: float = 0.5
-    """Coulomb coefficient between the object and what it lies on [1]."""
+    """Coulomb coefficient between the object and its support [1]."""
     bias: tuple[tuple[float, float, float], ...] = ()
     """Offset of each fingertip's targets in the robot's frame [m]: calibration, another hand's shape."""
 
@@ -89,7 +89,7 @@ class ReplayScene:
 
     @property
     def load(self) -> float:
-        """Force that friction at the fingers must carry [N]: the weight of what is lifted, or the drag of a wipe."""
+        """Force that friction at the fingers must carry [N]: the weight of a lifted object, or the drag of a wipe."""
         weight = self.mass * GRAVITY
         return weight if self.task == "grasp" else self.board_friction * (weight + self.body.pull)
 

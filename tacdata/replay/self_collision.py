@@ -27,7 +27,7 @@ def self_collisions(urdf: Path, joints: tuple[str, ...], values: np.ndarray, hom
     """Return which links overlap on a joint path. Neighbours, and links that overlap at home, do not count.
 
     Args:
-        urdf: The URDF, with its shapes; meshes are looked for beside it.
+        urdf: The URDF, with its shapes; meshes are searched in its folder.
         joints: Names of the joints.
         values: Their values [rad or m], shape (n, joints); rows with NaN are passed over.
         home: Their values at home, shape (joints,).
@@ -55,7 +55,7 @@ def self_collisions(urdf: Path, joints: tuple[str, ...], values: np.ndarray, hom
         found = set()
         for contact in data.contact[: data.ncon]:
             bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
-            # MuJoCo leaves out neighbours, but not those of a link that stands still.
+            # MuJoCo leaves out neighbours, but not those of a fixed link.
             joined = any(int(model.body_parentid[a]) == b for a, b in (bodies, bodies[::-1]))
             if contact.dist < -DEEP and not joined:
                 first, second = sorted(model.body(body).name for body in bodies)

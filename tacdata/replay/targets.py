@@ -15,7 +15,7 @@ from tacdata.demonstrations.paths.path_faults import CONTRADICTING
 from tacdata.errors import UsageError
 
 FAR = 0.05
-"""Shift by compensation that is said [m]; the paper's gains move a target by at most 36 mm."""
+"""Shift by compensation that is reported [m]; the paper's gains move a target by at most 36 mm."""
 VAGUE = 0.03
 """Share of the targets that may be known worse than `GUESS` though the finger was seen [1]."""
 UNITS = {"time_ns": "ns", "position": "m", "quaternion": "1 (xyzw)", "seen": "m", "depth": "mm", "gap": "1"}
@@ -150,7 +150,7 @@ def targets_of(
 
 
 def doubts(targets: FingertipTargets) -> list[str]:
-    """Describe what is doubtful in a demonstration's targets: stretches without sightings, and those that contradict.
+    """Describe the doubtful parts of a demonstration's targets: stretches without sightings, and those that contradict.
 
     A target over a gap is a guess where its standard deviation exceeds `GUESS`.
     """

@@ -18,7 +18,7 @@ DIGITS = 8
 
 
 def write_corrected(comparison: Comparison, model: Refined, path: Path) -> dict[str, str]:
-    """Write readings as recorded and as corrected, a row a reading, as CSV; return what was corrected.
+    """Write readings as recorded and as corrected, a row a reading, as CSV; return a summary of the correction.
 
     A delay is taken off the times, a kinematic effect is put into the path. Of any other effect its contribution to
     the readings, as the model predicts it, is subtracted.

@@ -56,7 +56,7 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True)
 class RevisionOptions:
-    """What to do besides the card."""
+    """Steps besides the card."""
 
     relabel: FarmSettings | None = None
     """How to make labels again; None to report only how far the tip moves."""
@@ -102,7 +102,7 @@ def revise(
         recordings: The recordings of the verdict.
         spec: The model spec of the verdict.
         out: Folder to create.
-        wishes: What to do besides the card.
+        wishes: Steps besides the card.
         note: Called with a line of progress.
 
     Raises:
@@ -167,7 +167,7 @@ def revise(
 def _about_labels(
     recordings: list[Path], held: Comparison, answer: list[Placed], out: Path, asked: RevisionOptions, note: Note
 ) -> dict[str, Any]:
-    """Return what the effects do to labels, to networks, and beside finite elements."""
+    """Return the effects' influence on labels and networks, and their comparison with finite elements."""
     moved = _labels(recordings, answer, out, asked, note)
     confirmed = _confirmed(recordings, held, answer, asked, note)
     trained = _retrained(recordings, held, answer, out, asked, note)

@@ -77,7 +77,7 @@ class Envelope:
     """Upper corner [mm]."""
 
     def contains(self, position: tuple[float, float, float]) -> bool:
-        """Whether a machine position [mm] lies inside."""
+        """Whether a machine position [mm] is inside."""
         return all(a <= p <= b for a, p, b in zip(self.min, position, self.max, strict=True))
 
 

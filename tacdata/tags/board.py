@@ -13,7 +13,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 
 PAPER = {"a4": (297.0, 210.0), "a3": (420.0, 297.0), "letter": (279.4, 215.9)}
-"""Width and height of a sheet that lies on its side [mm]."""
+"""Width and height of a sheet in landscape [mm]."""
 DPI = 600
 """Dots per inch of a drawn board; the edges of its squares are off by at most half a dot, 0.02 mm."""
 

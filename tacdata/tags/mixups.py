@@ -25,7 +25,7 @@ SIDEWAYS = 0.5
 
 
 def mixups(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> tuple[str, ...]:
-    """Describe what looks swapped in one image.
+    """Describe the suspected swaps in one image.
 
     Args:
         fingers: The fingers.

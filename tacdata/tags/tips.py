@@ -33,7 +33,7 @@ class TipPose:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What one image shows of the fingers."""
+    """Fingertips seen in one image."""
 
     tips: dict[str, TipPose]
     """Name of each finger that is seen -> its tip."""
@@ -69,7 +69,7 @@ def detect_fingers(
 
 
 def look(image: np.ndarray, intrinsics: dict[str, Any], what: dict[str, Any], hint: Any = None) -> Any:
-    """Return what an image shows of a rig file's ``cube``, or of its ``fingers``.
+    """Return the sightings, in an image, of a rig file's ``cube`` or ``fingers``.
 
     Args:
         image: Grey (height, width) or BGR (height, width, 3), uint8.

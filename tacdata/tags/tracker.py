@@ -46,7 +46,7 @@ class FingerTracker:
         self._since = self._every
 
     def update(self, image: np.ndarray) -> View:
-        """Return what an image, grey or BGR uint8, shows.
+        """Return the sightings in an image, grey or BGR uint8.
 
         Raises:
             UsageError: If the image is invalid or of another size than the intrinsics.

@@ -45,7 +45,7 @@ and middle finger exchanged; the middle finger's board silent after `SILENT_AFTE
 GRASPED = tuple(name for name in THINGS if name != "eraser")
 """Objects of the task grasp."""
 NUBS = 1.0, 200.0
-"""Smallest and largest radius of what presses a skin [mm]."""
+"""Smallest and largest radius of the nub that presses a skin [mm]."""
 FACE_UP = "-x"
 
 
@@ -85,7 +85,7 @@ class VirtualDemo:
             fault: One of `FAULTS`, or none.
             sensor: The skin on every finger, or finger -> skin; by default, and for fingers left out, the paper's.
             task: One of `TASKS`.
-            nub: Radius of what presses each skin [mm].
+            nub: Radius of the nub that presses each skin [mm].
             thing: Object that is grasped, one of `GRASPED`; by default the ball, to wipe always the eraser.
 
         Raises:
@@ -153,7 +153,7 @@ class VirtualDemo:
 
     @property
     def emulates(self) -> list[str]:
-        """What is emulated, one line each."""
+        """Emulated devices, one line each."""
         boards = [f"{name:<7} {board.port.path}  {self.layouts[name].rate:g} Hz" for name, board in self.boards.items()]
         return [
             *boards,
@@ -171,7 +171,7 @@ class VirtualDemo:
         """Switch everything on; the rig file comes last.
 
         Raises:
-            UsageError: If a demo rig file lies there already.
+            UsageError: If a demo rig file is there already.
         """
         if self.path.exists():
             raise UsageError(f"{self.path} exists", "a directory without a demo rig", "choose another directory")

@@ -43,7 +43,7 @@ class VirtualPort:
         return self._master >= 0 and not self._watch.poll(0)
 
     def read(self, timeout: float) -> bytes:
-        """Return what the host has sent, waiting at most ``timeout`` [s, real time]; may be empty."""
+        """Return the bytes that the host has sent, waiting at most ``timeout`` [s, real time]; may be empty."""
         if not self.connected:
             time.sleep(min(max(timeout, 0.0), 0.02))
             return b""
@@ -55,7 +55,7 @@ class VirtualPort:
             return b""
 
     def write(self, data: bytes) -> None:
-        """Send to the host, after what its buffer did not take before; beyond `BACKLOG` the newest bytes are lost."""
+        """Send to the host, after the bytes still waiting; beyond `BACKLOG` the newest bytes are lost."""
         with self._writing:
             if not self.connected:
                 self._unsent.clear()

@@ -144,7 +144,7 @@ class VirtualRig:
 
     @property
     def emulates(self) -> list[str]:
-        """What is emulated, one line each."""
+        """Emulated devices, one line each."""
         layout = self.layout
         lines = [
             f"motion controller  {self.controller.port.path}  GRBL 1.1",
@@ -158,7 +158,7 @@ class VirtualRig:
         """Switch everything on. The rig file is written last, so that its readers find the devices too.
 
         Raises:
-            UsageError: If another rig runs in the directory or another rig's file lies there.
+            UsageError: If another rig runs in the directory or another rig's file is there.
         """
         self._lock = _claim(self.directory, self.path)
         camera = (

@@ -1,4 +1,4 @@
-"""Decodes what arrives on the serial lines: a board's frames, and GRBL's answers."""
+"""Decodes the serial lines: a board's frames, and GRBL's answers."""
 
 from tacdata.wire.frames.decoder import Decoder
 from tacdata.wire.frames.encoder import Encoder

@@ -1,4 +1,4 @@
-"""What the serial lines deliver: readings, status reports, and their counts."""
+"""Data of the serial lines: readings, status reports, and their counts."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class CncStatus:
 
 @dataclass
 class StreamCounts:
-    """What a stream has delivered so far."""
+    """Counts of a stream's data so far."""
 
     received: int = 0
     """Good frames."""
@@ -58,13 +58,13 @@ class StreamCounts:
 
 
 class OwesAnswer(DeviceError):
-    """The controller stands idle and can no longer send what it owes: an answer was lost, or the firmware stalled."""
+    """The controller is idle and owes answers: one was lost, or the firmware stalled."""
 
 
 class StandsStill(DeviceError):
     """A machine that has come to rest, and whose motion cannot be abandoned."""
 
     def __init__(self, given: str, allowed: str, remedy: str, at: tuple[float, float, float] | None = None) -> None:
-        """Say why; ``at`` is where it stands [mm, machine], if that is known."""
+        """Say why; ``at`` is its position [mm, machine], if that is known."""
         super().__init__(given, allowed, remedy)
         self.at = at

@@ -13,7 +13,7 @@ STEP = 0.25
 class Patience:
     """A timeout in waking time.
 
-    A stopped host (a closed lid, SIGSTOP, overload) receives nothing in the meantime, and what it missed waits in the
+    A stopped host (a closed lid, SIGSTOP, overload) receives nothing in the meantime, and the missed bytes wait in the
     system's buffers. So a gap between two checks counts as one step, not as silence of the device. After a stall there
     is time to ask before anything is judged.
 

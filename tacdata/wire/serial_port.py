@@ -49,7 +49,7 @@ def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | Non
     Args:
         port: Path, ``COM`` name or pyserial URL.
         baud: Bits per second.
-        device: What should be there, for errors.
+        device: Expected device, for errors.
         timeout: Timeout of one read [s, real time].
         dtr: State of the DTR line after opening; None leaves it raised, as the system sets it.
 
@@ -70,7 +70,7 @@ def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | Non
 
 
 def read_available(line: serial.SerialBase) -> bytes:
-    """Return what has arrived; wait for the first byte at most as long as the port's timeout.
+    """Return the received bytes; wait for the first byte at most as long as the port's timeout.
 
     Raises:
         serial.SerialException: If the line broke (OSError or TypeError on some systems).

@@ -47,7 +47,7 @@ class PredictedMaps(Displayed):
     """Its origin."""
 
     def description(self) -> Iterator[str]:
-        """Yield what it is: maps, network, deepest pixel."""
+        """Yield the lines of its description: maps, network, deepest pixel."""
         frames, *pixels = self.depth.shape
         yield f"Prediction for episode {self.episode}: {frames} maps of {pixels[0]} × {pixels[1]} pixels"
         yield f"network {self.network} ({self.checkpoint[:12]}), which knew the episode as: {self.part}"

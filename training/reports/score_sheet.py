@@ -104,7 +104,12 @@ def _agreement(table: dict[str, Any], with_paper: bool) -> list[str]:
 def _baselines(document: dict[str, Any]) -> list[str]:
     heads = ["Predictor", *(title(metric) for metric in METRICS)]
     rows = {f"network {document['checkpoint']['name']}": document["contact_frames"], **document["baselines"]}
-    lines = ["## Beside predictors without a network, frames in contact (median)", "", row(heads), rule(len(heads), 1)]
+    lines = [
+        "## Compared with predictors without a network, frames in contact (median)",
+        "",
+        row(heads),
+        rule(len(heads), 1),
+    ]
     lines += [row([name, *(number(table[m]["median"]) for m in METRICS)]) for name, table in rows.items()]
     return [*lines, "", "mean: the mean training label; linear: ridge regression on the taxels of the one frame.", ""]
 

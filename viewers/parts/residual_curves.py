@@ -19,7 +19,7 @@ def residual_curves(told: Residuals) -> tuple[Curves, ...]:
     """Return for each stream its readings measured, before and after, and the residual over the noise; then the depth.
 
     Args:
-        told: What `tacdata discrepancy` wrote.
+        told: Document of `tacdata discrepancy`.
     """
     time_ns = np.round(told.time * 1e9).astype(np.int64)
     breaks = np.flatnonzero(np.diff(told.episode)) + 1

@@ -20,7 +20,7 @@ class ScenePart:
         self._shown: dict[str, int] = {}
 
     def newer(self, scene: Scene) -> Scene:
-        """Return a scene with only what was not in those before; parts without time stay, and so do the phases."""
+        """Return a scene with only the parts new since the last call; parts without time stay, and so do the phases."""
         return replace(
             scene,
             curves=self._known("curves", scene.curves),

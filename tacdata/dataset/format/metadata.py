@@ -71,7 +71,7 @@ class EpisodeRecord:
 
     @cached_property
     def key(self) -> int:
-        """What the column `tacdata.record` holds: decided by the content of measurement and label, not by time."""
+        """Content of the column `tacdata.record`: decided by the content of measurement and label, not by time."""
         return short_hash(provenance.content_hash([self.sensor, self.recording, self.label]))
 
     @property

@@ -1,1 +1,1 @@
-"""Where a camera stands in the world."""
+"""Pose of a camera in the world."""

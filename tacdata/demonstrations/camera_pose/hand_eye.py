@@ -1,4 +1,4 @@
-"""Estimates where a camera stands: by a robot that carries a tag cube, or by a board at the world's origin.
+"""Estimates the pose of a camera: by a robot that carries a tag cube, or by a board at the world's origin.
 
 Hand-eye calibration: gripper_i X = Y cube_i. Unknown are the cube in the gripper X and the camera in the robot's base Y
 (F. Dornaika and R. Horaud, IEEE Trans. Robotics and Automation 14 (1998) 617: robot-world, hand-eye). OpenCV's closed
@@ -82,7 +82,7 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
         spread: Standard uncertainty of the camera's position from one image [m].
 
     Raises:
-        FormatError: If the board stands elsewhere in some images: it, or the camera, moved.
+        FormatError: If the board's pose differs between images: it, or the camera, moved.
     """
     from scipy.spatial.transform import Rotation
 
@@ -108,7 +108,7 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
             f"the board in image {int(np.argmax(apart)) + 1} of {len(poses)} stands {1000 * apart.max():.1f} mm from "
             "where it stands in the others: it or the camera was pushed; leave that image out, or take them all again",
         )
-    # What the images differ by is as much of the uncertainty as what one image tells.
+    # The scatter between images counts in the uncertainty as well as the uncertainty of a single image.
     once = max(spread, float(np.sqrt((apart**2).mean())))
     known = once / np.sqrt(len(poses)), max(once / distance, float(np.sqrt((turns**2).mean()))) / np.sqrt(len(poses))
     residual = rms, float(np.sqrt((turns**2).mean()))

@@ -1,4 +1,4 @@
-"""Whether a camera stood still, by what stands still in its images: a table, a board, a wall.
+"""Whether a camera stood still, by the static background of its images: a table, a board, a wall.
 
 Corners of the first image are followed into images spread over the recording. While most of them stay, the camera
 stood still. When most of them shift together, and stay so, it was moved. Hands and arms move a minority, and not
@@ -76,7 +76,7 @@ def without_bumps(
     if behind:
         shown = {bump.camera for bump in behind}
         rivals = {bump.begin_ns: {b.camera for b in between if b.begin_ns == bump.begin_ns} for bump in between}
-        # What the background shows itself needs no second sentence, and acquits the other camera of the pair.
+        # A bump seen in the background is reported once, and rules out the other camera of the pair.
         between = [bump for bump in between if not rivals[bump.begin_ns] & shown]
     bumps = sorted([*behind, *between], key=lambda bump: bump.begin_ns)
     return split(sightings, bumps), [bump.words for bump in bumps]
@@ -103,7 +103,7 @@ def shifts(recording: DemoRecording, delays: Mapping[str, float]) -> list[Bump]:
 
 
 def _scale(recording: DemoRecording, camera: str) -> float | None:
-    """Return what a pixel is at the fingers [m]; None if the camera saw none, or has no intrinsics."""
+    """Return the size of a pixel at the fingers [m]; None if the camera saw none, or has no intrinsics."""
     intrinsics = recording.rig.cameras[camera].get("intrinsics")
     distances = [view.position[view.faces > 0, 2] for view in recording.views if view.camera == camera]
     known = np.concatenate(distances) if distances else np.zeros(0)
@@ -140,7 +140,7 @@ def _corners(image: np.ndarray) -> np.ndarray:
     grey = image.astype(np.float32)
     rough = np.asarray(grey - cv2.GaussianBlur(grey, (0, 0), 1.0), np.float32)
     noise = 1.4826 * float(np.median(np.abs(rough - np.median(rough))))
-    # What noise of this size makes of a grey wall.
+    # The gradient energy that noise of this size produces on a grey wall.
     wall = 128 + noise * np.random.default_rng(0).standard_normal((128, 128))
     least = OVER_NOISE * float(cv2.cornerMinEigenVal(np.clip(np.rint(wall), 0, 255).astype(np.uint8), BLOCK).max())
     found = []
@@ -188,7 +188,7 @@ def _shift(before: np.ndarray, after: np.ndarray, most: float, shape: tuple[int,
 
 
 def _bumps(camera: str, looks: list[_Look], scale: float, begin_ns: int) -> list[Bump]:
-    """Return a camera's bumps: stretches of at least two images whose background is shifted alike."""
+    """Return a camera's bumps: stretches of at least two images whose background has the same shift."""
     known = [look for look in looks if look.shift is not None]
     runs: list[list[_Look]] = []
     for look in known:

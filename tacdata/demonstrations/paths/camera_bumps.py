@@ -48,19 +48,19 @@ MOST = 4
 
 @dataclass(frozen=True)
 class Bump:
-    """One camera stands elsewhere than its file says, from a time on."""
+    """From a time on, one camera's pose differs from the one in its file."""
 
     camera: str
     begin_ns: int
-    """First time at which it may stand elsewhere [ns]."""
+    """First time at which it may be displaced [ns]."""
     sure_ns: int
-    """First time at which it surely does [ns]; what it saw in between is left out."""
+    """First time at which it surely does [ns]; sightings in between are left out."""
     end_ns: int | None
-    """Time from which it stands as before, or elsewhere again [ns]; None to the end."""
+    """Time of its return, or of its next displacement [ns]; None to the end."""
     size: float
-    """Distance by which it displaces what it sees, at the fingers [m]."""
+    """Displacement of its sightings, at the fingers [m]."""
     words: str
-    """What was noticed, for a person."""
+    """Description of the bump, for a person."""
     room: float = 0.0
     """Prior standard deviation of the camera's place, over the size [1]; 0 if images show it."""
 
@@ -170,7 +170,7 @@ def _apart(sightings: Mapping[str, Sightings], one: str, other: str) -> list[tup
 
 
 def _steps(pairs: list[tuple[np.ndarray, np.ndarray]]) -> list[tuple[int, float]]:
-    """Return the times [ns] and sizes [m] of all steps of the distance: the clearest, then those beside it."""
+    """Return the times [ns] and sizes [m] of all steps of the distance: the clearest, then its neighbours."""
     steps, spans = [], [(-np.inf, np.inf)]
     while spans and len(steps) < MOST:
         first, last = spans.pop()
@@ -229,7 +229,7 @@ def _cost(pairs: list[tuple[np.ndarray, np.ndarray]], moment: float) -> float:
 def _which(
     sightings: Mapping[str, Sightings], cameras: tuple[str, str], moment: int, span: tuple[float, float]
 ) -> tuple[tuple[str, ...], int, float]:
-    """Return which of two cameras moved, both if the motion does not tell, when [ns], and what it gains [nats]."""
+    """Return which of two cameras moved, both if the motion does not decide, when [ns], and the gain of likelihood."""
     near = {}
     for finger, found in sightings.items():
         kept = (found.time_ns > span[0]) & (found.time_ns < span[1])

@@ -13,7 +13,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import Sensor
 
 ALL = ""
-"""Name under which the network of all fingers without one of their own stands."""
+"""Key of the network for every finger without its own."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def by_finger(given: Estimator | Mapping[str, Estimator] | None, fingers: tuple[
     """Return each finger's estimator; fingers without one are missing.
 
     Args:
-        given: One for all, or finger -> estimator, in which `ALL` stands for the others.
+        given: One for all, or finger -> estimator, in which `ALL` is the default.
         fingers: Fingers with a board.
 
     Raises:

@@ -220,7 +220,7 @@ def _predicted(
 
 @lru_cache(maxsize=64)
 def _noise_parts(size: int, turning: float, velocity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what of the process noise goes with dt, dt^2 / 2 and dt^3 / 3, each of shape (size, size)."""
+    """Return the parts of the process noise proportional to dt, dt^2 / 2 and dt^3 / 3, each of shape (size, size)."""
     of_rates, mixed, of_places = (np.zeros((size, size)) for _ in range(3))
     for begin, density in ((0, turning), (3, velocity)):
         at, rate = slice(begin, begin + 3), slice(begin + 6, begin + 9)
@@ -261,7 +261,7 @@ def _observed(expected: _State, sightings: Sightings, n: int) -> np.ndarray:
         at = MOTION + 6 * list(sightings.cameras).index(sightings.camera[n])
         x, y, z = expected.position - sightings.cameras[sightings.camera[n]].place
         result[:, at : at + 6] = _EYE6
-        # A turn of the camera by e moves what it sees by e x r.
+        # A rotation of the camera by e displaces its sightings by e x r.
         result[3:, at : at + 3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return result
 

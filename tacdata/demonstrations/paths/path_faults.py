@@ -25,7 +25,7 @@ STANDING = 0.2
 """Share of the time for which fingers must be arranged like the other hand's, for a warning [1]."""
 
 CONTRADICTING = 0.08
-"""Share of a finger's sightings that contradict the others, from which it is said [1]."""
+"""Share of a finger's sightings that contradict the others, from which it is reported [1]."""
 
 
 def gaps(time_ns: np.ndarray, begin_ns: int, end_ns: int) -> list[tuple[int, int]]:

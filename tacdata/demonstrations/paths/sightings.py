@@ -27,7 +27,7 @@ class CameraError:
     """Error of a camera's pose in its file: the same for all of its sightings."""
 
     place: np.ndarray
-    """Position of the camera in the world [m], shape (3,): a rotation of the camera moves what it sees about it."""
+    """Position of the camera in the world [m], shape (3,): a rotation of the camera turns its sightings about it."""
     spread: tuple[float, float]
     """Standard deviation of its position [m] and rotation [rad], per axis."""
 

@@ -26,7 +26,7 @@ LAGS = np.arange(-6.0, 6.0001, 0.02)
 FINE = np.arange(-0.02, 0.0201, 0.002)
 """Lags about the best of them [s], shape (m,)."""
 SHORTEST = 0.012
-"""Smallest lag that is said [s]; the stated latencies are known to some milliseconds."""
+"""Smallest lag that is reported [s]; the stated latencies are known to some milliseconds."""
 BETTER = 2.0
 """Ratio of the mean squared differences without and with the lag from which it counts [1]."""
 SPACED = 0.2
@@ -122,7 +122,7 @@ def late_stretches(sightings: Mapping[str, Sightings], begin_ns: int) -> tuple[d
     """Return sightings with the uncertainty of times that two cameras' motion shows, and words about it.
 
     In a stretch in which the images of one camera are later than those of another, that lag is the uncertainty of its
-    times. Two cameras that are late alike do not show it.
+    times. Two cameras with the same delay do not show it.
 
     Args:
         sightings: Finger -> its sightings.
@@ -167,7 +167,7 @@ def timely(sightings: Sightings) -> Sightings:
 def carried_through(path: Smoothed, sightings: Sightings, times_ns: np.ndarray) -> Smoothed:
     """Return a path whose covariance holds the error of the images' times.
 
-    Neighbouring images are late alike. So this error does not average out, as the noise of single images does. It is
+    Neighbouring images share their delay. So this error does not average out, as the noise of single images does. It is
     the distance that the finger goes in that time by its sightings: a smoothed path may have cut a stroke short.
 
     Args:
@@ -212,7 +212,7 @@ def known_to(sightings: Sightings, times_ns: np.ndarray) -> np.ndarray:
 
 
 def late_words(sightings: Mapping[str, Sightings], begin_ns: int) -> list[str]:
-    """Describe which cameras' image times are known badly, when, and what that means for moving fingers."""
+    """Describe which cameras' image times are known badly, when, and the resulting error of moving fingers."""
     words = []
     for camera in sorted({camera.partition(" (")[0] for found in sightings.values() for camera in found.camera}):
         times, sigma, fastest = [], [], 0.0

@@ -1,4 +1,4 @@
-"""Turns a recorded demonstration into fingertip paths on one grid, and reports what is wrong."""
+"""Turns a recorded demonstration into fingertip paths on one grid, and reports its faults."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ FEWEST = 5
 def track(
     recording: DemoRecording, rate: float = RATE, estimator: Estimator | Mapping[str, Estimator] | None = None
 ) -> Demonstration:
-    """Smooth every finger's path, put the readings beside it, and report what is wrong.
+    """Smooth every finger's path, add the readings, and report the faults.
 
     Args:
         recording: A demonstration.
@@ -86,7 +86,7 @@ def track(
         remarks += words
         remarks += path_faults.contradictions(sightings[name], paths[name], begin)
         paths[name] = carried_through(paths[name], sightings[name], times)
-        # The sentence about a bump says why its moment is left out.
+        # The sentence about a bump explains already why its moment is left out.
         doubted = np.setdiff1d(whole[name].time_ns, found.time_ns)
         words, passed_over = _gaps(sightings[name], paths[name], times, looked, doubted)
         remarks += words
@@ -114,7 +114,7 @@ def track(
         parents["checkpoint"] = network["hash"]
         remarks += [f"{name}: no network, so no predicted depth" for name in recording.taxels if name not in estimators]
         remarks += [one.identity["unfitted"] for one in estimators.values() if "unfitted" in one.identity]
-        # A network that is fitted to no unit learnt from no readings: its own remark says what to do.
+        # A network that is fitted to no unit learnt from no readings: its own remark names the remedy.
         if any(one.novelty is None and "unfitted" not in one.identity for one in estimators.values()):
             remarks.append(
                 "whether these readings are like those that the network learnt from is not known: no seen.json of "
@@ -177,7 +177,7 @@ def _nothing_seen(recording: DemoRecording) -> FormatError:
 
 
 def _path(sightings: Sightings, times: np.ndarray) -> tuple[Sightings, Smoothed, dict[str, Any], list[str]]:
-    """Smooth one finger; return its sightings, path, settings, and what is wrong.
+    """Smooth one finger; return its sightings, path, settings and faults.
 
     A tag that contradicts the others whenever it is seen alone is left out and named.
     """

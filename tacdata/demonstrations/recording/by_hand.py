@@ -18,7 +18,7 @@ from tacdata.tags import look
 
 
 def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool) -> DemoSession:
-    """Record demonstrations into a folder; print what a person should know.
+    """Record demonstrations into a folder; print progress and warnings.
 
     Args:
         rig: Demo rig file.
@@ -59,7 +59,7 @@ def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count
 
 
 def _times_known(path: Path) -> str:
-    """Return how well the times of a recording's images are known, in words, and what to do where that is badly."""
+    """Return how well the times of a recording's images are known, as a sentence, and a remedy for poor ones."""
     known = times_known(path)
     if not known:
         return "too few images to know their times: record again"
@@ -68,7 +68,7 @@ def _times_known(path: Path) -> str:
 
 
 def _ending(out: Path) -> str:
-    """Return the last lines on the screen: what is on the disk, and what comes next."""
+    """Return the last lines on the screen: files on the disk, and the next command."""
     if not out.is_dir():
         return "  data:   nothing was written\n  then:   the same command"
     broken = file_names.unfinished(out)

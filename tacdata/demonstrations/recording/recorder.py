@@ -104,8 +104,8 @@ class DemoRecorder:
         """Record one demonstration until ``ended()``, or for ``seconds`` [s of the rig's clock].
 
         Raises:
-            DeviceError: If writing fails, a camera is lost, or every stream is silent; what was written is kept.
-            KeyboardInterrupt: On Ctrl-C; what was recorded so far is kept as an interrupted recording.
+            DeviceError: If writing fails, a camera is lost, or every stream is silent; the file so far is kept.
+            KeyboardInterrupt: On Ctrl-C; the recording so far is kept as an interrupted recording.
         """
         if self._streams is None:
             raise UsageError("the recorder is not open", "a recorder inside a with statement", "open it first")
@@ -118,7 +118,7 @@ class DemoRecorder:
         try:
             while not ended() and (seconds is None or self.rig.clock.now_ns() - begun < seconds * 1e9):
                 if writer.failure is not None:
-                    break  # closing reports what the disk refused
+                    break  # closing reports the failed writes
                 if lost := self._streams.lost_cameras:
                     reason = "; ".join(lost.values())
                     seconds_kept = (self.rig.clock.now_ns() - begun) * 1e-9

@@ -55,7 +55,7 @@ class DemoRig:
 
 
 def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
-    """Build a demo rig from a parsed file; files that it names are searched beside ``origin``.
+    """Build a demo rig from a parsed file; files that it names are searched in the folder of ``origin``.
 
     Raises:
         UsageError: If a file that it names does not exist.

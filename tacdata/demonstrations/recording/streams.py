@@ -15,11 +15,11 @@ from tacdata.recording.live.device_streams import DeviceStreams
 from tacdata.recording.live.reading_health import ReadingHealth
 
 AGAIN_NS = 60_000_000_000
-"""Readings that cannot be right are said again after this time [ns of the host's clock]."""
+"""Impossible readings are reported again after this time [ns of the host's clock]."""
 
 
 class DemoStreams(DeviceStreams):
-    """A context that writes what arrives to the open recording."""
+    """A context that writes incoming messages to the open recording."""
 
     silence = 1.5
 

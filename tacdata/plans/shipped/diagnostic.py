@@ -1,9 +1,9 @@
 """A short plan whose presses tell physical effects apart.
 
-Each block excites what splits one group of effects that look alike in ordinary presses:
+Each block separates one group of effects that are collinear in ordinary presses:
 
 - idle stretch: drift, noise, warm-up of the electronics, without anything near the skin;
-- fly-over: what moves with the carriage or answers to an indenter near the skin without touching it;
+- fly-over: effects that move with the carriage or respond to an indenter near the skin without touching it;
 - onset map: slow first contacts at three corners and the centre: zero error (constant), tilt (a plane), air gaps
   (each taxel its own), a seating gap (a dome);
 - virgin site: repeats at a place never pressed before, then deeper, then as before: softening, set, wear-in;

@@ -26,7 +26,7 @@ DEPTHS = [round(0.3 + 0.1 * k, 1) for k in range(13)]
 PLACES = 6
 """Places at which each depth is pressed."""
 INTERIOR, EDGE = 37, 3
-"""Number of position trials whose contact lies within the sensing area, and of those that its boundary cuts."""
+"""Number of position trials whose contact is within the sensing area, and of those that its boundary cuts."""
 POSITION_DEPTH = 0.8
 """Depth of the position trials [mm]."""
 CLEARANCE = 0.1

@@ -1,7 +1,7 @@
 """Some ten presses that say how a unit is: the same at each visit, so that visits can be compared press by press.
 
 - rest stretch: noise of every channel, and drift without contact;
-- sites: one press for each two by two taxels, off their centre, so that no two channels answer alike to all of them;
+- sites: one press for each two by two taxels, off centre, so that no two channels give the same answers to all of them;
 - reference: one press again and again through the visit: hysteresis and repeatability;
 - slow reference: the same at a quarter of the speed.
 """
@@ -26,7 +26,7 @@ SPEEDS = (1.0, 0.25)
 REST, HOLD = 20.0, 1.0
 """Length of the rest stretch and of the holds [s]."""
 REPEATS = 3
-"""Reference presses after the sites; one more stands before them [count]."""
+"""Reference presses after the sites; one more comes before them [count]."""
 OFF_CENTRE = (0.15, 0.2)
 """Distance of a site from the centre of its four taxels along x and y [pitches], to one side and the other in turn:
 each of the four answers otherwise, and neighbours do not keep their ratio from site to site."""
@@ -91,7 +91,7 @@ def _sites(sensor: Sensor) -> np.ndarray:
 
 
 def _middles(count: int) -> np.ndarray:
-    """Return the middles of successive pairs of ``count`` taxels [pitches from the centre]; an odd one stands alone."""
+    """Return the middles of successive pairs of ``count`` taxels [pitches from the centre]; an odd one is a pair."""
     first = np.arange(0, count, 2)
     return first + np.where(first + 1 < count, 0.5, 0.0) - (count - 1) / 2
 

@@ -1,1 +1,1 @@
-"""What touch was worth in a replay: control arms, stiffness, scenes unlike the demonstration."""
+"""Benefit of touch in a replay: control arms, stiffness, scenes unlike the demonstration."""

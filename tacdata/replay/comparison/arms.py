@@ -1,7 +1,7 @@
 """Control arms of a replay: the same targets, moved by something else than depth.
 
-Compensation by depth may hold an object because it presses harder, and not because of what was felt. Each arm takes
-away a part of the information and keeps the rest.
+Compensation by depth may hold an object because it presses harder, and not because of the measured touch. Each arm
+takes away a part of the information and keeps the rest.
 """
 
 from __future__ import annotations

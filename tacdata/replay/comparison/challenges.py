@@ -1,4 +1,4 @@
-"""Scenes unlike the demonstration: what a robot meets that repeats it on another day."""
+"""Scenes unlike the demonstration: changes that a robot meets when it repeats one on another day."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Challenge:
     change: Callable[[ReplayScene, np.random.Generator], ReplayScene]
     """Scene of a seed, and random numbers of that seed -> the scene that is replayed in."""
     force: float | None = None
-    """Largest force on a pad that the object stands, over the force of the demonstration [1]; None: any."""
+    """Largest force on a pad that the object withstands, over the force of the demonstration [1]; None: any."""
 
 
 def _wider(by: float) -> Callable[[ReplayScene, np.random.Generator], ReplayScene]:

@@ -1,4 +1,4 @@
-"""Closed loop by touch: fingertips press until the live estimate of depth is what the person felt.
+"""Closed loop by touch: fingertips press until the live estimate of depth equals the recorded one.
 
 The controller knows the stiffness of robot and skin of the undisturbed scene, not of the drawn one. Its estimate is
 late and wrong as measured of a network (docs/how_to/hands.md): too shallow by a constant, with scatter.

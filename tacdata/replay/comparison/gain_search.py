@@ -17,7 +17,7 @@ STEPS = 12
 
 @dataclass(frozen=True)
 class GripDemand:
-    """What every preliminary trial must meet."""
+    """Criterion of every preliminary trial."""
 
     trials: int = 20
     """Scenes in which the gain is tried [count]."""
@@ -82,7 +82,7 @@ class GripSearch:
         that meets the demand is bisected.
 
         Raises:
-            UsageError: If none does; it says what failed at the gain that failed last.
+            UsageError: If none does, with the failed criterion at the last gain.
         """
         low = 0.0
         for step in range(1, STEPS + 1):

@@ -42,17 +42,17 @@ class PairedDifference:
 
 
 def paired(first: Sequence[bool], second: Sequence[bool]) -> PairedDifference:
-    """Return the difference of two arms, from what each held in the same scenes, in the same order."""
+    """Return the difference of two arms, from their outcomes in the same scenes, in the same order."""
     pairs = list(zip(first, second, strict=True))
     return PairedDifference(sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs), len(pairs))
 
 
 def worth(depth: Sequence[bool], controls: dict[str, list[bool]]) -> str:
-    """Return what depth was worth against the best of other arms, in a sentence.
+    """Return the benefit of depth over the best of the other arms, as a sentence.
 
     Args:
-        depth: What the arm with depth held, scene by scene.
-        controls: Arm -> what it held in the same scenes.
+        depth: Outcomes (held or not) of the arm with depth, scene by scene.
+        controls: Arm -> its outcomes in the same scenes.
     """
     if not controls:
         return "what depth was worth is not known: there is no other arm"

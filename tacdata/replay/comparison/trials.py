@@ -72,7 +72,7 @@ class Trials:
     def held_in(
         self, scene: ReplayScene, kinds: Sequence[str], seeds: int, challenge: str = ""
     ) -> dict[str, list[bool]]:
-        """Return what each kind held in the scenes of seeds 0, 1, ... about a scene.
+        """Return the outcomes of each kind in the scenes of seeds 0, 1, ... about a scene.
 
         Args:
             scene: The undisturbed scene.
@@ -200,7 +200,7 @@ def rate(held: Sequence[bool]) -> dict[str, Any]:
 
 
 def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
-    """Return what each arm held at each of `STIFFNESSES`: plain data, with what depth was worth there."""
+    """Return the outcomes of each arm at each of `STIFFNESSES`, as plain data, with the benefit of depth there."""
     kinds = [kind for kind in tried[0].paths if all(kind in one.paths for one in tried)]
     return [
         _row({"stiffness": value}, [one.held_in(replace(scene, stiffness=value), kinds, seeds) for one in tried])
@@ -209,7 +209,7 @@ def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[
 
 
 def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
-    """Return what each arm and the closed loop held in each of `CHALLENGES`: plain data."""
+    """Return the outcomes of each arm and of the closed loop in each of `CHALLENGES`, as plain data."""
     kinds = [*(kind for kind in tried[0].paths if all(kind in one.paths for one in tried)), CLOSED]
     return [
         _row({"challenge": name}, [one.held_in(scene, kinds, seeds, name) for one in tried], CLOSED)

@@ -1,4 +1,4 @@
-"""A robot file (`schemas/robot.schema.json`): where a robot stands, which links carry fingertips, its limits."""
+"""A robot file (`schemas/robot.schema.json`): the pose of a robot's base, which links carry fingertips, its limits."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Robot:
     """Lower and upper corner of the box that targets must lie in, root frame [m], shape (3,) each."""
     document: dict[str, Any]
     remarks: tuple[str, ...] = ()
-    """What a person should know of the URDF's limits."""
+    """Remarks about the URDF's limits."""
     source: Path | None = None
     """The URDF's file, with its shapes."""
 

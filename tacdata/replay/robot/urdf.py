@@ -1,4 +1,4 @@
-"""A robot's URDF without shapes and masses, held against what the format and a robot allow.
+"""A robot's URDF without shapes and masses, checked against the format and a robot's possibilities.
 
 MuJoCo takes much in silence. A joint whose limits lack or stand the wrong way round turns freely; degrees count as
 radians; a mimic joint without its leader is free. So the file is checked before it gets there.
@@ -47,7 +47,7 @@ class Urdf:
     velocity: dict[str, float]
     """Joint -> largest speed [rad/s or m/s]; joints without one are missing."""
     remarks: tuple[str, ...]
-    """What a person should know of the limits."""
+    """Remarks about the limits."""
 
 
 def _is_utf8(text: bytes) -> bool:
@@ -118,7 +118,7 @@ def _wrong(path: Path, given: str, allowed: str, next_step: str = "correct the U
 
 
 def _check_tree(links: list[str], joints: list[ET.Element], path: Path) -> None:
-    """Refuse what is no tree of named links and joints."""
+    """Refuse any structure but a tree of named links and joints."""
     for what, names in (("link", links), ("joint", [joint.get("name") for joint in joints])):
         if any(not name or name == "None" for name in names):
             raise _wrong(path, f"a {what} without name", f"a name for each {what}")

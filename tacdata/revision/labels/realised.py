@@ -53,7 +53,7 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
     """Return the tip error before and after, or None where there is no reference.
 
     Each session's median is subtracted from both, because the registration has a constant error too; it is reported
-    separately. A tag does not see what bends behind it, so only effects that it can see are compared with it.
+    separately. A tag does not see parts that bend behind it, so only effects that it can see are compared with it.
 
     Args:
         session: Folder of recordings.

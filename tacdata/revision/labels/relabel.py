@@ -1,4 +1,4 @@
-"""Makes labels again under a revised model, beside the old ones: only those that its effects change."""
+"""Makes labels again under a revised model, in a new folder: only those that its effects change."""
 
 from __future__ import annotations
 

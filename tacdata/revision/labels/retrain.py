@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FEWEST = 5
 """Minimum number of episodes with labels: for training, for early stopping, for scoring."""
 LABELS, READINGS = "labels", "readings"
-"""What the revision changes in the training data: labels or readings."""
+"""Part of the training data that the revision changes: labels or readings."""
 
 
 @dataclass(frozen=True)

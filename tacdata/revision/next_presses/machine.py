@@ -23,14 +23,14 @@ CLEAR = 0.3
 
 @dataclass(frozen=True)
 class MachineLimits:
-    """What a next press may ask of a machine."""
+    """Limits of a machine for the next presses."""
 
     rates: tuple[float, ...]
     """Speeds to choose from [mm/s]."""
     lowest: float
-    """Depth at which presses begin and end [mm]: negative above the skin, never beyond what the machine showed."""
+    """Depth at which presses begin and end [mm]: negative above the skin, never beyond the recorded range."""
     limits: AxisLimits
-    """What it accelerates by."""
+    """Its acceleration."""
 
     @classmethod
     def of_plan(cls, plan: Plan, limits: AxisLimits = USUAL_LIMITS) -> MachineLimits:

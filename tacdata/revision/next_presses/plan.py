@@ -4,7 +4,7 @@ Box and Hill (Technometrics 9 (1967) 57) choose the experiment with the largest 
 probabilities. For Gaussian readings with the same covariance S under every rival, it has the largest sum over pairs of
 pi_i pi_j d_ij' S^-1 d_ij, with d_ij the difference of their predictions.
 
-What calibration leaves open is no evidence: every channel's offset and one error of the press's depth are projected out
+Errors of calibration are no evidence: every channel's offset and one error of the press's depth are projected out
 of d_ij first. Presses are chosen one after another. A pair counts by the logarithm of its evidence so far, so that
 every pair gets its press.
 """
@@ -35,7 +35,7 @@ STEP = 0.01
 NOISY = 1.0
 """Whitened distance of two rivals [nats] below which a press, with all its repeats, is not informative."""
 SETTLES = 4.0
-"""By so many expected standard errors two rivals are told apart; `RIVAL_Z`, with a reserve for what no model has [1].
+"""By so many expected standard errors two rivals are distinguished; `RIVAL_Z`, with a reserve for model error [1].
 """
 PLANS = 4
 """A pair that a plan settles only if it is recorded more often than this is beyond the guide [1]."""
@@ -99,7 +99,7 @@ def standard_errors(nats: float) -> float:
 
 
 def left_open(chosen: list[Choice], repeats: int = REPEATS) -> str:
-    """Return what a plan will not settle, in words; empty if it settles every pair.
+    """Return the pairs that a plan will not settle, as a sentence; empty if it settles every pair.
 
     Args:
         chosen: Its presses.

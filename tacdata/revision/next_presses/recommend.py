@@ -36,7 +36,7 @@ def recommend(
     presses: int,
     note: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
-    """Return the next presses; a plan that cannot be made is a remark, as all else stands without it.
+    """Return the next presses; a plan that cannot be made is a remark, as all else is complete without it.
 
     Args:
         recordings: The recordings of the verdict.

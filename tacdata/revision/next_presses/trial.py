@@ -94,7 +94,7 @@ class CandidatePress:
 
 
 def trials(course: Course, machine: MachineLimits) -> list[CandidatePress]:
-    """Return presses within what was recorded: its places, tools and depths, at speeds of the machine.
+    """Return presses within the recorded range: its places, tools and depths, at speeds of the machine.
 
     Args:
         course: The recordings.
@@ -200,7 +200,7 @@ def _path(trial: CandidatePress, machine: MachineLimits) -> tuple[np.ndarray, np
 def predicted_readings(
     course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress, own: Course
 ) -> np.ndarray:
-    """Return what would be read in a trial, shape (readings, channels).
+    """Return the predicted readings of a trial, shape (readings, channels).
 
     Args:
         course: The recordings.

@@ -76,7 +76,7 @@ class Batch:
         """Make an idle batch.
 
         Args:
-            newton: Solves; its surfaces are the indenter's and, if the skin stands on one, the board's.
+            newton: Solves; its surfaces are the indenter's and, if the skin has one, the board's.
             idle: Conditions of one idle column.
             nodes: Nodes of the mesh.
             capacity: Number of columns.

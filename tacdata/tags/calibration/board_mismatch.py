@@ -21,19 +21,19 @@ _CHANGES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     MIRRORED: lambda grey: np.ascontiguousarray(grey[:, ::-1]),
     NEGATIVE: lambda grey: 255 - grey,
 }
-"""What may have happened to the images -> how it is undone."""
+"""Possible change to the images -> its inverse."""
 _FEWEST = 3
 """Smallest number of squares of a board along a side [1]."""
 
 
 @dataclass(frozen=True)
 class Mismatch:
-    """What differs between a board file and the board in the images."""
+    """Difference between a board file and the board in the images."""
 
     found: str
-    """What the images show, as a sentence."""
+    """Content of the images, as a sentence."""
     remedy: str
-    """What to change."""
+    """Remedy."""
 
 
 def mismatch(images: Sequence[np.ndarray], board: Board) -> Mismatch | None:

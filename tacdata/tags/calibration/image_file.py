@@ -1,4 +1,4 @@
-"""Reads the pixels of image files as the sensor wrote them, whatever turn a viewer is told by their orientation tag."""
+"""Reads the pixels of image files as the sensor wrote them, without the turn of their orientation tag."""
 
 from __future__ import annotations
 
@@ -43,5 +43,5 @@ def _unturned(data: bytes) -> bytes:
             if struct.unpack_from(order + "H", data, entry)[0] == _ORIENTATION:
                 return data[: entry + 8] + struct.pack(order + "H", 1) + data[entry + 10 :]
     except struct.error:
-        pass  # cut off: OpenCV says so
+        pass  # cut off: OpenCV reports it
     return data

@@ -122,7 +122,7 @@ def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model
         model: One of `MODELS`, or "auto": the smallest that predicts held-out views about as well as any.
 
     Raises:
-        FormatError: If the views do not determine the camera, saying what is missing.
+        FormatError: If the views do not determine the camera, with the missing views.
     """
     _check_count(views, "")
     share = coverage_of(views, size)

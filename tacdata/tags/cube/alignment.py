@@ -173,7 +173,7 @@ def _step(
 
 
 def _patches(pose: Alignment, cube: Cube, matrix: np.ndarray, grey: np.ndarray, detail: float) -> dict[str, FacePatch]:
-    """Draw every face that the pose turns to the camera and that lies inside the image."""
+    """Draw every face that the pose turns to the camera and that is inside the image."""
     drawn = (
         (face, draw_face(face, pose.rotation, pose.translation, pose.blur, cube, matrix, grey, detail))
         for face in cube.ids

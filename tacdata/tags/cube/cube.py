@@ -1,6 +1,6 @@
 """A cube with AprilTags on its faces.
 
-Cube frame: origin at the cube's centre, axes along its edges, right-handed. A tag is centred on its face and stands
+Cube frame: origin at the cube's centre, axes along its edges, right-handed. A tag is centred on its face and is
 upright as OpenCV draws it (`cv2.aruco.generateImageMarker`). On the side faces its upper edge points to the cube's +z,
 on the +z face to +y. The images published by AprilRobotics are turned by 180 degrees.
 

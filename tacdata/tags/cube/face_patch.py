@@ -85,7 +85,7 @@ def draw_face(
         return None
     pixels = outline @ matrix.T
     pixels = pixels[:, :2] / pixels[:, 2:]
-    # Two pixels around the face feed the derivatives; what lies outside the image is neither rendered nor compared.
+    # Two pixels around the face feed the derivatives; pixels outside the image are neither rendered nor compared.
     left, top = np.maximum(np.floor(pixels.min(axis=0)), 0).astype(int) - 2
     right, bottom = np.minimum(np.ceil(pixels.max(axis=0)) + 1, grey.shape[::-1]).astype(int) + 2
     if right - left < 6 or bottom - top < 6:
@@ -140,7 +140,7 @@ def _inset(corners: list[list[float]], depth: float) -> list[tuple[float, float]
         if abs(cross) < 1e-9:
             return None
         inner.append(((b * f - c * e) / cross, (c * d - a * f) / cross))
-    # Turned inside out, a corner lies on the wrong side of an edge.
+    # Turned inside out, a corner is on the wrong side of an edge.
     if any(a * x + b * y + c < -1e-6 for a, b, c in edges for x, y in inner):
         return None
     return inner

@@ -91,7 +91,7 @@ def _april() -> Any:
 
 
 def _read_suspects(grey: np.ndarray) -> list[Tag]:
-    """Read the candidates, then what lies beside a tag that was read; without one, the smallest remaining boxes."""
+    """Read the candidates, then the neighbourhood of each tag read; without one, the smallest remaining boxes."""
     tags: list[Tag] = []
     rest = []
     for suspect in suspects(grey):

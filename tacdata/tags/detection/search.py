@@ -77,7 +77,7 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
     short, long = np.minimum(across, down), np.maximum(across, down)
     likely = (short >= LEAST_SIDE) & (long <= SLENDER * short)
     likely &= boxes[:, cv2.CC_STAT_AREA] >= 0.5 * DARK * across * down
-    likely[0] = False  # what is not dark
+    likely[0] = False  # bright cells
     places, quads = [], []
     labels_left = np.flatnonzero(likely)
     if len(labels_left) > MOST:
@@ -140,7 +140,7 @@ def _framed(grey: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 
 def _grid() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return bilinear weights of the corners, shape (100, 4), at a tag's cells and around it, and which is what."""
+    """Return bilinear weights of the corners, shape (100, 4), at a tag's cells and around it, and the kind of each."""
     cells = (np.arange(-1, 9) + 0.5) / 8
     u, v = (axis.ravel() for axis in np.meshgrid(cells, cells))
     away = np.maximum(np.abs(u - 0.5), np.abs(v - 0.5)) * 8

@@ -1,4 +1,4 @@
-"""Says why no tag is read in images that may show some: a mirror, white on black, or another family."""
+"""Explains why no tag is read in images that may show some: a mirror, white on black, or another family."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Unread:
     """Tags that are there but not read."""
 
     found: str
-    """What the images show, in words."""
+    """Content of the images, as a sentence."""
     remedy: str
-    """What to change."""
+    """Remedy."""
 
 
 def why_unread(images: Sequence[np.ndarray]) -> Unread | None:
@@ -47,7 +47,7 @@ def why_unread(images: Sequence[np.ndarray]) -> Unread | None:
 
 
 def _readings() -> Iterator[tuple[Callable[[np.ndarray], int], Unread]]:
-    """Yield how to count tags in a grey image in another way, and what it means if some are found."""
+    """Yield how to count tags in a grey image in another way, and the meaning of a find."""
     yield _mirrored, Unread("mirrored tags", "switch the camera's mirroring off")
     yield _inverted, Unread("tags in white on black", "print the tags black on white")
     for name, dictionary in OTHERS.items():

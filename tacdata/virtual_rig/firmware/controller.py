@@ -22,11 +22,11 @@ REALTIME = b"?!~\x18"
 TELL_ALL = 0x87
 """Query for a report with the alarm's number (grblHAL)."""
 DROPPED = re.compile(r"[\x00-\x20/]")
-"""What is left out of a line: blanks, control characters, slashes."""
+"""Characters left out of a line: blanks, control characters, slashes."""
 BYTE_SECONDS = 10 / 115200
 NS = 1_000_000_000
 Wire = Callable[[str], str | None]
-"""What happens to a line on its way: what arrives, or None if nothing does."""
+"""Fault of a line on its way: returns the received line, or None if it is lost."""
 
 
 class Controller:
@@ -204,7 +204,7 @@ class Controller:
             else:
                 self.machine.realtime(byte, now)
         elif self._waiting() >= self.machine.firmware.rx_bytes:
-            return  # what does not fit is lost, as in the firmware's ring buffer
+            return  # bytes beyond the buffer are lost, as in the firmware's ring buffer
         elif byte in (0x0A, 0x0D):
             due = now + int((len(self._received) + 1) * BYTE_SECONDS * NS)
             line = self._to_controller(self._received.decode("ascii", "replace"))
@@ -218,7 +218,7 @@ class Controller:
         return len(self._received) + sum(len(line) + 1 for _, line in self._lines)
 
     def _wiped(self, restart: Callable[[], None]) -> None:
-        """Discard what was received and not answered, then restart."""
+        """Discard the lines that were received and not answered, then restart."""
         self._lines.clear()
         self._received.clear()
         self._out.clear()

@@ -24,7 +24,7 @@ GROUPS = {
     "spindle": ("M3", "M4", "M5"),
     "coolant": ("M7", "M8", "M9"),
 }
-"""Modal group -> the words that the emulator accepts; ``once`` stands for GRBL's non-modal group."""
+"""Modal group -> the words that the emulator accepts; ``once`` is GRBL's non-modal group."""
 GROUP_OF = {word: group for group, words in GROUPS.items() for word in words}
 POWER_ON = {
     "motion": "G0",
@@ -52,7 +52,7 @@ class Refused(Exception):
 
 @dataclass
 class Modal:
-    """Modal state: what lasts from line to line."""
+    """Modal state, which lasts from line to line."""
 
     words: dict[str, str] = field(default_factory=lambda: dict(POWER_ON))
     """Group -> active word."""
@@ -81,7 +81,7 @@ class Modal:
 
 @dataclass(frozen=True)
 class Action:
-    """What a line asks for, besides modal changes."""
+    """Request of a line, besides modal changes."""
 
     dwell: float | None = None
     """Pause [s]."""

@@ -79,7 +79,7 @@ class Interpreter(Machine):
             self._set(line, now)
 
     def _turn_check_mode(self, now: int) -> None:
-        """Switch it on, or off; what was checked has changed the modal state, so leaving it is a reset."""
+        """Switch it on, or off; the checked lines have changed the modal state, so leaving it is a reset."""
         if self.alarm is not None:
             raise gcode.Refused(8)
         self.check = not self.check

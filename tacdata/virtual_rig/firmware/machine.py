@@ -241,7 +241,7 @@ class Machine:
         self._limit_hit = True
 
     def power_on(self, now: int, fresh: bool) -> None:
-        """Send what a board sends when it is switched on; ``fresh``: with empty memory."""
+        """Send a board's lines at power-on; ``fresh``: with empty memory."""
         if fresh:
             self._say(now, "error:7")
             for line in texts.information("$$", self.firmware, self.settings, self.offset, []) or []:
@@ -269,7 +269,7 @@ class Machine:
         self.planner.resume(now)
 
     def _cancel(self, now: int) -> None:
-        """Process grblHAL's stop: motors halt without braking, every queue is emptied, and it says Idle."""
+        """Process grblHAL's stop: motors halt without braking, every queue is emptied, and it reports Idle."""
         self._drop()
         if self.planner.stop(now):
             self.error += self._rng.normal(0, LOST, 3)
@@ -279,7 +279,7 @@ class Machine:
         self._dropped = False
 
     def _drop(self) -> None:
-        """Take that the main loop breaks off what it does; it answers before it begins anew."""
+        """Let the main loop break off its work; it answers before it begins again."""
         self._dropped |= self.dwell_ns is not None or self.homing or self.reading
 
     def _raise_alarm(self, code: int, now: int) -> None:

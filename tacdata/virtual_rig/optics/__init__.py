@@ -1,1 +1,1 @@
-"""What an emulated camera sees."""
+"""Images of an emulated camera."""

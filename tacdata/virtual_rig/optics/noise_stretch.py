@@ -8,7 +8,7 @@ import numpy as np
 class NoiseStretch:
     """White noise as a generator draws it; each frame takes a stretch of long noise, from a random place.
 
-    Numbers drawn anew take three quarters of a frame's time: at eightfold speed a whole core.
+    New numbers for each frame take three quarters of a frame's time: at eightfold speed a whole core.
     """
 
     def __init__(self, rng: np.random.Generator) -> None:

@@ -155,7 +155,7 @@ def _through_exposure(pose: np.ndarray, look: Look) -> list[np.ndarray]:
 
 
 def _put_before(image: np.ndarray, look: Look) -> None:
-    """Draw what covers the cubes, and a shadow, with smooth edges."""
+    """Draw an occluder of the cubes, and a shadow, with smooth edges."""
     import cv2
 
     for polygon, is_shadow in [*((p, False) for p in look.covers), *(((look.shadow, True),) if look.shadow else ())]:

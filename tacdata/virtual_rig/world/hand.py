@@ -1,6 +1,6 @@
 """An emulated hand that grasps a ball, a can or a box, or wipes with an eraser, again and again.
 
-World: z up; the object lies on the table about the origin. Fingertip frame: origin on the pad, x along the finger, z
+World: z up; the object is on the table about the origin. Fingertip frame: origin on the pad, x along the finger, z
 out of the pad. The object presses the skins with the ball's radius, or by round nubs of a smaller one.
 """
 
@@ -52,7 +52,7 @@ class Hand:
     task: str = "grasp"
     """"grasp" or "wipe"."""
     nub: float = RADIUS
-    """Radius of what presses each skin [mm]: the ball's own, or that of nubs on the object."""
+    """Radius of the nub that presses each skin [mm]: the ball's own, or that of nubs on the object."""
     thing: str = "ball"
     """One of `THINGS`."""
 
@@ -79,7 +79,7 @@ class Hand:
         along /= np.linalg.norm(along)
         # The whole hand sways a little, so that no pose is ever at rest.
         phase = 2 * np.pi * (seconds + 0.37 * self.seed)
-        free = 1.0 if self.task == "grasp" else 0.1  # an eraser lies flat on its board, and the hand with it
+        free = 1.0 if self.task == "grasp" else 0.1  # an eraser is flat on its board, and the hand with it
         sway = 4.0 * free * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
         shake = self.tremor * np.array([np.sin(8 * phase), np.sin(8 * phase + 1), np.sin(8 * phase + 2)])
         matrix = np.eye(4)
@@ -99,7 +99,7 @@ class Hand:
             return np.array([-1.0 if finger == "thumb" else 1.0, 0.0, 0.0])
         out = np.array(DIRECTIONS[finger])
         if self.thing == "can":
-            out[2] = 0.0  # it stands upright
+            out[2] = 0.0  # it is upright
         return out / np.linalg.norm(out)
 
     def _middle(self, finger: str, t: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from tacdata.indenters import Indenter
 SPACING = 0.05
 """Spacing of the samples [mm]."""
 FAR = 100.0
-"""Height that stands for "no solid here" [mm]."""
+"""Height that marks "no solid here" [mm]."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class LowerFace:
     extent: float
     """Largest horizontal distance of the solid from its axis [mm]."""
     heights: np.ndarray
-    """Height over a square of twice the extent [mm], shape (n, n); ``FAR`` beside the solid."""
+    """Height over a square of twice the extent [mm], shape (n, n); ``FAR`` outside the solid."""
 
     @classmethod
     def upright(cls, indenter: Indenter) -> Self:

@@ -1,4 +1,4 @@
-"""Mounts indenters on a virtual rig, through a small file beside the rig."""
+"""Mounts indenters on a virtual rig, through a small file in the rig's folder."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Mounted:
         self._thread = threading.Thread(target=self._watch, name="virtual-mounting", daemon=True)
 
     def start(self) -> None:
-        """Watch the file in a thread and confirm what was mounted; reading a solid takes seconds."""
+        """Watch the file in a thread and confirm the mounted indenter; reading a solid takes seconds."""
         self.path.unlink(missing_ok=True)
         taken(self.path).write_text("nothing")
         self._thread.start()
@@ -93,7 +93,7 @@ class Mounted:
             taken(self.path).unlink(missing_ok=True)
 
     def look(self) -> None:
-        """Read what is mounted now: one `stat`, and a read if the file has changed."""
+        """Read the mounted indenter: one `stat`, and a read if the file has changed."""
         try:
             status = self.path.stat()
             if (mark := (status.st_ino, status.st_mtime_ns)) == self._seen:
@@ -117,7 +117,7 @@ class Mounted:
             before = self._seen
             try:
                 self.look()
-            except TacdataError as error:  # whoever mounts is told that the file was refused
+            except TacdataError as error:  # whoever mounts reads in its answer that the file was refused
                 print(error, file=sys.stderr, flush=True)
             if self._seen != before:
                 taken(self.path).write_text(str(self._seen))

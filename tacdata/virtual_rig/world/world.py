@@ -4,7 +4,7 @@ Its model is not the FEM that makes the labels: a stiffening bed of springs unde
 of stress with depth (K. L. Johnson, Contact Mechanics, eq. 2.22), Hertzian protrusions (ibid., eq. 4.23), parallel
 plates with a parasitic capacitance, a Prony series in time, gain spread, drift, noise and quantisation.
 
-The pipeline sees it through the wires only; `Truth` is written beside the rig for tests.
+The pipeline sees it through the wires only; `Truth` is written into the rig's folder for tests.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) 
 
 
 class IndenterProfile(Protocol):
-    """What the skin needs to know of an indenter (`tacdata.indenters.Indenter` provides it)."""
+    """Indenter, as far as the skin needs it (`tacdata.indenters.Indenter` provides it)."""
 
     @property
     def extent(self) -> float:

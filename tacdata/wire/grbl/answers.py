@@ -1,8 +1,8 @@
-"""What comes back for a line: was it refused, and did it arrive as it was sent?
+"""Answers to a line: was it refused, and did it arrive as it was sent?
 
 No released Grbl 1.1, grblHAL or FluidNC takes a checksum on a line: a changed one is carried out if it can be read.
 Each can send a received line back before carrying it out: FluidNC with ``$GCode/Echo=on``, Grbl and grblHAL built with
-``REPORT_ECHO_LINE_RECEIVED``. Such an echo is compared with what was sent. Without it, a changed line is noticed at the
+``REPORT_ECHO_LINE_RECEIVED``. Such an echo is compared with the sent line. Without it, a changed line is noticed at the
 next status report, as soon as the machine leaves the path that was sent (`tacdata.recording.motion.allowed_path`).
 """
 
@@ -23,7 +23,7 @@ UNASKED_ANSWER = (
     "one answer for each line",
     "see that no other program and no second controller uses this line, then start again",
 )
-"""Given, allowed, remedy: what is wrong with an answer too many."""
+"""Given, allowed, remedy of an answer too many."""
 
 
 @dataclass
@@ -59,7 +59,7 @@ def refusal(line: str, answer: str) -> DeviceError | None:
 
 
 def changed_on_its_way(sent: str, echo: str) -> DeviceError | None:
-    """Return what is wrong with a line of motion that was sent back; None if it arrived as it was sent."""
+    """Return the fault of a line of motion that was sent back; None if it arrived as it was sent."""
     if sent.startswith("$") or "".join(echo.split()).upper() == sent.upper():
         return None
     return DeviceError(

@@ -120,7 +120,7 @@ HOMING_REQUIRED = 11
 POSITION_KEPT = (2, 4, 5)
 """Alarms that keep the position: nothing moved, or the machine came to rest first."""
 UNLOCK = "reset it (Ctrl-X) and unlock it ($X) in a terminal, which keeps the position; then start again"
-"""What to do after such an alarm; limit alarms take no ``$X`` before a reset."""
+"""Remedy of such an alarm; limit alarms take no ``$X`` before a reset."""
 DAMAGED_LINE = (1, 2, 3, 4, 11, 20, 21, 22, 23, 24, 25, 26, 27, 28, 30, 31, 36)
 """Refusals that a correct line only gets if bytes of it were lost or changed on the way."""
 

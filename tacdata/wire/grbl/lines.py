@@ -49,7 +49,7 @@ class StatusReport:
     pins: str = ""
     """Letters of the active inputs, for example ``Z`` for its limit switch, ``D`` for the door."""
     pendant: bool | None = None
-    """Whether a pendant has control (grblHAL's ``MPG``), if the report says so."""
+    """Whether a pendant has control (grblHAL's ``MPG``), if the report states it."""
     scaled: str = ""
     """Letters of the axes that G51 scales (grblHAL's ``Sc``)."""
 
@@ -58,7 +58,7 @@ def parse_status(line: str) -> StatusReport | None:
     """Parse ``<State|MPos:x,y,z|...>``; None if the line is damaged.
 
     After the first two fields others may follow in any order or be absent; unknown ones are ignored. A report that
-    was cut off and begun anew counts from its last beginning. A position that is no number is no position.
+    was cut off and begun again counts from its last beginning. A position that is no number is no position.
     """
     if not (line.startswith("<") and line.endswith(">")):
         return None

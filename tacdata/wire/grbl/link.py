@@ -39,8 +39,8 @@ class GrblLink:
     Each line is answered once, in order, and only ``ok`` or ``error:N`` alone on a line is an answer. A line goes out
     only when it fits into the free part of the receive buffer.
 
-    What stops the machine for good (alarm, unexpected welcome, broken line, silence) is kept as `fault` and raised by
-    every later call. What only interrupts it (a hold, the door) is kept as `interruption` until `rearm`.
+    A permanent fault (alarm, unexpected welcome, broken line, silence) is kept as `fault` and raised by
+    every later call. A mere interruption (a hold, the door) is kept as `interruption` until `rearm`.
     """
 
     def __init__(self, port: serial.SerialBase, clock: Clock, poll_rate: float) -> None:
@@ -57,9 +57,9 @@ class GrblLink:
         self.halted = False
         """Whether the controller itself has ended all motion: an alarm, a restart, motors switched off."""
         self.alarm: int | None = None
-        """Number of the latest alarm, as far as it was said; None once a report shows another state."""
+        """Number of the latest alarm, as far as it was reported; None once a report shows another state."""
         self.pendant = False
-        """Whether a pendant has control, as far as a report has said."""
+        """Whether a pendant has control, by the latest report that states it."""
         self.interruption: DeviceError | None = None
         self._unasked = False  # whether an answer came that no line waited for
         self.notes: list[str] = []
@@ -93,7 +93,7 @@ class GrblLink:
 
     @property
     def at_rest(self) -> bool:
-        """Whether the latest report says Idle and no line went out since."""
+        """Whether the latest report is Idle and no line went out since."""
         last = self.last
         return last is not None and last.state == "Idle" and last.sent_ns > self._commanded_ns
 
@@ -355,7 +355,7 @@ class GrblLink:
 
     def _take_alarm(self, line: str, number: int | None) -> None:
         self.alarm = number
-        if self.polled or self.homing:  # at its start grblHAL says why it is locked; opening tells a person
+        if self.polled or self.homing:  # at its start grblHAL reports why it is locked; opening informs a person
             self.halted = True
             self._fail(*stopped_by(number, line), lost=number not in codes.POSITION_KEPT)
 
@@ -395,6 +395,6 @@ class GrblLink:
             wrong, for_good = what_is_wrong(report, self._held, self.homing, again, still)
             if wrong and for_good:
                 self.halted = True
-                self._fail(*wrong, lost=self.fault is None)  # an alarm's own line, if it came first, said what is lost
+                self._fail(*wrong, lost=self.fault is None)  # an alarm's own line, if it came first, reported the loss
             elif wrong and self.interruption is None:
                 self.interruption = DeviceError(*wrong)

@@ -1,4 +1,4 @@
-"""Opens the conversation: makes sure that the controller stands still and obeys, without moving it."""
+"""Opens the conversation: makes sure that the controller is at rest and obeys, without moving it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TALKS = ("Idle", "Alarm")
 """States in which ``$`` commands are answered."""
 DEAF = (1, 2, 17)
 """Alarms of a machine at rest that obeys no line before a reset (grblHAL: ``error:79``, or no answer in older ones;
-Grbl says nothing at all then). The emergency stop is not among them: while it is active, a reset ends nothing.
+Grbl sends nothing at all then). The emergency stop is not among them: while it is active, a reset ends nothing.
 """
 TELL_ALL = b"\x87"
 """grblHAL's query for a report with all fields, the alarm's number among them. FluidNC runs a macro at it."""
@@ -73,7 +73,7 @@ def _place(link: GrblLink) -> None:
 
 
 def straighten(link: GrblLink) -> tuple[str, ...]:
-    """End everything that changes coordinates (scaling, rotation, G92, tool length, inches); return what that was, as
+    """End everything that changes coordinates (scaling, rotation, G92, tool length, inches); return the changes, as
     text.
 
     Raises:
@@ -179,7 +179,7 @@ def _reset(link: GrblLink) -> None:
 
 
 def locked(link: GrblLink, settings: GrblSettings) -> DeviceError:
-    """Return what to tell a person whose controller is in alarm."""
+    """Return the error for a controller in alarm."""
     why = codes.alarm_in_words(link.alarm) if link.alarm else "state Alarm"
     kept = link.alarm in codes.POSITION_KEPT
     home = (

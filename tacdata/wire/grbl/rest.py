@@ -14,7 +14,7 @@ from tacdata.wire.patience import Patience
 COMING_TO_REST = 30.0
 """Longest deceleration of a feed hold [s of the clock]."""
 STANDING = 3.0
-"""A machine that reports the same place for so long stands still, whatever its state says [s of the clock]."""
+"""A machine that reports the same place for so long is at rest, whatever state it reports [s of the clock]."""
 LOOK = 0.05
 """Time between two reports that are compared [s, real time]."""
 

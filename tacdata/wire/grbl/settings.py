@@ -1,4 +1,4 @@
-"""A GRBL controller's settings, and what follows from them for a recording."""
+"""A GRBL controller's settings, and their consequences for a recording."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class GrblSettings:
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What a person should know before the first move."""
+        """Remarks before the first move."""
         found = []
         if not self.number("$20"):
             found.append("soft limits are off ($20=0): only the rig file's envelope keeps the guide in bounds")

@@ -58,7 +58,7 @@ class Statuses:
         if self._queries and now - max(self._asked_at, self._answered_at) <= REPEAT:
             return False
         if self._answered:
-            self._queries.clear()  # what was repeated and is not answered by now was answered together
+            self._queries.clear()  # repeated queries without an answer by now were answered together
         self._queries.append(self._clock.now_ns())
         self._asked_at, self._answered = now, False
         return True

@@ -35,7 +35,7 @@ UNASKED = {
     "Sleep": ("the controller fell asleep and its motors are off", "a machine that is awake", "reset and home it"),
     "Tool": ("the controller waits for a tool change", "no tool change", RESUME),
 }
-"""State -> text; none of these follows from what a recording sends."""
+"""State -> text; none of these follows from a recording's own lines."""
 PENDANT: Words = (
     "a pendant has taken control of the machine (MPG:1): lines from here are ignored",
     "one master",
@@ -53,7 +53,7 @@ KNOWN = {"Idle", "Run", "Dwell", "Alarm", *UNASKED}
 
 
 def stopped_by(number: int | None, line: str) -> Words:
-    """Return what to say of an alarm in motion."""
+    """Return the error for an alarm in motion."""
     kept = number in codes.POSITION_KEPT
     return (
         f"the controller stopped with {codes.alarm_in_words(number) if number else line}",
@@ -65,7 +65,7 @@ def stopped_by(number: int | None, line: str) -> Words:
 def what_is_wrong(
     report: StatusReport, held: bool, homing: bool, again: bool = False, still: bool = False
 ) -> tuple[Words | None, bool]:
-    """Return what is wrong by a report, or None, and whether that is permanent.
+    """Return the fault that a report shows, or None, and whether that is permanent.
 
     Args:
         report: A report of a machine that was opened and made ready.
