@@ -27,15 +27,15 @@ MOST_VARIANTS = 4
 """Messages that one construction may stand for, by words chosen when it happens."""
 WORDS, TRIPLE = "Words", "tuple[str, str, str]"
 """Types of the three parts, where they are no error yet."""
-LISTED, SAID = "what the message lists", "what the message says"
+LISTED, SAID = "as listed in the message", "as described in the message"
 """Parts that are made when the error happens."""
 MOST_WORDS = 24
 """Words of a part; more are cut with …."""
 HEAD = """# Troubleshooting
 
-Every error of tacdata has three parts: what was given, what is allowed, and what to do next. Search this page for a few
+Every error of tacdata has three parts: the given value, the allowed ones, and the remedy. Search this page for a few
 words of your message. Where the message names a file, a value or a name of yours, the page shows `…`. The
-[exit code](exit_codes.md) says which kind of error it is.
+[exit code](exit_codes.md) names the kind of error.
 
 The page is generated from the source: `.venv/bin/python .dev/troubleshooting.py`.
 """
@@ -219,7 +219,7 @@ def page(found: list[Entry]) -> str:
     rooms = list(dict.fromkeys(entry.room for entry in found))
     parts = [HEAD, " · ".join(f"[{room}](#{room.replace('/', '')})" for room in rooms)]
     for room, group in itertools.groupby(found, lambda entry: entry.room):
-        parts += [f"\n## {room}\n\n{about(room)}\n", "| message | allowed | what to do |", "|---|---|---|"]
+        parts += [f"\n## {room}\n\n{about(room)}\n", "| message | allowed | remedy |", "|---|---|---|"]
         parts += [f"| {cell(e.given)} | {cell(e.allowed)} | {cell(e.remedy)} |" for e in group]
     return "\n".join(parts) + "\n"
 

@@ -87,7 +87,7 @@ class MeasuredStream:
     name: str
     """Its name, for example "force"."""
     unit: str
-    """Unit of its values: N for forces, mm for lengths, otherwise as its source says."""
+    """Unit of its values: N for forces, mm for lengths, otherwise as in its source."""
     names: tuple[str, ...]
     """Name of each of its values."""
     sample_ns: np.ndarray
@@ -170,7 +170,7 @@ class Episode(Displayed):
         """Mean reading of each taxel in the rest phase [counts], shape (taxels,).
 
         Raises:
-            FormatError: If no frame lies in the rest phase, so that the readings cannot be tared.
+            FormatError: If no frame is in the rest phase, so that the readings cannot be tared.
         """
         resting = self.phase_at(self.taxels.sample_ns) == PHASES.index("rest")
         if not resting.any():
@@ -200,7 +200,7 @@ class Episode(Displayed):
 
     @cached_property
     def label(self) -> Label | None:
-        """The label in the folder ``labels`` beside the recording; None without one.
+        """The label in the folder ``labels`` next to the recording; None without one.
 
         Raises:
             FormatError: If its file is damaged.
@@ -225,7 +225,7 @@ class Episode(Displayed):
         return pandas.DataFrame({"time_s": self.times, "phase": names, "x": x, "y": y, "depth": depth, **taxels})
 
     def description(self) -> Iterator[str]:
-        """Yield what it is: press, readings, label."""
+        """Yield the lines of its description: press, readings, label."""
         frames, taxels = self.readings.shape
         yield f"Episode {self.path.name}: {self.press}"
         seconds = self.times[-1] if frames else 0.0

@@ -122,7 +122,7 @@ def _fit(height: np.ndarray, answer: np.ndarray, powers: np.ndarray) -> tuple[fl
     best = int(np.argmin(profile))
     if best >= GRID - 2:
         return None
-    # Noise as the residuals show it, never less than what the idle readings show.
+    # Noise as the residuals show it, never less than that of the idle readings.
     scale = max(profile[best] / max(len(height) - 4, 1), 1.0)
     within = trial[profile <= profile[best] + scale]
     width = max(float(within.max() - within.min()) / 2, float(trial[1] - trial[0]) / 2)

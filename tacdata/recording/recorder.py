@@ -80,7 +80,7 @@ class Recorder:
         Args:
             rig: The rig; its clock is the recording's.
             sensor: The skin that is pressed.
-            plan: What to press. There is no motion without a plan.
+            plan: Presses. There is no motion without a plan.
             out: Session folder to create, or to continue with ``resume``.
             resume: Continue with the next press that has no finished recording.
             devices: Drivers; by default those that the rig file names.
@@ -90,7 +90,7 @@ class Recorder:
             sync_tap: Begin with touches that measure each stream's constant latency.
             say: Called with messages for a person.
             watch: Called with a sample of the data (`live_feed`); must return at once.
-            ask: Puts a question to a person that no --yes answers; by default nobody says yes.
+            ask: Puts a question to a person that no --yes answers; by default nobody confirms.
             confirmed: Code of the question about a lost position that a person answered in advance with yes.
             prove: Touches the skin before the first press, unless the machine has just homed for a new session; raises
                 where the skin begins elsewhere than the registration states.
@@ -118,7 +118,7 @@ class Recorder:
             confirm: Called with the preflight summary before the first move; False ends the session.
 
         Returns:
-            The session as it stands on disk.
+            The session as stored on disk.
 
         Raises:
             UsageError: If the folder exists (or, resuming, does not), the summary was refused, or the board sends

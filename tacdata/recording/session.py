@@ -26,7 +26,7 @@ _OTHERS = {
     "meta/tacdata.json": "it is a dataset: name the recordings that it was packed from; simulated presses have none",
     "simulation.json": "it holds simulated presses, nobody recorded them: name recordings",
 }
-"""File of another kind of folder -> what to do with it."""
+"""File of another kind of folder -> remedy."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -74,7 +74,7 @@ class Session(Displayed):
         return map(read_episode, self.episodes)
 
     def description(self) -> Iterator[str]:
-        """Yield what it is: recordings, sensor, plan."""
+        """Yield the lines of its description: recordings, sensor, plan."""
         yield f"Session {self.folder}: {len(self)} of {len(self.plan.presses)} presses of plan {self.plan.name!r}"
         yield f"sensor {self.sensor.name}, {self.sensor.taxels.columns} × {self.sensor.taxels.rows} taxels"
         labels = [path for path in self.episodes if label_files.label(self.labels, path).is_file()]
@@ -184,7 +184,7 @@ def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
     A recording that a crash left whole, before it had got its name, gets it now.
 
     Raises:
-        UsageError: If it was made with another plan or sensor, or the skin lies elsewhere on the rig.
+        UsageError: If it was made with another plan or sensor, or the skin is at another place on the rig.
     """
     session = read_session(folder)
     old = session.document

@@ -12,7 +12,7 @@ from tacdata.recording.motion.move_times import AnchoredMove
 CONTACT = 0.3
 """Depth from which a press is used [mm]."""
 CLEAR = 20.0
-"""Answer from which its time can be told [times the noise]."""
+"""Answer from which its time can be estimated [times the noise]."""
 FEW = 10
 """Readings without contact that are needed [count]."""
 FELT = 0.25
@@ -25,10 +25,10 @@ NEAR = 0.02
 
 
 def reading_lag(figures: RecordingFigures) -> float | None:
-    """Return how much later the readings come than the motion [ms]; None where it cannot be told.
+    """Return how much later the readings come than the motion [ms]; None where it cannot be estimated.
 
     Taken where answer and depth cross half of their greatest value, going in and coming out. A curved answer moves
-    both crossings in opposite ways, so the mean is the delay. What remains is the skin's own: its creep and hysteresis.
+    both crossings in opposite ways, so the mean is the delay. The skin's own delay remains: its creep and hysteresis.
     """
     felt, episode = _felt(figures, 0.5), figures.recording.episode
     if felt is None:
@@ -39,7 +39,7 @@ def reading_lag(figures: RecordingFigures) -> float | None:
 
 
 def height_felt(figures: RecordingFigures) -> float | None:
-    """Return the depth at which `FELT` of the press's greatest answer is felt [mm]; None where it cannot be told.
+    """Return the depth at which `FELT` of the press's greatest answer is felt [mm]; None where it cannot be estimated.
 
     The mean of going in and coming out, in which a delay cancels. A gain does not enter.
     """
@@ -84,7 +84,7 @@ def _crossings(values: np.ndarray, greatest: float, share: float, time_ns: np.nd
 
 
 def other_place(figures: RecordingFigures, tolerance: float) -> str:
-    """Return where the guide went, if that is farther than ``tolerance`` [mm] from what the label says; else ""."""
+    """Return where the guide went, if that is farther than ``tolerance`` [mm] from the label's path; else ""."""
     episode = figures.recording.episode
     press = episode.press
     if not episode.complete or not figures.recording.moves or press.depth < CONTACT:
@@ -118,7 +118,7 @@ def stood_still(figures: RecordingFigures, rate: float) -> float:
     """Return for how long the controller may have stood still on a way in or out [ms]; 0 if it cannot have.
 
     A profile takes it that a move is never interrupted. A controller that stalls reports nothing, and answers the pause
-    behind the move later. If this computer stalls, the readings come late, too, and nothing is said.
+    behind the move later. If this computer stalls, the readings come late, too, and nothing is reported.
 
     Args:
         figures: Figures of the recording.

@@ -21,9 +21,9 @@ JUMP = 10.0
 JUMP_SHARE = 0.05
 """Minimum jump as a share of the channel's answer to the press [1]; relaxation stays below it."""
 ALONE_SHARE = 0.02
-"""... and without what all channels do at that moment in the ratio of their answers, as relaxation does [1]."""
+"""... and without the common change of all channels at that moment, in ratios of answers, as by relaxation [1]."""
 ANSWERING, TOGETHER = 20.0, 4
-"""Answer from which a channel tells what all do [times the noise], and how many must [count]."""
+"""Answer from which a channel counts in the common change [times the noise], and how many must [count]."""
 SPIKE, SPIKE_AROUND = 15.0, 5
 """Distance of a spike from the median around it [times the noise], and the frames of that median [count]."""
 SLOWER = 0.1
@@ -167,8 +167,9 @@ def jumps(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jum
 def _together(change: np.ndarray, response: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the share of their answers by which all channels change [1], shape (n,), and its standard error [1].
 
-    A median of the channels' ratios, weighted by the precision of each: a channel of small answer says little of a
-    large one. None has more than half the weight of all others, so that its own jump is not taken for everybody's.
+    A median of the channels' ratios, weighted by the precision of each: a channel of small answer carries little
+    information on a large one. None has more than half the weight of all others, so that its own jump is not taken for
+    everybody's.
 
     Args:
         change: Readings of clear channels less their first [counts], shape (n, m).
@@ -235,7 +236,7 @@ def held_by_chance(counts: np.ndarray, idle: np.ndarray, frames: int) -> float:
     """Return how many runs of so many equal ``frames`` noise alone leaves in a recording [count].
 
     Channels whose noise is common count as fewer. A board that renews its readings less often than it sends frames
-    has equal ones throughout; nothing is said of it (infinity).
+    has equal ones throughout; it gets no judgement (infinity).
 
     Args:
         counts: Readings [counts], shape (n, taxels).

@@ -1,6 +1,6 @@
-"""Tests whether the channels sit where the sensor file says, and whether their gain steps.
+"""Tests whether the channels are placed as in the sensor file, and whether their gain steps.
 
-Every press excites the taxels around its site, less with distance and alike in all directions. So the answers of a
+Every press excites the taxels around its site, less with distance and equally in all directions. So the answers of a
 session fit ``gain of channel * amplitude of press * exp(-distance^2 / 2 width^2)``. A channel that is wired to another
 place fits better there than at its own. One whose gain steps leaves the fit from some press on.
 """
@@ -41,7 +41,7 @@ SILENT = 6.0
 
 @dataclass(frozen=True)
 class Answers:
-    """What each channel answered to each press of a session, in the order of recording."""
+    """Answers of each channel to each press of a session, in the order of recording."""
 
     response: np.ndarray
     """Change from rest to hold [counts], shape (presses, taxels)."""

@@ -28,7 +28,7 @@ COUNTS = "counts"
 
 @dataclass(frozen=True)
 class RecordingFigures:
-    """What was measured in one recording."""
+    """Measured figures of one recording."""
 
     recording: Recording
     document: dict[str, Any]
@@ -62,7 +62,7 @@ def figures(recording: Recording) -> RecordingFigures:
 
 
 def recording_pairs(recording: Recording) -> tuple[StreamPair, ...]:
-    """Return every pair of a recording's streams, and what is known of the time between them."""
+    """Return every pair of a recording's streams, and the known time between them."""
     streams = ["taxels", *(f"camera {name}" for name in recording.images)]
     clocks = {name: recording.clocks.get(name) for name in streams}
     return stream_pairs({name: clock.latency if clock else None for name, clock in clocks.items()})
@@ -157,7 +157,7 @@ def _rate(time_ns: np.ndarray) -> float | None:
 
 
 def _spread(time_ns: np.ndarray) -> float:
-    """Return the jitter of sample times: half of what the middle 68 % of the intervals span [ms]."""
+    """Return the jitter of sample times: half of the span of the middle 68 % of the intervals [ms]."""
     return _rounded(np.ptp(np.percentile(np.diff(time_ns), [16, 84])) / 2e6) if len(time_ns) > 2 else 0.0
 
 

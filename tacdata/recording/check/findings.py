@@ -37,17 +37,17 @@ DEPTH_MM = (0.05, 0.2)
 """Depth uncertainty from which a warning is given, and from which a recording is unusable [mm]."""
 LATE_MS = 20.0
 """Contradiction of reports and profile from which a motion came late [ms of real time]: the controller is the cause of
-what then looks like a jump at rest."""
+which then looks like a jump at rest."""
 HOLD_MM = 0.05
 """Distance between reported and commanded position in the hold that makes a recording unusable [mm]."""
 EXACT_MM = 0.01
-"""... and what gives a warning, beside the resolution of a report on three axes [mm]."""
+"""... and from which there is a warning, besides the resolution of a report on three axes [mm]."""
 LAG_MS = 150.0
 """Warning threshold: delay of the readings against the motion [ms of real time]; skins creep, so less is no proof."""
 LAG_SHARE = 0.25
 """... and as a share of the way in [1]: hysteresis alone shifts the readings by some 5 %."""
 PLACE_MM = 0.1
-"""Distance between where the guide went and what the label says that makes a recording unusable [mm]."""
+"""Distance of the guide's path from the label's that makes a recording unusable [mm]."""
 HELD = 4
 """Frames in a row without change from which a board counts as held at any noise [count]."""
 HELD_BY_CHANCE = 1e-4
@@ -69,7 +69,7 @@ class Finding:
     file: str
     """Name of the recording; empty for the session."""
     text: str
-    """What was found, as a sentence."""
+    """Description of the finding, as a sentence."""
 
 
 def findings(figures: RecordingFigures) -> list[Finding]:
@@ -145,7 +145,7 @@ def _longest_silence(figures: RecordingFigures) -> float:
 
 
 def _line(counts: dict) -> list[str]:
-    """Describe what the driver counted on the line."""
+    """Describe the driver's counts on the line."""
     found = []
     if counts.get("corrupt", 0):
         found.append(f"{counts['corrupt']} damaged frames discarded")
@@ -215,7 +215,7 @@ def _together(figures: RecordingFigures) -> list[Judgement]:
         found.append((WARNING, "taxels", text))
     lag = reading_lag(figures)
     off = figures.document["cnc"]["hold_error"] or 0.0
-    # Where the guide was not where it should be, nothing can be said of when it was.
+    # Where the guide was not where it should be, its times cannot be judged.
     if lag is not None and off <= HOLD_MM and abs(lag) > max(LAG_MS * rate, LAG_SHARE * loading(figures)):
         text = f"they come {lag:+.0f} ms after the motion: measure the delay by a sync tap (record --sync-tap)"
         found.append((WARNING, "taxels", text))

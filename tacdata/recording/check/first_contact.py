@@ -90,7 +90,7 @@ def _one_way(depth: np.ndarray, counts: np.ndarray, noise: np.ndarray) -> FirstC
 
 
 def height_words(contacts: list[FirstContact]) -> tuple[float, str] | None:
-    """Return the middle depth of first contact and its words, if it lies beyond the first limit; else None."""
+    """Return the middle depth of first contact and its words, if it is beyond the first limit; else None."""
     if not contacts:
         return None
     depth = float(np.median([contact.depth for contact in contacts]))

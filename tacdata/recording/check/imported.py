@@ -35,7 +35,7 @@ def imported_summary(entries: Sequence[RecordingFigures]) -> list[str]:
 
 
 def imported_findings(figures: RecordingFigures) -> list[tuple[str, str, str]]:
-    """Return (severity, stream, text) of what is wrong or doubtful in an imported recording."""
+    """Return (severity, stream, text) of the faults and doubts of an imported recording."""
     episode, values = figures.recording.episode, figures.document["taxels"]
     if values["frames"] < 2:
         return [("unusable", "taxels", f"{values['frames']} frames")]

@@ -1,4 +1,4 @@
-"""Bounds on what can be: times, speeds and contact that no rig produces, and what a recording cannot tell."""
+"""Physical bounds: times, speeds and contact that no rig produces, and the limits of a recording."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Doubt = tuple[str, str, str]
 
 
 def impossible(figures: RecordingFigures) -> list[Doubt]:
-    """Return what cannot be in a recording, as (severity, stream, text)."""
+    """Return the impossible parts of a recording, as (severity, stream, text)."""
     episode = figures.recording.episode
     times = [] if figures.document["taxels"]["lost"] else _uneven(episode.taxels.sample_ns)
     stated = _other_rate(figures.document["taxels"]["rate"], figures.document["taxels"]["nominal_rate"])
@@ -164,7 +164,7 @@ def _force(episode: Episode) -> list[Doubt]:
 
 
 def answer(figures: RecordingFigures) -> float | None:
-    """Return the strongest channel's change from rest to contact [times its noise]; None where it cannot be told."""
+    """Return the strongest channel's change from rest to contact [times its noise]; None where it is unknown."""
     episode = figures.recording.episode
     if not len(episode.tip_ns) or not len(episode.taxels.sample_ns):
         return None
@@ -182,5 +182,5 @@ def answer(figures: RecordingFigures) -> float | None:
 
 
 def _quantum(counts: np.ndarray) -> np.ndarray:
-    """Return a bound of what noise can be, relative to each channel's own range, shape (channels,)."""
+    """Return a bound of the noise, relative to each channel's own range, shape (channels,)."""
     return np.maximum(1e-9 * np.nan_to_num(np.nanmax(counts, axis=0) - np.nanmin(counts, axis=0)), 1e-300)

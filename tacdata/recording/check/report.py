@@ -34,7 +34,7 @@ class Report:
     """Figures of every recording that could be read."""
     findings: tuple[Finding, ...]
     not_assessed: tuple[str, ...] = ()
-    """What the recordings cannot tell, and why, as sentences."""
+    """Questions that the recordings leave open, and why, as sentences."""
 
     @property
     def usable(self) -> bool:
@@ -143,7 +143,7 @@ def _weak(entries: list[RecordingFigures]) -> list[Finding]:
 
 
 def _not_assessed(entries: list[RecordingFigures]) -> list[str]:
-    """Say what the recordings cannot tell."""
+    """Describe the questions that the recordings leave open."""
     pressed = [entry for entry in entries if entry.recording.episode.press.depth >= CONTACT]
     blind = sum(answer(entry) is None for entry in pressed)
     words = f"{blind} of {len(pressed)} presses have no rest, no contact or no noise to compare"
@@ -197,7 +197,7 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
 
 
 def _seen(views: list[dict[str, Any]]) -> str:
-    """Describe what one camera saw of its cube and of fingers, over several recordings."""
+    """Describe one camera's sightings of its cube and of fingers, over several recordings."""
     fingers = sorted({finger for view in views for finger in view["fingers"]})
     looked = {finger: [v["fingers"][finger] for v in views if finger in v["fingers"]] for finger in fingers}
     if any(view["searched"] for view in views) or not fingers:

@@ -42,7 +42,7 @@ LAG_DEPTH = 0.2
 FEWEST = 4
 """Recordings needed for comparing their delays or noise [count]."""
 PLAIN = 4.0
-"""How far beyond what counts as an answer the other presses' answers must lie [1]."""
+"""Smallest ratio of the other presses' answers to the threshold of an answer [1]."""
 NOT_FELT = "the tip did not reach the skin, or the board does not see it"
 MIDDLE, LEANING = 0.8, 300
 """Share of a drift that the middle of the latencies must show, too [1], and how many of them are looked at [count]."""
@@ -124,7 +124,7 @@ def _drifts(entries: list[RecordingFigures]) -> list[Finding]:
         off = clock["drift"] - usual
         if abs(off) <= max(DRIFT_PPM, 3 * clock["drift_uncertainty"]):
             continue
-        # What is far off its nominal rate is named in the recording itself.
+        # A stream far off its nominal rate is named in the recording itself.
         named = abs(clock["drift"]) - 2 * clock["drift_uncertainty"] > DRIFT_PPM
         low, high = off + _lean(entry)
         if (low > MIDDLE * DRIFT_PPM or high < -MIDDLE * DRIFT_PPM) and not named:
@@ -178,14 +178,14 @@ def _heights(entries: list[RecordingFigures]) -> list[Finding]:
 
 
 def over_taxels(entry: RecordingFigures) -> bool:
-    """Whether a press lies over a taxel, so that it must be felt."""
+    """Whether a press is over a taxel, so that it must be felt."""
     press, taxels = entry.recording.episode.press, entry.recording.episode.sensor.taxels
     apart = np.linalg.norm(taxels.centers - np.array([press.x, press.y]), axis=1)
     return bool(apart.min() < 0.75 * max(taxels.pitch_x, taxels.pitch_y))
 
 
 def _steps(entries: list[RecordingFigures], found: Answers, names: list[str]) -> list[tuple[str, str]]:
-    """Describe a step of all answers: sideways, else in height, else in strength, as each changes what follows it."""
+    """Describe a step of all answers: sideways, else in height, else in strength, as each changes the next."""
     if slipped := slip(found):
         x, y = slipped.size
         words = "the tool or the skin slipped, or the registration changed"
@@ -223,7 +223,7 @@ def _louder(entries: list[RecordingFigures]) -> list[Finding]:
 
 
 def _places(found: Answers, moved: dict[int, int]) -> list[str]:
-    """Describe the channels that are wired to other taxels than the sensor file says."""
+    """Describe the channels that are wired to other taxels than in the sensor file."""
     for words, order in zip(TURNED, orders(found.taxels)[1:], strict=True):
         same = sum(int(order[k]) == j for k, j in moved.items())
         if len(moved) > 0.6 * len(order) and same > 0.9 * len(moved):

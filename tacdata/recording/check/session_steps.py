@@ -1,6 +1,6 @@
 """Do all answers step within a session, in place, in strength or in height? Each press is held against all others.
 
-A regression explains what differs between presses by their depth, site, speed and indenter, and by a steady drift.
+A regression explains the differences between presses by their depth, site, speed and indenter, and by a steady drift.
 A step from one press on is a further column (the Chow test with an unknown break). Strength is the amplitude of the
 answers. Height is the depth at which a share of a press's greatest answer is felt: it does not depend on gains.
 """
@@ -41,12 +41,12 @@ class AnswerStep:
     row: int
     """Which of the answers comes first after it, from 0."""
     size: np.ndarray
-    """By how much [unit of what steps], shape (quantities,)."""
+    """Size [unit of the quantity], shape (quantities,)."""
 
 
 @dataclass(frozen=True)
 class StepSearch:
-    """What a search for a step came to."""
+    """Result of a search for a step."""
 
     step: AnswerStep | None
     """The step, if there is a sure one."""
@@ -59,7 +59,7 @@ def find_step(explained: np.ndarray, values: np.ndarray, least: float) -> StepSe
 
     Args:
         explained: Columns that explain the values otherwise, shape (presses, columns).
-        values: What was measured, shape (presses, quantities).
+        values: Measured quantities, shape (presses, quantities).
         least: Smallest step that is reported [unit of the values].
     """
     count, best, middle = len(values), None, np.inf

@@ -25,7 +25,7 @@ class StreamLatency:
     uncertainty_ns: int
     """Its standard uncertainty [ns]."""
     source: str = "sync tap"
-    """What measured it, for example a sync tap."""
+    """Source of the measurement, for example a sync tap."""
 
     @property
     def document(self) -> dict[str, int | str]:
@@ -43,7 +43,7 @@ class ClockModel:
     """A linear clock: sample time = reference + period (counter - first counter) - latency."""
 
     first_counter: int
-    """Counter at the reference [frames], or the device's own time [ns] if `axis` says so."""
+    """Counter at the reference [frames], or the device's own time [ns], by `axis`."""
     reference_ns: int
     """Fitted host time of that frame's earliest arrival [ns]."""
     period_ns: float

@@ -1,7 +1,7 @@
 """Fits a stream's clock under the lower envelope of its arrivals, while they come.
 
 A least squares line would be late by the mean latency (9 ms behind an FTDI adapter, whose latency timer is 16 ms). The
-line here lies below all points and has the smallest sum of distances: the edge of their lower convex hull under the
+line here is below all points and has the smallest sum of distances: the edge of their lower convex hull under the
 mean counter (Moon, Skelly and Towsley, INFOCOM 1999).
 
 Frames that arrive late for a moment (a stalled host) return to the line. Frames that stay late for seconds, or come too
@@ -41,7 +41,7 @@ TYPICAL = 1.2
 HIDDEN = 0.1
 """Share of the typical latency that may stay hidden in every block [1]: 1.6 ms of a 16 ms timer."""
 STALLED = 3.0
-"""Mean latency of a block over the median of all blocks, beside `LATE_NS`, that shows a stalled host [1]."""
+"""Mean latency of a block over the median of all blocks, besides `LATE_NS`, that shows a stalled host [1]."""
 CRYSTAL = 250e-6
 """Largest deviation of a crystal from its nominal rate [1]: three times that of a poor one."""
 KEPT = 32
@@ -148,7 +148,7 @@ class _Stretch:
         slope = min(max(free[2], self.nominal_ns * (1 - CRYSTAL)), self.nominal_ns * (1 + CRYSTAL))
         off = abs(slope - free[2])
         if off == 0 or off > self.nominal_ns * 2 * self.uncertainty_ns() / self.span_ns:
-            return free  # what the arrivals prove outweighs the nominal rate
+            return free  # the bound by the arrivals outweighs the nominal rate
         x0, y0 = min(self.hull, key=lambda point: point[1] - self.origin[1] - slope * (point[0] - self.origin[0]))
         return x0, y0, slope
 
@@ -215,7 +215,7 @@ class EnvelopeFit:
         """Begin without arrivals.
 
         Args:
-            axis: What `add` is given: ``counter``, ``device_ns`` or ``order`` (see `ClockModel`).
+            axis: Argument of `add`: ``counter``, ``device_ns`` or ``order`` (see `ClockModel`).
             rate: Seconds that the host's clock shows per real second; host latencies grow with it.
             nominal_ns: Nominal time per count [ns], or 1 on the device's own time; None if unknown.
         """
@@ -262,7 +262,7 @@ class EnvelopeFit:
             self._before = ended
 
     def _came_back(self, before: _Stretch, point: Point) -> bool:
-        """Undo a new line if a frame lies on the old one again: then the host was late, and nothing stepped."""
+        """Undo a new line if a frame is on the old one again: then the host was late, and nothing stepped."""
         line = before.line()
         if line is None or point[1] - before.last[1] > RETURN_NS * self._rate:
             self._before = None

@@ -1,7 +1,8 @@
 """The time of exposure of every image of one camera in a finished recording, each with its own uncertainty.
 
 An image arrives after a latency of at least the camera's minimum. On a busy computer the latency grows, and images are
-lost. With a time stamp of the camera the two are told apart: the line under arrival against stamp gives every exposure.
+lost. With a time stamp of the camera the two are distinguished: the line under arrival against stamp gives every
+exposure.
 
 Numbers given on arrival do not tell a late image from one after a lost one. Against a clock of constant period P, the
 excess E = arrival - P number rises with both and falls only when lateness ends. So the lateness of an image is at

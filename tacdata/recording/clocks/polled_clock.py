@@ -1,4 +1,4 @@
-"""The clock of a device that answers queries: each answer's time lies between query and receipt."""
+"""The clock of a device that answers queries: each answer's time is between query and receipt."""
 
 from __future__ import annotations
 

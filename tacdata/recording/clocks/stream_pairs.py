@@ -15,7 +15,7 @@ NOT_MEASURED = "not measured"
 
 @dataclass(frozen=True)
 class StreamPair:
-    """Two streams, and what a sync tap measured of the constant delay between them.
+    """Two streams, and the constant delay between them as a sync tap measured it.
 
     Example:
         ``stream_pairs({"taxels": StreamLatency(6_100_000, 300_000)})[0].words`` is ``+6.10 +- 0.30 ms, taken off``.

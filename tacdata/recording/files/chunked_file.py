@@ -83,7 +83,7 @@ class ChunkedFile:
         self._flushed_at = self._host.monotonic()
 
     def close(self) -> None:
-        """Write the summary and close; if the disk refuses, what was written stays readable."""
+        """Write the summary and close; if the disk refuses, the data so far stay readable."""
         try:
             self._writer.finish()
             self._host.sync(self._stream)

@@ -36,7 +36,7 @@ class GrowingFile:
             raise FormatError(f"{path} is no MCAP file", "a recording made by tacdata record", "check the path")
 
     def update(self) -> bool:
-        """Read what was appended, up to the last complete record; return whether there was anything."""
+        """Read the appended bytes, up to the last complete record; return whether there was anything."""
         found = False
         while not self.finished:
             at = self._stream.tell()

@@ -1,4 +1,4 @@
-"""Reads everything readable from an MCAP file, finished or cut off; reports what is not."""
+"""Reads everything readable from an MCAP file, finished or cut off; reports the damaged parts."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Records:
     attachments: dict[str, Attachment] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
-    """What could not be read, as sentences; empty for a file that was closed properly."""
+    """Damaged parts, as sentences; empty for a file that was closed properly."""
 
     @property
     def messages(self) -> list[Message]:
@@ -79,7 +79,7 @@ def read_records(
         images: Whether to keep the pictures; without them each message is replaced by its picture's CRC32,
             4 bytes, and a long recording needs little memory.
         digests: Whether to compute the CRC32. Without it a picture leaves no data, which is much faster.
-        seen: Takes the topic and message of each picture that is not kept; it must copy what it keeps.
+        seen: Takes the topic and message of each picture that is not kept; it must copy the parts that it keeps.
 
     Raises:
         UsageError: If there is no such file.
@@ -165,7 +165,7 @@ def walk(path: Path, damage: list[str]) -> Iterator[Any]:
 
     Args:
         path: The file.
-        damage: Takes what could not be read, in words.
+        damage: Takes the description of each damaged part.
 
     Raises:
         FormatError: If another recording follows the end of the first.

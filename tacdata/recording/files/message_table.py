@@ -42,7 +42,7 @@ class ChunkContent:
         """Find the records.
 
         Raises:
-            ValueError: If one is longer than what is left.
+            ValueError: If one is longer than the remaining bytes.
         """
         starts, place, size, unpack = [], 0, len(content), RECORD.unpack_from
         while place < size:

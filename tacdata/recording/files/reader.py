@@ -49,7 +49,7 @@ class Recording:
     log: tuple[str, ...]
     """Warnings and errors logged while recording."""
     clocks: dict[str, ClockModel]
-    """Stream name ("taxels", "camera NAME") -> its clock, as stored or fitted anew."""
+    """Stream name ("taxels", "camera NAME") -> its clock, as stored or fitted again."""
     cameras: dict[str, ImageTimes]
     """Camera name -> its images' times."""
     polled: dict[str, str]
@@ -81,7 +81,7 @@ def read_episode(path: StrPath) -> Episode:
 def read_recording(
     path: StrPath, digests: bool = True, seen: Callable[[str, memoryview], None] | None = None
 ) -> Recording:
-    """Read one recording with everything in it, also what `Episode` leaves out.
+    """Read one recording with everything in it, also the parts that `Episode` leaves out.
 
     Args:
         path: The file.
@@ -206,7 +206,7 @@ def _array(values: list[int]) -> np.ndarray:
 
 
 def _clocks(records: Records, frames: TaxelFrames, cameras: list[str], rate: float) -> dict[str, ClockModel]:
-    """Return each stream's clock: as stored, or fitted anew to what a crash left."""
+    """Return each stream's clock: as stored, or fitted again to the frames before a crash."""
     clocks = {}
     for name in ("taxels", *(f"camera {camera}" for camera in cameras)):
         stored = records.metadata.get(f"clock_model/{name}")

@@ -29,7 +29,7 @@ class Recovered:
     attachments: int = 0
     """Attachments in it."""
     damage: list[str] = field(default_factory=list)
-    """What was wrong with the old file, as sentences; empty if nothing was."""
+    """Faults of the old file, as sentences; empty if nothing was."""
 
 
 class NothingRecovered(FormatError):
@@ -39,7 +39,7 @@ class NothingRecovered(FormatError):
 
 
 def recover(path: Path, target: Path | None = None) -> Recovered:
-    """Write what can be read of ``path`` beside it, as ``NAME.recovered.mcap``; the old file is kept.
+    """Write the readable part of ``path`` into its folder, as ``NAME.recovered.mcap``; the old file is kept.
 
     The copy is marked incomplete and names the damage. It keeps every message, time and attachment.
 

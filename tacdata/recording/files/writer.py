@@ -114,7 +114,7 @@ class EpisodeWriter:
 
         Args:
             path: The finished file's name.
-            header: What is attached to it.
+            header: Attachments.
             clock: The recording's clock.
             cameras: Names of the cameras.
             fingers: Names of the fingers that cameras may look at.
@@ -131,7 +131,7 @@ class EpisodeWriter:
         self._streams = [*taxels, *(f"camera {camera}" for camera in cameras)]
         self._moves = "controller.json" in header.attachments
         self.begun_ns = clock.now_ns()
-        """Host time of creation [ns]; what arrived before belongs to no recording or to the one before."""
+        """Host time of creation [ns]; earlier arrivals belong to no recording or to the one before."""
         try:
             self._file = _begun(path, header, clock, cameras, fingers, boards)
         except OSError as error:
@@ -273,7 +273,7 @@ class EpisodeWriter:
             The file's path: the final one, or that of an interrupted recording.
 
         Raises:
-            DeviceError: If the disk refused something; the message says which file holds what was written.
+            DeviceError: If the disk refused something; the message names the file that holds the data so far.
         """
         self._queue.put(None)
         self._thread.join()

@@ -52,7 +52,7 @@ class DeviceStreams(ABC):
             boards: The opened boards; a single one may be called "".
             cameras: The opened cameras.
             entries: The rig file's camera entries.
-            fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
+            fingers: Fingers that cameras without a cube look for (`schemas/fingers.schema.json`).
             detect: Searches an image for cubes; without it images are only stored.
             watch: Called with a sample of the data.
         """
@@ -126,7 +126,7 @@ class DeviceStreams(ABC):
 
     @property
     def counts(self) -> dict[str, StreamCounts]:
-        """What each stream has delivered since the last call of `record_into`."""
+        """Counts of each stream's data since the last call of `record_into`."""
         return {name: _since(self._before.get(name, StreamCounts()), now) for name, now in self._totals().items()}
 
     def record_into(self, sink: EpisodeWriter | None) -> None:
@@ -144,7 +144,7 @@ class DeviceStreams(ABC):
                 clock.set_latency(latencies.get(name))
 
     def catch_up(self, patience: float = CATCH_UP) -> None:
-        """Wait at most ``patience`` [s of real time] until every stream has handed on what has arrived."""
+        """Wait at most ``patience`` [s of real time] until every stream has handed on its arrivals."""
         end, self._ending = self._host.monotonic() + patience, True
         begun = dict(self._passes)
         for thread in self._threads:

@@ -1,4 +1,4 @@
-"""The last lines on the screen when a session broke off: motion, tip, data, and what comes next."""
+"""The last lines on the screen when a session broke off: motion, tip, data, and the next step."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from tacdata.recording.live.guarded_motion import GuardedMotion
 
 
 def ending(motion: GuardedMotion, lost: str, data: tuple[str, ...], command: str, error: BaseException) -> str:
-    """Return the lines; what the error itself says is not said again.
+    """Return the lines; none repeats the error itself.
 
     Args:
-        motion: What moved.
+        motion: Guide that moved.
         lost: Why the position is not known, in words; empty if it is.
-        data: What is on the disk, a line each.
+        data: Files on the disk, a line each.
         command: How to go on.
-        error: What broke the session off.
+        error: Error that broke the session off.
     """
     said = error.given if isinstance(error, TacdataError) else ""
     first = "find its zero again (home it, or touch off), then " if lost else ""
@@ -32,7 +32,7 @@ def ending(motion: GuardedMotion, lost: str, data: tuple[str, ...], command: str
 
 
 def on_disk(folder: Path, presses: int) -> tuple[str, ...]:
-    """Say what a session's folder holds of so many ``presses``."""
+    """Describe the recordings in a session's folder, of so many ``presses``."""
     if not folder.exists():
         return ("nothing was written",)
     broken = file_names.unfinished(folder)

@@ -58,9 +58,9 @@ class GuardedMotion:
         self._state = state
         self._cnc, self._clock, self._interruption = cnc, clock, interruption or Interruption()
         self._halted = clock.host.event()
-        self._rest: Position | None = None  # where it stands after a stop; None: it runs, or does not obey
+        self._rest: Position | None = None  # its place after a stop; None: it runs, or does not obey
         self._why = "nothing was stopped"
-        self._stands: Position | None = None  # where a machine stands that does not obey, if that is known
+        self._stands: Position | None = None  # place of a machine that does not obey, if that is known
         self._path: AllowedPath | None = None
         self._at: Position | None = None  # where the last path ended
         self._lifted, self._clear, self._still = "", False, False
@@ -68,7 +68,7 @@ class GuardedMotion:
         self._rising: float | None = None  # machine height to which a lift is under way, or was when it broke off
 
     def off_path(self, status: CncStatus) -> DeviceError | None:
-        """Return what is wrong with where a report says the guide is, by the moves that were sent; or None."""
+        """Return the fault of a reported position, by the moves that were sent; or None."""
         found = self._path.off(status) if self._path else None
         if found and self._path:
             self._path.forget()  # it was noticed; from now on reports say where it comes to rest
@@ -86,7 +86,7 @@ class GuardedMotion:
 
         Args:
             path: The steps; each move starts from rest.
-            start: Where the guide stands [mm].
+            start: Position of the guide [mm].
             streams: Watched for faults.
             writer: Receives every acknowledged step.
 
@@ -150,7 +150,7 @@ class GuardedMotion:
         self._find_rest()
 
     def _find_rest(self) -> None:
-        """Empty the controller's queue, and take where it stands, or why that is unknown."""
+        """Empty the controller's queue, and take its position, or why that is unknown."""
         self._rest = None
         try:
             self._rest = self._cnc.abandon()
@@ -259,7 +259,7 @@ class GuardedMotion:
         return LATER if self._still or self._rest is not None else ASKS
 
     def go_on(self) -> Position:
-        """After a stop and a lift: accept steps again, and return where the guide stands [mm].
+        """After a stop and a lift: accept steps again, and return the guide's position [mm].
 
         Raises:
             DeviceError: If it was not lifted.
@@ -277,7 +277,7 @@ class GuardedMotion:
 
     @property
     def ending(self) -> tuple[str, ...]:
-        """What a person must know last, a line each: does it move, where does it stand, was the tip lifted?"""
+        """Final remarks for a person, a line each: does it move, where is it, was the tip lifted?"""
         if self._path is None:
             if not self._cnc.moved:
                 return ("motion: nothing was moved",)

@@ -47,7 +47,7 @@ class Interruption:
             self._host.signal(number, handler)
 
     def check(self) -> None:
-        """Raise what was signalled in the meantime.
+        """Raise the signal of the meantime.
 
         Raises:
             KeyboardInterrupt: If a signal came that was not raised yet.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 Watch = Callable[[str, int, Any], None]
-"""``watch(stream, arrival [ns], value)``; must return at once, and may drop what it is shown.
+"""``watch(stream, arrival [ns], value)``; must return at once, and may drop values.
 
 ``taxels``: readings, shape (channels,); ``cnc``: machine position [mm]; ``camera NAME``: image."""
 RATE = {"taxels": 30.0, "cnc": 10.0, "camera": 5.0}

@@ -18,7 +18,7 @@ OPTION = "--confirm-position"
 
 
 class PositionGuard:
-    """Compares where a machine was left with what its controller reports, and asks where they differ.
+    """Compares a machine's last position with its controller's report, and asks where they differ.
 
     Example:
         ``guard = PositionGuard(state, cnc, ask); guard.before_homing(False); ...open...; guard.require_known(-35.0)``
@@ -73,7 +73,7 @@ class PositionGuard:
             resumed: Whether earlier recordings rest on the same machine zero.
 
         Raises:
-            DeviceError: If nobody says yes. Nothing has moved.
+            DeviceError: If nobody confirms. Nothing has moved.
         """
         why = self.doubt(resumed)
         code = self._code("known", why) if why else ""

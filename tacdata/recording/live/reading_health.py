@@ -9,7 +9,7 @@ import numpy as np
 from tacdata.errors import DeviceError
 
 LASTS_NS = 1_000_000_000
-"""How long readings must be impossible before it is said [ns of the host's clock]; one frame proves nothing."""
+"""How long readings must be impossible before it is reported [ns of the host's clock]; one frame proves nothing."""
 FRAMES = 20
 """... and over how many frames at least [count]."""
 RARE = 10
@@ -25,11 +25,11 @@ RATE_EVERY_NS = 150_000_000
 SLOW = 0.6
 """Share of the rate below which a board counts as slow [1]."""
 FEWEST = 3
-"""Frames in that stretch below which nothing is said about a rate [count]; silence is noticed elsewhere."""
+"""Frames in that stretch below which no rate is judged [count]; silence is noticed elsewhere."""
 
 
 class BadReadings(DeviceError):
-    """A board delivers, but what it delivers cannot be right."""
+    """A board delivers impossible readings."""
 
 
 class ReadingHealth:
@@ -44,7 +44,7 @@ class ReadingHealth:
 
         Args:
             limits: Least and greatest reading that the frame format can hold [counts].
-            rate: Frames per second that the board should send [Hz]; it counts as slow if it falls below what it sent at
+            rate: Frames per second that the board should send [Hz]; it counts as slow if it falls below its rate at
                 first, or below this if that is less.
             speed: Seconds of the clock per second of real time, in which a busy computer delays frames.
         """
@@ -58,7 +58,7 @@ class ReadingHealth:
         self._same = self._longest = self._changes = 0
 
     def take(self, arrival_ns: int, counts: np.ndarray) -> str:
-        """Take a frame; return what cannot be, in words, or "".
+        """Take a frame; return its impossible values, as a sentence, or "".
 
         Args:
             arrival_ns: Host time of receipt [ns].

@@ -51,7 +51,7 @@ class RigDevices:
 
 
 def require_channels(board: TaxelBoard, sensor: Sensor, what: str = "the board", remedy: str = "--sensor") -> None:
-    """Hold a board against the skin that is said to lie on it.
+    """Compare a board with the skin that is configured on it.
 
     Raises:
         UsageError: If it sends another number of channels than the sensor has taxels.

@@ -24,7 +24,7 @@ TRIPS = 4096
 BOARD_SILENCE, SILENT_FRAMES = 1.8, 5
 """Time without a frame after which a board counts as silent [s of real time], and in frames of a slow one."""
 AGAIN_NS = 60_000_000_000
-"""Bad readings that go on are said again after this time [ns of the host's clock]."""
+"""Bad readings that go on are reported again after this time [ns of the host's clock]."""
 TOO_BUSY = "end other programs on this computer, then check cable and power, and start again"
 TAXELS = "taxels"
 """Name of the only board's stream."""
@@ -54,9 +54,9 @@ class RigStreams(DeviceStreams):
             on_fault: Called first, in the faulty stream's thread: stops the motion.
             detect: Searches an image for the cube; without it images are only stored.
             watch: Called with a sample of the data.
-            fingers: What cameras without a cube look for (`schemas/fingers.schema.json`).
+            fingers: Fingers that cameras without a cube look for (`schemas/fingers.schema.json`).
             on_bad_readings: Called with words when the board's readings cannot be right, in place of a fault.
-            off_path: Called with every status report; returns what is wrong with it (`GuardedMotion.off_path`).
+            off_path: Called with every status report; returns its fault (`GuardedMotion.off_path`).
         """
         super().__init__({"": devices.board}, devices.cameras, cameras, fingers, detect, watch)
         self._cnc, self._on_fault, self._off_path = devices.cnc, on_fault, off_path
@@ -99,7 +99,7 @@ class RigStreams(DeviceStreams):
         return models if polled is None else {**models, "cnc": polled}
 
     def nothing_yet(self, seconds: float) -> DeviceError:
-        """Return what to say when board or controller has delivered nothing of use for ``seconds`` [s]."""
+        """Return the message when board or controller has delivered nothing of use for ``seconds`` [s]."""
         if self.frames >= 2 and self.position is None:
             given = f"the motion controller has sent no position for {seconds:g} s"
             return DeviceError(given, "a running stream", "check cable and power")
@@ -185,7 +185,7 @@ class RigStreams(DeviceStreams):
         with self._lock:
             for status in statuses:
                 if wrong := self._off_path(status):
-                    self._on_fault()  # after an earlier fault too: the lift may be what goes astray
+                    self._on_fault()  # after an earlier fault too: the lift itself may go astray
                     self._fault = self._fault or wrong
                 x, y, z = status.position.tolist()
                 self.position = (x, y, z)

@@ -1,4 +1,4 @@
-"""Where the guide may be at each moment, by what it was sent; every status report is compared with it."""
+"""Allowed positions of the guide at each moment, by the moves sent; every status report is compared with it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class _Leg:
     ended_ns: int | None = None
     """Host time by which it is known to have ended [ns]."""
     expected_ns: int | None = None
-    """Host time at which it ends, if it was accepted and the controller does as it is told [ns]."""
+    """Host time at which it ends, if it was accepted and the controller obeys [ns]."""
     chain: float = 0.0
     """Duration of this move and of those before it, since the guide was last idle [s]."""
 
@@ -59,7 +59,7 @@ class AllowedPath:
     """
 
     def __init__(self, limits: AxisLimits, resolution: float) -> None:
-        """Begin without a known place; ``resolution`` [mm] is what a report at rest may be off."""
+        """Begin without a known place; ``resolution`` [mm] is the error of a report at rest."""
         self._limits, self._tolerance = limits, TOLERANCE + resolution
         self._legs: list[_Leg] = []
         self._since_ns = self._asked_ns = 0
@@ -67,7 +67,7 @@ class AllowedPath:
         self._lock = threading.Lock()
 
     def stand(self, position: tuple[float, float, float], now_ns: int) -> None:
-        """Take that the guide stands at ``position`` [mm]; nothing else is allowed until a move is sent.
+        """Set the guide's ``position`` [mm]; nothing else is allowed until a move is sent.
 
         Where the moves so far lead there, they are kept: a report of one of them may still be read. Else reports that
         were asked for before ``now_ns`` are not judged.
@@ -113,14 +113,14 @@ class AllowedPath:
             self._legs = self._legs[-KEPT:]
 
     def off(self, status: CncStatus) -> DeviceError | None:
-        """Return what is wrong with where a report says the guide is, or None."""
+        """Return the fault of a reported position, or None."""
         with self._lock:
             asked_ns, self._asked_ns = min(self._asked_ns, status.sent_ns), status.sent_ns
             sent = [leg for leg in self._legs if leg.sent_ns <= status.arrival_ns] or self._legs[:1]
         if not sent or asked_ns < self._since_ns:
             return None
         x, y, z = status.position.tolist()
-        # Whatever was sent last, and what may have run since the query; of a move that had ended, only its end.
+        # The last move sent, and those that may have run since the query; of a move that had ended, only its end.
         legs = [leg for leg in sent if leg is sent[-1] or leg.ended_ns is None or leg.ended_ns >= asked_ns]
         nearest, distance, behind = None, np.inf, None
         for leg in legs:
@@ -155,12 +155,12 @@ class AllowedPath:
         )
 
     def is_short(self, target: tuple[float, float, float], position: tuple[float, float, float]) -> bool:
-        """Whether ``position`` [mm] lies below or beside the end of a way straight up; higher is clear as well."""
+        """Whether ``position`` [mm] is below or off the end of a way straight up; higher is clear as well."""
         x, y, z = np.subtract(position, target)
         return float(np.hypot(x, y)) > self._tolerance or z < -self._tolerance
 
     def _believed_ended(self, sent: list[_Leg], status: CncStatus) -> _Leg | None:
-        """Return the latest move with the reported place on its way, though an answer said that it had ended."""
+        """Return the latest move with the reported place on its way, though an answer reported its end."""
         for leg in reversed(sent[:-1]):
             profile, here = leg.profile, status.position
             if leg.ended_ns is None or np.linalg.norm(here - profile.target) <= self._tolerance or not profile.length:
@@ -190,7 +190,7 @@ class AllowedPath:
         return leg.due_ns is not None and leg.due_ns < asked_ns and off > self._tolerance
 
     def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
-        """Return how far off the move a report lies [mm], and whether it lies farther along than time allows."""
+        """Return the distance of a report from the move [mm], and whether it is farther along than time allows."""
         profile, position = leg.profile, status.position
         if not profile.length or (leg.ended_ns is not None and leg.ended_ns < asked_ns):
             return float(np.linalg.norm(position - profile.target)), False

@@ -124,7 +124,7 @@ def anchor(
     """
     anchored = []
     resolution = report_resolution({}) if resolution is None else resolution
-    # A controller takes a line, plans, answers and starts, alike every time. If an `ok` takes longer than the
+    # A controller takes a line, plans, answers and starts in the same time each time. If an `ok` takes longer than the
     # quickest one, host and link caused that.
     quickest = min((c.acknowledged_ns - c.sent_ns for c in commands if c.is_move), default=0)
     for index, command in enumerate(commands):

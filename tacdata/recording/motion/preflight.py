@@ -39,9 +39,9 @@ class Preflight:
     seconds: tuple[float, ...]
     """Expected duration of each press [s]."""
     cautions: tuple[str, ...] = ()
-    """What a person should know about the controller's settings before the first move."""
+    """Remarks on the controller's settings before the first move."""
     tap: str = ""
-    """What the sync tap does, in words; empty without one."""
+    """Description of the sync tap; empty without one."""
     height: float = float("nan")
     """Machine height to which the first move goes, straight up [mm]; NaN where there is none."""
     tools: str = ""
@@ -86,7 +86,7 @@ def preflight(
         limits: The controller's axis limits.
         wanted: Numbers of the presses still to do.
         travel: Machine box of the controller's soft limits [mm], shapes (3,) and (3,); None if they are off.
-        cautions: What a person should know before the first move.
+        cautions: Remarks before the first move.
         tap: The touch of a sync tap before the first press (`sync_tap.touch`), if there is one.
 
     Raises:

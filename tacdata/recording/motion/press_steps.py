@@ -16,7 +16,7 @@ SYNC = 0.01
 REPORT_LAG = 0.1
 """Longest time from the making of a report to the feed hold that follows it [s]."""
 SHORTEST_PAUSE = 0.05
-"""What GRBL rounds such a pause up to [s]."""
+"""Such a pause as GRBL rounds it up [s]."""
 
 SIDES = {"": (0.0, 0.0), "+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 """Direction from a site to where the guide comes from, for each value of `Press.approach_from`."""
@@ -41,9 +41,9 @@ class Step:
 def steps(press: Press, motion: MotionSettings, registration: Registration) -> tuple[Step, ...]:
     """Return the steps of one press: travel, rest, approach, press, hold, release, retract, recovery.
 
-    A pause stands behind every move. So the next move starts from rest, as `trapezoid` assumes, and the pause's
+    A pause follows every move. So the next move starts from rest, as `trapezoid` assumes, and the pause's
     acknowledgement bounds the move's end. A press with negative depth stops above the skin. One with ``approach_from``
-    rests ``run_up`` beside its site and comes over it from there. Strokes come before the hold.
+    rests ``run_up`` away from its site and comes over it from there. Strokes come before the hold.
     """
     # Above the standoff the way down is halved, so that approach and press are both moves.
     high = -press.depth >= motion.standoff

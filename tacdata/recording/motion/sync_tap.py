@@ -19,11 +19,11 @@ LEAST = 0.1
 SLOW, QUICK = 1.0, 10.0
 """Speeds of the touches [mm/s]."""
 TOUCHES = (SLOW, QUICK, QUICK, QUICK, QUICK, SLOW, QUICK, QUICK, QUICK, QUICK, SLOW)
-"""Order of the touches; alternating, so that drift affects slow and quick ones alike."""
+"""Order of the touches; alternating, so that drift affects slow and quick ones equally."""
 HELD = 0.15
 """Time at depth [s]."""
 APART = (0.55, 0.083)
-"""Rest before a touch, and what each further one adds, so that sample times differ in phase [s]."""
+"""Rest before a touch, and the increment for each further one, so that sample times differ in phase [s]."""
 
 
 def touch(plan: Plan, sensor: Sensor) -> Press:

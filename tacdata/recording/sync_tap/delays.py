@@ -160,7 +160,7 @@ def _cut(move: AnchoredMove, sample_ns: np.ndarray, signal: np.ndarray) -> _Touc
 
 
 def _coarse(quick: list[_Touch], origin: float) -> float:
-    """Return the latency at which depth and signal are most alike [s]."""
+    """Return the latency at which depth and signal agree best [s]."""
     delays = np.arange(RANGE[0], RANGE[1], 0.004)
     signal = np.concatenate([t.signal for t in quick])
     likeness = [

@@ -132,8 +132,8 @@ def _read(grey: np.ndarray, box: tuple[int, int, int, int], scale: float) -> lis
         crop = cv2.resize(crop, None, fx=scale, fy=scale, interpolation=kind)
     with _LOCK:
         found = _april().detect(np.ascontiguousarray(crop))
-    # In the library's coordinates a pixel's corner is a whole number, so scaling is plain division, by what
-    # the rounding of the sides has made of the scale.
+    # In the library's coordinates a pixel's corner is a whole number, so scaling is plain division, by the ratio of the
+    # rounded sides.
     scales = np.array([crop.shape[1] / (right - left), crop.shape[0] / (bottom - top)])
     offset = np.array([left, top], float) - HALF_PIXEL
     return [
