@@ -251,13 +251,7 @@ class Recorder:
     def _rise(self, streams: RigStreams) -> Position:
         """Go straight up to the clearance height; return the position there [mm]."""
         here = streams.position or (np.nan, np.nan, np.nan)
-        above = (here[0], here[1], max(here[2], self._height))
-        if not self.rig.envelope.contains(above):
-            raise DeviceError(
-                f"the guide stands at {tuple(round(value, 2) for value in here)} mm, outside the envelope",
-                f"{self.rig.envelope.min} to {self.rig.envelope.max} mm",
-                "jog it inside, or correct the rig file",
-            )
+        above = self.rig.envelope.top_of_rise(here, self._height)
         if here[2] < self._height:
             speed = self.plan.motion.approach_speed
             try:

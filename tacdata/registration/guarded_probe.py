@@ -150,8 +150,7 @@ class GuardedProbe(Probe):
 
     def rise(self, speed: float) -> None:
         """Go straight up to the safe height."""
-        x, y, z = self._position
-        self.go((x, y, max(z, self._height)), speed)
+        self.go(self._rig.envelope.top_of_rise(self._position, self._height), speed)
 
     def read(self, frames: int) -> StillReading:
         """Collect frames sampled since the guide came to rest; see the base."""

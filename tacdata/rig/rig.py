@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata import documents, provenance, registry
 from tacdata.clock import Clock
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.paths import StrPath
 
 
@@ -79,6 +79,22 @@ class Envelope:
     def contains(self, position: tuple[float, float, float]) -> bool:
         """Whether a machine position [mm] is inside."""
         return all(a <= p <= b for a, p, b in zip(self.min, position, self.max, strict=True))
+
+    def top_of_rise(self, position: tuple[float, float, float], height: float) -> tuple[float, float, float]:
+        """Return where a rise from ``position`` to machine ``height`` ends [mm].
+
+        Raises:
+            DeviceError: If that is outside: the guide stands elsewhere than the rig file allows.
+        """
+        x, y, z = position
+        top = x, y, max(z, height)
+        if not self.contains(top):
+            raise DeviceError(
+                f"the guide stands at ({x:.2f}, {y:.2f}, {z:.2f}) mm, outside the envelope",
+                f"{self.min} to {self.max} mm",
+                "jog it inside, or correct the rig file",
+            )
+        return top
 
 
 @dataclass(frozen=True)

@@ -268,3 +268,40 @@ def test_a_ctrl_c_before_anything_is_opened_says_that_nothing_moved(verb, tmp_pa
     code, _, loud = run(monkeypatch, capfd, verb, "--rig", tmp_path / "rig.yaml", *more)
     assert code == 130
     assert "motion: nothing was moved\n  data:   nothing was written\n  then:   the same command" in loud
+
+
+def test_after_a_power_cycle_in_mid_press_nothing_moves_before_an_answer(virtual, tmp_path, monkeypatch, capfd):
+    """Without homing the controller counts from where it was switched on."""
+    monkeypatch.setattr("builtins.input", lambda question: "n")
+    virtual.controller.settings.update({"$20": "0", "$22": "0"})
+    surface = read_rig(virtual.path).registration.origin[2]
+    pressing = tmp_path / "session" / "episode-000000.partial.mcap"
+
+    def place():
+        return virtual.controller.position_at(virtual.clock.now_ns() - 5_000_000).copy()
+
+    def cycle():
+        while not pressing.exists() or place()[2] > surface - 0.2:
+            time.sleep(0.002)
+        virtual.controller.inject_brown_out()
+
+    threading.Thread(target=cycle, daemon=True).start()
+    code, _, loud = run(monkeypatch, capfd, *record(virtual, tmp_path, tmp_path / "session"))
+    assert code == 4, loud
+    assert "zero:   LOST" in loud
+    before = place()
+    assert before[2] < surface, "the tip is in the skin"
+
+    code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes")
+    assert code == 4, loud
+    assert "the position is not known: the controller was reset in mid-stream" in loud
+    assert "motion: nothing was moved" in loud
+    assert np.array_equal(place(), before)
+    assert not virtual.path.with_name(FILE).exists()
+
+    # The code answers this question, even untruly; the envelope, which the wrong count has left, is the last safeguard.
+    [answer] = re.findall(r"--confirm-position (\w+)\)", loud)
+    code, _, loud = run(monkeypatch, capfd, "register", "--rig", virtual.path, "--yes", "--confirm-position", answer)
+    assert code == 4, loud
+    assert "the guide stands at (0.00, 0.00, 0.00) mm, outside the envelope" in loud
+    assert np.array_equal(place(), before)
