@@ -380,5 +380,5 @@ def write(path: Path, document: dict[str, Any], schema: str) -> None:
     """Check a document and write it, as YAML or JSON by the file's ending."""
     check(document, schema, str(path))
     as_yaml = path.suffix in (".yaml", ".yml")
-    text = yaml.safe_dump(document, sort_keys=False) if as_yaml else json.dumps(document, indent=1)
+    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True) if as_yaml else json.dumps(document, indent=1)
     write_text(path, text + ("" if text.endswith("\n") else "\n"))

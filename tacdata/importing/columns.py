@@ -11,7 +11,7 @@ import numpy as np
 from tacdata.documents import composed
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import INNER, SourceTable
-from tacdata.importing.text_layout import THOUSANDS
+from tacdata.importing.text.layout import THOUSANDS
 from tacdata.importing.units import factor, quantity_of, split_unit
 
 Selector = str | int | list[Any]

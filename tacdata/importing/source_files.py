@@ -29,6 +29,8 @@ class FileSet:
     """Why the files are not complete."""
     more: dict[str, tuple[Path, ...]] = field(default_factory=dict)
     """Name under ``files`` -> the further files of the set, whose rows follow."""
+    titles: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    """Name under ``files`` -> title of each of its files."""
 
     def options(self, name: str, mapping: dict[str, Any]) -> dict[str, Any]:
         """Return how a mapping has a file read, with the {parts} of its table filled in."""
@@ -52,9 +54,23 @@ class FileSet:
                 for part in (path, *self.more.get(name, ()))
                 for sheet in sheets
             ]
-            table = parts[0] if len(parts) == 1 else joined(parts, options)
+            table = parts[0] if len(parts) == 1 else self._joined(name, parts, sheets, options)
             tables[name] = with_derived(table, options.get("derived", {}), f"files: {name}: derived")
         return tables
+
+    def _joined(
+        self, name: str, parts: list[SourceTable], sheets: list[str | None], options: dict[str, Any]
+    ) -> SourceTable:
+        """Return the parts of a file as one table."""
+        if options.get("join") != "columns":
+            return joined(parts, options)
+        several = len(parts) > len(sheets)
+        titles = [
+            " ".join(filter(None, (title if several else "", sheet)))
+            for title in self.titles.get(name, ("",))
+            for sheet in sheets
+        ]
+        return side_by_side(parts, titles, options)
 
     @property
     def label(self) -> str:
@@ -115,7 +131,7 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     """
     check_source(source)
     if is_one(source):
-        if len({entry["path"] for entry in files.values()}) != 1:
+        if len({path for entry in files.values() for path in _patterns(entry)}) != 1:
             raise UsageError(
                 f"{source} is one file, the mapping names {len(files)} ({', '.join(files)})",
                 "the folder that holds them",
@@ -123,7 +139,13 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
             )
         matches: dict[str, list[tuple[dict[str, str], Path]]] = {name: [({}, source)] for name in files}
     else:
-        matches = {name: _matches(source, entry["path"]) for name, entry in files.items()}
+        matches = {}
+        for name, entry in files.items():
+            each = {path: _matches(source, path) for path in _patterns(entry)}
+            matches[name] = [match for path, fitting in each.items() for match in fitting]
+            if lacking := [path for path, fitting in each.items() if not fitting and len(each) > 1]:
+                matches[name] = []
+                files = {**files, name: {**entry, "path": lacking[0]}}
     for name, found in matches.items():
         if not found:
             raise UsageError(
@@ -141,24 +163,43 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     if files[leading].get("join"):
         led = [parts for number, parts in enumerate(led) if parts not in led[:number]]
     for parts in led:
-        paths, more, fault = {}, {}, None
+        paths, more, titles, fault = {}, {}, {}, None
         for name in files:
             fitting = [
                 p for own, p in matches[name] if all(parts.get(key, value) == value for key, value in own.items())
             ]
-            if fitting and files[name].get("join"):
+            wanted = len(_patterns(files[name]))
+            if files[name].get("join") and len(fitting) >= wanted:
                 paths[name], more[name] = fitting[0], tuple(fitting[1:])
+                titles[name] = _titles(fitting, files[name])
                 continue
-            if len(fitting) != 1:
+            if len(fitting) != 1 or wanted > 1:
                 fault = FormatError(
-                    f"{len(fitting)} files {files[name]['path']} for {parts or 'the source'}",
-                    "exactly one",
+                    f"{len(fitting)} files {' and '.join(_patterns(files[name]))} for {parts or 'the source'}",
+                    "exactly one" if wanted == 1 else "one of each, and join: rows, continued or columns",
                     "complete the source, or narrow the path with a {part} in the mapping",
                 )
                 break
             paths[name] = fitting[0]
-        sets.append(FileSet(parts, paths, fault, more))
+        sets.append(FileSet(parts, paths, fault, more, titles))
     return sets
+
+
+def _patterns(entry: dict[str, Any]) -> list[str]:
+    """Return the paths of a kind of file: one, or the parts of a trial in their order."""
+    return entry["path"] if isinstance(entry["path"], list) else [entry["path"]]
+
+
+def _titles(paths: list[Path], entry: dict[str, Any]) -> tuple[str, ...]:
+    """Return a title for each file: its pattern's name without {parts}, or its own name where one pattern fits all."""
+    patterns = _patterns(entry)
+    return titles_of(patterns) if len(patterns) == len(paths) else tuple(path.stem for path in paths)
+
+
+def titles_of(patterns: list[str]) -> tuple[str, ...]:
+    """Return the names in paths without their folders, endings, {parts} and #."""
+    names = [Path(pattern).stem for pattern in patterns]
+    return tuple(re.sub(r"\{\w+\}|#", "", name).strip("_- ") or name for name in names)
 
 
 def without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
@@ -183,6 +224,60 @@ def without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
         if axes:
             result[section] = axes
     return result
+
+
+def side_by_side(parts: list[SourceTable], titles: list[str], options: dict[str, Any]) -> SourceTable:
+    """Return tables next to each other, as of two boards with one clock. A title stands before names that repeat.
+
+    Raises:
+        FormatError: If their clocks differ, or they have no column of times.
+    """
+    clock = options.get("time", {}).get("column")
+    first, time = parts[0].path.name, None
+    if clock is not None:
+        time = single(parts[0], clock, "files: time: column")
+        _check_clocks(parts, time)
+    elif len({part.rows for part in parts}) > 1:
+        rows = ", ".join(f"{part.path.name} {part.rows}" for part in parts)
+        raise FormatError(f"parts of different rows ({rows})", "a row of each at each time", "give a time column")
+    names = [name for part in parts for name in part.columns]
+    columns, units, typed = dict[str, np.ndarray](), dict[str, str](), set[str]()
+    for number, (part, title) in enumerate(zip(parts, titles, strict=True)):
+        for name, values in part.columns.items():
+            if name == time and number:
+                continue
+            new = f"{title} {name}" if names.count(name) > 1 and name != time else name
+            columns[new] = values
+            units |= {new: part.units[name]} if name in part.units else {}
+            typed |= {new} if name in part.typed else set()
+    notes = [f"{first}: the columns of {len(parts)} parts stand side by side"]
+    notes += [note for part in parts for note in part.notes]
+    doubts = tuple(doubt for part in parts for doubt in part.doubts)
+    return replace(parts[0], columns=columns, units=units, typed=frozenset(typed), notes=tuple(notes), doubts=doubts)
+
+
+def _check_clocks(parts: list[SourceTable], time: str) -> None:
+    """Refuse parts whose rows are of different times.
+
+    Raises:
+        FormatError: With the files and the largest difference.
+    """
+    first = parts[0].column(time)
+    for part in parts[1:]:
+        other = part.column(time) if time in part.columns else np.empty(0)
+        if len(first) == len(other):
+            if first.dtype == object or other.dtype == object:
+                equal = bool((first == other).all())
+            else:
+                usual = float(np.median(np.abs(np.diff(first.astype(float))))) if len(first) > 1 else 0.0
+                equal = bool(np.nanmax(np.abs(first.astype(float) - other.astype(float)), initial=0.0) <= 0.5 * usual)
+            if equal:
+                continue
+        raise FormatError(
+            f"{parts[0].path.name} has {len(first)} rows by {time}, {part.path.name} {len(other)} of other times",
+            "one clock for tables that stand side by side",
+            "give the second one a file of its own and bring its columns in under measured, with their own times",
+        )
 
 
 def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:

@@ -12,7 +12,8 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, SourceTable, kind_of_bytes
-from tacdata.importing.text_layout import (
+from tacdata.importing.text.encoding import ENCODINGS, encoding_of
+from tacdata.importing.text.layout import (
     COMMENTS,
     DELIMITERS,
     MISSING,
@@ -182,8 +183,10 @@ def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
         try:
             raw.decode()
         except UnicodeDecodeError:
-            raw = raw.decode("latin-1").encode()
-            notes.append(f"{path.name}: not UTF-8, read as Latin-1")
+            encoding, doubtful = encoding_of(raw)
+            raw = raw.decode(encoding).encode()
+            advice = " by guess; if names look wrong, give encoding under the file" if doubtful else ""
+            notes.append(f"{path.name}: not UTF-8, read as {ENCODINGS.get(encoding, encoding)}{advice}")
     raw = raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return _whole_cells(raw[:HEAD]) + raw[HEAD:], notes
 

@@ -12,7 +12,8 @@ from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
 from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
 from tacdata.importing.proposing.roles import is_whole, roles_of
-from tacdata.importing.source_files import check_source, files_below, is_one
+from tacdata.importing.proposing.trial_parts import PartsInOrder, parts_in_order
+from tacdata.importing.source_files import check_source, files_below, is_one, joined, side_by_side, titles_of
 
 SHOWN = 30
 """Columns that are listed per file."""
@@ -33,6 +34,10 @@ class FoundKind:
     """What a mapping has to say under the file to read it so."""
     words: dict[int, list[str]] = field(default_factory=dict)
     """Number of a # of the kind -> the words that it stands for."""
+    parts: tuple[str, ...] = ()
+    """Kinds that are parts of one trial, in their order."""
+    join: str = ""
+    """How the parts are joined, as in a mapping."""
 
 
 def described(source: Path) -> tuple[dict[str, FoundKind], str]:
@@ -96,7 +101,22 @@ def _read(path: Path, options: dict[str, Any]) -> tuple[SourceTable, dict[str, A
             break
         if len(_lost(tried)) < best:
             table, best, chosen = tried, len(_lost(tried)), {**options, "trial_axis": axis}
+    if not best and any("trial_axis says" in note for note in table.notes):
+        for axis in (2, 1, 0):
+            tried = read_table(path, {**options, "trial_axis": axis})
+            if _one_clock(tried):
+                return tried, {**options, "trial_axis": axis}
     return table, chosen
+
+
+def _one_clock(table: SourceTable) -> bool:
+    """Return whether the first column of the trials of an array is the same in each and rises, as a clock does."""
+    name, trial = next(iter(table.columns)), table.columns.get("trial")
+    if trial is None or not table.inner(name):
+        return False
+    clock = table.column(f"{name}[0]")
+    first, second = (clock[trial == number] for number in (0, 1))
+    return len(first) > 2 and np.array_equal(first, second) and bool((np.diff(first) > 0).all())
 
 
 def _lost(table: SourceTable) -> list[str]:
@@ -107,12 +127,16 @@ def _lost(table: SourceTable) -> list[str]:
 def _of_same_columns(found: dict[str, FoundKind]) -> dict[str, FoundKind]:
     """Put kinds together that are whole trials of the same columns: their paths differ by words."""
     alike: dict[Any, list[str]] = {}
+    found = _boards_together(found)
     for key, entry in found.items():
-        own = key if not is_whole(roles_of(entry.table)) else ""
+        own = key if entry.join or not is_whole(roles_of(entry.table)) else ""
         depth = key.partition(INSIDE)[0].count("/")
         alike.setdefault((own, depth, INSIDE in key, tuple(entry.table.columns)), []).append(key)
     result = {}
     for keys in alike.values():
+        if len(keys) > 1 and (order := parts_in_order({key: found[key].table for key in keys})):
+            result[order.keys[0]] = _joined_kind(order, found)
+            continue
         whole = merged(keys) if len(keys) > 1 else None
         if whole is None:
             result |= {key: found[key] for key in keys}
@@ -120,6 +144,38 @@ def _of_same_columns(found: dict[str, FoundKind]) -> dict[str, FoundKind]:
         first = found[keys[0]]
         result[whole] = replace(first, count=sum(found[key].count for key in keys), words=_words(keys, whole))
     return result
+
+
+def _boards_together(found: dict[str, FoundKind]) -> dict[str, FoundKind]:
+    """Put kinds together that hold the same channels at the same times, next to a kind with the position."""
+    roles = {key: roles_of(entry.table) for key, entry in found.items()}
+    if not any({"depth", "z"} & set(each) for each in roles.values()):
+        return found
+    boards: dict[Any, list[str]] = {}
+    for key, each in roles.items():
+        if each["channels"] and each.get("time") and not {"depth", "z"} & set(each):
+            clock = found[key].table.column(each["time"][0])
+            boards.setdefault((tuple(found[key].table.columns), len(clock), found[key].count), []).append(key)
+    for keys in boards.values():
+        clocks = [found[key].table.column(roles[key]["time"][0]) for key in keys]
+        if len(keys) < 2 or any(clock.dtype == object or not np.allclose(clock, clocks[0]) for clock in clocks):
+            continue
+        found = {key: entry for key, entry in found.items() if key not in keys[1:]} | {
+            keys[0]: _joined_kind(PartsInOrder(tuple(keys), "columns"), found)
+        }
+    return found
+
+
+def _joined_kind(order: PartsInOrder, found: dict[str, FoundKind]) -> FoundKind:
+    """Return the kind of a trial whose parts are in several files or sheets."""
+    tables = [found[key].table for key in order.keys]
+    time = (roles_of(tables[0]).get("time") or [None])[0]
+    options = {"join": order.join, **({"time": {"column": time}} if time else {})}
+    if order.join == "columns":
+        table = side_by_side(tables, list(titles_of([key.replace(INSIDE, " ") for key in order.keys])), options)
+    else:
+        table = joined(tables, options)
+    return replace(found[order.keys[0]], table=table, parts=order.keys, join=order.join)
 
 
 def _words(keys: list[str], whole: str) -> dict[int, list[str]]:

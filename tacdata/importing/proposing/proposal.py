@@ -19,12 +19,12 @@ from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
 from tacdata.importing.proposing.roles import roles_of
+from tacdata.importing.proposing.stream_clocks import SHORT, own_clocks
 from tacdata.importing.proposing.strokes import CLEAR, PressingAxis, pressing_axis
+from tacdata.importing.proposing.unused import leave_unused_out, listed, without_summaries
 from tacdata.importing.times import layouts_of, times
 from tacdata.importing.units import factor, plain
 
-SHORT = ("s", "ms", "us", "ns", "min", "h", "d")
-"""Units of time that a mapping may name; others stand in the header and are read from there."""
 SPECIMEN = re.compile(r"(?:specimen|spec|sample|material|coupon|probe)[-_ ]?$", re.IGNORECASE)
 """What stands in a path before the number or the name of a specimen."""
 PLACE = re.compile(r"(?<![A-Za-z])([xyXY])[-_=]?$")
@@ -49,6 +49,8 @@ class Proposal:
 
 def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
     """Return a mapping for the kinds of files, as far as names and values allow, and what to ask."""
+    asked: list[str] = []
+    kinds = without_summaries(kinds, asked)
     aliases: dict[str, str] = {}
     for kind in kinds:
         path, _, inside = kind.partition(INSIDE)
@@ -63,7 +65,7 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         for found in roles.values():
             found["channels"] = found.pop("force", [])
     wide = max(aliases, key=lambda alias: (len(roles[alias]["channels"]), "value" in roles[alias]))
-    asked = [question] if (question := stand_in(tables, roles)) else []
+    asked += [question] if (question := stand_in(tables, roles)) else []
     for alias, found in roles.items():
         _whole_strokes(tables[alias], found, asked)
     document: dict[str, Any] = {
@@ -92,6 +94,8 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         if key not in document.get("position", {}):
             document.setdefault("press", {})[key] = {"part": part}
     _unnamed(tables[wide], roles[wide], asked)
+    own_clocks(document, tables, roles, asked)
+    leave_unused_out(document, aliases, kinds, roles, asked)
     return Proposal(document, tuple(asked))
 
 
@@ -106,11 +110,18 @@ def _place(
             entry = {key: _axis(table, found[key][0]) for key in chosen if key in found}
             document["position"] = {"file": alias} | entry
             unsaid = [found[key][0] for key in chosen if key in found and "unit" in entry[key]]
+            if "by_shape" in found:
+                asked.append(
+                    f"{found['depth'][0]}: taken for the position by its shape: it is smooth, comes back, and the "
+                    "readings follow it"
+                )
+            if "error" in found and found.get("depth") == found.get("set_point", [None])[:1]:
+                document["position"]["depth"] = _without_error(table, found, asked)
             if "stand_in" in found:
                 entry["depth"]["unit"] = length_of(table, found["stand_in"][0])
             elif unsaid:
                 unit = _length(table, entry, found[chosen[-1]][0])
-                asked.append(f"{_and(unsaid)}: no unit is given; {unit} is a guess")
+                asked.append(f"{listed(unsaid)}: no unit is given; {unit} is a guess")
             _motion(document, table, found, roles[document["taxels"]["file"]]["channels"], asked)
         lengths = found.get("depth", [])
         lengths = lengths[:1] + [name for name in lengths[1:] if not is_copy(table, lengths[0], name)]
@@ -135,7 +146,7 @@ def _whole_strokes(table: SourceTable, found: dict[str, list[str]], asked: list[
     labels = table.column(found["trial"][0]).astype(str)
     if are_halves(labels, table.column(moving[0]).astype(float)):
         (name,) = found.pop("trial")[:1]
-        words = _and(list(dict.fromkeys(labels.tolist()))[:3])
+        words = listed(list(dict.fromkeys(labels.tolist()))[:3])
         asked.append(f"{name} tells the way in from the way back ({words}): trials are cut by depth instead")
 
 
@@ -174,7 +185,7 @@ def _motion(
         )
     if "trial" not in found and "trials" not in document:
         entry = position["depth" if is_depth else "z"]
-        above = motion.above * _in_mm(unit_of(table, entry, name))
+        above = motion.above * _in_mm(unit_of(table, {"column": name, **entry}, name))
         _cut(document, motion, above if is_depth else None, asked)
 
 
@@ -185,7 +196,11 @@ def _from_the_lowest(
     parts = [table.column(channel) for channel in channels if channel in table.columns]
     if not parts:
         return
-    depth = entry.get("scale", 1.0) * table.column(name).astype(float) * _in_mm(unit_of(table, entry, name))
+    depth = (
+        entry.get("scale", 1.0)
+        * table.column(name).astype(float)
+        * _in_mm(unit_of(table, {"column": name, **entry}, name))
+    )
     readings = np.column_stack(parts).astype(float)
     if low := below_zero([zero_side(depth[rows], readings[rows]) for rows in _each_press(depth)]):
         entry["offset"] = float(np.ceil(1000 * low) / 1000)
@@ -253,9 +268,11 @@ def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str
         return found
     for number, words in entry.words.items():
         if 2 * sum(bool(MATERIAL.search(word)) for word in words) >= len(words):
-            asked.append(f"the folders {_and(words)} are taken for specimens")
+            asked.append(f"the folders {listed(words)} are taken for specimens")
             return {"part": f"part{number}"}
-        asked.append(f"are the folders {_and(words)} specimens? Then write press: {{specimen: {{part: part{number}}}}}")
+        asked.append(
+            f"are the folders {listed(words)} specimens? Then write press: {{specimen: {{part: part{number}}}}}"
+        )
     return {}
 
 
@@ -286,7 +303,9 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[
     outer, _, inside = kind.partition(INSIDE)
     path, parts = pattern(outer) if entry.count > 1 or "#" in inside else (entry.path, 0)
     found: dict[str, Any] = {"path": path, **entry.options}
-    if "#" in inside:
+    if entry.join:
+        found |= _parts(entry, asked)
+    elif "#" in inside:
         found["table"] = pattern(inside, parts)[0]
     if not roles.get("time"):
         rate = rate_of(table, roles)
@@ -312,6 +331,21 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[
     return found | {"time": clock}
 
 
+def _parts(entry: FoundKind, asked: list[str]) -> dict[str, Any]:
+    """Return the keys of a file whose parts are joined."""
+    outer = [kind.partition(INSIDE)[0] for kind in entry.parts]
+    sheets = [kind.partition(INSIDE)[2] for kind in entry.parts]
+    same = len(set(outer)) == 1
+    places = {"columns": "side by side", "rows": "below each other"}.get(
+        entry.join, "below each other, the clock continued"
+    )
+    asked.append(f"{listed(sheets if same else outer)} are taken for parts of one trial, {places} (join: {entry.join})")
+    found: dict[str, Any] = {"join": entry.join}
+    if same:
+        return found | {"table": sheets}
+    return found | {"path": [pattern(kind)[0] for kind in outer]}
+
+
 def _american(table: SourceTable, name: str, asked: list[str]) -> dict[str, str]:
     """Return the format of dates with AM and PM, where month and day could change places: the month comes first."""
     values = table.column(name)
@@ -322,6 +356,14 @@ def _american(table: SourceTable, name: str, asked: list[str]) -> dict[str, str]
         return {}
     asked.append(f"{name}: {known[0]!r} is read with the month first (format: {layout!r}); is it?")
     return {"format": layout}
+
+
+def _without_error(table: SourceTable, found: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
+    """Return the measured depth as the set point minus the position error."""
+    target, error = found["depth"][0], found["error"][0]
+    asked.append(f"the position is taken as {target} - {error}: is the error the set point minus the position?")
+    unit = {} if table.units.get(target) and table.units.get(target) == table.units.get(error) else {"unit": "mm"}
+    return {"expression": f"`{target}` - `{error}`", **unit}
 
 
 def _axis(table: SourceTable, name: str) -> dict[str, Any]:
@@ -344,7 +386,3 @@ def _short(names: list[str]) -> list[str]:
     if len(numbers) < max(len(names), 2) or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
         return names
     return [f"{names[0].rpartition('[')[0]}[{numbers[0]}-{numbers[-1]}]"]
-
-
-def _and(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -8,36 +8,52 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.proposing.shapes import are_letters, drive_by_shape, without_signal
 from tacdata.importing.times import times
 from tacdata.importing.units import OTHERS, plain, quantity_of, split_unit
 
-BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|actual)"
+BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|actual|trans(lation)?)"
 """What a coordinate in a column's name is one of."""
 GUESSES = {
     "time": (
-        r"(x_value|time|t|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed)"
-        r"([_ ]?(time|zeit|uhrzeit))?"
+        r"(x_value|time|t|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
+        r"([_ ]?(time|zeit|uhrzeit))?|\w+_(time_?)?stamp(_(ns|us|ms|s|sec))?"
     ),
     "depth": (
         r"(depth|indentation|displacement|disp|travel|stroke|extension|crosshead|pos(ition)?"
-        r"|(traversen|verfahr)?weg|eindringtiefe|d)"
+        r"|(traversen|verfahr)?weg|eindringtiefe|d|dist(ance)?|desplazamiento|d[eé]placement|spostamento|位移|変位)"
     ),
+    "set_point": (
+        r"set_?point|(set|target|cmd|command(ed)?|desired|demand(ed)?|ref(erence)?)_?"
+        r"(pos(ition)?|depth|disp(lacement)?|z)|(pos(ition)?|depth|p?_?z)_?(set|target|cmd|ref)"
+    ),
+    "error": r"((pos(ition)?|tracking|following|control|depth|z)_?)?(error|err|deviation)",
     "x": rf"({BODY}[_.]?)?x|p_?x|x_{BODY}",
     "y": rf"({BODY}[_.]?)?y|p_?y|y_{BODY}",
-    "z": rf"({BODY}[_.]?)?z|p_?z|z_{BODY}|height",
-    "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy])",
+    "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_{BODY}|height",
+    "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)",
     "temperature": r"(temp(erature)?(_?\w{1,4})?|t_?amb)",
     "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|zyklus|element)(_?(id|no|nr|number))?",
     "specimen": (
         r"(specimen|material|coupon|silicone|elastomer|werkstoff|probe)(_?(id|no|nr|number|name))?"
         r"|sample_?(id|no|nr|number|name)"
     ),
-    "counter": r"(counter|frame|seq(uence)?|sample|index|n)",
+    "counter": (
+        r"(counter|frame|seq(uence)?|sample|index|n|row|line|iter(ation)?|loop|packet)(_?(id|no|nr|number|count))?"
+    ),
     "number": r"(channel|ch|taxel|sensor)(_?(id|no|nr|number|index))?",
     "value": r"(value|val|reading|wert)",
-    "setting": r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))|(set|target|cmd)_\w+",
-    "state": r"(segment|segm|state|status|moving|flag|block)(_?(id|no|nr|number|index))?",
-    "derived": r"grad(ient)?|derivative|slope",
+    "setting": (
+        r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))"
+        r"|(set|target|cmd|demand|desired|commanded)_\w+|\w+_(limit|target|set)|gain|k[pid]"
+    ),
+    "state": (
+        r"(segment|segm|state|status|moving|flag|block|mode|phase|enabled?|valid)(_?(id|no|nr|number|index))?"
+        r"|(\w+_)?(flag|fault|alarm|warning|status|state|error(_code)?)|is_\w+|battery\w*|cpu\w*"
+    ),
+    "orientation": r"(rot(ation)?|quat(ernion)?|orientation|q)_?[xyzw]|roll|pitch|yaw",
+    "joint": r"(joint|axis|q)_?\d(_?(pos(ition)?|angle|vel(ocity)?|torque|effort))?",
+    "derived": r"grad(ient)?|derivative|slope|rms|std(_?dev)?|variance|r_?(2|squared)",
     "strain": (
         r"((true|eng(ineering)?|nominal|axial|tensile|compressive|compression|shear|hencky|log(arithmic)?|applied)_?)?"
         r"(strain|stretch|elongation|dehnung|stauchung)(_?ratio)?"
@@ -61,10 +77,11 @@ NAMED = re.compile(r"_?(id|no|nr|number|index)$")
 def roles_of(table: SourceTable) -> dict[str, list[str]]:
     """Return the columns of each role; ``channels`` are those of no other."""
     roles: dict[str, list[str]] = {"channels": []}
+    lettered = are_letters(list(table.columns))
     for name, values in table.columns.items():
         if values.dtype.kind == "f" and np.isnan(values).all():
             continue  # a comma at the end of each row makes one
-        role = _role(table, name, values)
+        role = None if lettered and values.dtype != object else _role(table, name, values)
         if role == "place":
             for axis, number in zip("xyz", range(3), strict=True):
                 roles.setdefault(axis, []).append(f"{name}[{number}]")
@@ -80,10 +97,15 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
             roles["depth"] = roles.pop("x")
     if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
         _most_evenly_rising(table, roles)
-    if not roles.get("time") and len(table.columns) == 1 and table.inner(next(iter(table.columns))):
-        _first_rising_inside(table, roles)
+    if not roles.get("time") and (array := _lone_array(table)):
+        _first_rising_inside(table, array, roles)
     if not roles.get("time"):
         _evenly_rising(table, roles)
+    if idle := without_signal(table, roles["channels"]):
+        roles["idle"] = list(idle)
+        roles["channels"] = [name for name in roles["channels"] if name not in idle]
+    if not {"depth", "z"} & set(roles):
+        _drive(table, roles)
     _set_for_each_trial(table, roles)
     if not ("number" in roles and "value" in roles):
         # Without a column that numbers channels a value is a channel, and the other way round.
@@ -97,6 +119,15 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     return roles
 
 
+def _drive(table: SourceTable, roles: dict[str, list[str]]) -> None:
+    """Find the position where no name states it: a set point, or the column whose shape is that of a drive."""
+    if "set_point" in roles:
+        roles["depth"] = roles["set_point"][:1]
+    elif not {"strain", "angle", "force"} & set(roles) and (name := drive_by_shape(table, roles["channels"])):
+        roles["depth"] = roles["by_shape"] = [name]
+        roles["channels"].remove(name)
+
+
 def is_whole(roles: dict[str, list[str]]) -> bool:
     """Return whether a file holds its own position and readings, so that it is a trial by itself."""
     return ("depth" in roles or "z" in roles) and bool(roles["channels"] or "force" in roles)
@@ -104,7 +135,7 @@ def is_whole(roles: dict[str, list[str]]) -> bool:
 
 def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     bare, inside = split_unit(name.rsplit(".", 1)[-1])
-    bare = re.sub(r"\s+", "_", bare.lower())
+    bare = re.sub(r"[\s-]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
     if values.ndim == 2 and values.shape[1] in (3, 6, 7) and re.fullmatch(PLACE, bare):
         return "place"
     role = next((role for role, pattern in GUESSES.items() if re.fullmatch(pattern, bare)), None)
@@ -119,6 +150,8 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
         return "time"  # "ms", "seconds"
     if role is None and values.dtype == object and _are_times(table, name):
         return "time"
+    if role == "error" and unit != "mm" and (unit or bare in ("error", "err")):
+        role = "state"
     return {"mm": "depth", "deg": "angle"}.get(unit or "") if role is None else role
 
 
@@ -152,11 +185,18 @@ def _most_evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None
         roles["channels"].remove(roles["time"][0])
 
 
-def _first_rising_inside(table: SourceTable, roles: dict[str, list[str]]) -> None:
-    """Tell the time of an array without names: its first column that only rises."""
-    (name,) = table.columns
+def _lone_array(table: SourceTable) -> str:
+    """Return the name of the only array of a table, next to which at most a number of the trial stands; else ""."""
+    names = [name for name in table.columns if name != "trial"]
+    return names[0] if len(names) == 1 and table.inner(names[0]) else ""
+
+
+def _first_rising_inside(table: SourceTable, name: str, roles: dict[str, list[str]]) -> None:
+    """Find the time of an array without names: its first column that only rises inside a trial."""
     columns = [f"{name}[{k}]" for k in range(table.inner(name))]
-    steps = [np.diff(table.column(column)) for column in columns]
+    trial = table.columns.get("trial", np.zeros(table.rows))
+    inside = np.diff(trial) == 0
+    steps = [np.diff(table.column(column))[inside] for column in columns]
     rising = next((k for k, step in enumerate(steps) if (step >= 0).all() and (step > 0).mean() > 0.5), None)
     if rising is not None:
         roles["time"] = [columns.pop(rising)]

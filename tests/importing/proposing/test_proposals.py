@@ -69,7 +69,7 @@ def test_streams_of_one_trial_stay_apart(tmp_path):
         written(tmp_path / f"{name}.csv", "t_s,cap0,cap1", T, STROKE, STROKE)
     written(tmp_path / "stage.csv", "t_s,depth_mm", T, STROKE)
     found, _ = proposed(tmp_path)
-    assert sorted(entry["path"] for entry in found.mapping["files"].values()) == ["left.csv", "right.csv", "stage.csv"]
+    assert [entry["path"] for entry in found.mapping["files"].values()] == [["left.csv", "right.csv"], "stage.csv"]
 
 
 def test_signs_in_names_belong_to_their_numbers(tmp_path):

@@ -1,0 +1,92 @@
+"""Shapes of columns over time: a drive, a reading, or no signal at all."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.importing.formats.source_format import SourceTable
+
+
+@dataclass(frozen=True)
+class ShapePolicy:
+    """Limits of shapes. None was tuned on data."""
+
+    rows: int = 50
+    """Fewest rows by which a shape is judged [rows]."""
+    smoother: float = 3.0
+    """Smallest ratio of the roughness of every other column to that of a drive [1]."""
+    follows: float = 0.7
+    """Smallest correlation of a drive with the readings [1]."""
+    exact: float = 1e-6
+    """Roughness of numbers without noise [range]; smaller ones are rounding."""
+    returns: float = 0.3
+    """Largest distance of a drive's last value from its first [its range]."""
+
+
+POLICY = ShapePolicy()
+NUMBER = re.compile(r"\d+")
+
+
+def are_letters(names: list[str]) -> bool:
+    """Return whether names are letters of the alphabet in their order, as of a sheet without a header."""
+    return len(names) > 2 and names == [chr(ord(names[0][:1] or "?") + k) for k in range(len(names))]
+
+
+def without_signal(table: SourceTable, names: list[str], policy: ShapePolicy = POLICY) -> dict[str, str]:
+    """Return columns that measure nothing, each with the reason: constants, flags and counters of rows.
+
+    A constant among columns of one name and different numbers is a dead channel, and stays.
+    """
+    reasons = {name: _reason(table, name) for name in names} if table.rows >= policy.rows else {}
+    families: dict[str, list[str]] = {}
+    for name in reasons:
+        families.setdefault(NUMBER.sub("#", name), []).append(name)
+    alive = {name for family in families.values() if not all(reasons[member] for member in family) for name in family}
+    idle = {name: reason for name, reason in reasons.items() if reason and name not in alive}
+    return idle if len(idle) < len(names) else {}
+
+
+def _reason(table: SourceTable, name: str) -> str:
+    values = table.column(name)
+    if values.dtype == object or values.ndim > 1:
+        return ""
+    known = values[np.isfinite(values.astype(float))]
+    levels = np.unique(known)
+    if len(levels) < 2:
+        return "constant"
+    if len(levels) == 2 and np.isin(levels, (0, 1)).all():
+        return "a flag"
+    return "a counter of rows" if len(known) == len(values) and (np.diff(known) == 1).all() else ""
+
+
+def drive_by_shape(table: SourceTable, names: list[str], policy: ShapePolicy = POLICY) -> str:
+    """Return the column whose shape is that of a position: smooth, back at its start, followed by the readings.
+
+    Returns:
+        Its name, or "" if there is none, or more than one.
+    """
+    columns = {name: table.column(name) for name in names}
+    known = {name: values.astype(float) for name, values in columns.items() if values.ndim == 1}
+    known = {name: values for name, values in known.items() if np.isfinite(values).all() and np.ptp(values) > 0}
+    if table.rows < policy.rows or len(known) < 2:
+        return ""
+    roughness = {name: max(_roughness(values), policy.exact) for name, values in known.items()}
+    name, second = sorted(roughness, key=lambda column: roughness[column])[:2]
+    if roughness[second] <= policy.smoother * roughness[name]:
+        return ""
+    values = known.pop(name)
+    if abs(values[-1] - values[0]) > policy.returns * np.ptp(values):
+        return ""
+    way = np.abs(values - values[0])
+    changes = [np.abs(reading - np.median(reading[:5])) / np.ptp(reading) for reading in known.values()]
+    correlation = float(np.corrcoef(way, np.mean(changes, axis=0))[0, 1])
+    return name if correlation >= policy.follows else ""
+
+
+def _roughness(values: np.ndarray) -> float:
+    """Return the mean size of second differences without the largest twentieth [range of the values]."""
+    bends = np.sort(np.abs(np.diff(values, 2)))
+    return float(bends[: max(int(0.95 * len(bends)), 1)].mean() / np.ptp(values))

@@ -1,0 +1,1 @@
+"""Text of foreign files: its encoding, and the layout of its columns."""
