@@ -10,6 +10,7 @@ from typing import Any
 
 from tacdata import documents, provenance
 from tacdata.discrepancy.data.recordings import course_of
+from tacdata.discrepancy.heading import Heading
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.page.verdict_page import verdict_page
@@ -61,19 +62,22 @@ def run(
     hashes = {f"recording {name}": recording_hash(path) for name, path in zip(names, paths, strict=True)}
     parents = {"spec": spec.content_hash, **hashes}
     verdict = judge(course, spec, note, parents, until=until)
+    heading = Heading.of(paths, out)
+    following = [heading.filled(words) for words in verdict.document["next"]]
+    document = verdict.document | {"heading": heading.document(), "next": following}
     out.mkdir(parents=True)
-    documents.write(out / VERDICT, verdict.document, "verdict")
-    text = in_text(verdict.document)
+    documents.write(out / VERDICT, document, "verdict")
+    text = in_text(document)
     documents.write_text(out / TEXT, text)
-    draw(verdict.found, verdict.before, verdict.after, verdict.document, out / PICTURE)
+    draw(verdict.found, verdict.before, verdict.after, document, out / PICTURE)
     residuals = beside_model(course, verdict.found, chosen(course))
-    residual_table.write(out / residual_table.FILE, residuals, provenance.content_hash(verdict.document))
-    documents.write_text(out / PAGE, verdict_page(verdict.document, residuals))
+    residual_table.write(out / residual_table.FILE, residuals, provenance.content_hash(document))
+    documents.write_text(out / PAGE, verdict_page(document, residuals))
     if verdict.decision.status == "named":
         effects = [e.finding for e in verdict.decision.effects]
-        following = spec.with_effects([f.placed for f in effects], [f.error for f in effects], VERDICT)
-        documents.write(out / SPEC, following, "model_spec")
-    return Written(verdict.document, text, out)
+        revised = spec.with_effects([f.placed for f in effects], [f.error for f in effects], VERDICT)
+        documents.write(out / SPEC, revised, "model_spec")
+    return Written(document, text, out)
 
 
 def recording_hash(path: Path) -> str:

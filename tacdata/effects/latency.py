@@ -14,7 +14,6 @@ class Latency(Effect):
     moves = ("signal",)
     group = "lag"
     family = Family.DELAY_AND_FILTER
-    word = "delay"
     equation = "s(t) = s_e(t - L)"
     experiment = "three rates: a delay is the same time at each, and edges keep their shape"
     form_error = 0.02

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from tacdata import provenance, schemas
@@ -201,25 +200,3 @@ def document(found: Difference, heading: Heading, parents: dict[str, str]) -> di
 
 def _interval(size: Size) -> list[float]:
     return [size.value - 1.645 * size.error, size.value + 1.645 * size.error]
-
-
-def unit_of(path: Path) -> tuple[str, str]:
-    """Return the unit of a session's readings, and when its first recording was made; empty where it is not stated."""
-    from datetime import UTC, datetime
-
-    from tacdata.recording import read_session
-    from tacdata.recording.files.reader import read_recording
-    from tacdata.recording.session import FILE
-
-    file = path if path.is_file() else None
-    if file is None:
-        file = read_session(path).episodes[0] if (path / FILE).is_file() else min(path.glob("*.mcap"))
-    recording = read_recording(file)
-    began = int(recording.episode.taxels.sample_ns[0]) * 1e-9
-    # Imported clocks may begin at zero: that is no date.
-    date = datetime.fromtimestamp(began, UTC).strftime("%Y-%m-%d %H:%M") if began > YEAR_2000 else ""
-    return str(recording.board.get("unit") or "counts"), date
-
-
-YEAR_2000 = 946684800
-"""Seconds since 1970."""

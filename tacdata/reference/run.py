@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from tacdata import documents
+from tacdata.discrepancy.heading import unit_of
 from tacdata.discrepancy.run import recording_hash
 from tacdata.errors import UsageError
 from tacdata.reference import picture
 from tacdata.reference.difference import Difference, difference
-from tacdata.reference.report import Heading, document, text, unit_of
+from tacdata.reference.report import Heading, document, text
 from tacdata.reference.sessions import read_sessions
 
 DOCUMENT, TEXT, PICTURE = "difference.json", "difference.txt", "difference.png"

@@ -9,7 +9,7 @@ from tacdata.chain.at_rest import always_touched
 from tacdata.discrepancy.data.clocks import shifted
 from tacdata.discrepancy.data.idle_lines import idle_lines
 from tacdata.discrepancy.data.single_channels import odd_channels
-from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, shortcomings
+from tacdata.discrepancy.data.sufficiency import FEWEST_EPISODES, limitations, shortcomings
 from tacdata.discrepancy.data.wiring import miswired
 from tacdata.discrepancy.model.response_curve import response_curve
 from tacdata.discrepancy.model.setting import Setting
@@ -29,7 +29,7 @@ class DataChecks:
     wiring: tuple[str, ...] = ()
     """Channels that are not those of the model: no verdict."""
     shortcomings: tuple[str, ...] = ()
-    """What is missing from the recordings, each with its remedy."""
+    """What is amiss with the recordings, each with its remedy."""
     base: tuple[str, ...] = ()
     """What the model that they are held against leaves open."""
     watched: tuple[str, ...] = ()
@@ -40,6 +40,8 @@ class DataChecks:
     """Readings that answer where nothing should press: no verdict."""
     early: tuple[str, ...] = ()
     """By how much they come early. A loop explains it."""
+    limitations: tuple[str, ...] = ()
+    """What recordings of such a protocol leave open, each with its remedy."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -66,6 +68,7 @@ def check(setting: Setting) -> DataChecks:
         words if late else (),
         _touched(course),
         () if late else words,
+        tuple(limitations(course)),
     )
 
 

@@ -14,7 +14,7 @@ RATE_RATIO, ALIKE = 2.5, 1.3
 
 
 def shortcomings(course: Course) -> list[str]:
-    """Return in words what is missing from recordings, each with its remedy."""
+    """Return in words what is amiss with recordings, each with its remedy."""
     remarks = list(course.notes)
     if course.episodes < FEWEST_EPISODES:
         remarks.append(
@@ -25,6 +25,16 @@ def shortcomings(course: Course) -> list[str]:
         wide = max(_spread(rates) for rates in speeds(course))
         what = "one rate only" if wide < ALIKE else f"most presses differ in rate by a factor of {wide:.1f} only"
         remarks.append(f"{what}: delay, filter, backlash and relaxation look alike; record three rates over a decade")
+    if course.tip[:, 2].min() > 0.05 * course.stroke and course.tip[:, 2].max() > 0:
+        remarks.append("never without contact: idle readings are not known; begin and end every press off the skin")
+    if _tared(course):
+        remarks.append("every episode begins at the same reading, as if tared: drift and set are lost; record un-tared")
+    return remarks + units(course) + stuck(course)
+
+
+def limitations(course: Course) -> list[str]:
+    """Return in words what recordings of such a protocol leave open, each with its remedy."""
+    remarks = []
     if longest_hold(course) < HOLD:
         remarks.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")
     elif not _recovers(course):
@@ -33,16 +43,10 @@ def shortcomings(course: Course) -> list[str]:
     reach = float(depths.max()) if depths.max() > 0 else course.stroke
     if len(depths) > 1 and np.ptp(depths) < 0.15 * reach:
         remarks.append("one depth only: record three")
-    if course.tip[:, 2].min() > 0.05 * course.stroke and course.tip[:, 2].max() > 0:
-        remarks.append("never without contact: idle readings are not known; begin and end every press off the skin")
-    if _tared(course):
-        remarks.append("every episode begins at the same reading, as if tared: drift and set are lost; record un-tared")
     if any(t.shape == "unknown" or not np.isfinite(t.radius) for t in course.tools):
         remarks.append("an indenter without a known radius: what depends on it is not judged")
     if len(course.tools) < 2:
         remarks.append("one indenter: compliance, stiffening and poroelasticity need a second radius")
-    remarks += units(course)
-    remarks += stuck(course)
     if course.force is None:
         remarks.append("no force beside the readings: stiffness and gain, relaxing skin and taxel cannot be separated")
     if course.tag is None:

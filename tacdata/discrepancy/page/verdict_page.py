@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.discrepancy.heading import origin, sentence, sizes
 from tacdata.discrepancy.page import charts
 from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.telling import ToldPress, telling
@@ -62,7 +63,9 @@ def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
         *_folded(verdict),
     ]
     shown = [part for part in parts if part.pictures or part.lines]
-    return _template().render(verdict=verdict, parts=shown, tiles=_tiles(verdict))
+    first, further = sentence(verdict["why"])
+    head = {"sentence": first, "further": further, "sizes": sizes(verdict), "origin": origin(verdict)}
+    return _template().render(verdict=verdict, head=head, parts=shown, tiles=_tiles(verdict))
 
 
 def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
@@ -189,10 +192,11 @@ def _folded(verdict: dict[str, Any]) -> list[Part]:
     """Return what cannot be judged, by reason, and what is known and not modelled."""
     reasons: dict[str, list[str]] = {}
     for name, reason in verdict["unjudgeable"].items():
-        reasons.setdefault(reason, []).append(name.replace("_", " "))
-    lines = [f"{reason}: {', '.join(sorted(names))}" for reason, names in reasons.items()]
+        reasons.setdefault(reason, []).append(load(name).spoken)
+    lines = [f"{reason}: {', '.join(sorted(set(names)))}" for reason, names in reasons.items()]
     untested = "; ".join(words.split(": ", 1)[-1] for words in verdict["untested"])
     return [
+        Part("Limitations of these recordings", lines=tuple(verdict.get("limitations", ())), folded=True),
         Part("What cannot be judged here, by reason", lines=tuple(lines), folded=True),
         Part("Known, and not modelled", lines=(untested,) if untested else (), folded=True),
     ]

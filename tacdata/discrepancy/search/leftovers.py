@@ -61,6 +61,8 @@ def _stream_gains(problem: Problem, residual: np.ndarray, columns: np.ndarray, s
     course = problem.setting.course.reduced
     weight = strength * float(np.mean(np.einsum("ij,ij->j", columns, columns)))
     result = np.zeros(len(problem.folds))
+    if weight <= 0:
+        return result  # a path at rest has no history
     for fold in np.unique(problem.folds):
         train = problem.folds[course.episode] != fold
         matrix = columns[train].T @ columns[train] + weight * np.eye(columns.shape[1])

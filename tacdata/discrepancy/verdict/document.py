@@ -58,7 +58,7 @@ def document(
     spoken = decision.reason in (Reason.ALARM, Reason.UNEXPLAINED)
     alarms = () if spoken else decision.alarms
     seen = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]
-    remarks = [*checks.wiring, *checks.watched, *seen, *checks.shortcomings, *clocks, *told, *checks.base]
+    remarks = [*checks.wiring, *checks.watched, *seen, *checks.shortcomings, *clocks, *told, *checks.base[1:]]
     tests, noise, values = found.tests, found.problem.null.noise, max(float(found.values.sum()), 1.0)
     return {
         "version": schemas.version("verdict"),
@@ -90,6 +90,7 @@ def document(
         "data": {**data(course), "sealed": list(shown.names) if shown else []},
         "sealed": shown.document() if shown else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
         "remarks": [words for words in remarks if words],
+        "limitations": [*checks.limitations, *checks.base[:1]],
         "next": following(decision, course, bool(checks.watched), bool(checks.base)),
         "provenance": provenance.stamp("tacdata discrepancy", parents, {"flips": DRAWS}),
     }

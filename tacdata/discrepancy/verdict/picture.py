@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from tacdata.discrepancy.data.streams import Streams
+from tacdata.discrepancy.heading import origin, sentence, sizes
 from tacdata.discrepancy.search.findings import Findings
 from tacdata.discrepancy.verdict.residual_slices import Slice, whitened_residual
+from tacdata.effects import load
 
 MOST_ROWS = 1200
 """Rows drawn of the worst episodes."""
@@ -27,7 +29,8 @@ def draw(found: Findings, before: list[Slice], after: list[Slice], verdict: dict
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(12, 8), constrained_layout=True)
-    title = textwrap.fill(f"{verdict['status']}: {verdict['why']}", TITLE_WIDTH)
+    head = [f"{verdict['status']}: {sentence(verdict['why'])[0]}", *sizes(verdict), origin(verdict)]
+    title = "\n".join(textwrap.fill(line, TITLE_WIDTH) for line in head if line)
     figure.suptitle(title, fontsize=11)
     added = bool(verdict["effects"])  # without an effect there is no after
     _streams(axes[0, 0], found, added)
@@ -85,7 +88,9 @@ def _rivals(axis: Any, found: Findings) -> None:
     chosen = {m.placed.effect.name for m in found.effects}
     colors = ["tab:blue" if name in chosen else "0.6" for name in order]
     top = max(best.values(), default=1.0) or 1.0
-    axis.barh([name.replace("_", " ") for name in order], [best[name] / top for name in order], color=colors)
+    # Several forms have the same name.
+    forms = [load(name).spoken if load(name).called == name else f"{load(name).spoken} ({name})" for name in order]
+    axis.barh([form.replace("_", " ") for form in forms], [best[name] / top for name in order], color=colors)
     axis.invert_yaxis()
     axis.tick_params(axis="y", labelsize=7)
     axis.set(xlabel="what each effect alone explains at first sight, over the most", title="candidates")

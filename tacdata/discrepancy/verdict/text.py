@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tacdata.discrepancy.heading import origin, sentence, sizes
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.search.gate import GATE
 from tacdata.discrepancy.verdict.residual_slices import figure
@@ -11,8 +12,8 @@ from tacdata.effects import library, load
 
 MOST_RIVALS = 6
 """Most rivals that are listed."""
-MOST_UNJUDGED = 6
-"""Effects that cannot be judged are listed up to so many; of more, only their number is given."""
+MOST_WORDS = 200
+"""Words of an unknown verdict, at most."""
 MEAN_SQUARE = "as a mean square over the noise (1 is noise alone)"
 WITHIN_NOISE = 2.0
 """What is left is noise below so many standard errors [1]."""
@@ -29,13 +30,17 @@ WEAK_LIMIT = 3.0
 
 
 def in_text(verdict: dict[str, Any]) -> str:
-    """Return a verdict (`schemas/verdict.schema.json`) for reading."""
-    lines = [f"{verdict['status'].upper()}: {verdict['why']}", ""]
-    for e in verdict["effects"]:
-        lines += _effect(e)
-    lines += [""] if verdict["effects"] else []
+    """Return a verdict (`schemas/verdict.schema.json`) for reading; an unknown one in `MOST_WORDS` words."""
+    first, further = sentence(verdict["why"])
+    lines = [f"{verdict['status'].upper()}: {first}", *(f"  {words}" for words in sizes(verdict))]
+    lines += [f"  {words}" for words in (origin(verdict),) if words]
+    lines += [further] if further else []
     if verdict["next"]:
-        lines += ["next:", *(f"  {words}" for words in verdict["next"])]
+        lines += ["", "next:", *(f"  {words}" for words in verdict["next"])]
+    lines.append("")
+    unknown = verdict["status"] == "unknown"
+    for e in verdict["effects"]:
+        lines += _effect(e)[:1] if unknown else _effect(e)
     lines += [_gate(verdict), *_sizes(verdict)]
     if verdict["located"]:
         lines += [f"where the residual is largest, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located"])]
@@ -46,18 +51,37 @@ def in_text(verdict: dict[str, Any]) -> str:
         ]
     if remarks := unsaid(verdict):
         lines += ["of these recordings:", *(f"  {words}" for words in remarks)]
-    spoken = answered(verdict)
-    if hidden := sorted(set(verdict["unjudgeable"]) - spoken):
-        few = _plain(hidden) if len(hidden) <= MOST_UNJUDGED else f"{len(hidden)} effects; verdict.html says why"
-        lines.append(f"cannot be judged here: {few}")
-    weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in spoken]
-    if weak:
-        lines.append("would be seen only at more than three times their usual size: " + _plain(sorted(weak)))
-    if verdict["untested"]:
-        titles = [words.split(": ", 1)[-1] for words in verdict["untested"]]
-        few = "; ".join(titles) if len(titles) <= MOST_UNJUDGED else f"{len(titles)} effects; verdict.html lists them"
-        lines.append(f"known, not modelled: {few}")
-    return "\n".join(lines) + "\n"
+    lines += _folded(verdict)
+    return "\n".join(_short(lines) if unknown else lines) + "\n"
+
+
+def _short(lines: list[str]) -> list[str]:
+    """Return the first lines, `MOST_WORDS` words in all, and where the others are."""
+    more = "more: verdict.html"
+    left, shown = MOST_WORDS - len(more.split()), []
+    for line in lines:
+        left -= len(line.split())
+        if left < 0:
+            # A heading without its lines is none.
+            while shown and (shown[-1].endswith(":") or not shown[-1]):
+                shown.pop()
+            return [*shown, more]
+        shown.append(line)
+    return shown
+
+
+def _folded(verdict: dict[str, Any]) -> list[str]:
+    """Return in a line how much verdict.html has folded away."""
+    judged = answered(verdict)
+    weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in judged]
+    counts = [
+        (len(set(verdict["unjudgeable"]) - judged), "effects that cannot be judged here"),
+        (len(weak), "that would be seen only at more than three times their usual size"),
+        (len(verdict["untested"]), "that are known and not modelled"),
+        (len(verdict.get("limitations", ())), "limitations of the recordings"),
+    ]
+    parts = [f"{count} {words}" for count, words in counts if count]
+    return [f"folded away in verdict.html: {', '.join(parts)}"] if parts else []
 
 
 def unsaid(verdict: dict[str, Any]) -> list[str]:
@@ -82,11 +106,6 @@ def between_specimens(verdict: dict[str, Any]) -> bool:
     Each has a curve of its own, so the effect is in no residual.
     """
     return not verdict["gate"]["gap"] and any(load(e["effect"]).in_series for e in verdict["effects"])
-
-
-def _plain(names: list[str]) -> str:
-    """Return names of effects without the signs that stand for blanks."""
-    return ", ".join(name.replace("_", " ") for name in names)
 
 
 def answered(verdict: dict[str, Any]) -> set[str]:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from tacdata import documents
-from tacdata.discrepancy.verdict.document import REVISE
 from tacdata.errors import TacdataError
 from tacdata.plans import Plan
 from tacdata.recording import read_episode, read_session
@@ -47,7 +46,7 @@ def recommend(
         note: Called with a line of progress.
     """
     # Without a plan the verdict's own words hold, but those that send one here.
-    others = [words for words in verdict["next"] if REVISE not in words]
+    others = [words for words in verdict["next"] if "`tacdata revise " not in words]
     if verdict["status"] in ("named", "none"):
         return {"plan": None, "presses": [], "remark": ""}
     try:

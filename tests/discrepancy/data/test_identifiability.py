@@ -7,7 +7,7 @@ import pytest
 from pressing import course
 
 from tacdata.discrepancy.data.identifiability import lookalikes
-from tacdata.discrepancy.data.sufficiency import one_rate, shortcomings
+from tacdata.discrepancy.data.sufficiency import limitations, one_rate
 from tacdata.discrepancy.data.tip_motion import longest_hold, speeds, stairs
 from tacdata.effects import load
 
@@ -48,10 +48,10 @@ def test_a_hold_is_told_from_a_path_with_noise():
     assert np.array_equal(measured(held).dithers[:2], [0, 0]), "each axis has its own"
     for made in (held, measured(held)):
         assert longest_hold(made) == pytest.approx(1.5, abs=0.1)
-        assert not any("no hold" in words for words in shortcomings(made))
+        assert not any("no hold" in words for words in limitations(made))
     for made in (course(hold=0.3, episodes=8), measured(course(hold=0.3, episodes=8))):
         assert longest_hold(made) < 0.4
-        assert any("no hold" in words for words in shortcomings(made))
+        assert any("no hold" in words for words in limitations(made))
     slow = course(rates=(0.002,), hold=0.0, episodes=1)
     assert longest_hold(slow) == 0 == longest_hold(measured(slow)), "who presses slowly does not stand"
     assert "relaxation" not in lookalikes(measured(course(rates=(1.0,), hold=1.5)), load("backlash"), {})

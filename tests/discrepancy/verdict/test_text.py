@@ -10,10 +10,11 @@ from pressing import course
 
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.data.checks import DataChecks
+from tacdata.discrepancy.heading import Heading, sentence
 from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason, decide
-from tacdata.discrepancy.verdict.document import following
+from tacdata.discrepancy.verdict.document import REVISE, following
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import in_text
@@ -84,16 +85,42 @@ def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
     """Nor are other forms of it, or what may stand in for it; what is judged is not called unjudgeable either."""
     limits = {"power_creep": None, "relaxation": 9.0, "bouc_wen": 9.0, "drift": 9.0, "tilt": 1.0}
     told = in_text(document(effects=[effect("power_creep", ("hysteresis",))], limits=limits))
-    assert line(told, "would be seen") == "would be seen only at more than three times their usual size: drift"
+    assert "1 that would be seen only at more than three times their usual size" in line(told, "folded away")
     assert "would be seen" not in in_text(document(effects=[effect("softening")], limits={"softening": None}))
-    assert line(in_text(document(effects=[effect("carriage_compliance")])), "cannot be judged") == (
-        "cannot be judged here: tilt"
-    )
+    judged = in_text(document(effects=[effect("carriage_compliance")]))
+    assert line(judged, "folded away") == "folded away in verdict.html: 1 effects that cannot be judged here"
+
+
+def test_the_head_has_size_interval_session_and_date():
+    entry = effect("power_creep") | {"parameters": {"f": {"value": 0.2, "unit": "1", "error": 0.01}}}
+    heading = {"recordings": ["/data/monday"], "folder": "v", "recorded": "2026-11-27 10:00", "unit": "V"}
+    stamp = {"made_at": "2026-11-28T10:00:00", "code_version": "1.2"}
+    text = in_text(document("named", [entry]) | {"heading": heading, "provenance": stamp})
+    assert text.splitlines()[1:3] == [
+        "  size of relaxation: relaxed share over the decades 20 % (90 %: 18.4 to 21.6)",
+        "  session monday, recorded 2026-11-27 10:00, judged 2026-11-28, tacdata 1.2",
+    ]
+
+
+def test_the_first_sentence_has_thirty_words_and_an_unknown_verdict_two_hundred():
+    clauses = [" ".join(["word"] * 12) for _ in range(40)]
+    for between in ("; ", ". ", ", ", ": ", " "):
+        head, tail = sentence(between.join(clauses))
+        assert 0 < len(head.split()) <= 30
+        assert len(f"{head} {tail}".split()) == 480
+    long = document("unknown") | {"why": "; ".join(clauses[:4]), "next": clauses, "remarks": clauses}
+    assert len(in_text(long).split()) <= 200
+    assert in_text(long).endswith("more: verdict.html\n")
+
+
+def test_a_command_is_filled_in_with_the_paths_of_the_verdict():
+    heading = Heading(("a b/s", "t"), "out/v", "", "V")
+    assert heading.filled(REVISE) == "`tacdata revise out/v 'a b/s' t --out out/v-revised`"
 
 
 def test_what_is_worse_is_not_called_better():
     margins = {"power_creep": -2.7, "relaxation": -2.2, "backlash": 3.9}
-    text = in_text(document("unknown", [effect("bouc_wen", margins=margins, status="suspected")]))
+    text = in_text(document("ambiguous", [effect("bouc_wen", margins=margins, status="suspected")]))
     assert line(text, "fits better").endswith("standard errors over presses, than: backlash 3.9")
     assert line(text, "fits worse").endswith("than: relaxation 2.7"), "of two forms the nearest"
 
@@ -128,10 +155,10 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
     answer = [finding(n, *(r for r in rates if r != load(n).called)) for n in ("power_creep", "backlash", "bouc_wen")]
     assert said("ambiguous", answer) == (
         "these recordings do not say which effect it is: relaxation, backlash and hysteresis together fit best, but "
-        "delay or creep may stand in for any of them"
+        "latency or creep may stand in for any of them"
     )
     assert said("ambiguous", [finding("low_pass_filter", "latency", "creep")]).endswith(
-        "low-pass filter fits best, but delay or creep may stand in for it"
+        "low-pass filter fits best, but latency or creep may stand in for it"
     )
     assert said("ambiguous", [finding("drift"), finding("backlash", "creep")]).startswith(
         "drift is there. Something else is, too, and these recordings do not say which effect it is: backlash fits best"
@@ -143,7 +170,7 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
 def test_many_that_may_stand_in_are_told_by_family_and_listed_below():
     rates = ("low_pass_filter", "viscosity", "backlash", "hysteresis", "creep")
     assert said("ambiguous", [finding("latency", *rates)]).endswith(
-        "delay fits best, but 5 others (delay and filtering, memory of the skin or friction and play) may stand in "
+        "latency fits best, but 5 others (delay and filtering, memory of the skin or friction and play) may stand in "
         "for it"
     )
     text = in_text(document("ambiguous", [effect("latency", rates) | {"parameters": {}}]))
@@ -226,8 +253,8 @@ def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
     assert "fit no better" in said("unknown", [finding("power_creep")], 20.128, 20.130)
     both = said("unknown", [finding("latency"), finding("power_creep")], 95.0, 6.0)
     assert both == (
-        "something is missing that has no name yet; delay and relaxation together come closest and leave 10 % of what "
-        "could be explained, so they are not the names, or not all of it"
+        "something is missing that has no name yet; latency and relaxation together come closest and leave 10 % of "
+        "what could be explained, so they are not the names, or not all of it"
     )
     assert said("unknown", [finding("thermal_growth", "lost_steps")]).endswith(
         "thermal growth comes closest and leaves 10 % of what could be explained, and lost steps may stand in for it"
