@@ -81,9 +81,14 @@ def press_gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.nd
     power = np.array([np.nansum(np.square(p), axis=0) for p in expected])
     both = np.array([np.nansum(m * p, axis=0) for m, p in zip(measured, expected, strict=True)])
     peak = np.array([np.abs(p).max(axis=0) for p in expected])
+    # A channel that no press stirs has no gain.
+    strong = (peak >= STRONG * peak.max(axis=0)) & (power > 0)
+    gains = np.where(strong, both / np.where(strong, power, 1.0), np.nan)
+    usual = np.full(gains.shape[1], np.nan)
+    known = strong.any(axis=0)
+    usual[known] = np.nanmedian(gains[:, known], axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        gains = np.where(peak >= STRONG * peak.max(axis=0), both / power, np.nan)
-        return gains / np.nanmedian(gains, axis=0)
+        return gains / usual
 
 
 def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, left_out: set[int]) -> list[str]:

@@ -7,7 +7,7 @@ import pytest
 from pressing import course
 
 from tacdata.discrepancy.data.idle_lines import idle_lines
-from tacdata.discrepancy.data.single_channels import odd_channels
+from tacdata.discrepancy.data.single_channels import odd_channels, press_gains
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 
 IDLE = np.full(3, 5000.0)
@@ -92,3 +92,9 @@ def test_a_channel_without_others_is_unlike_none():
     moved = with_readings(course(noise=0.5), lambda t, e, r: r * (1 + np.array([0, 0, 0.08]) * np.sin(e / 4)))
     alone = replace(moved, readings=moved.readings[:, 2:], numbers=())
     assert odd_channels(alone, FittedResponse(alone)) == []
+
+
+def test_a_channel_that_no_press_stirs_has_no_gain():
+    still = [np.zeros((9, 2)) for _ in range(4)]
+    with np.errstate(all="raise"):
+        assert np.isnan(press_gains(still, still)).all()

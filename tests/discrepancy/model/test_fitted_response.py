@@ -221,3 +221,12 @@ def test_errors_of_an_episode_hold_no_effect_of_another_model(monkeypatch):
     left = [refine(setting, [], null, steps=0).energy.sum() for null in (first, again)]
     assert model.energy.sum() < 0.2 * left[0]
     assert left[1] > 0.5 * left[0]
+
+
+def test_without_the_shallowest_presses_the_lowest_readings_are_the_idle_ones():
+    """Presses that only hold: those left have no reading at the course's lowest depth."""
+    made = course(episodes=12)
+    deep = made.tip[:, 2] > 0.5 * made.tip[:, 2].max()
+    response = FittedResponse(replace(made, averaged=np.where(deep, made.averaged, 0.0)))
+    assert np.isfinite(response.idle).all()
+    assert np.isfinite(response.signal(response.load(made.tip, made.tool))).all()
