@@ -47,6 +47,8 @@ def bounded(matrix: np.ndarray, target: np.ndarray, low: np.ndarray, high: np.nd
         return best
     x = np.clip(best, low, high)
     held = x != best
+    diagonal = np.diag(matrix)
+    size = np.sqrt(np.where(diagonal > 0, diagonal, np.inf))  # by round-off a column without information is below 0
     for _ in range(MOST_SETS * len(x)):
         free = np.flatnonzero(~held)
         step = np.zeros(len(x))
@@ -59,9 +61,9 @@ def bounded(matrix: np.ndarray, target: np.ndarray, low: np.ndarray, high: np.nd
             first = int(np.argmin(room))
             x[first], held[first] = (high if step[first] > 0 else low)[first], True
             continue
-        slope = (target - matrix @ x) / np.sqrt(np.diag(matrix))
+        slope = (target - matrix @ x) / size
         inward = np.where(held, np.where(x <= low, slope, -slope), 0.0)
-        if inward.max() <= SETTLED * np.abs(target / np.sqrt(np.diag(matrix))).max():
+        if inward.max() <= SETTLED * np.abs(target / size).max():
             break
         held[int(np.argmax(inward))] = False
     return x

@@ -12,6 +12,7 @@ import numpy as np
 from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.effects import Placed
+from tacdata.errors import UsageError
 from tacdata.recording.motion.press_steps import SHORTEST_PAUSE
 from tacdata.revision.next_presses.machine import MachineLimits
 
@@ -27,6 +28,8 @@ A delay, a filter and play differ where the tip starts, stops or turns, and nowh
 """
 RECOVERY = 10.0
 """Time after the release that may be recorded [s]."""
+LONGEST = 3600.0
+"""Longest press of a plan [s]."""
 FRAME = 1 / 30
 """Time between readings if it is unknown [s]."""
 PLACES = 2
@@ -143,8 +146,17 @@ def laid_out(course: Course, trial: CandidatePress, machine: MachineLimits) -> C
         course: The recordings: readings come as often.
         trial: The press.
         machine: Its limits: acceleration rounds the corners of the path.
+
+    Raises:
+        UsageError: If the press is longer than `LONGEST`.
     """
     at, depth = _path(trial, machine)
+    if not at[-1] <= LONGEST:
+        raise UsageError(
+            f"a press of {at[-1]:.3g} s, at the rates of these recordings",
+            f"{LONGEST:g} s or less",
+            "record presses that move, then plan again",
+        )
     inside = course.reduced.step[~course.reduced.first]
     frame = float(np.clip(np.median(inside), 1e-3, 0.1)) if len(inside) else FRAME
     at, frames = np.round(at, 9), np.round(np.arange(0.0, at[-1], frame), 9)
