@@ -64,11 +64,8 @@ class FittedResponse(Response):
         self._course = course
         self._read = course.read
         reduced = course.reduced
-        quiet = reduced.tip[:, 2] <= max(0.0, float(course.tip[:, 2].min()) + 0.02 * course.stroke)
-        if not quiet.any():
-            quiet = (
-                reduced.tip[:, 2] <= float(reduced.tip[:, 2].min()) + 0.02 * course.stroke
-            )  # the shallowest was left out
+        depth = reduced.tip[:, 2]  # the shallowest presses may have no readings
+        quiet = depth <= max(0.0, float(course.tip[:, 2].min()) + 0.02 * course.stroke, float(depth.min()))
         self.idle = np.median(reduced.readings[quiet], axis=0)
         self.context = contexts(course)
         self._rows = [np.flatnonzero(self.context == k) for k in range(int(self.context.max()) + 1)]
