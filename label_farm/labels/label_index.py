@@ -94,7 +94,7 @@ class LabelIndex:
         """Add rows. A cache that cannot be written is no loss."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with closing(sqlite3.connect(self.path, timeout=60.0)) as db, db:
+            with closing(sqlite3.connect(self.path, timeout=5.0)) as db, db:
                 db.execute("PRAGMA synchronous = OFF")
                 for statement in TABLES.split(";"):
                     db.execute(statement)

@@ -9,7 +9,7 @@ import typer
 
 from tacdata.commands.command import PIPELINE, Result
 from tacdata.errors import Exit
-from tacdata.progress import suggest
+from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.recording.check.report import Report
@@ -27,8 +27,18 @@ def run(
     """Check every stream for gaps, noise, stuck channels and missing tags; exit 0 if usable, 1 if not."""
     report = checked(path, out or (path if path.is_dir() else path.parent))
     if path.is_dir() and report.usable:
-        suggest("label", path)
+        if unknown_skin(report):
+            say("labels need the skin's size and material: give them under sensor in the mapping, and import again")
+            suggest("browse", path)
+        else:
+            suggest("label", path)
     return Result(report.document, Exit.DONE if report.usable else Exit.UNFIT)
+
+
+def unknown_skin(report: Report) -> bool:
+    """Return whether the skin of imported recordings is a stand-in, so that their labels would be of another skin."""
+    rigs = [entry.recording.episode.rig.get("imported", {}) for entry in report.episodes]
+    return any(text.startswith("skin/") for rig in rigs for text in rig.get("stand_ins", []))
 
 
 def checked(path: Path, folder: Path) -> Report:

@@ -47,7 +47,7 @@ def test_every_entry_says_what_was_given_what_is_allowed_and_what_to_do(entries)
         ),
         (
             'given = "no plan"\nraise UsageError(given, ", ".join(known), NEXT)',
-            ("no plan", "what the message lists", "make one"),
+            ("no plan", "as listed in the message", "make one"),
         ),
         ('raise Late("late by " + f"{s} s", "at once", "hurry")', ("late by … s", "at once", "hurry")),
         ('raise UsageError(str(error), "a number", "correct it")', None),

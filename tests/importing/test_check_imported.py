@@ -1,9 +1,11 @@
 """What `tacdata check` says of recordings that were imported: in their own unit, by their own times."""
 
+import importlib
 import re
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from foreign import mapping, press_data, wide_csv
 from matplotlib.figure import Figure
 
@@ -76,3 +78,25 @@ def test_a_depth_that_rests_at_zero_has_a_rest(tmp_path):
     flat = np.round(20 + np.random.default_rng(1).normal(0, 0.01, signals.shape), 4)
     (tmp_path / "flat").mkdir()
     assert "no channel answers" in told(tmp_path / "flat", (time, np.maximum(depth, 0), force, flat)).text
+
+
+@pytest.mark.parametrize(("offset", "doubted"), ((-5.0, True), (0.0, False)))
+def test_a_path_above_the_skin_whose_readings_answer_is_doubted(tmp_path, offset, doubted):
+    time, depth, force, signals = several(1)
+    report = told(tmp_path, (time, depth + offset, force, signals))
+    assert ("above the skin, and the readings follow it" in report.text) is doubted
+
+
+def test_a_path_above_the_skin_without_an_answer_is_a_rest(tmp_path):
+    time, depth, force, signals = several(1)
+    report = told(tmp_path, (time, depth - 5, force, np.random.default_rng(1).normal(20, 0.01, signals.shape).round(4)))
+    assert "the readings follow it" not in report.text
+
+
+def test_an_unknown_skin_is_not_to_be_labelled_next(tmp_path, capsys):
+    told(tmp_path, several(2))
+    session = tmp_path / "session"
+    importlib.import_module("tacdata.commands.check").run(session)
+    shown = capsys.readouterr().out
+    assert "labels need the skin's size and material" in shown
+    assert "next: tacdata label" not in shown

@@ -33,6 +33,8 @@ NO_INDENTER = {"shape": "sphere", "radius": 2.0}
 """Stand-in for an unknown indenter."""
 FEWEST = 10
 """Fewest rows of a stretch between two steps back of the time that is a recording [rows]."""
+ANSWER = 5.0
+"""Smallest change of readings that follow a path [their noise]."""
 SLOWEST = 1e-4
 """Smallest speed that a press is given [mm/s]."""
 UNITS = {
@@ -186,6 +188,8 @@ def _imported(
             f"presses of at most {most:g} mm",
             "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
         )
+    if doubt := _never_touched(taxels, position, tip[:, 2]):
+        record = {**record, "set_aside": [*record["set_aside"], doubt], "notes": [*record["notes"], doubt]}
     indenter, name = _indenter(mapping)
     if name == "unknown":
         stand_ins.append("indenter: not said by the source; a sphere of 2 mm stands in")
@@ -218,6 +222,25 @@ def _imported(
     }
     record = {**record, "stand_ins": [*stand_ins, *unknown], "notes": notes}
     return ImportedPress(press, sensor, registration, taxels, position, streams.measured, phases, {}, record, lost)
+
+
+def _never_touched(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
+    """Return a doubt about the zero of a path that stays above the skin while the readings follow it; "" without."""
+    stroke = float(np.ptp(depth))
+    if stroke <= 0 or depth.max() > 0:
+        return ""
+    at = np.interp(taxels.time_ns, position.time_ns, depth)
+    low, high = at <= at.min() + 0.1 * stroke, at >= at.max() - 0.1 * stroke
+    if min(low.sum(), high.sum()) < FEWEST:
+        return ""
+    noise = np.nanmedian(np.abs(np.diff(taxels.values, axis=0)), axis=0)
+    change = np.abs(np.nanmedian(taxels.values[high], axis=0) - np.nanmedian(taxels.values[low], axis=0))
+    if not (change > ANSWER * noise).any():
+        return ""
+    return (
+        f"position: it stays {-depth.max():.4g} mm above the skin, and the readings follow it: correct its zero "
+        "(contact, offset, or zero under the position)"
+    )
 
 
 def _remarks(taxels: Stream, planned: ScheduledPress | None, path: PressPath, lost: int) -> list[str]:

@@ -1,5 +1,7 @@
 """The queue: each job to one worker at a time, none forgotten."""
 
+import errno
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -7,7 +9,7 @@ from dataclasses import replace
 import pytest
 from farm_examples import HERE
 
-from tacdata.errors import FormatError
+from tacdata.errors import FormatError, UsageError
 from tacdata.label_farm.ledger.ledger import DONE, FAILED, LEASED, MAX_TRIES, WAITING, Ledger, owner_name
 from tacdata.label_farm.ledger.roster import Roster
 from tacdata.label_farm.presses.job import Job
@@ -217,3 +219,14 @@ def test_an_unusable_ledger_is_said_in_words(tmp_path, content):
     with pytest.raises(FormatError, match=r"damaged|layout 99") as error:
         Ledger(path)
     assert "no result is lost" in error.value.remedy
+
+
+def test_a_drive_without_locks_is_refused_at_once_with_the_way_out(tmp_path, monkeypatch):
+    def refused(stream, operation):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fcntl.lockf", refused)
+    with pytest.raises(UsageError, match="its drive locks no files") as error:
+        Ledger(tmp_path / "ledger.sqlite")
+    assert "--store FOLDER" in error.value.remedy
+    assert not list(tmp_path.iterdir())
