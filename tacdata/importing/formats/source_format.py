@@ -49,6 +49,17 @@ MAGIC = {
 }
 """First bytes of files and what they are."""
 
+CONVERSIONS = {
+    ".xls": "open it in Excel or LibreOffice and save it as .xlsx",
+    ".ods": "open it in LibreOffice and save it as .xlsx",
+    ".h5": "in Python: h5py.File(name)[dataset][:], then numpy.savez(new_name, ...)",
+    ".hdf5": "in Python: h5py.File(name)[dataset][:], then numpy.savez(new_name, ...)",
+    ".tdms": "in LabVIEW or Excel: export it as .csv or .xlsx",
+    ".bag": "rosbags-convert --src name.bag --dst folder, then import the folder",
+    ".pkl": "in Python: pandas.read_pickle(name).to_parquet(new_name)",
+}
+"""Endings of files that are not read, and the way to a file that is."""
+
 
 @dataclass(frozen=True)
 class SourceTable:
@@ -213,6 +224,15 @@ def _by_ending(path: Path) -> str:
         for ending in registry.load(ROOM, BASE, name, SourceFormat).endings:
             known[ending] = name
     found = [ending for ending in known if path.name.lower().endswith(ending)]
+    ending = path.suffix.lower()
+    if ending == ".xls" and path.is_file():
+        with path.open("rb") as stream:
+            kind = kind_of_bytes(stream.read(16))
+        if not kind:
+            return "csv"  # instruments write tabs and give the file this ending
+        raise UsageError(f"{path} is {kind}", "an Excel workbook (.xlsx)", CONVERSIONS[ending])
+    if ending in CONVERSIONS:
+        raise UsageError(f"{path}: {ending} is not read", ", ".join(sorted(known)), CONVERSIONS[ending])
     if not found:
         raise UsageError(
             f"{path}: the ending {path.suffix or '(none)'} is of no known format",
