@@ -13,6 +13,7 @@ from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError
 from tacdata.wire import Decoder, FrameFormat, default_format, read_format
 from tacdata.wire.frames.frame_format import from_document
+from tacdata.wire.grbl.lines import WELCOME
 from tacdata.wire.serial_port import open_port, read_available, why_broken
 
 FINE_TICK = 0.0002
@@ -166,7 +167,14 @@ class CapacitiveBoard(TaxelBoard):
             return DeviceError(
                 f"{wait}: not one byte came",
                 limit,
-                "check power, cable and port, and whether the board must be started",
+                "check power, cable and port (the rig file may have swapped those of cnc and board), and whether the "
+                "board must be started",
+            )
+        if WELCOME.search(seen.decode("ascii", "replace")):
+            return DeviceError(
+                f"a GRBL controller is on the taxel board's port {self.port}",
+                "a taxel board on that port",
+                "swap port under cnc and port under board in the rig file",
             )
         what = f"{wait}: {len(seen)} bytes came, beginning {seen[:24].hex(' ')}"
         if layout.sync and layout.sync not in seen:

@@ -1,5 +1,6 @@
 """The board driver against an emulated board, through a real pseudo-terminal."""
 
+import threading
 import time
 
 import numpy as np
@@ -9,6 +10,7 @@ from tacdata.clock import Clock
 from tacdata.devices.capacitive_board import CapacitiveBoard
 from tacdata.errors import DeviceError, FormatError, UsageError
 from tacdata.virtual_rig.board import Timing, VirtualBoard, draw_timing
+from tacdata.virtual_rig.firmware.controller import Controller
 from tacdata.virtual_rig.port import VirtualPort
 from tacdata.wire import default_format
 from tacdata.wire.frames.frame_format import from_document
@@ -93,6 +95,15 @@ def test_silent_board():
     with pytest.raises(DeviceError, match="not one byte came"):
         CapacitiveBoard(Clock.start(), port.path).open()
     port.close()
+
+
+def test_a_controller_on_the_boards_port_is_named():
+    clock = Clock.start()
+    controller = Controller(clock, 1)
+    threading.Timer(0.2, lambda: controller.port.write(b"\r\nGrbl 1.1h ['$' for help]\r\n")).start()
+    with pytest.raises(DeviceError, match=r"a GRBL controller is on(.|\n)*swap port"):
+        CapacitiveBoard(clock, controller.port.path).open()
+    controller.port.close()
 
 
 def test_pulled_cable_hands_out_what_came_before(board):

@@ -29,6 +29,8 @@ LINE_BYTES = 79
 """Longest line that Grbl 1.1 takes [bytes without its end] (``LINE_BUFFER_SIZE`` 80; grblHAL takes 256)."""
 RX_BYTES = 128
 """Size of the receive buffer until the controller states its own [bytes]; Grbl 1.1's."""
+PUSHED = ("[", "$", ">")
+"""First characters of a line that is no report and no answer; any other line is noise, or a report that lost bytes."""
 READ_FAILED = "error:7"
 """Sent by ``$#`` and ``$N`` for each entry that cannot be read, before their own answer."""
 
@@ -71,7 +73,7 @@ class GrblLink:
         step = max(0.25, 2.0 / (poll_rate * clock.rate))  # it is looked at once a poll
         self._silence = Patience(SILENCE, clock.rate, SILENCE, step, clock.host)
         self.unread = ""
-        """The latest report that could not be read, since one that could."""
+        """The latest line that could not be read, since a report that could."""
         self._commanded_ns = clock.now_ns()
         self._welcome_expected, self._reset_asked = True, False
         self.polled = False
@@ -320,6 +322,8 @@ class GrblLink:
                 del buffer[: end + 1]
                 if line:
                     self._take(line, arrival_ns)
+            if len(buffer) > LINE_BYTES:  # noise may hold no end of a line
+                self.unread = bytes(buffer[:LINE_BYTES]).decode("ascii", "replace")
             del buffer[: max(0, len(buffer) - 4096)]
 
     def _take(self, line: str, arrival_ns: int) -> None:
@@ -343,10 +347,10 @@ class GrblLink:
                 changed = changed_on_its_way(self._unanswered[0].text, echo[1])
                 self.echoes = True
                 self.interruption = self.interruption or changed
-            elif self._unanswered:
-                self._unanswered[0].pushed.append(line)
             else:
-                self.notes.append(line)
+                if not line.startswith(PUSHED):
+                    self.unread = line
+                (self._unanswered[0].pushed if self._unanswered else self.notes).append(line)
             del self.notes[:-200]
             self._changed.notify_all()
         if changed:

@@ -198,6 +198,13 @@ def unreadable(times):
     return wire(reports(change))
 
 
+def noisy(world):
+    """Turn what the controller sends into noise for 4 s: no line begins as a report does."""
+    end = world.schedule.now + 4.0
+    noise = lambda data: bytes(byte ^ 0x41 for byte in data) if world.schedule.now < end else data  # noqa: E731
+    world.cnc_line.to_host.change = noise
+
+
 def strange_hold(world):
     """Hold with a substate that no manual names, while it brakes and at rest."""
     world.controller.inject_wire(to_host=reports(lambda text: re.sub(r"^<Hold:\d", "<Hold:4294967295", text)))
@@ -234,6 +241,14 @@ def test_what_moves_otherwise_is_stopped_soon_and_lifted_straight_up(tmp_path, n
     sideways = np.linalg.norm(np.diff(places[:, :2], axis=0), axis=1)
     assert name == "another program moves" or sideways[rising & low].max(initial=0.0) < 0.002
     assert run.end - max(at, PRESSING) < 6.0, "nobody waits for long beside a tip in the skin"
+
+
+def test_noise_is_no_silence_and_the_tip_is_lifted_after_it(tmp_path):
+    run, said = play(tmp_path, noisy, HOLDING)
+    assert "only reports that cannot be read" in str(run.error), said
+    assert LIFTED in said
+    assert run.here[2] > ORIGIN[2] + CLEARANCE - 0.02
+    assert "LOST" not in said
 
 
 STATES = {
