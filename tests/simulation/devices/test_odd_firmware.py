@@ -233,7 +233,8 @@ def test_what_moves_otherwise_is_stopped_soon_and_lifted_straight_up(tmp_path, n
     act, at, words, world = STOPPED[name]
     run, said = play(tmp_path, act, at, **world)
     assert words in str(run.error), said
-    assert LIFTED in said
+    # Reports that are shifted contradict the lift, too: it went up, and nobody can know it from them.
+    assert ("not lifted all the way: the lift ended at" if act is shifted else LIFTED) in said
     assert run.here[2] > ORIGIN[2] + CLEARANCE - 0.02
     times, places, _ = run.path
     rising = (np.diff(places[:, 2]) > 0) & (times[1:] > at)
