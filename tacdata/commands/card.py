@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import DATA, Result
 
-ORDER = 42
-PANEL = PIPELINE
+ORDER = 70
+PANEL = DATA
+EXAMPLES = ("tacdata card dataset", "tacdata card dataset --out card", "tacdata card dataset --json")
 
 
 def run(
@@ -34,4 +35,4 @@ def run(
         documents.write_text(out / "card.md", text)
         coverage_picture.draw(out / card.PICTURE, opened)
         print(f"written: {out / 'card.md'}, {card.PICTURE}")
-    return Result({"card": text})
+    return Result(card.document(opened))

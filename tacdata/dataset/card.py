@@ -74,6 +74,51 @@ def card(dataset: Dataset) -> str:
     return "\n".join(lines) + "\n"
 
 
+def document(dataset: Dataset) -> dict[str, Any]:
+    """Return the content of the data card as data: lengths [mm], times [s], counts [1].
+
+    Raises:
+        FormatError: If the dataset is of several sensors.
+    """
+    records = [e.record for e in dataset.episodes if e.record]
+    presses = [record.configuration for record in records]
+    sensor = dataset.sensor
+    losses, outside = _invalid(dataset)
+    names = sorted({press.indenter_name for press in presses})
+    return {
+        "dataset": dataset.root.name,
+        "content": dataset.content_hash,
+        "episodes": len(dataset.episodes),
+        "simulated_episodes": dataset.simulated,
+        "frames": len(dataset),
+        "seconds": len(dataset) / sensor.taxels.rate,
+        "rate_hz": sensor.taxels.rate,
+        "sensor": {"name": sensor.name, "hash": sensor.content_hash, "columns": sensor.taxels.columns}
+        | {"rows": sensor.taxels.rows, "map": list(sensor.map.shape), "pixel_pitch_mm": sensor.map.pixel_pitch},
+        "specimens": dict(Counter(record.specimen or "not named" for record in records)),
+        "rigs": dict(Counter(record.rig for record in records)),
+        "indenters": [
+            {
+                "name": name,
+                "presses": len(mine),
+                "shape": mine[0].indenter.document,
+                "depths_mm": [min(p.depth for p in mine), max(p.depth for p in mine)],
+                "speeds_mm_s": [min(p.speed for p in mine), max(p.speed for p in mine)],
+            }
+            for name, mine in ((name, [p for p in presses if p.indenter_name == name]) for name in names)
+        ],
+        "coverage": {"depth_borders_mm": DEPTH_BORDERS, "counts": coverage(presses, dataset).counts},
+        "labels": [record.label_provenance for record in records],
+        "frames_after_a_loss": losses,
+        "frames_outside_the_path": outside,
+        "incomplete_recordings": [record.recording_file for record in records if not record.complete],
+        "notes": dict(Counter(note for record in records for note in record.notes)),
+        "columns": {
+            key: {"shape": values.shape[1:], "unit": dataset.units[key]} for key, values in dataset.columns.items()
+        },
+    }
+
+
 def _simulated(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
     """Begin with the note that it is simulated, and from which ranges."""
     drawn = Counter(f"plan {r.simulated['plan']}, seed {r.simulated['seed']}" for r in records if r.simulated)

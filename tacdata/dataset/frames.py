@@ -78,7 +78,7 @@ def valid(episode: Episode) -> np.ndarray:
     if len(counter) > 1 and (counter < 0).all():
         step = np.diff(times)
         follows = np.append(True, step < LOST * np.median(step))
-    return follows & (times >= episode.tip_ns[0]) & (times <= episode.tip_ns[-1])
+    return follows & episode.on_path
 
 
 def episode_columns(episode: Episode, label: Label, extra: Iterable[str] = ()) -> dict[str, np.ndarray]:

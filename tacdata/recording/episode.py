@@ -187,6 +187,14 @@ class Episode(Displayed):
         return self.readings - self.baseline
 
     @property
+    def on_path(self) -> np.ndarray:
+        """Whether each reading is within the time of the commanded path, shape (n,), bool; False without a path."""
+        times = self.taxels.sample_ns
+        if not len(self.tip_ns):
+            return np.zeros(len(times), bool)
+        return (times >= self.tip_ns[0]) & (times <= self.tip_ns[-1])
+
+    @property
     def times(self) -> np.ndarray:
         """Estimated time of each reading since the first [s], shape (n,)."""
         return (self.taxels.sample_ns - self.taxels.sample_ns[:1]) / 1e9

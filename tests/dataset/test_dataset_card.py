@@ -95,3 +95,14 @@ def test_records_of_an_earlier_release_open(tmp_path: Path) -> None:
     dataset = read_dataset(root)
     assert dataset.episodes[0].record.specimen == ""
     assert "specimens: not named (1)" in card.card(dataset)
+
+
+def test_the_card_as_data_agrees_with_its_words(tmp_path):
+    dataset = read_dataset(packed(tmp_path / "d", [example.episode(n) for n in range(3)]))
+    data = card.document(dataset)
+    assert (data["episodes"], data["frames"]) == (3, 60)
+    assert [(entry["name"], entry["presses"]) for entry in data["indenters"]] == [("sphere0", 2), ("sphere1", 1)]
+    words = card.card(dataset)
+    assert f"- {data['frames_after_a_loss']} of 60 frames follow a lost frame" in words
+    assert f"- {data['frames_outside_the_path']} of 60 frames are outside the commanded path" in words
+    assert data["columns"]["observation.depth"]["unit"] == "mm"

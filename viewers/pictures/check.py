@@ -99,6 +99,8 @@ def _lag(axes, report: Report) -> None:
     if len(lag):
         axes.hist(lag, bins=60, color="tab:blue")
         axes.set_yscale("log")
+        axes.axvline(float(np.mean(lag)), color="tab:red", linewidth=1.0, label=f"mean {np.mean(lag):.1f} ms")
+        axes.legend(fontsize=7)
     axes.set(xlabel="arrival after sample [ms]", ylabel="frames", title="delay of the taxel stream")
 
 

@@ -84,14 +84,20 @@ def clock_warnings(clock: dict[str, Any] | None, rate_of_clock: float) -> list[s
     return found
 
 
-def clock_words(clock: dict[str, Any] | None) -> str:
-    """Describe a clock in half a line."""
+def clock_words(clock: dict[str, Any] | None, timing: bool = True) -> str:
+    """Describe a clock in half a line.
+
+    Args:
+        clock: Its figures (`clock_figures`).
+        timing: Whether to state delay and jitter too.
+    """
     if clock is None:
         return "no counter, so sample times are arrival times"
     if not clock["steady"]:
         return "too unsteady to be followed, so sample times are arrival times"
     drift = "" if clock["drift"] is None else f"drift {clock['drift']:+.0f} +- {clock['drift_uncertainty']:.0f} ppm, "
-    words = f"clock: {drift}delay {clock['delay']:.1f} ms beyond the least, jitter {clock['jitter']:.1f} ms"
+    delay = f"delay {clock['delay']:.1f} ms beyond the least, jitter {clock['jitter']:.1f} ms" if timing else ""
+    words = f"clock: {drift}{delay}".rstrip(", ") if drift or delay else "clock followed by its counter"
     if clock["latency"] is None:
         return words
     return f"{words}; constant delay {clock['latency']:.1f} +- {clock['latency_uncertainty']:.1f} ms taken off"

@@ -58,7 +58,7 @@ class Report:
         """The report as one page of text."""
         lines = [f"{self.source}: {len(self.episodes)} recordings"]
         imported = bool(self.episodes) and is_imported(self.episodes[0].recording.episode)
-        told = imported_summary(self.episodes) if imported else _summary([entry.document for entry in self.episodes])
+        told = imported_summary(self.episodes) if imported else _summary(self.episodes)
         lines += [*_sync_words(self.episodes), *told]
         lines += [f"  NOT ASSESSED  {text}" for text in self.not_assessed]
         lines += _grouped(self.findings) or ["nothing to remark"]
@@ -170,17 +170,18 @@ def _sync_words(entries: tuple[RecordingFigures, ...]) -> list[str]:
     return [*lines, f"  sync    not measured: {', '.join(unknown)} ({why})"] if unknown else lines
 
 
-def _summary(documents: list[dict[str, Any]]) -> list[str]:
-    if not documents:
+def _summary(entries: tuple[RecordingFigures, ...]) -> list[str]:
+    if not entries:
         return []
+    documents = [entry.document for entry in entries]
     taxels, cnc = [d["taxels"] for d in documents], [d["cnc"] for d in documents]
     noise = [v for t in taxels for v in t["idle_noise"] if v is not None]
     answers = _middle(c["round_trip"] for c in cnc)
     lines = [
         f"  taxels  {_middle(t['rate'] for t in taxels):.2f} Hz, {sum(t['frames'] for t in taxels)} frames, "
-        f"{sum(t['lost'] for t in taxels)} lost, jitter {_middle(t['jitter'] for t in taxels):.1f} ms, "
-        f"latency {_middle(t['latency'] for t in taxels):.0f} ms, idle noise {_middle(noise):.1f} counts",
-        f"          {clock_words(taxels[-1]['clock'])}",
+        f"{sum(t['lost'] for t in taxels)} lost, {_outside(entries)} outside the commanded path, "
+        f"idle noise {_middle(noise):.1f} counts",
+        f"          {_arrival(entries)}; {clock_words(taxels[-1]['clock'], timing=False)}",
         f"  cnc     {_middle(c['rate'] for c in cnc):.1f} reports/s, start of a move known to "
         f"{_middle(c['start_uncertainty'] for c in cnc):.1f} ms, depth to "
         f"{max(c['depth_uncertainty'] for c in cnc):.3f} mm, "
@@ -194,6 +195,19 @@ def _summary(documents: list[dict[str, Any]]) -> list[str]:
         )
         lines.append(f"          {clock_words(views[-1]['clock'])}")
     return lines
+
+
+def _outside(entries: tuple[RecordingFigures, ...]) -> int:
+    """Return the number of readings before the start or after the end of their commanded path."""
+    return sum(int((~entry.recording.episode.on_path).sum()) for entry in entries)
+
+
+def _arrival(entries: tuple[RecordingFigures, ...]) -> str:
+    """Return how late the readings arrived, over all recordings: the figures of the histogram in the picture."""
+    lag = np.concatenate([entry.lag for entry in entries])
+    if not lag.any():
+        return "arrival times only"
+    return f"arrival {np.mean(lag):.1f} ms after the sample, jitter {np.std(lag):.1f} ms, {np.max(lag):.0f} ms at most"
 
 
 def _seen(views: list[dict[str, Any]]) -> str:
