@@ -64,3 +64,28 @@ def test_a_wrong_path_ends_in_words(view, tmp_path):
     assert done.returncode == 2
     assert "no file or folder" in done.stderr and "Traceback" not in done.stderr
     assert not (tmp_path / "e.rrd").exists()
+
+
+def test_a_folder_shows_the_only_thing_in_it(view, session, tmp_path):
+    folder = tmp_path / "work"
+    folder.mkdir()
+    (folder / "session").symlink_to(session, target_is_directory=True)
+    done = view(folder, "--picture", tmp_path / "e.png")
+    assert done.returncode == 0, done.stderr
+    assert f"{folder} holds a session folder: {folder / 'session'}" in done.stdout
+    assert (tmp_path / "e.png").is_file()
+
+
+def test_a_folder_with_several_things_names_them(view, session, tmp_path):
+    for name in ("monday", "tuesday"):
+        (tmp_path / name).symlink_to(session, target_is_directory=True)
+    done = view(tmp_path)
+    assert done.returncode == 2
+    assert f"{tmp_path} holds 2 things to view" in done.stderr
+    assert f"{tmp_path / 'tuesday'} (a session folder)" in done.stderr
+    assert f"next:    tacdata view {tmp_path / 'monday'}" in done.stderr
+
+
+def test_an_empty_folder_is_refused(view, tmp_path):
+    done = view(tmp_path, "--picture", tmp_path / "e.png")
+    assert done.returncode == 2 and "no finished recording" in done.stderr

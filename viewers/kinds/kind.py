@@ -30,6 +30,10 @@ class Kind(ABC):
     def claims(self, path: Path) -> bool:
         """Return whether a path is of this kind, by its name and the files in it; nothing large is read."""
 
+    def holds(self, path: Path) -> bool:
+        """Return whether a path that it claims has something to show."""
+        return path.exists()
+
     @abstractmethod
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return the scene.
@@ -61,6 +65,23 @@ def kind_of(path: Path) -> Kind:
     raise UsageError(
         given or f"no file or folder {path}", "; ".join(dict.fromkeys(k.NOUN for k in known)), "check the path"
     )
+
+
+DEEPEST = 2
+"""Levels of folders below a named one that are searched."""
+
+
+def contents(folder: Path) -> dict[Path, Kind]:
+    """Return what can be viewed in a folder that holds no recordings itself, by path."""
+    members = kinds()
+    paths = [path for level in range(1, DEEPEST + 1) for path in sorted(folder.glob("/".join(["*"] * level)))]
+    entries: dict[Path, Kind] = {}
+    for path in paths:
+        if path.is_dir() and not path.name.startswith(".") and not set(path.parents) & entries.keys():
+            kind = next((kind for kind in members if kind.claims(path) and kind.holds(path)), None)
+            if kind is not None:
+                entries[path] = kind
+    return entries
 
 
 def refuse(asked: Asked, noun: str, *allowed: str) -> None:

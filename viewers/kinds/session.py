@@ -26,6 +26,10 @@ class SessionKind(Kind):
         """Any folder: missing files are reported when it is opened."""
         return path.is_dir()
 
+    def holds(self, path: Path) -> bool:
+        """A folder with a recording in it."""
+        return bool(file_names.finished(path) or file_names.unfinished(path))
+
     def scene(self, path: Path, asked: Asked) -> Scene:
         """Return one episode; if none is named the first, or the first that the predictions are of."""
         from tacdata.viewers.parts.prediction_files import first_predicted

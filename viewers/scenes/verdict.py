@@ -80,7 +80,11 @@ def _distinguished(effect: dict[str, Any]) -> list[str]:
     """Return the nearest rivals by these recordings' own margins; the experiment only where a rival is open."""
     margins = sorted(effect.get("margins", {}).items(), key=lambda item: item[1])
     open_to = {*effect["alternatives"], effect["mechanism"]}
-    excluded = [f"{name} by {by:.1f}" for name, by in margins if load(name).called not in open_to][:RIVALS]
+    nearest: dict[str, float] = {}
+    for name, by in margins:
+        if load(name).called not in open_to:
+            nearest.setdefault(load(name).called, by)  # of several forms of a mechanism the nearest
+    excluded = [f"{name} by {by:.1f}" for name, by in nearest.items() if by > 0][:RIVALS]
     lines = []
     if excluded:
         lines.append(f"- distinguished in these recordings from: {', '.join(excluded)} standard errors")
@@ -93,7 +97,7 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
     """Return the verdict as Markdown: the conclusion, the evidence, the next step."""
     lines = [f"# {title}: {verdict['status']}", "", verdict["why"] + ".", ""]
     for effect in verdict["effects"]:
-        lines += [f"## {effect['title']} ({effect['effect']}, {effect['stage']}): {effect['status']}", ""]
+        lines += [f"## {effect['title']} ({effect['mechanism']}, {effect['stage']}): {effect['status']}", ""]
         for name, p in effect["parameters"].items():
             value = np.ravel(p["value"])
             shown = f"{value[0]:.4g}" if len(value) == 1 else f"{value.min():.3g} to {value.max():.3g}, one a channel"
@@ -105,9 +109,12 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
         if effect.get("confidence") is not None:
             lines.append(f"- probability that the name is right: {effect['confidence']:.0%}")
     gate, left = verdict["gate"], verdict["left"]
-    says = f"{GATE:g} or less says so"
     share = f" **Left** {left['share']:.1%} of what could be explained." if verdict["effects"] else ""
-    lines += ["", f"**Gap** p = {gate['p']:.3g} ({'there is one' if gate['gap'] else 'none'}: {says}).{share}", ""]
+    lines += [
+        "",
+        f"**Gap** p = {gate['p']:.3g} ({'a gap' if gate['gap'] else 'no gap'}; {GATE:g} or less is one).{share}",
+        "",
+    ]
     for heading, items in (
         ("Where it lives", verdict["located"]),
         ("Next", verdict["next"]),
@@ -118,7 +125,7 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
     if verdict["unjudgeable"]:
         lines += ["Cannot be judged here: " + ", ".join(verdict["unjudgeable"]) + ".", ""]
     if picture:
-        lines.append(f"A page with the residuals lies beside it: {picture}.")
+        lines.append(f"The page with the residuals is {picture}.")
     return "\n".join(lines)
 
 
@@ -145,7 +152,7 @@ def _margins(verdict: dict[str, Any]) -> list[Bars]:
     for effect in verdict["effects"]:
         if effect["margins"]:
             rivals = sorted(effect["margins"].items(), key=lambda pair: pair[1])
-            title = f"{effect['effect']}: by how many standard errors better than"
+            title = f"{effect['mechanism']}: by how many standard errors better than"
             found.append(
                 Bars(
                     f"margins/{effect['effect']}",
