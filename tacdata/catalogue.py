@@ -11,6 +11,8 @@ from pathlib import Path
 from tacdata import registry
 from tacdata.errors import UsageError
 
+TYPED = {"commands": "verbs"}
+"""Folders with another name in ``tacdata list``."""
 PACKAGES = ("tacdata", "tacdata.label_farm", "tacdata.training", "tacdata.viewers")
 
 
@@ -49,7 +51,8 @@ def registries() -> dict[str, Registry]:
         for node in ast.parse(text).body if "ROOM, BASE = " in text else ():
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "(ROOM, BASE)":
                 room, base = ast.literal_eval(node.value)
-                name = room.rsplit(".", 1)[-1]
+                folder = room.rsplit(".", 1)[-1]
+                name = TYPED.get(folder, folder)
                 by_name[name] = Registry(name, room, base, _first_line(_parse(_folder(room) / "__init__.py")))
     return dict(sorted(by_name.items()))
 

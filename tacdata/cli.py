@@ -1,15 +1,16 @@
-"""The one command: finds the verbs in `tacdata/commands`, orders them as the pipeline, turns errors into words."""
+"""The one command: finds the verbs in `tacdata/commands`, orders them by task, turns errors into words."""
 
 from __future__ import annotations
 
+import difflib
 import functools
 import inspect
 import io
 import itertools
 import re
 import sys
-from collections.abc import Callable
-from contextlib import nullcontext, redirect_stdout
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext, redirect_stdout, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
@@ -18,7 +19,7 @@ try:
     import typer
 
     from tacdata import progress, registry, stages
-    from tacdata.commands.command import Result
+    from tacdata.commands.command import Result, members
     from tacdata.errors import Exit, TacdataError, UsageError, refused_by_system
     from tacdata.extras import missing_package
 except KeyboardInterrupt:  # these imports take most of the first half second
@@ -27,6 +28,7 @@ except KeyboardInterrupt:  # these imports take most of the first half second
 
 ROOM, BASE = "tacdata.commands", "command"
 QUIET, JSON = "quiet", "as_json"
+HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
 OPTIONS = {
     QUIET: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no hints: only results and errors.")],
     JSON: Annotated[bool, typer.Option("--json", help="Print the result as JSON; words go to standard error.")],
@@ -38,18 +40,21 @@ def application() -> typer.Typer:
     """Build the command line from the folder `tacdata/commands`: one file, one verb."""
     app = typer.Typer(
         name="tacdata",
-        help="The data engine for soft tactile skins. Verbs stand in the order of the pipeline.",
+        help="The data engine for soft tactile skins. Verbs by task, in the order in which a person meets them.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode="markdown",
+        context_settings=HELP_OPTIONS,
         callback=_before,
     )
-    for module, name in _members(ROOM):
+    for module, name in members(ROOM, BASE):
         if _is_group(module):
             app.add_typer(_group(module, name), name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)
         else:
             verb = answering(f"tacdata {name}", module.run)
-            app.command(name=name, help=module.run.__doc__, rich_help_panel=module.PANEL)(verb)
+            app.command(name=name, help=module.run.__doc__, epilog=_examples(module), rich_help_panel=module.PANEL)(
+                verb
+            )
     return app
 
 
@@ -59,7 +64,7 @@ def _is_group(verb: ModuleType) -> bool:
 
 def _verbs(room: str = ROOM) -> tuple[Callable[..., Any], ...]:
     """Return the functions of a room's verbs, those of its groups among them."""
-    modules = [module for module, _ in _members(room)]
+    modules = [module for module, _ in members(room, BASE)]
     below = [_verbs(module.__name__) for module in modules if _is_group(module)]
     return (*(module.run for module in modules), *itertools.chain(*below))
 
@@ -73,17 +78,16 @@ def _command(verbs: tuple[Callable[..., Any], ...]) -> Any:
 def _group(room: ModuleType, name: str) -> typer.Typer:
     """Return a verb that is a folder: each file in it is a verb below it."""
     group = typer.Typer(no_args_is_help=True, rich_markup_mode="markdown")
-    for module, below in _members(room.__name__):
+    for module, below in members(room.__name__, BASE):
         verb = answering(f"tacdata {name} {below}", module.run)
-        group.command(name=below, help=module.run.__doc__)(verb)
+        group.command(name=below, help=module.run.__doc__, epilog=_examples(module))(verb)
     return group
 
 
-def _members(room: str) -> list[tuple[ModuleType, str]]:
-    """Return a room's verbs and how they are typed, in their order."""
-    modules = [registry.load_module(room, BASE, name) for name in registry.names(room, BASE)]
-    modules.sort(key=lambda module: (module.ORDER, module.__name__))
-    return [(module, module.__name__.rsplit(".", 1)[-1].replace("_", "-")) for module in modules]
+def _examples(verb: ModuleType) -> str:
+    """Return a verb's examples as the last part of its help; a verb of a plug-in may have none."""
+    examples = getattr(verb, "EXAMPLES", ())
+    return "\n\n".join(["**Examples**", *(f"- `{line}`" for line in examples)]) if examples else ""
 
 
 def _version(asked: bool) -> None:
@@ -168,6 +172,33 @@ MISTYPED: Any = typer.BadParameter.__mro__[1]
 """Typer's errors for a line that does not fit a verb."""
 
 
+def closest(name: str, names: Iterable[str]) -> str:
+    """Return the question whether the most similar of some names was meant; an empty text if none is similar."""
+    close = difflib.get_close_matches(name, list(names), n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
+def missing_path(error: TacdataError, arguments: Sequence[str]) -> str:
+    """Return the question whether a neighbour was meant, for a path that was typed and does not exist.
+
+    Args:
+        error: The error; a path counts only where its message names it.
+        arguments: The words that were typed, the verb first.
+    """
+    names = [word for word in arguments if not word.startswith("-")]
+    for word in names[1:]:  # the first is the verb
+        path = Path(word)
+        if path.exists() or not path.name or word not in error.given:
+            continue
+        folder = next((parent for parent in path.parents if parent.is_dir()), None)
+        first = path.parts[len(folder.parts)] if folder and folder != Path() else path.parts[0]
+        with suppress(OSError):
+            neighbours = [entry.name for entry in folder.iterdir()] if folder else []
+            if close := difflib.get_close_matches(first, neighbours, n=1):
+                return f"did you mean {folder / close[0]}?" if folder else ""
+    return ""
+
+
 def in_words(error: Any) -> UsageError:
     """Return the fault of a typed line in three parts: given, allowed, remedy."""
     context, kind = error.ctx, type(error).__name__
@@ -187,11 +218,13 @@ def in_words(error: Any) -> UsageError:
             for option in parameter_info.opts
             if option[:2] == "--"
         ]
-        return UsageError(f"{path} with {error.option_name}", ", ".join(sorted(allowed_names)), remedy)
+        suggestion = closest(error.option_name, allowed_names)
+        return UsageError(f"{path} with {error.option_name}", ", ".join(sorted(allowed_names)), suggestion + remedy)
     if kind == "NoSuchCommand" or "No such command" in error.message:
-        allowed_names = ", ".join(context.command.list_commands(context))
-        problem = error.message.rstrip(".").replace("No such command", f"{path} has no verb")
-        return UsageError(problem, allowed_names, remedy)
+        verbs = context.command.list_commands(context)
+        name = re.search(r"No such command '([^']*)'", error.message)
+        problem = f"{path} has no verb '{name[1] if name else ''}'"
+        return UsageError(problem, ", ".join(verbs), (closest(name[1], verbs) if name else "") + remedy)
     if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)", error.message):
         return UsageError(f"{path} with {extra[1]}, which it has no place for", allowed, f"leave it out; {remedy}")
     return UsageError(f"{path}: {error.format_message().rstrip('.')}", allowed, remedy)
@@ -219,6 +252,9 @@ def main() -> None:
         print("interrupted", file=sys.stderr)
         raise SystemExit(int(Exit.INTERRUPTED)) from None
     except TacdataError as error:
+        suggestion = missing_path(error, sys.argv[1:])
+        if suggestion:
+            error.args = (str(error).replace("  next:    ", f"  next:    {suggestion} ", 1),)
         print("\n".join([f"error: {error}", *last_words(error)]), file=sys.stderr)
         raise SystemExit(int(error.exit_code)) from None
     except KeyboardInterrupt as error:

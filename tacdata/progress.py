@@ -57,6 +57,44 @@ def console() -> Console:
     return Console(stderr=True, quiet=_quiet)
 
 
+LEAST_DONE, LEAST_SHARE = 5, 0.02
+"""Finished items [count], and their share of all [1], from which the time of the others is estimated. The first items
+of a batch bear the cost of compiling and of the whole batch."""
+
+
+def remaining(done: int, total: int, seconds: float) -> str:
+    """Return the estimated time of the items that are not finished, such as "about 12 min left".
+
+    Empty as long as too few are finished for an estimate, or if none is missing.
+
+    Args:
+        done: Finished items.
+        total: All items.
+        seconds: Time that the finished ones took [s].
+
+    Example:
+        >>> from tacdata.progress import remaining
+        >>> remaining(1, 7339, 87.0), remaining(200, 7339, 174.0)
+        ('', 'about 104 min left')
+    """
+    if done >= total or done < max(LEAST_DONE, LEAST_SHARE * total):
+        return ""
+    expected = seconds * (total - done) / done
+    return f"about {expected:.0f} s left" if expected < 120 else f"about {expected / 60:.0f} min left"
+
+
+def remaining_column() -> ProgressColumn:
+    """Return a column of a progress bar with `remaining`."""
+    from rich.progress import ProgressColumn as Column
+    from rich.text import Text
+
+    class Remaining(Column):
+        def render(self, task: Any) -> Text:
+            return Text(remaining(int(task.completed), int(task.total or 0), task.elapsed or 0.0))
+
+    return Remaining()
+
+
 def bars(*columns: str | ProgressColumn, **options: Any) -> Progress:
     """Return rich's progress bars, with its arguments."""
     from rich.console import Console

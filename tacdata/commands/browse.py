@@ -7,14 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import DATA, Result
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.viewers.browse.episode_list import EpisodeList
 
-ORDER = 71
-PANEL = PIPELINE
+ORDER = 30
+PANEL = DATA
+EXAMPLES = (
+    "tacdata browse session",
+    "tacdata browse dataset --where 'depth>0.8' --sort=-depth",
+    "tacdata browse dataset --predictions network --sort error --web",
+)
 
 
 def run(

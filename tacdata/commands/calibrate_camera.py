@@ -8,15 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import RECORD, Result
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.tags.board import Board
     from tacdata.tags.calibration.view_picker import ViewPicker
 
-ORDER = 104
-PANEL = TOOLS
+ORDER = 70
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata calibrate-camera --board board.yaml --draw board.pdf",
+    "tacdata calibrate-camera --board board.yaml --source images --out camera.yaml",
+    "tacdata calibrate-camera --board board.yaml --source 0 --out camera.yaml",
+)
 
 
 def run(

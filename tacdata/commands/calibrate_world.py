@@ -9,14 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import RECORD, Result
 from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.camera_world import CameraWorld
 
-ORDER = 105
-PANEL = TOOLS
+ORDER = 80
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata calibrate-world --pairs pairs.yaml --out eye.yaml",
+    "tacdata calibrate-world --board board.yaml --images views --calibration camera.yaml --out world.yaml",
+    "tacdata calibrate-world --pairs pairs.yaml --camera left --out left.yaml",
+)
 
 
 def run(

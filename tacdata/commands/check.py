@@ -7,15 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import RECORD, Result
 from tacdata.errors import Exit
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.recording.check.report import Report
 
-ORDER = 20
-PANEL = PIPELINE
+ORDER = 40
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata check session",
+    "tacdata check session/episode-000003.mcap",
+    "tacdata check session --json --out report",
+)
 
 
 def run(

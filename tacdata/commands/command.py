@@ -2,9 +2,9 @@
 
 A module in this folder named ``my_verb.py`` becomes ``tacdata my-verb``. It holds
 
-- ``ORDER``: its place in ``tacdata --help`` (record 10, check 20, label 30, pack 40, train 50, evaluate 60, view 70;
-  tools around the pipeline from 100 on);
-- ``PANEL``: ``PIPELINE`` or ``TOOLS``, its heading;
+- ``PANEL``: one of `TASKS`, its heading in ``tacdata --help``;
+- ``ORDER``: its place under the heading, in the order in which a person meets the verbs;
+- ``EXAMPLES``: three command lines that ``--help`` shows;
 - ``run(...)``: a Typer command. ``--help`` shows the first line of its docstring. Heavy imports stay inside it.
   Bad input raises a `tacdata.errors.TacdataError`; the command line prints it and exits with its code.
 
@@ -22,12 +22,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import PurePath
+from types import ModuleType
 from typing import Any
 
+from tacdata import registry
 from tacdata.errors import Exit, TacdataError
 
-PIPELINE = "The pipeline, in order"
-TOOLS = "Around it"
+START = "Start"
+RECORD = "Record: rig, plan, recordings"
+DATA = "Data: import, look, label, pack"
+LEARN = "Learn: train and score networks"
+FIND = "Find the missing physical effect"
+HANDS = "Hands and robots"
+FARM = "Label farm"
+TASKS = (START, RECORD, DATA, LEARN, FIND, HANDS, FARM)
+"""Headings of ``tacdata --help``, in the order in which a person meets them."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +52,19 @@ class Result:
     def text(self) -> str:
         """The document as JSON."""
         return json.dumps(plain(self.document), indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def members(room: str, base: str) -> list[tuple[ModuleType, str]]:
+    """Return a room's verbs and their names as they are typed, by task and in their order.
+
+    Args:
+        room: Dotted package name, such as ``tacdata.commands``.
+        base: File name of the room's base, which is no verb.
+    """
+    modules = [registry.load_module(room, base, name) for name in registry.names(room, base)]
+    ranks = {panel: rank for rank, panel in enumerate(TASKS)}
+    modules.sort(key=lambda module: (ranks.get(getattr(module, "PANEL", ""), len(ranks)), module.ORDER))
+    return [(module, module.__name__.rsplit(".", 1)[-1].replace("_", "-")) for module in modules]
 
 
 @contextmanager

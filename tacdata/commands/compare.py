@@ -7,14 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import DATA, Result
 from tacdata.errors import UsageError
 
 if TYPE_CHECKING:
     from tacdata.viewers.scene.scene import Scene
 
-ORDER = 72
-PANEL = PIPELINE
+ORDER = 50
+PANEL = DATA
+EXAMPLES = (
+    "tacdata compare session --labels relabelled --episode 3",
+    "tacdata compare dataset --predictions network --predictions history",
+    "tacdata compare session --spec before.json --spec after.json",
+)
 
 
 def run(

@@ -12,13 +12,14 @@ from typing import Annotated
 import typer
 
 from tacdata import stages
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import START, Result
 from tacdata.errors import SolveError, UsageError
 from tacdata.extras import require
 from tacdata.progress import say
 
-ORDER = 100
-PANEL = TOOLS
+ORDER = 20
+PANEL = START
+EXAMPLES = ("tacdata demo", "tacdata demo --presses 24 --epochs 5 --out small", "tacdata demo --seed 2 --out second")
 EXTRAS = ("fem", "learn", "view")
 START_LIMIT = 60.0
 """Time that the virtual rig may take to open its ports [s]."""

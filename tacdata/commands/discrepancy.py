@@ -9,10 +9,15 @@ from typing import Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import FIND, Result
 
-ORDER = 160
-PANEL = TOOLS
+ORDER = 10
+PANEL = FIND
+EXAMPLES = (
+    "tacdata discrepancy session --out verdict",
+    "tacdata discrepancy tuesday --reference monday --out changed",
+    "tacdata discrepancy session --spec spec.json --out verdict",
+)
 
 
 def run(

@@ -8,10 +8,15 @@ from typing import Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import LEARN, Result
 
-ORDER = 60
-PANEL = PIPELINE
+ORDER = 20
+PANEL = LEARN
+EXAMPLES = (
+    "tacdata evaluate network",
+    "tacdata evaluate network --dataset unseen --out scores",
+    "tacdata evaluate network --device cpu --json",
+)
 
 
 def run(

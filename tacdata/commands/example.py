@@ -8,11 +8,12 @@ from typing import Annotated
 import typer
 
 from tacdata.commands import check
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import START, Result
 from tacdata.progress import say
 
-ORDER = 100
-PANEL = TOOLS
+ORDER = 10
+PANEL = START
+EXAMPLES = ("tacdata example", "tacdata example /tmp/first_look", "tacdata example mine --quiet")
 PICTURE = "press.png"
 
 

@@ -8,15 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import HANDS, Result
 from tacdata.errors import Exit
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
     from tacdata.replay.targets import FingertipTargets
 
-ORDER = 121
-PANEL = TOOLS
+ORDER = 20
+PANEL = HANDS
+EXAMPLES = (
+    "tacdata export demos --out targets --format lerobot",
+    "tacdata export demos --out targets --format csv --direct",
+    "tacdata export demos --out joints --format joints --robot robot.yaml",
+)
 SESSION = "session.json"
 """Content of a folder of recorded presses."""
 

@@ -7,10 +7,15 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import LEARN, Result
 
-ORDER = 163
-PANEL = TOOLS
+ORDER = 70
+PANEL = LEARN
+EXAMPLES = (
+    "tacdata export-network network --out network.onnx",
+    "tacdata export-network network --dataset dataset --out network.onnx",
+    "tacdata export-network network/best.pt --out network.onnx --json",
+)
 
 
 def run(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import LEARN, Result
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -16,8 +16,13 @@ if TYPE_CHECKING:
     from tacdata.training.settings import TrainingSettings
     from tacdata.training.train import Progress
 
-ORDER = 64
-PANEL = PIPELINE
+ORDER = 50
+PANEL = LEARN
+EXAMPLES = (
+    "tacdata generalize dataset --out generalize",
+    "tacdata generalize dataset --split shape --split depth --out generalize",
+    "tacdata generalize dataset --network pattern --seeds 3 --out generalize",
+)
 REPORT = "report.html"
 
 

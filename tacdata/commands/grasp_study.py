@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import HANDS, Result
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -15,8 +15,13 @@ if TYPE_CHECKING:
     from tacdata.sensor import Sensor
     from tacdata.training.frames.frames import Frames
 
-ORDER = 124
-PANEL = TOOLS
+ORDER = 50
+PANEL = HANDS
+EXAMPLES = (
+    "tacdata grasp-study --out study",
+    "tacdata grasp-study --network network --out study",
+    "tacdata grasp-study --repeats 3 --seed 1 --out study",
+)
 RESULT, PICTURE, NETWORK = "grasp_study.json", "grasp_study.png", "network"
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import RECORD, Result
 from tacdata.errors import Exit
 from tacdata.progress import say
 
@@ -15,8 +15,13 @@ if TYPE_CHECKING:
     from tacdata.health.network_error import NetworkError
     from tacdata.health.visit import Visit
 
-ORDER = 102
-PANEL = TOOLS
+ORDER = 60
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata health monday tuesday --out health",
+    "tacdata health monday tuesday --model network",
+    "tacdata health monday --json",
+)
 
 
 def run(

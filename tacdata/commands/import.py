@@ -7,12 +7,17 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import DATA, Result
 from tacdata.errors import Exit
 from tacdata.progress import say, suggest
 
-ORDER = 15
-PANEL = PIPELINE
+ORDER = 10
+PANEL = DATA
+EXAMPLES = (
+    "tacdata import measured --propose mapping.yaml",
+    "tacdata import measured --mapping mapping.yaml --out session",
+    "tacdata import bag --mapping mapping.yaml --out session --json",
+)
 
 
 def run(

@@ -9,15 +9,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import DATA, Result
 from tacdata.errors import SolveError
-from tacdata.progress import bars, say, suggest
+from tacdata.progress import bars, remaining, remaining_column, say, suggest
 
 if TYPE_CHECKING:
     from tacdata.label_farm.labelling import LabellingSummary
 
-ORDER = 30
-PANEL = PIPELINE
+ORDER = 40
+PANEL = DATA
+EXAMPLES = (
+    "tacdata label session",
+    "tacdata label session --no-uncertainty --workers 2",
+    "tacdata label session --follow --into dataset",
+)
 
 
 def run(
@@ -88,17 +93,10 @@ class _Bars:
     """One bar a stage, with the time that remains; a line a press where there is no terminal."""
 
     def __enter__(self) -> _Bars:
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
         self._progress = bars(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("remaining"),
-            # A press takes seconds to minutes, so the speed is estimated from all that this run has solved.
-            TimeRemainingColumn(elapsed_when_finished=False),
-            speed_estimate_period=24 * 3600.0,
+            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), remaining_column()
         )
         if sys.stdout.isatty():
             self._progress.start()
@@ -109,6 +107,9 @@ class _Bars:
     def __exit__(self, *exception: object) -> None:
         self._progress.stop()
 
+    def _estimate(self, done: int, total: int) -> str:
+        return remaining(done, total, time.monotonic() - self._began)
+
     def show(self, stage: str, done: int, total: int) -> None:
         """Move the bar of a stage."""
         names = {"read": "reading recordings", "look": "looking for labels", "solve": "solving presses"}
@@ -116,8 +117,7 @@ class _Bars:
             self._tasks[stage] = self._progress.add_task(names[stage], total=total)
         self._progress.update(self._tasks[stage], completed=done)
         if not sys.stdout.isatty() and stage == "solve" and done:
-            seconds = (time.monotonic() - self._began) * (total - done) / done
-            say(f"  press {done} of {total} solved, about {seconds:.0f} s left")
+            say(", ".join(filter(None, [f"  press {done} of {total} solved", self._estimate(done, total)])))
 
 
 def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import LEARN, Result
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -16,8 +16,13 @@ if TYPE_CHECKING:
     from tacdata.training.pretraining.learning_curve import CurvePoint
     from tacdata.training.train import Progress
 
-ORDER = 65
-PANEL = PIPELINE
+ORDER = 60
+PANEL = LEARN
+EXAMPLES = (
+    "tacdata learning-curve dataset --out curve",
+    "tacdata learning-curve dataset --presses 0,3,10 --out curve",
+    "tacdata learning-curve dataset --from none --network history --out curve",
+)
 PICTURE = "curve.png"
 NONE = "none"
 """A start without a pretrained network, for a sensor that has none."""

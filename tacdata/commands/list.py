@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from tacdata import catalogue
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import START, TASKS, Result, members
 from tacdata.progress import say
 
-ORDER = 110
-PANEL = TOOLS
+ORDER = 30
+PANEL = START
+EXAMPLES = ("tacdata list", "tacdata list verbs", "tacdata list indenters --json")
 
 
 def run(
@@ -28,9 +29,31 @@ def run(
             print(f"{folder['name']:<12} {folder['members']:>3}  {folder['meaning']}")
         say("\nnext: tacdata list ROOM, for example `tacdata list indenters`")
         return Result(folders)
-    members = catalogue.members(room)
-    for member in members:
+    if room in ("verbs", "commands"):
+        return Result(_verbs())
+    entries = catalogue.members(room)
+    for member in entries:
         print(f"{member.name:<16} {member.meaning}")
         for name, meaning in member.parameters:
             print(f"{'':<16}   {name}: {meaning}")
-    return Result([{**asdict(member), "parameters": dict(member.parameters)} for member in members])
+    return Result([{**asdict(member), "parameters": dict(member.parameters)} for member in entries])
+
+
+def _verbs() -> list[dict[str, Any]]:
+    """Print the verbs by task; return name, task, meaning and examples of each."""
+    verbs = [
+        {
+            "name": name,
+            "task": module.PANEL,
+            "meaning": (module.run.__doc__ or "").split("\n")[0],
+            "examples": getattr(module, "EXAMPLES", ()),
+        }
+        for module, name in members("tacdata.commands", "command")
+    ]
+    for task in TASKS:
+        print(task)
+        for verb in verbs:
+            if verb["task"] == task:
+                print(f"  {verb['name']:<16} {verb['meaning']}")
+    say("\nnext: tacdata VERB -h, for example `tacdata record -h`")
+    return verbs

@@ -12,14 +12,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import HANDS, Result
 from tacdata.progress import say
 
 if TYPE_CHECKING:
     from tacdata.live.live_loop import LiveLoop
 
-ORDER = 122
-PANEL = TOOLS
+ORDER = 40
+PANEL = HANDS
+EXAMPLES = (
+    "tacdata live shipped --rig rig.yaml",
+    "tacdata live shipped --rig rig.yaml --view window",
+    "tacdata live network --rig demo_rig.yaml --finger index --socket 7000",
+)
 
 
 def run(

@@ -7,11 +7,16 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import DATA, Result
 from tacdata.progress import say, suggest
 
-ORDER = 40
-PANEL = PIPELINE
+ORDER = 60
+PANEL = DATA
+EXAMPLES = (
+    "tacdata pack session --out dataset",
+    "tacdata pack tuesday --out dataset --append",
+    "tacdata pack session --labels relabelled --out dataset",
+)
 
 
 def run(

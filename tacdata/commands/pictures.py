@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import START, Result
 
-ORDER = 170
-PANEL = TOOLS
+ORDER = 90
+PANEL = START
+EXAMPLES = ("tacdata pictures", "tacdata pictures demo --out docs/pictures", "tacdata pictures demo --verdict verdict")
 
 
 def run(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import RECORD, Result
 from tacdata.progress import suggest
 
 if TYPE_CHECKING:
@@ -15,8 +15,13 @@ if TYPE_CHECKING:
     from tacdata.recording.motion.plan_time import PlanTime
     from tacdata.sensor import Sensor
 
-ORDER = 101
-PANEL = TOOLS
+ORDER = 20
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata plan training --presses 200 --out plan.yaml",
+    "tacdata plan health --out health.yaml --picture plan.png",
+    "tacdata plan diagnostic --indenter sphere_2 --out diagnostic.yaml",
+)
 
 
 def run(

@@ -7,10 +7,15 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import LEARN, Result
 
-ORDER = 62
-PANEL = PIPELINE
+ORDER = 40
+PANEL = LEARN
+EXAMPLES = (
+    "tacdata protocols trials",
+    "tacdata protocols trials --network network",
+    "tacdata protocols trials --network network --out protocols",
+)
 JSON, SHEET = "protocols.json", "protocols.md"
 
 

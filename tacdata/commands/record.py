@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import PIPELINE, Result, before_it_moves
+from tacdata.commands.command import RECORD, Result, before_it_moves
 from tacdata.errors import Exit
 from tacdata.progress import say, suggest
 
@@ -20,8 +20,13 @@ if TYPE_CHECKING:
     from tacdata.plans import Press
     from tacdata.rig import Rig
 
-ORDER = 10
-PANEL = PIPELINE
+ORDER = 30
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata record --rig rig.yaml --plan plan.yaml --out session",
+    "tacdata record --rig rig.yaml --plan plan.yaml --out session --resume",
+    "tacdata record --demo --rig demo_rig.yaml --out demos --seconds 18",
+)
 
 
 def run(

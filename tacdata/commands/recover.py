@@ -7,10 +7,15 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import RECORD, Result
 
-ORDER = 120
-PANEL = TOOLS
+ORDER = 50
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata recover session/episode-000003.partial.mcap",
+    "tacdata recover cut.mcap --out whole.mcap",
+    "tacdata recover cut.mcap --json",
+)
 
 
 def run(

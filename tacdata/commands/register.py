@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result, before_it_moves
+from tacdata.commands.command import RECORD, Result, before_it_moves
 from tacdata.errors import Exit
 from tacdata.progress import say, suggest
 
@@ -21,8 +21,13 @@ if TYPE_CHECKING:
     from tacdata.rig import Rig
     from tacdata.sensor import Sensor
 
-ORDER = 5
-PANEL = PIPELINE
+ORDER = 10
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata register --rig rig.yaml",
+    "tacdata register --rig rig.yaml --indenter sphere_2 --depth 0.3",
+    "tacdata register --rig rig.yaml --taxel 0 --taxel 23 --yes",
+)
 
 
 def run(

@@ -7,15 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import HANDS, Result
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
     from tacdata.replay.comparison.trials import Trials
     from tacdata.replay.scene import ReplayScene
 
-ORDER = 123
-PANEL = TOOLS
+ORDER = 30
+PANEL = HANDS
+EXAMPLES = (
+    "tacdata replay demos",
+    "tacdata replay demos/episode-000000.mcap --seeds 20 --out replay.json",
+    "tacdata replay demos --find-gain --video replay.mp4",
+)
 
 
 def run(

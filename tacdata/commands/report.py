@@ -7,11 +7,16 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import LEARN, Result
 from tacdata.progress import say
 
-ORDER = 66
-PANEL = PIPELINE
+ORDER = 30
+PANEL = LEARN
+EXAMPLES = (
+    "tacdata report network --out report.html",
+    "tacdata report pattern history --out report.html",
+    "tacdata report network --dataset unseen --out unseen.html",
+)
 
 
 def run(

@@ -8,11 +8,16 @@ from typing import Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import FIND, Result
 from tacdata.progress import say, suggest
 
-ORDER = 162
-PANEL = TOOLS
+ORDER = 20
+PANEL = FIND
+EXAMPLES = (
+    "tacdata revise verdict session --out revised",
+    "tacdata revise verdict session --out revised --suspected --corrected",
+    "tacdata revise verdict session --out revised --presses 8",
+)
 
 
 def run(

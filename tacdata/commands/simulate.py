@@ -9,14 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
-from tacdata.progress import bars, say, suggest
+from tacdata.commands.command import DATA, Result
+from tacdata.progress import bars, remaining, remaining_column, say, suggest
 
 if TYPE_CHECKING:
     from tacdata.pipeline.simulate import SimulatedPresses
 
-ORDER = 45
-PANEL = PIPELINE
+ORDER = 90
+PANEL = DATA
+EXAMPLES = (
+    "tacdata simulate --presses 100 --out simulated",
+    "tacdata simulate plan.yaml --out simulated --workers 2",
+    "tacdata simulate --presses 50 --effects effects.json --out worn",
+)
 SAY_SECONDS = 30.0
 """Seconds between two lines of progress where there is no terminal."""
 
@@ -87,7 +92,9 @@ class _Bars:
     """A bar a stage, with the time that remains; a line now and then where there is no terminal."""
 
     def __init__(self) -> None:
-        self._bar = bars(speed_estimate_period=24 * 3600.0)
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+
+        self._bar = bars(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), remaining_column())
         self._tasks: dict = {}
         self.solving_seconds = 0.0
 
@@ -111,8 +118,8 @@ class _Bars:
         self.solving_seconds = time.monotonic() - self._began
         if not sys.stdout.isatty() and time.monotonic() - self._spoke > SAY_SECONDS:
             self._spoke = time.monotonic()
-            minutes = self.solving_seconds * (total - done) / done / 60
-            say(f"  press {done} of {total} solved, about {minutes:.0f} min left")
+            estimate = remaining(done, total, self.solving_seconds)
+            say(", ".join(filter(None, [f"  press {done} of {total} solved", estimate])))
 
 
 def _report(done: SimulatedPresses, seconds: float) -> None:

@@ -9,10 +9,15 @@ from typing import Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import DATA, Result
 
-ORDER = 130
-PANEL = TOOLS
+ORDER = 95
+PANEL = DATA
+EXAMPLES = (
+    "tacdata solve case.yaml",
+    "tacdata solve case.yaml --out solved --picture",
+    "tacdata solve case.yaml --json",
+)
 
 
 def run(

@@ -7,10 +7,15 @@ from typing import Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import HANDS, Result
 
-ORDER = 165
-PANEL = TOOLS
+ORDER = 60
+PANEL = HANDS
+EXAMPLES = (
+    "tacdata success trials.csv",
+    "tacdata success dense=35/40 sparse=21/40",
+    "tacdata success trials.csv --group edge=1,2,7,8 --paper",
+)
 
 
 def run(

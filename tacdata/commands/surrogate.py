@@ -8,12 +8,17 @@ from typing import Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import FIND, Result
 from tacdata.errors import UsageError
 from tacdata.progress import say, suggest
 
-ORDER = 158
-PANEL = TOOLS
+ORDER = 30
+PANEL = FIND
+EXAMPLES = (
+    "tacdata surrogate session --dry-run --out base",
+    "tacdata surrogate session --out base",
+    "tacdata surrogate session --fine --out base",
+)
 
 
 def run(

@@ -8,15 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS, Result
+from tacdata.commands.command import HANDS, Result
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
     from tacdata.demonstrations.paths.estimator import Estimator
 
-ORDER = 120
-PANEL = TOOLS
+ORDER = 10
+PANEL = HANDS
+EXAMPLES = (
+    "tacdata track demos",
+    "tacdata track demos --network shipped",
+    "tacdata track demos --network thumb=thumb_network --rate 60",
+)
 
 
 def run(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import LEARN, Result
 from tacdata.progress import bars, suggest
 
 if TYPE_CHECKING:
@@ -18,8 +18,13 @@ if TYPE_CHECKING:
     from tacdata.training.inference.checkpoint import Checkpoint
     from tacdata.training.train import Progress
 
-ORDER = 50
-PANEL = PIPELINE
+ORDER = 10
+PANEL = LEARN
+EXAMPLES = (
+    "tacdata train dataset --network pattern --out network",
+    "tacdata train dataset --from shipped --out network",
+    "tacdata train dataset --out network --resume",
+)
 
 
 def run(

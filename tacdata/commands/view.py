@@ -8,10 +8,17 @@ from typing import Annotated
 import typer
 
 from tacdata.commands import browse
-from tacdata.commands.command import PIPELINE, Result
+from tacdata.commands.command import DATA, Result
+from tacdata.errors import UsageError
+from tacdata.progress import say
 
-ORDER = 70
-PANEL = PIPELINE
+ORDER = 20
+PANEL = DATA
+EXAMPLES = (
+    "tacdata view session",
+    "tacdata view session --episode 3 --predictions network",
+    "tacdata view verdict --picture verdict.png",
+)
 
 
 def run(
@@ -46,6 +53,7 @@ def run(
         write_foxglove_layout(path, foxglove)
         print(f"saved {foxglove}; in Foxglove open {path}, then Layouts, Import from file")
         return Result({"written": [foxglove]})
+    path = viewable(path)
     output = showing.Output(save, picture, video, web)
     output.check()
     path = following.meant(path) if episode is None else path
@@ -61,6 +69,25 @@ def run(
     scene = scene_at(path, labels, predictions, episode, output.prepare)
     showing.show(scene, output)
     return Result({"shown": scene.title, "found": scene.found, "written": output.files})
+
+
+def viewable(path: Path) -> Path:
+    """Return a path, or the only thing to view in a folder that is none itself.
+
+    Raises:
+        UsageError: If a folder holds several things to view.
+    """
+    from tacdata.viewers.kinds.kind import contents, kind_of
+
+    if not path.is_dir() or kind_of(path).holds(path):
+        return path
+    entries = contents(path)
+    if len(entries) > 1:
+        listed = "; ".join(f"{entry} ({kind.NOUN})" for entry, kind in entries.items())
+        raise UsageError(f"{path} holds {len(entries)} things to view", listed, f"tacdata view {next(iter(entries))}")
+    for entry, kind in entries.items():
+        say(f"{path} holds {kind.NOUN}: {entry}")
+    return next(iter(entries), path)
 
 
 def _is_list(path: Path) -> bool:

@@ -9,12 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import RECORD
 
 if TYPE_CHECKING:
     from tacdata.sensor import Sensor
 
-ORDER, PANEL = 110, TOOLS
+ORDER = 5
+PANEL = RECORD
+EXAMPLES = (
+    "tacdata virtual-rig rig",
+    "tacdata virtual-rig rig --rough --seed 3",
+    "tacdata virtual-rig hands --demo --task wipe",
+)
 
 
 def run(

@@ -163,3 +163,12 @@ def test_a_shell_can_complete_verbs(monkeypatch):
     assert shown.output.split() == ["evaluate"]
     monkeypatch.delenv("_TACDATA_COMPLETE")
     assert "--install-completion" in tacdata("--help").output
+
+
+def test_no_time_is_estimated_from_the_first_items_of_a_batch():
+    assert progress.remaining(1, 7339, 87.0) == ""
+    assert progress.remaining(4, 50, 40.0) == ""
+    assert progress.remaining(5, 50, 50.0) == "about 8 min left"
+    assert progress.remaining(40, 50, 40.0) == "about 10 s left"
+    assert progress.remaining(50, 50, 50.0) == ""
+    assert progress.remaining(0, 0, 0.0) == ""

@@ -7,7 +7,9 @@ LINES = {
     "check": ("tacdata check without path", "tacdata check [OPTIONS]", "name it; tacdata check --help explains each"),
     "check a b c": ("tacdata check with b c, which it has no place for", "tacdata check [OPTIONS]", "leave it out"),
     "check --nope a": ("tacdata check with --nope", "--help, --json, --out, --quiet", "tacdata check --help"),
-    "chek a": ("tacdata has no verb 'chek'", "register, record, import, check", "tacdata --help explains each"),
+    "check --jsn a": ("tacdata check with --jsn", "--help, --json", "did you mean --json? tacdata check --help"),
+    "chek a": ("tacdata has no verb 'chek'", "register, plan, record, check", "did you mean check? tacdata --help"),
+    "farm statu": ("tacdata farm has no verb 'statu'", "status", "did you mean status? tacdata farm --help"),
     "farm nope": ("tacdata farm has no verb 'nope'", "up, send, submit", "tacdata farm --help explains each"),
     "record --rig": ("--rig without a value", "a value behind it", "name it"),
     "record --plan p": ("tacdata record without --", "tacdata record [OPTIONS]", "name it; tacdata record --help"),
@@ -32,3 +34,12 @@ def test_help_and_version_end_as_before(line, code):
     done = tacdata(*line.split())
     assert done.returncode == code
     assert "tacdata" in done.stdout + done.stderr
+
+
+def test_a_path_that_does_not_exist_is_answered_with_its_neighbour(tmp_path):
+    (tmp_path / "monday" / "session").mkdir(parents=True)
+    for typed, meant in (("monday/sesion", "monday/session"), ("mondya/session", "monday")):
+        done = tacdata("check", typed, folder=tmp_path)
+        assert done.returncode == 2
+        assert f"next:    did you mean {meant}?" in done.stderr
+    assert "did you mean" not in tacdata("check", "xyz", folder=tmp_path).stderr

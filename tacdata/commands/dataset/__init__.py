@@ -1,9 +1,9 @@
 """Edits of datasets; each file in this folder is a verb below ``tacdata dataset``."""
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import DATA
 
-ORDER = 103
-PANEL = TOOLS
+ORDER = 80
+PANEL = DATA
 
 
 def run() -> None:

@@ -11,6 +11,11 @@ from tacdata.commands.command import Result
 from tacdata.progress import suggest
 
 ORDER = 20
+EXAMPLES = (
+    "tacdata dataset delete dataset --episodes 3,7-9 --out fewer",
+    "tacdata dataset delete dataset --episodes 0 --out later",
+    "tacdata dataset delete dataset --episodes 5-9 --out half --json",
+)
 
 
 def run(

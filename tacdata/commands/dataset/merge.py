@@ -11,6 +11,11 @@ from tacdata.commands.command import Result
 from tacdata.progress import suggest
 
 ORDER = 40
+EXAMPLES = (
+    "tacdata dataset merge monday tuesday --out both",
+    "tacdata dataset merge a b c --out all",
+    "tacdata dataset merge monday tuesday --out both --json",
+)
 
 
 def run(

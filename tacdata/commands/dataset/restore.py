@@ -11,6 +11,11 @@ from tacdata.commands.command import Result
 from tacdata.progress import suggest
 
 ORDER = 10
+EXAMPLES = (
+    "tacdata dataset restore edited dataset",
+    "tacdata dataset restore merged monday tuesday",
+    "tacdata dataset restore edited dataset --json",
+)
 
 
 def run(

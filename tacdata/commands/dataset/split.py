@@ -11,6 +11,11 @@ from tacdata.commands.command import Result
 from tacdata.progress import suggest
 
 ORDER = 30
+EXAMPLES = (
+    "tacdata dataset split dataset --part train=0-15 --part test=16-19 --out parts",
+    "tacdata dataset split dataset --part first=0-9 --out parts",
+    "tacdata dataset split dataset --part odd=1,3,5 --out parts --json",
+)
 
 
 def run(

@@ -1,9 +1,9 @@
 """The label farm as a service; each file in this folder is a verb below ``tacdata farm``."""
 
-from tacdata.commands.command import TOOLS
+from tacdata.commands.command import FARM
 
-ORDER = 105
-PANEL = TOOLS
+ORDER = 10
+PANEL = FARM
 
 
 def run() -> None:

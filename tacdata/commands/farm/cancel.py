@@ -10,6 +10,11 @@ from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
 
 ORDER = 40
+EXAMPLES = (
+    "tacdata farm cancel 000001",
+    "tacdata farm cancel 000001 --url http://HOST:8765",
+    "tacdata farm cancel 000001 --json",
+)
 
 
 def run(

@@ -13,6 +13,11 @@ from tacdata.commands.command import Result
 from tacdata.progress import say
 
 ORDER = 70
+EXAMPLES = (
+    "tacdata farm dataset sets/skin",
+    "tacdata farm dataset sets/skin --no-build",
+    "tacdata farm dataset sets/skin --json",
+)
 
 
 def run(

@@ -12,6 +12,11 @@ from tacdata.commands.farm import command as service
 from tacdata.progress import suggest
 
 ORDER = 35
+EXAMPLES = (
+    "tacdata farm fetch 000001 sessions/monday",
+    "tacdata farm fetch 000001 sessions/monday --wait",
+    "tacdata farm fetch 000001 sessions/monday --url http://HOST:8765",
+)
 
 
 def run(

@@ -10,6 +10,11 @@ from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
 
 ORDER = 50
+EXAMPLES = (
+    "tacdata farm priority 000001 10",
+    "tacdata farm priority 000001 0 --url http://HOST:8765",
+    "tacdata farm priority 000001 100 --json",
+)
 
 
 def run(

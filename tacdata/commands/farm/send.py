@@ -12,6 +12,11 @@ from tacdata.commands.farm import command as service
 from tacdata.progress import suggest
 
 ORDER = 15
+EXAMPLES = (
+    "tacdata farm send sessions/monday",
+    "tacdata farm send sessions/monday --to monday",
+    "tacdata farm send sessions/monday --url http://HOST:8765",
+)
 
 
 def run(

@@ -11,6 +11,7 @@ from tacdata.commands.farm import command as service
 from tacdata.progress import suggest
 
 ORDER = 30
+EXAMPLES = ("tacdata farm status", "tacdata farm status 000001 --wait", "tacdata farm status --json")
 
 
 def run(

@@ -13,6 +13,11 @@ from tacdata.commands.farm import command as service
 from tacdata.progress import say, suggest
 
 ORDER = 20
+EXAMPLES = (
+    "tacdata farm submit sessions/monday",
+    "tacdata farm submit sessions/monday --into sets/skin",
+    "tacdata farm submit sessions/monday --priority 10 --redo",
+)
 
 
 def run(

@@ -8,6 +8,11 @@ from typing import Annotated
 import typer
 
 ORDER = 10
+EXAMPLES = (
+    "tacdata farm up --root /data",
+    "tacdata farm up --root /data --host 0.0.0.0 --workers 4",
+    "tacdata farm up --root /data --dask tcp://HOST:8786",
+)
 
 
 def run(

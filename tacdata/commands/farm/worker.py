@@ -9,6 +9,11 @@ import typer
 from tacdata.commands.farm import command as service
 
 ORDER = 60
+EXAMPLES = (
+    "tacdata farm worker http://HOST:8765",
+    "tacdata farm worker http://HOST:8765 --processes 4",
+    "tacdata farm worker tcp://HOST:8786",
+)
 
 
 def run(
