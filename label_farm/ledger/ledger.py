@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import socket
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import FormatError
+from tacdata.label_farm.ledger.file_locks import refuse_without_locks
 from tacdata.label_farm.ledger.tables import (
     DROP_UNWANTED,
     FIRST_EXPIRED,
@@ -88,7 +88,7 @@ class Ledger:
         """
         self.path, self.lease_seconds = path, lease_seconds
         self._boot = boot_name()
-        _refuse_without_locks(path)
+        refuse_without_locks(path)
         self._db = sqlite3.connect(path, timeout=BUSY_SECONDS, isolation_level=None)
         try:
             self._prepare()
@@ -393,33 +393,3 @@ def _alive(process: int) -> bool:
     # In a container without an init process the dead stay in the table as zombies.
     status = Path(f"/proc/{process}/stat")
     return not status.exists() or status.read_text().rpartition(")")[2].split()[0] != "Z"
-
-
-WITHOUT_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
-"""How drives refuse to lock a file."""
-
-
-def _refuse_without_locks(path: Path) -> None:
-    """Refuse a drive that locks no files: SQLite would wait for minutes for a lock that never comes.
-
-    Raises:
-        UsageError: With the way out.
-    """
-    try:
-        import fcntl
-    except ModuleNotFoundError:  # Windows locks files on every drive
-        return
-    probe = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with probe.open("wb") as stream:
-            fcntl.lockf(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in WITHOUT_LOCKS:
-            raise UsageError(
-                f"{path.parent}: its drive locks no files ({error.strerror})",
-                "a drive that locks files, as a local disk",
-                "keep the store on a local disk (--store FOLDER)",
-            ) from None
-    finally:
-        with suppress(OSError):
-            probe.unlink(missing_ok=True)

@@ -19,6 +19,7 @@ from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
 from tacdata.importing.proposing.roles import roles_of
+from tacdata.importing.proposing.shapes import varying
 from tacdata.importing.proposing.stream_clocks import SHORT, own_clocks
 from tacdata.importing.proposing.strokes import CLEAR, PressingAxis, pressing_axis
 from tacdata.importing.proposing.unused import leave_unused_out, listed, without_summaries
@@ -64,7 +65,7 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         # Nothing else was read: the load cell is the sensor.
         for found in roles.values():
             found["channels"] = found.pop("force", [])
-    wide = max(aliases, key=lambda alias: (len(roles[alias]["channels"]), "value" in roles[alias]))
+    wide = max(aliases, key=lambda alias: (varying(tables[alias], roles[alias]["channels"]), "value" in roles[alias]))
     asked += [question] if (question := stand_in(tables, roles)) else []
     for alias, found in roles.items():
         _whole_strokes(tables[alias], found, asked)
@@ -103,8 +104,11 @@ def _place(
     document: dict[str, Any], tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]], asked: list[str]
 ) -> None:
     """Add position, gauge, force and temperature; cut trials where one file holds several."""
-    for alias, found in roles.items():
-        table = tables[alias]
+    # A height that never changes, as of an image, is a position only where nothing else is.
+    keys = ("depth", "z", "x", "y")
+    axes = {alias: [name for key in keys for name in found.get(key, [])] for alias, found in roles.items()}
+    for alias in sorted(roles, key=lambda name: (not varying(tables[name], axes[name]), -len(axes[name]))):
+        found, table = roles[alias], tables[alias]
         if "position" not in document and ("depth" in found or "z" in found):
             chosen = ("x", "y", "depth") if "depth" in found else ("x", "y", "z")
             entry = {key: _axis(table, found[key][0]) for key in chosen if key in found}

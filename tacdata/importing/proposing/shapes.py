@@ -35,6 +35,13 @@ def are_letters(names: list[str]) -> bool:
     return len(names) > 2 and names == [chr(ord(names[0][:1] or "?") + k) for k in range(len(names))]
 
 
+def varying(table: SourceTable, names: list[str]) -> int:
+    """Return how many of some columns change, those inside arrays counted each."""
+    columns = [table.column(name) for name in names]
+    numbers = [np.atleast_2d(values.astype(float).T) for values in columns if values.dtype != object]
+    return sum(int((np.nanmax(each, axis=1) > np.nanmin(each, axis=1)).sum()) for each in numbers if each.size)
+
+
 def without_signal(table: SourceTable, names: list[str], policy: ShapePolicy = POLICY) -> dict[str, str]:
     """Return columns that measure nothing, each with the reason: constants, flags and counters of rows.
 

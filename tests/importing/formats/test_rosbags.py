@@ -119,7 +119,8 @@ def test_a_mapping_is_proposed_from_all_topics(tmp_path):
     assert shown.returncode == 0, shown.stderr
     assert "/taxels: 600 rows" in shown.stdout and "/stage: 180 rows" in shown.stdout
     proposed = yaml.safe_load((tmp_path / "mapping.yaml").read_text())
-    assert {entry["table"] for entry in proposed["files"].values()} == {"/eye", "/lab", "/stage", "/taxels"}
+    assert {entry["table"] for entry in proposed["files"].values()} == {"/stage", "/taxels"}
+    assert (proposed["taxels"]["file"], proposed["position"]["file"]) == ("taxels", "stage")
     assert proposed["files"]["stage"]["path"] == "bag.db3"
     assert proposed["files"]["stage"]["time"] == {"column": "header.stamp", "unit": "ns"}
 
