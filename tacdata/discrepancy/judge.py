@@ -25,16 +25,16 @@ from tacdata.effects import library
 
 @dataclass(frozen=True)
 class Verdict:
-    """A verdict and what it rests on."""
+    """A verdict and its basis."""
 
     document: dict[str, Any]
     """As in the file (`schemas/verdict.schema.json`)."""
     checks: DataChecks
-    """What the recordings can carry."""
+    """Checks of the recordings' information."""
     found: Findings
-    """What the search found."""
+    """Findings of the search."""
     decision: Decision
-    """What may be said of it."""
+    """Decision on them."""
     before: list[Slice]
     """Where the residual lives, in the episodes that were not sealed; empty where the gate was the last step."""
     after: list[Slice]
@@ -53,20 +53,20 @@ def judge(
     """Judge recordings: which effect does the model lack?
 
     1. Seal some episodes: their readings are not looked at.
-    2. Check the data: wiring, units, what is missing.
+    2. Check the data: wiring, units, gaps.
     3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
     4. Hold the answer against the saturated model of each family: is its law borne out?
-    5. Look for what has no form of the library: alarms.
+    5. Look for patterns without a form of the library: alarms.
     6. Open the sealed episodes: how much smaller is their gap?
-    7. Decide: named (all of it, or some beside a remainder), ambiguous, unknown or none. Sealed episodes can take a
+    7. Decide: named (all of it, or some with a remainder left), ambiguous, unknown or none. Sealed episodes can take a
        name away; they never give one.
     8. Write it all down.
 
     Args:
         course: The recordings.
         spec: The model.
-        note: Is told what is being done.
-        parents: Name to content hash of what is judged.
+        note: Called with each step.
+        parents: Name to content hash of the judged files.
         without: Mechanisms that are not tried.
         until: The last step to make (`tacdata.discrepancy.search.findings.STEPS`).
         correct_p: Whether p-values are corrected for the number of effects tried.
@@ -91,7 +91,7 @@ def judge(
 
 
 def _setting(course: Course, spec: Spec, without: tuple[str, ...], correct_p: bool) -> Setting:
-    """Return what is judged: all effects are tried that the model has not."""
+    """Return the setting of a judgement: all effects are tried that the model has not."""
     response, given = spec.response(course), spec.effects()
     left_out = {p.effect.called for p in given} | set(without)
     effects = [e for e in library() if e.called not in left_out]

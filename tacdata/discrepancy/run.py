@@ -28,7 +28,7 @@ VERDICT, TEXT, PICTURE, PAGE, SPEC = "verdict.json", "verdict.txt", "verdict.png
 
 @dataclass(frozen=True)
 class Written:
-    """What was found, and where it lies."""
+    """Findings, and the path of their file."""
 
     verdict: dict[str, Any]
     text: str
@@ -44,7 +44,7 @@ def run(
         paths: Recordings or folders of sessions.
         spec: The model.
         out: Folder to create.
-        note: Is told what is being done.
+        note: Called with each step.
         until: The last step to make (`tacdata.discrepancy.search.findings.STEPS`).
 
     Raises:

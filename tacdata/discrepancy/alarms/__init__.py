@@ -1,1 +1,1 @@
-"""What the residual shows without any form: an alarm has no name, and says what was seen, and where."""
+"""Structure of the residual without any form: an alarm has no name; it reports the pattern and its place."""

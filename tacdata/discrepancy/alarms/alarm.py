@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Alarm:
-    """What was seen without any form."""
+    """Pattern seen without any form."""
 
     seen: str
-    """What, where, and how large in readings or mm."""
+    """Pattern, place, and size in readings or mm."""
     next: str
-    """What to look at or to record."""
+    """Part to inspect, or presses to record."""

@@ -1,4 +1,4 @@
-"""All alarms of what a model leaves."""
+"""All alarms of a model's residual."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tacdata.discrepancy.search.problem import Problem
 
 
 def alarms(problem: Problem, form_error: float = 0.0) -> tuple[Alarm, ...]:
-    """Return what the residual of a problem's model shows without any form.
+    """Return the alarms of the residual of a problem's model.
 
     Args:
         problem: The model, with the effects of the answer.
-        form_error: What their forms may leave: half a sum of squares [1].
+        form_error: Model error of their forms: half a sum of squares [1].
     """
     cleaned = Cleaned.of(problem, form_error)
-    # What moves readings while the path moves shows in more than one test: the finest that sees it speaks.
+    # A disturbance during motion shows in more than one test: the finest that sees it reports.
     moving = channel_histories(cleaned) or swings(cleaned) or motor_lines(cleaned)
     return (*moving, *press_depths(cleaned), *channel_drops(cleaned))

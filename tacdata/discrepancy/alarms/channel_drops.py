@@ -1,8 +1,8 @@
 """A channel that drops, or jumps, in several presses and comes back: a contact that is loose, a cable that breaks.
 
-Each press's gain of each channel is divided by the median of all channels: what they share (a depth that is off) goes.
+Each press's gain of each channel is divided by the median of all channels: a common part (a depth error) cancels.
 Large deviations that gather on one channel are the statistic. For the null distribution, channels change places within
-each press. So what one press does, as a spike frame, and what all channels have alike is in it.
+each press. So the effects of a single press, as a spike frame, and of all channels together are in it.
 """
 
 from __future__ import annotations

@@ -30,12 +30,12 @@ STIRRED = 0.02
 FEWEST_CHANNELS = 2
 MOST_NAMED = 4
 USUAL = 0.95
-"""A size is told where the history has this quantile [1]."""
+"""A size is reported where the history has this quantile [1]."""
 
 TIME_CONSTANTS = (0.1, 0.4, 1.5, 6.0, 25.0)
 """Of leaky means of depth [s]."""
 OFFSET, RISE, LATE = "offset", "rise", "late"
-"""What a channel's weight moves: its reading whatever presses it, its rise, its time."""
+"""Quantity that a channel's weight moves: its reading at any press, its rise, its time."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Best:
     kind: str
     history: str
     over: str
-    """What its size goes with: "", the time or the temperature."""
+    """Covariate of its size: "", the time or the temperature."""
     test: Largest
     weight: np.ndarray
     """Weight of each channel [its unit, 1 or s, over the history], shape (channels,); 0 where it does not count."""
@@ -96,7 +96,7 @@ def _scatter(rest: np.ndarray) -> float:
     """Return by how much scores, shape (presses, channels), scatter beyond their flips [1], 1 or more.
 
     Flips take presses as independent. Slow noise makes sums scatter by more. Few presses may scatter by chance by
-    less than the noise model says. That is the least.
+    less than in the noise model. That is the least.
     """
     later, earlier = rest[1:], rest[:-1]
     size = float(np.sqrt(np.sum(np.square(later)) * np.sum(np.square(earlier))))
@@ -106,7 +106,7 @@ def _scatter(rest: np.ndarray) -> float:
 
 
 def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:
-    """Give what a channel may follow: kind, history, what it goes with, and the column (m, channels)."""
+    """Yield candidates of a channel: kind, history, covariate, and the column (m, channels)."""
     course, rise = cleaned.problem.setting.course, cleaned.rise
     reduced, read = course.reduced, course.read
     step = np.maximum(reduced.step, 1e-9)[:, None]
@@ -122,7 +122,7 @@ def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:
     for goes, by in over:
         for name, values in own:
             yield RISE, name, goes, values * rise * by[:, None]
-            if not goes:  # what a press's own offset does, and a session's, is drift
+            if not goes:  # a press's own offset, and a session's, is drift
                 yield OFFSET, name, goes, cleaned.without_mean(values) * flat
         yield LATE, "", goes, -rate * by[:, None]
         if goes:
@@ -130,7 +130,7 @@ def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:
 
 
 def _histories(course: Course) -> dict[str, np.ndarray]:
-    """Return what a path remembers, by what it is called, each (n,) of size about 1."""
+    """Return the histories of a path, by name, each (n,) of size about 1."""
     share = depth_share(course)
     speed = course.speed
     fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)

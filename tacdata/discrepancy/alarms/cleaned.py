@@ -1,4 +1,4 @@
-"""What a model leaves of each press: the whitened residual, without nuisances."""
+"""Whitened residual of each press, without nuisances."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ MOST_CLUSTERS = 200
 
 @dataclass(frozen=True)
 class Cleaned:
-    """What a model leaves, of the rows read."""
+    """Residual of a model, of the rows read."""
 
     problem: Problem
     residual: np.ndarray
     """Whitened, without nuisances, of channels alone [noise scales], shape (m, channels), float64."""
     rise: np.ndarray
-    """What presses add to each channel [its unit], shape (m, channels)."""
+    """Rise of each channel under presses [its unit], shape (m, channels)."""
     speed: np.ndarray
     """Rate of depth [mm/s], shape (m,)."""
     begins: np.ndarray
@@ -36,11 +36,11 @@ class Cleaned:
     noise: Noise
     """Of channels alone."""
     form_error: float = 0.0
-    """What the forms of its effects may leave, as half a whitened sum of squares [1]."""
+    """Model error of its effects' forms, as half a whitened sum of squares [1]."""
 
     @classmethod
     def of(cls, problem: Problem, form_error: float = 0.0) -> Cleaned:
-        """Return what a problem's model leaves, its effects' forms some of it."""
+        """Return the residual of a problem's model, with the model error of its effects' forms."""
         null, setting = problem.null, problem.setting
         course, placed = setting.course, [*setting.given, *problem.placed]
         whitener = null.whitener_for(setting, placed)
@@ -78,7 +78,7 @@ class Cleaned:
 
     @property
     def least(self) -> float:
-        """What the response may be off about by itself, as a sum of squares [1]: less is no alarm."""
+        """Model error of the response itself, as a sum of squares [1]: less is no alarm."""
         share = SPLINE_ERROR if self.problem.setting.response.fitted else TABLE_ERROR
         return float((share * self.problem.rise) ** 2)
 
@@ -88,7 +88,7 @@ class Cleaned:
         return max(self.least, 2 * self.form_error)
 
     def whitened(self, column: np.ndarray) -> np.ndarray:
-        """Return a column of each channel (m, channels) as noise is whitened, but for what a press errs by."""
+        """Return a column of each channel (m, channels) as noise is whitened, without a press's own errors."""
         return whiten(column[:, :, None], self.course, self.noise)[:, :, 0].astype(float)
 
     def without_mean(self, values: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
-"""Lines in the spectrum while the path moves, and not while it stands: a motor's drive is heard.
+"""Lines in the spectrum while the path moves, and not at rest: noise of a motor's drive.
 
 Periodograms of a whole session are summed over channels, whatever their phases. Without a line the sum is a gamma
-variable. Its level is told beside, its shape from quartiles. So channels that share noise make no lines.
+variable. Its level is estimated around the line, its shape from quartiles. So channels that share noise make no lines.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from tacdata.discrepancy.plain_number import plain_number
 CHANCE = 1e-4
 """Probability that noise makes one of all lines as large [1]."""
 STANDS = 0.01
-"""A line that stands still, too, is hum: it is told from idle readings [the same]."""
+"""A line at rest, too, is hum: it is distinguished by idle readings [the same]."""
 BESIDE = 1.0
-"""A line that stands so near counts [Hz]; also the width over which the level is told."""
+"""A line so near counts [Hz]; also the width over which the level is estimated."""
 LOWEST = 1.0
-"""Lowest line [Hz]: what is slower is of presses."""
+"""Lowest line [Hz]: slower variation comes from presses."""
 WINDOW = 512.0
 """A session is cut in windows of this length [s]: motors keep no beat for hours."""
 FINER = 4
@@ -74,7 +74,7 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
 
 
 def hums(cleaned: Cleaned) -> bool:
-    """Return whether readings have a line while the path stands: channels hum together, each with its own phase."""
+    """Return whether readings have a line while the path rests: channels hum together, each with its own phase."""
     course = cleaned.course
     inside = ~course.first
     if not inside.any():

@@ -20,7 +20,7 @@ from tacdata.discrepancy.search.problem import Problem
 FEWEST = 16
 """Presses, at least."""
 LEAST_STRETCH = 4
-"""Presses of a stretch, and beside it, at least."""
+"""Presses of a stretch, and around it, at least."""
 MOST_EDGES = 60
 """Stretches begin and end at so many presses, at most."""
 LEAST_Z = 5.0
@@ -63,7 +63,7 @@ def press_depths(cleaned: Cleaned) -> list[Alarm]:
             )
         ]
     if problem.setting.response.fitted:
-        return []  # each place's depth is its own: what two groups differ by is hidden by it
+        return []  # each place's depth is its own: it hides a difference of two groups
     apart = two_groups(depth, error)
     if apart is None or abs(apart[1]) * unit < LEAST_MM or reasoned(course, episodes, apart[0]):
         return []
@@ -175,7 +175,7 @@ def _likelihood(depth: np.ndarray, variance: np.ndarray, share: float, low: floa
 
 
 def reasoned(course: Course, episodes: np.ndarray, lower: np.ndarray) -> bool:
-    """Return whether something that presses are known by says of which group they are."""
+    """Return whether a known property of presses determines their group."""
     rows = [np.flatnonzero(course.episode == e) for e in episodes]
     deep = np.array([round(float(course.tip[r, 2].max()), 2) for r in rows])
     fast = np.array([round(float(np.log(max(np.abs(course.speed[r]).max(), 1e-6))), 0) for r in rows])

@@ -1,7 +1,8 @@
-"""One harness for tests without a form: the largest of many statistics beside that of draws under the null.
+"""One harness for tests without a form: the largest of many statistics compared with that of draws under the null.
 
-Each alarm makes its draws (flips of sign, permutations) so that what noise can do is in them. The level is that of all
-its statistics together (maxT: Westfall & Young, Resampling-Based Multiple Testing, 1993), and the same for every alarm.
+Each alarm makes its draws (flips of sign, permutations) so that they contain the effect of noise. The level is that of
+all its statistics together (maxT: Westfall & Young, Resampling-Based Multiple Testing, 1993), and the same for every
+alarm.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ LEAST_Z = 3.7
 
 @dataclass(frozen=True)
 class Largest:
-    """The statistic that stands out most."""
+    """The largest statistic."""
 
     at: int
     """Which."""
@@ -36,7 +37,7 @@ class Largest:
 
 
 def largest(table: np.ndarray, counts: np.ndarray | None = None) -> Largest:
-    """Return the statistic that stands out most.
+    """Return the largest statistic.
 
     Args:
         table: Sums of squares [1], observed first, then draws, shape (1 + draws, statistics).

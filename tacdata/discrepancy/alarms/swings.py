@@ -2,8 +2,8 @@
 
 Their mean over presses is zero: no score test sees them. Readings are projected on the rise times waves, along the
 path and in time. For the null distribution, channels change sign in each press. Single channels' noise keeps its
-spectrum, its tails and its growth. Only what channels share makes a difference. A press's own errors are projected out
-before.
+spectrum, its tails and its growth. Only the common part of channels makes a difference. A press's own errors are
+projected out before.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
     rng = np.random.default_rng([seed, 29])
     together = episodes
     if hums(cleaned):
-        # Channels that hum have fixed phases: at one place they add up alike in each press.
+        # Channels that hum have fixed phases: at one place they add up equally in each press.
         place = np.zeros(cleaned.problem.setting.course.episodes, dtype=np.int64)
         place[cleaned.course.episode] = cleaned.problem.null.context
         together = place[episodes]
@@ -140,7 +140,7 @@ def _presses(cleaned: Cleaned) -> list[np.ndarray]:
 
 
 def _projected(cleaned: Cleaned, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return what channels (channels, waves) of a press hold of each wave, and its information; None if too short."""
+    """Return the amplitudes (channels, waves) of each wave in a press, and its information; None if too short."""
     if len(rows) < FEWEST_ROWS:
         return None
     course, noise, stroke = cleaned.course, cleaned.noise, cleaned.problem.setting.course.stroke

@@ -1,1 +1,1 @@
-"""Recordings as a course, and checks of what they can carry."""
+"""Recordings as a course, and checks of their information."""

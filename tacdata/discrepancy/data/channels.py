@@ -1,4 +1,4 @@
-"""Which channels can be used, which are clipped or hold codes, and what their source calls them."""
+"""Which channels can be used, which are clipped or hold codes, and their names in the source."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Readings:
 
 
 def readings(recording: Recording) -> Readings:
-    """Return what a recording read, and how deep the tip was."""
+    """Return a recording's readings, and the depth of the tip."""
     episode = recording.episode
     order = np.argsort(episode.taxels.sample_ns, kind="stable")
     time_ns = episode.taxels.sample_ns[order]
@@ -53,7 +53,7 @@ def readings(recording: Recording) -> Readings:
 
 
 def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Return which channels can be used, the limits at which they are clipped, and in words what there is to know.
+    """Return which channels can be used, the limits at which they are clipped, and remarks as sentences.
 
     Returns:
         Channels, shape (k,), int64; the least and the largest reading of each, -inf and inf where it is not clipped
@@ -134,7 +134,7 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
 
 
 def without_codes(recordings: Sequence[Recording]) -> tuple[Sequence[Recording], list[str]]:
-    """Return recordings whose codes are missing values, and in words what was set aside.
+    """Return recordings whose codes are missing values, and remarks on those set aside.
 
     Args:
         recordings: Of the same channels.
@@ -170,7 +170,7 @@ def codes(values: np.ndarray) -> np.ndarray:
         if not known.any():
             continue
         low, middle, high = np.quantile(column[known], [INNER[0], 0.5, INNER[1]])
-        # Of a channel that hardly moves, its size stands for its range.
+        # For a channel that hardly moves, its size replaces its range.
         size = max(float(high - low), STILL * abs(float(middle)))
         if 0 < size < np.inf:
             result[known, k] = np.abs(column[known] - middle) > FAR * size

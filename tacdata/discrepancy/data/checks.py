@@ -1,4 +1,4 @@
-"""Checks of the data, made once before anything is fitted: what can recordings carry, and are they what they say?"""
+"""Checks of the data, made once before anything is fitted: is their information sufficient, are they as stated?"""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FITTED = (
 
 @dataclass(frozen=True)
 class DataChecks:
-    """What was found of the recordings themselves, in words."""
+    """Remarks on the recordings themselves, as sentences."""
 
     episodes: int
     """Number of episodes."""
@@ -31,11 +31,11 @@ class DataChecks:
     shortcomings: tuple[str, ...] = ()
     """What is amiss with the recordings, each with its remedy."""
     base: tuple[str, ...] = ()
-    """What the model that they are held against leaves open."""
+    """Open questions of the model that they are compared with."""
     watched: tuple[str, ...] = ()
-    """What idle stretches and single channels show that no effect of the library does."""
+    """Patterns of idle stretches and single channels that no effect of the library has."""
     clocks: tuple[str, ...] = ()
-    """By how much readings follow the path late: said unless the verdict speaks of a delay."""
+    """Delay of readings after the path: reported unless the verdict names a delay."""
     touched: tuple[str, ...] = ()
     """Readings that answer where nothing should press: no verdict."""
     early: tuple[str, ...] = ()
@@ -45,7 +45,7 @@ class DataChecks:
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """What keeps these recordings from any verdict. A unit that was stated is believed: a doubt is a remark."""
+        """Obstacles to any verdict on these recordings. A unit that was stated is believed: a doubt is a remark."""
         return (*self.wiring, *self.touched)
 
     @property
@@ -73,7 +73,7 @@ def check(setting: Setting) -> DataChecks:
 
 
 def _touched(course: Course) -> tuple[str, ...]:
-    """Return that no side is without contact, where readings say so: what is told of touch would be of half the way."""
+    """Return that no side is without contact, where readings show it: estimates of touch would be of half the way."""
     low = always_touched(course)
     if not low:
         return ()
@@ -84,7 +84,7 @@ def _touched(course: Course) -> tuple[str, ...]:
 
 
 def _base(setting: Setting) -> tuple[str, ...]:
-    """Return what the base leaves open, and which contact law it is like; nothing of one that was not fitted."""
+    """Return the open questions of the base, and the nearest contact law; nothing of one that was not fitted."""
     if not setting.response.fitted:
         return ()
     curve = response_curve(setting.course)

@@ -19,9 +19,9 @@ SCANS = ((0.5, 0.05), (0.5, 0.05), (0.06, 0.01), (0.06, 0.01))
 TOP = 0.9
 """Edges: a press turns in the middle of the time for which it is deeper than this share of its depth [1]."""
 KNOTS = 10
-"""Edges: intervals of the splines that say what is read at a depth."""
+"""Edges: intervals of the splines of readings over depth."""
 CREEPS = (1.0, 8.0)
-"""Edges: time constants of a skin that creeps or relaxes beside: without them its recovery looks late [s]."""
+"""Edges: time constants of a skin that creeps or relaxes meanwhile: without them its recovery looks late [s]."""
 MOST_ROWS = 6000
 """Edges: rows that are looked at, at most."""
 CLEARER = 0.3
@@ -43,7 +43,7 @@ def shifted(course: Course) -> tuple[bool, tuple[str, ...]]:
 def shift(course: Course) -> tuple[float, float, float]:
     """Return by how much readings follow the path later than their times say [s].
 
-    Beside it the shares of their variance that depth does not explain then, and as they are [1].
+    With it the shares of their variance that depth does not explain then, and as they are [1].
     """
     main = _main(course)
     lags = np.linspace(-WIDEST, WIDEST, LAGS)
@@ -69,7 +69,7 @@ def _left_at(course: Course, reading: np.ndarray, lag: float) -> float:
 def edges(course: Course, about: float) -> tuple[float, float]:
     """Return by how much readings are late while the tip presses, and while it leaves [s].
 
-    On both ways a reading is the same smooth function of the depth so long before, beside slow memory. The two delays
+    On both ways a reading is the same smooth function of the depth so long before, plus slow memory. The two delays
     are those that such splines follow best.
 
     Args:

@@ -1,7 +1,7 @@
 """Identifiability: which effects these presses cannot tell apart, whatever the fits say.
 
 Real effects have other forms than any library. Small differences in fit do not split two of them; the way of pressing
-must. What each effect needs is its class data (`tacdata.effects.Effect`).
+must. The needs of each effect are its class data (`tacdata.effects.Effect`).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def lookalikes(course: Course, effect: Effect, values: Mapping[str, np.ndarray |
 
 
 def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray | float]) -> list[str]:
-    """Return the mechanisms that look alike at one rate; none if there are several rates."""
+    """Return the mechanisms that are indistinguishable at one rate; none if there are several rates."""
     if effect.at_rest is None or not one_rate(course):
         return []
     known = {p.name: np.asarray(values.get(p.name, 0.0)) for p in effect.parameters}
@@ -56,7 +56,8 @@ def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray
         and effect.delay(known) >= 0
         and (stairs(course) or hold >= max(HOLD, OVER * lag))
     ):
-        # At a stop it catches up, and is done: play stays behind there, what relaxes falls, what creeps goes on.
+        # At a stop it catches up, and is done: play stays behind there, a relaxing reading falls, a creeping one goes
+        # on.
         return _that(AtRest.CATCHES_UP)
     if not stairs(course):
         quick = effect.at_rest is AtRest.RELAXES and 0 < effect.time_constant(known) < QUICK * pressing_time(course)
@@ -84,7 +85,7 @@ def _that(*kinds: AtRest) -> list[str]:
 
 
 def _evenly_spaced(course: Course) -> bool:
-    """Return whether the number of presses at a place so far says what the clock says."""
+    """Return whether the number of presses at a place so far is collinear with the clock."""
     first = course.time[course.first]
     before = np.array([np.sum(course.site[:k] == course.site[k]) for k in range(course.episodes)], dtype=float)
     return bool(np.ptp(before) > 0 and np.corrcoef(before, first)[0, 1] > SAME_CLOCK)

@@ -16,7 +16,7 @@ FEWEST = 6
 EVEN = 0.25
 """Successive readings of a window stand apart as usual, but for this share [1]."""
 NEAR = 6
-"""Bins on either side that say what noise there is beside a line."""
+"""Bins on either side of a line from which the noise is estimated."""
 CHANCE = 1e-6
 """Probability by which noise alone makes a bin as large."""
 LEAST = 0.003
@@ -49,7 +49,7 @@ def idle_lines(course: Course) -> list[str]:
         top = int(np.argmax(own))
         beside = np.concatenate([own[max(top - NEAR, 0) : max(top - 1, 0)], own[top + 2 : top + 1 + NEAR]])
         strong = amplitude[first + top, channel]
-        # What comes back slowly after a press falls from the lowest frequency on: a line rises above it.
+        # Slow recovery after a press falls from the lowest frequency on: a line rises above it.
         peak = top > 0 and len(beside) >= 3 and own[top] > most * np.median(beside)
         if peak and strong > LEAST * rise:
             found.setdefault(float(frequency[first + top]), []).append((channel, float(strong)))

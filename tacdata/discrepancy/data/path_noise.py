@@ -51,7 +51,7 @@ def without_noise(time_ns: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np
 
 
 def resolved(tip_ns: np.ndarray, depth: np.ndarray, time_ns: np.ndarray) -> np.ndarray:
-    """Return at which times the depth is known, shape (m,), bool: not beside corners that positions leave out.
+    """Return at which times the depth is known, shape (m,), bool: not near corners that positions leave out.
 
     A straight line through positions before and after a corner is off it by up to a quarter of how far the corner is
     off a straight line: of a fast ramp sampled seldom that is far more than any reading's noise. A path that is given
@@ -82,7 +82,7 @@ def _sampled(time_ns: np.ndarray) -> bool:
 def _noise(time: np.ndarray, values: np.ndarray) -> float:
     """Return the noise of values by how far each is off the line between its neighbours; 0 if half are not off.
 
-    By second differences of that: a path bends alike from one position to the next, its noise does not.
+    By second differences of that: a path bends equally from one position to the next, its noise does not.
     """
     share = (time[1:-1] - time[:-2]) / np.maximum(time[2:] - time[:-2], 1e-12)
     deviation = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]

@@ -27,7 +27,7 @@ SAME_PLACE = 0.15
 FEW_ROWS = 8
 """A stroke with fewer readings is left out."""
 UNKNOWN = "unknown"
-"""What an import calls an indenter that its source does not name."""
+"""Name that an import gives to an indenter without one."""
 HELD = 1.0
 """Gaps of a measured quantity up to so long are bridged by a straight line [s]."""
 LONG_PAUSE = 36000.0
@@ -44,7 +44,7 @@ class _Stroke:
     tool: Tool
     place: np.ndarray
     specimen: str
-    """What the source calls what was pressed; empty where it says nothing."""
+    """Name of the pressed specimen in the source; empty where it has none."""
 
 
 def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
@@ -201,7 +201,7 @@ def _strokes_of(
 
 
 def _to_the_end(spans: list[tuple[int, int]], depth: np.ndarray, time_ns: np.ndarray) -> list[tuple[int, int]]:
-    """Return spans with what was read before the tip began to move and after it came to rest, off the skin."""
+    """Return spans with the readings before the tip began to move and after it came to rest, off the skin."""
     away = depth <= max(0.0, float(depth.min()) + 0.05 * float(np.ptp(depth)))
     if away[0]:
         spans = [(min(spans[0][0], int(time_ns[0])), spans[0][1]), *spans[1:]]
@@ -269,7 +269,7 @@ def _joined(
 
 
 def _sites(parts: list[_Stroke], channels: int) -> tuple[np.ndarray, list[str]]:
-    """Return a number for each press that presses of one place and one specimen share, and what to say of it."""
+    """Return a number for each press that presses of one place and one specimen share, and a remark on it."""
     place, named = places(np.array([p.place for p in parts])), [p.specimen for p in parts]
     if not any(named):
         return specimens([p.rows for p in parts], place, channels)

@@ -11,7 +11,7 @@ STRONG = 0.2
 FEWEST = 10
 """Presses in which a channel is watched, at least."""
 LEAST_JUMP, LEAST_WANDER = 0.08, 0.04
-"""Changes of a gain that are told of [1]..."""
+"""Changes of a gain that are reported [1]..."""
 JUMP_Z, WANDER_Z = 6.0, 8.0
 """...from so many times the scatter from press to press on [1]."""
 SHARED = 0.4
@@ -30,7 +30,7 @@ def odd_channels(course: Course, response: Response) -> list[str]:
 
     Args:
         course: The recordings.
-        response: What presses should do to the channels.
+        response: Expected response of the channels to presses.
     """
     reduced, predicted = course.reduced, predict(course, response, []).signal[course.read]
     episodes = np.unique(reduced.episode)
@@ -57,7 +57,7 @@ def _turned(course: Course, episodes: np.ndarray, rows: list[np.ndarray], measur
     A fitted response is of no help: it follows the mean of both signs. Slopes over depth are compared at each place.
     """
     known, depth = [np.nan_to_num(m) for m in measured], course.reduced.tip[:, 2]
-    # About its mean: what a press begins with may be friction already.
+    # About its mean: a press may begin with friction already.
     ways = [depth[r] - depth[r].mean() for r in rows]
     peak = np.array([m.T @ way / max(float(np.linalg.norm(way)), 1e-9) for m, way in zip(known, ways, strict=True)])
     place, steps = course.site[episodes], np.concatenate([np.abs(np.diff(m, axis=0)) for m in known])
@@ -94,7 +94,7 @@ def press_gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.nd
 def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, left_out: set[int]) -> list[str]:
     words: list[tuple[float, str]] = []
     if gains.shape[1] < 2:
-        return []  # a channel without others is unlike none: what goes with the session may be an effect
+        return []  # a channel without others cannot be compared: a change over the session may be an effect
     for channel in range(gains.shape[1]):
         known = np.flatnonzero(np.isfinite(gains[:, channel]))
         if len(known) < FEWEST or channel in left_out:

@@ -1,4 +1,4 @@
-"""Specimens that were pressed at one place one after the other, told apart by how stiff they are.
+"""Specimens that were pressed at one place one after the other, distinguished by their stiffness.
 
 Test machines press many materials at the same place. One curve for all of them would make each material's stiffness
 look like a gain that drifts.
@@ -13,7 +13,7 @@ import numpy as np
 from tacdata.chain.rows import Rows
 
 APART, FAR_APART = 0.12, 0.4
-"""Specimens differ by this much at least in what is read at one depth [natural logarithm]; two of them, and a few that
+"""Specimens differ by this much at least in the reading at one depth [natural logarithm]; two of them, and a few that
 only get softer, by more: one specimen that changed does so, too."""
 SURELY = 4
 """So many specimens, even if each is softer than the one before [1]."""
@@ -30,9 +30,9 @@ SAME_RATE = 0.25
 
 
 def specimens(parts: Sequence[Rows], place: np.ndarray, channels: int) -> tuple[np.ndarray, list[str]]:
-    """Return a number for each press that presses of one place and one specimen share, and what to say of it.
+    """Return a number for each press that presses of one place and one specimen share, and a remark on it.
 
-    Two groups that follow one another may be one specimen that changed: they are asked about, and not told apart.
+    Two groups that follow one another may be one specimen that changed: they are asked about, and not distinguished.
 
     Args:
         parts: Rows of each press.
@@ -127,7 +127,7 @@ def _rise(part: Rows, depth: float) -> float:
 
 
 def _level(part: Rows, depth: float, channels: int) -> float:
-    """Return what a press reads above idle when it first reaches a depth, root mean square over channels."""
+    """Return the rise of a press above idle when it first reaches a depth, root mean square over channels."""
     read = np.isfinite(part.values[:, :channels]).all(axis=1)
     tip, values = part.tip[read, 2], part.values[read, :channels]
     top = int(np.argmax(tip))

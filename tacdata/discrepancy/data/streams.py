@@ -11,7 +11,7 @@ from tacdata.chain import Course, Prediction, Response
 
 @dataclass(frozen=True)
 class Streams:
-    """Which columns of the stacked streams are what: readings first, then force, then the tag's x, y and depth."""
+    """Columns of the stacked streams: readings first, then force, then the tag's x, y and depth."""
 
     channels: int
     force: bool
@@ -35,11 +35,11 @@ class Streams:
         return ["signal"] * self.channels + ["force"] * self.force + ["tag"] * (3 * self.tag)
 
     def names(self, course: Course) -> tuple[str, ...]:
-        """Return what each stream is called, channels by their numbers in the recordings."""
+        """Return the name of each stream, channels by their numbers in the recordings."""
         return (*course.channel_names, *["force"] * self.force, *["tag x", "tag y", "tag depth"] * self.tag)
 
     def measured(self, course: Course) -> np.ndarray:
-        """Return what was measured at the rows that were read, shape (m, streams); NaN where missing or clipped."""
+        """Return the measured values at the rows that were read, shape (m, streams); NaN where missing or clipped."""
         parts = [course.readings if course.clipped is None else np.where(course.clipped, np.nan, course.readings)]
         if self.force and course.force is not None:
             parts.append(course.force[:, None])
@@ -57,7 +57,7 @@ class Streams:
         return np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
 
     def rise(self, prediction: Prediction, response: Response) -> np.ndarray:
-        """Return what presses add at the rows that were read, shape (m, streams): readings without their value in
+        """Return the rise under presses at the rows that were read, shape (m, streams): readings without their value in
         the air, force; 0 for the tag's."""
         result = self.predicted(prediction)
         result[:, : self.channels] -= response.signal(np.zeros((1, self.channels)))

@@ -1,4 +1,4 @@
-"""What recordings cannot carry, and what to record next."""
+"""Gaps of recordings, and the next ones to record."""
 
 from __future__ import annotations
 
@@ -72,12 +72,12 @@ def _spread(rates: np.ndarray) -> float:
 STROKE, RATE, RADIUS, EVERY = 0.02, 500.0, 200.0, (2e-5, 5.0)
 """Sizes beyond are hardly of their unit: strokes [mm], rates [mm/s], radii [mm], intervals [s].
 
-A long stroke is no reason to doubt: strips are stretched by tens of mm. An import refuses what no press can be.
+A long stroke is no reason to doubt: strips are stretched by tens of mm. An import refuses impossible presses.
 """
 
 
 def units(course: Course) -> list[str]:
-    """Return in words what is of another size than its unit lets expect."""
+    """Return remarks on quantities of an unexpected size for their unit."""
     remarks = []
     if course.stroke < STROKE:
         remarks.append(f"strokes of {course.stroke:.3g} mm: is the depth in mm? Say its unit in the import mapping")

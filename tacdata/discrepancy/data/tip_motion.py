@@ -1,4 +1,4 @@
-"""How the tip moved: what its recorded path carries of noise, how fast it pressed and let go, how long it stood."""
+"""Motion of the tip: noise of its recorded path, speeds of pressing and release, time at rest."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ LEVELS = 40
 CLEAR = 10.0
 """Levels lie so many times the path's noise apart at least [1]."""
 STILL = 0.002
-"""Band within which a tip stands, of the stroke [1]..."""
+"""Band within which a tip rests, of the stroke [1]..."""
 SWAY = 10.0
-"""...and of the path's noise: that much more than what a minute of readings takes up [1]."""
+"""...and of the path's noise: that much more than a minute of readings takes up [1]."""
 LINGERS = 4.0
-"""A tip that stands stays in the band so many times as long as one that presses takes through it [1]."""
+"""A tip at rest stays in the band so many times as long as one that presses takes through it [1]."""
 DEEP = 0.3
 """Hold: deeper than this share of the stroke [1]."""
 STOP = 0.4
@@ -82,9 +82,9 @@ def pressing_time(course: Course) -> float:
 
 
 def longest_hold(course: Course) -> float:
-    """Return the longest time that the tip stands at depth [s].
+    """Return the longest time that the tip rests at depth [s].
 
-    It stands while its depth stays within a band: a small share of the stroke, and room for the noise of the path.
+    It rests while its depth stays within a band: a small share of the stroke, and room for the noise of the path.
     """
     depth = course.tip[:, 2]
     band = STILL * course.stroke + SWAY * course.dither
@@ -102,7 +102,7 @@ def longest_hold(course: Course) -> float:
 def stairs(course: Course) -> bool:
     """Return whether most presses stop at several depths on the way in, and on the way out.
 
-    What lags behind catches up at a stop; friction and play do not.
+    A lagging reading catches up at a stop; friction and play do not.
     """
     band = STILL * course.stroke + SWAY * course.dither
     count, pressed = 0, 0

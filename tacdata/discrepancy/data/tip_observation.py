@@ -1,7 +1,7 @@
 """Where a camera, or a second gauge, saw the tip: laid onto the commanded path, episode by episode.
 
 How camera and guide lie to each other is not known, so that a rotation and an offset for a whole session are fitted;
-what is left over is what the guide did otherwise than commanded. A constant error of place is lost by that.
+the remainder is the guide's deviation from its commands. A constant error of place is lost by that.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Views:
     """x, y, depth [mm], shape (p, 3); NaN where not known."""
 
     def at(self, time_ns: np.ndarray) -> np.ndarray:
-        """Return what was seen at times [ns], shape (n, 3): linear between views, NaN far from any."""
+        """Return the observed positions at times [ns], shape (n, 3): linear between views, NaN far from any."""
         result = np.stack([np.interp(time_ns, self.time_ns, column) for column in self.tip.T], axis=-1)
         behind = np.clip(np.searchsorted(self.time_ns, time_ns), 1, len(self.time_ns) - 1)
         distance = np.minimum(np.abs(time_ns - self.time_ns[behind - 1]), np.abs(time_ns - self.time_ns[behind]))
@@ -43,7 +43,7 @@ class Views:
 
 
 def second_views(episodes: list[Episode]) -> dict[int, Views]:
-    """Return what a session's episodes saw of the tip, by their place in the list; none if there are too few."""
+    """Return the observations of the tip by episodes of a session, by their place in the list; none if too few."""
     raw = {k: seen for k, e in enumerate(episodes) if (seen := _seen(e)) is not None}
     if sum(len(time) for time, _ in raw.values()) < FEWEST_VIEWS:
         return {}

@@ -17,7 +17,7 @@ POOR = 0.85
 INVERTED = -0.6
 """Wiring: below this correlation a channel is inverted [1]."""
 TURNS = {"mirrored along x": (-1, 1), "mirrored along y": (1, -1), "turned by 180 degrees": (-1, -1)}
-"""What may have happened to a whole array -> what becomes of x and y."""
+"""Possible change of a whole array -> resulting x and y."""
 LEAST_MOTION = 0.02
 """Wiring: channels that move by a smaller share of the largest are not checked [1]."""
 

@@ -1,1 +1,1 @@
-"""Names beside a flexible remainder, by levels: family, mechanism, form."""
+"""Names despite a flexible remainder, by levels: family, mechanism, form."""

@@ -1,7 +1,7 @@
 """Is an effect's size the same in all conditions? That of a mechanism is; that of a stand-in changes with them.
 
-What lies beside a true effect has no reason to follow it into every condition. A stand-in fits what is there on the
-average of them. So its size, told from slow presses alone, is not that told from fast ones (invariance: Peters,
+A remainder has no reason to follow a true effect into every condition. A wrong effect fits the data on the
+average of them. So its size from slow presses differs from that of fast ones (invariance: Peters,
 Buhlmann & Meinshausen, J. R. Stat. Soc. B 78, 2016, 947).
 """
 
@@ -24,15 +24,15 @@ CELLS = 3
 WIDE = 1.25
 """A condition is one where its largest part's value is so many times its smallest's [1]."""
 STANDS = 0.02
-"""A tip that is slower stands [fastest]."""
+"""A slower tip is at rest [fastest]."""
 UNSURE = 0.25
-"""A part whose size is not known within so much says nothing of it [share of the size]."""
+"""A part whose size is not known within so much carries no information on it [share of the size]."""
 
 
 def constancies(found: Findings) -> tuple[dict[str, float], ...]:
     """Return each effect's spread of size over the parts of each condition [share of its size], in their order.
 
-    0: the same in all parts. What episodes scatter by is taken off. Conditions that do not vary are not there.
+    0: the same in all parts. The scatter of episodes is taken off. Conditions that do not vary are not there.
     """
     final = found.final
     if not final.placed:
@@ -44,7 +44,7 @@ def constancies(found: Findings) -> tuple[dict[str, float], ...]:
 def spread(gram: np.ndarray, parts: int) -> float:
     """Return the spread of a column's coefficient over its parts, that of chance taken off [1].
 
-    All parts count alike, however little of the effect is in them: one that fits fast presses alone is found by the
+    All parts count equally, however little of the effect is in them: one that fits fast presses alone is found by the
     slow ones, which hold little of it.
 
     Args:
@@ -79,7 +79,7 @@ def _of(final: Problem, at: int, conditions: dict[str, np.ndarray]) -> dict[str,
     )
     moving = final.tangent.values[:, :, [k for k, knob in enumerate(final.tangent.knobs) if knob.at != at]]
     whitener = final.null.whitener_for(setting, [*setting.given, *final.placed])
-    clock = final.placed[at].effect.follows_clock  # its own form says how it changes with time
+    clock = final.placed[at].effect.follows_clock  # its own form contains the change with time
     told = {name: labels for name, labels in conditions.items() if not (clock and name == TIME)}
     each = {name: [own * (labels == k) for k in range(int(labels.max()) + 1)] for name, labels in told.items()}
     columns = np.stack([residual, *(c for parts in each.values() for c in parts)], axis=2)

@@ -1,10 +1,10 @@
-"""Lack of fit: does an answer leave what another law of a family would still explain?
+"""Lack of fit: does another law of a family explain part of an answer's residual?
 
 A mechanism is held against the saturated model of its family (`tacdata.discrepancy.regressors.saturated`), which
-contains it but for its form: the nested test of goodness of fit. What the answer leaves is regressed on those columns.
+contains it but for its form: the nested test of goodness of fit. The answer's residual is regressed on those columns.
 
-- Held-out gain (folds of presses, ridge) says whether anything is there.
-- Its size is what the columns explain, less half a unit of the sum of squares for each: that is what noise explains.
+- Held-out gain (folds of presses, ridge) tests whether there is any.
+- Its size is the part that the columns explain, less half a unit of the sum of squares for each, the part of noise.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ EXCITED = 1e-6
 SURE_T = 2.0
 """Something is there from so many standard errors over episodes on [1]..."""
 CLEAR_GAIN, CLEAR_T = 8.0, 1.0
-"""...and another form of what has a name from so much evidence on (nats, held out), too, if many bear it [1]."""
+"""...and another form of a named effect from so much evidence on (nats, held out), too, if many bear it [1]."""
 ANOTHER_FORM = 0.15
-"""A law of which its family explains this share more is another one [what the effect explains]."""
+"""A law of which its family explains this share more is another one [the effect's explained part]."""
 MUCH = 0.15
-"""What other families explain of what is left counts as left over from here on [1]."""
+"""Share of the residual that other families explain, from which it counts as left over [1]."""
 SURE_GAIN = 5.0
 """Another family is there, too, if it lowers half the held-out sum of squares by so much [1]..."""
 SURE_SHARE = 0.03
-"""...and explains this share of what the answer does: its laws may be off by less [1]."""
+"""...and explains this share of the answer's own part: its laws may be off by less [1]."""
 FAR_MORE = 2.0
-"""A family explains far more of what is left than another if so many times as much [1]."""
+"""A family explains far more of the residual than another if so many times as much [1]."""
 SHARE_LEFT = 0.05
 """Leftovers: largest share of the explainable that an answer may leave [1]."""
 MODEL = {Family.CONTACT: Family.KINEMATICS}
@@ -50,18 +50,18 @@ MODEL = {Family.CONTACT: Family.KINEMATICS}
 
 @dataclass(frozen=True)
 class Lack:
-    """What a family's saturated model still explains beside an answer."""
+    """Part that a family's saturated model explains in addition to an answer."""
 
     gain: float
     """Fall of half the whitened sum of squares, held out, summed over episodes [1]; 0 or more."""
     t: float
     """Its mean over episodes, in standard errors [1]."""
     size: float
-    """The same of all episodes together, what noise explains taken off [1]; 0 or more."""
+    """The same of all episodes together, less the part of noise [1]; 0 or more."""
 
 
 def of_family(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> Lack | None:
-    """Return what the saturated model of an effect's family explains; None if it has none."""
+    """Return the part that the saturated model of an effect's family explains; None if it has none."""
     family = finding.placed.effect.family
     return lacking.get(MODEL.get(family, family))
 
@@ -75,7 +75,7 @@ def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
 
 
 def fills(found: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
-    """Return whether what an answer leaves is another law of an effect's family: at that level hardly anything is left.
+    """Return whether an answer's residual is another law of an effect's family: at that level hardly anything is left.
 
     The family explains nearly all of it, and far more than any other does: models of families overlap.
     """
@@ -88,7 +88,7 @@ def fills(found: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack])
 
 
 def with_families(found: Findings, lacking: Mapping[Family, Lack]) -> Findings:
-    """Return findings that leave what the families beside the answer explain, where that is much."""
+    """Return findings with a large residual that families outside the answer explain."""
     sure = [lacking[family] for family in _others(found, lacking) if lacking[family].t >= SURE_T]
     most = max(sure, key=lambda own: own.gain, default=None)
     if most is None or most.gain < max(found.left.gain, MUCH * (most.gain + max(found.explained, 0.0))):
@@ -103,21 +103,21 @@ def elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
 
 
 def surely_elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
-    """Return families beside the answer's that surely explain some of what it leaves, however little."""
+    """Return families outside the answer that surely explain some of its residual, however little."""
     others = _others(found, lacking) if lacking else []
     sure = [family for family in others if lacking[family].t >= SURE_T and lacking[family].gain >= SURE_GAIN]
     return sorted(sure, key=lambda family: -lacking[family].size)
 
 
 def _others(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
-    """Return families beside the answer's that explain more than these: models of families overlap."""
+    """Return families outside the answer that explain more than these: models of families overlap."""
     taken = {MODEL.get(f.placed.effect.family, f.placed.effect.family) for f in found.effects}
     own = max((lacking[family].gain for family in taken if family in lacking), default=0.0)
     return [family for family in lacking if family not in taken and lacking[family].gain > own]
 
 
 def lack_of_fit(final: Problem) -> dict[Family, Lack]:
-    """Return what each family's saturated model explains of what an answer leaves.
+    """Return the part of an answer's residual that each family's saturated model explains.
 
     Args:
         final: The model with the answer in place.
@@ -142,7 +142,7 @@ def lack_of_fit(final: Problem) -> dict[Family, Lack]:
 
 
 def lack(gram: np.ndarray, folds: np.ndarray) -> Lack:
-    """Return what columns explain.
+    """Return the part that columns explain.
 
     Args:
         gram: Residual first, shape (episodes, 1 + k, 1 + k).

@@ -1,4 +1,4 @@
-"""Each effect of an answer beside a remainder: is its size the same in all conditions, and how far are its rivals?"""
+"""Each effect of an answer, given a remainder: is its size the same in all conditions, and how far are its rivals?"""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tacdata.discrepancy.search.j_test import ModelError, j_statistic
 
 
 class Level(Enum):
-    """How fine a name is; the value is what a verdict's file says."""
+    """How fine a name is; the value is the word in a verdict's file."""
 
     FAMILY = "family"
     MECHANISM = "mechanism"
@@ -23,7 +23,7 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class BesideRemainder:
-    """One effect's evidence beside a remainder of the size that is left."""
+    """One effect's evidence, given a remainder of the residual's size."""
 
     necessity: float
     """By how many standard errors over episodes the model is worse without it (J test) [1]."""
@@ -34,9 +34,9 @@ class BesideRemainder:
 
 
 def beside_remainder(found: Findings) -> tuple[BesideRemainder, ...]:
-    """Return each effect's evidence beside the remainder, in the order of the answer.
+    """Return each effect's evidence, given the remainder, in the order of the answer.
 
-    A remainder may take up part of what separates two effects. What is left of their difference must carry the name.
+    A remainder may absorb part of the difference between two effects. The other part must support the name.
     """
     if not found.comparisons:
         return ()
@@ -60,5 +60,5 @@ def _held_against(found: Findings, one: RivalModels, at: int, left: Remainder) -
 
 
 def _joined(error: ModelError, left: Remainder) -> ModelError:
-    """Return what a model's equations may be wrong by together with the remainder."""
+    """Return the model error of a model's equations together with the remainder."""
     return replace(error, columns=np.concatenate([error.columns, left.columns], axis=2))

@@ -1,9 +1,9 @@
-"""The remainder: what an answer leaves, as a discrepancy term that is orthogonal to what it names.
+"""The remainder: an answer's residual as a discrepancy term, orthogonal to the named effects.
 
 The residual is taken as a Gaussian process with a linear kernel: patterns of the streams times histories of the path
-(depth, rate, memory, direction) with weights N(0, tau^2). What the named effects' numbers move is projected out first,
-so neither takes what belongs to the other (Plumlee, J. Am. Stat. Assoc. 112, 2017, 1274). tau is estimated by
-restricted maximum likelihood.
+(depth, rate, memory, direction) with weights N(0, tau^2). The tangent space of the named effects' parameters is
+projected out first, so neither absorbs a part of the other (Plumlee, J. Am. Stat. Assoc. 112, 2017, 1274). tau is
+estimated by restricted maximum likelihood.
 """
 
 from __future__ import annotations

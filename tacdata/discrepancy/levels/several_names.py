@@ -1,4 +1,4 @@
-"""Of several names each must stand by itself: it may be a part of what has no name, or of another's form."""
+"""Tests that a further effect is not just model error of another, or part of the unexplained remainder."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ SHARE_LEFT_ALONE = 0.15
 
 
 def stands_in(found: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
-    """Return whether an effect may be a part of what another leaves by its form, or of what all leave.
+    """Return whether an effect may be model error of another, or part of the common remainder.
 
-    It explains little beside that, beyond the others. A form that is off by a tenth leaves a hundredth. What a family
-    without a name surely explains is left, too. A single effect is held against what is left by `adequate`.
+    It explains little compared with that, beyond the others. A form that is off by a tenth leaves a hundredth. What a
+    family without a name surely explains is left, too. `adequate` compares a single effect with the residual.
     """
     if len(found.effects) < 2 or finding.corrected_p is None:
         return False
@@ -38,15 +38,15 @@ def lent(found: Findings, finding: FoundEffect) -> bool:
 
 
 def form_error(found: Findings) -> float:
-    """Return what an effect's form may leave: half a whitened sum of squares [1]."""
+    """Return the model error of an effect's form: half a whitened sum of squares [1]."""
     raced = [f for f in found.effects if f.corrected_p is not None]
     return max((f.placed.effect.form_error**2 * f.bought for f in raced), default=0.0)
 
 
 def beside_open(found: Findings, answer: list[FoundEffect], levels: list[Level | None]) -> list[Level | None]:
-    """Return the levels that hold beside effects of the answer that are open: these count as left over, too.
+    """Return the levels that hold while other effects of the answer are open: these count as left over, too.
 
-    What explains most has a name, whatever else of the answer may be something else.
+    The effect that explains most has a name, whatever else of the answer may be something else.
     """
     left = _left(found) + sum(max(f.bought, 0.0) for f, level in zip(answer, levels, strict=True) if level is None)
     large = [left < SHARE_LEFT_ALONE * (left + max(f.bought, 0.0)) for f in answer]
@@ -54,14 +54,14 @@ def beside_open(found: Findings, answer: list[FoundEffect], levels: list[Level |
 
 
 def traded(answer: Sequence[FoundEffect], levels: Sequence[Level | None]) -> list[bool]:
-    """Return of each effect whether it was told by calibration beside one in its place that has no name.
+    """Return of each effect whether it was found by calibration while an unnamed one may replace it.
 
-    The two trade: each may be there to take back what the other falsely explains.
+    The two are collinear: each may compensate a false part of the other.
     """
     nameless = {f.placed.effect.called for f, level in zip(answer, levels, strict=True) if level is None}
     return [f.corrected_p is None and bool(nameless & set(f.rivals)) for f in answer]
 
 
 def _left(found: Findings) -> float:
-    """Return what is surely left [half the whitened sum of squares, held out]."""
+    """Return the certain part of the residual [half the whitened sum of squares, held out]."""
     return found.left.gain if found.left.t >= LEFT_T else 0.0

@@ -18,9 +18,9 @@ EVEN_INTERVALS = 8
 """With so few intervals, knots stay evenly spaced."""
 INTERVALS = 50
 """Most intervals of the splines in depth. They know nothing of direction, rate or time, so history stays out however
-many they are; too few cannot follow how a skin is first touched, and half of that looks like a skin that sticks. (What
-predicts left-out episodes best is no guide: that bias lies far below one reading's noise, and far above what a test of
-all of them sees.)"""
+many they are; too few cannot follow how a skin is first touched, and half of that looks like a skin that sticks. (The
+best predictor of left-out episodes is no guide: that bias is far below one reading's noise, and far above what a test
+of all of them sees.)"""
 BENT = 0.65
 """Share of the knots that follow the response's curvature [1]."""
 LITTLE = 0.02
@@ -38,8 +38,8 @@ REML_STEPS = 30
 MOST_SMOOTHING = 1e9
 """REML: largest weight of bending [1]."""
 SLOPES = 10.0
-"""REML: noise is taken for so many times its variance. What moves the tip shows by slopes, which need more smoothing
-than values do. What a smoother response misses of the values is projected out [1]."""
+"""REML: noise is taken for so many times its variance. A motion of the tip shows by slopes, which need more smoothing
+than values do. The values that a smoother response misses are projected out [1]."""
 INNER = (0.02, 0.98)
 """Quantiles of readings between which their range is taken: a few odd ones do not count [1]."""
 CACHED = 6
@@ -159,11 +159,11 @@ class FittedResponse(Response):
         return max(len(b.t) - b.k - 1 for b in self._bases)
 
     def correct(self, residual: np.ndarray, features: np.ndarray) -> None:
-        """Add to the response what of a residual its splines can follow.
+        """Add to the response the part of a residual that its splines can follow.
 
         Args:
             residual: Of the rows read, shape (m, channels), or one more with the force.
-            features: What each spline adds to a reading in a model, shape (m, most splines of a place); to each
+            features: Contribution of each spline to a reading in a model, shape (m, most splines of a place); to each
                 stream, shape (m, streams, splines), where the force differs.
         """
         self._answers = []
@@ -172,7 +172,7 @@ class FittedResponse(Response):
             self._weights[k][:, of] += more
 
     def residual_after(self, residual: np.ndarray, features: np.ndarray) -> np.ndarray:
-        """Return what the next correction would leave if effects were linear in load, shape (m, streams).
+        """Return the residual after the next correction if effects were linear in load, shape (m, streams).
 
         Args:
             residual: As for `correct`.
@@ -186,7 +186,7 @@ class FittedResponse(Response):
     def _corrections(
         self, residual: np.ndarray, features: np.ndarray
     ) -> Iterator[tuple[int, slice, np.ndarray, np.ndarray]]:
-        """Give places and streams with their features, shape (k, splines), and what to add to weights there."""
+        """Give places and streams with their features, shape (k, splines), and the increments of the weights there."""
         last = residual.shape[1] - 1
         parts = [slice(None)] if features.ndim == 2 else [slice(0, last), slice(last, None)]
         for k, basis in enumerate(self._bases):
@@ -226,7 +226,7 @@ class FittedResponse(Response):
         size = np.maximum(np.abs(self._weights[k]).max(axis=0), 1e-12)
         spline = BSpline(basis.t, self._weights[k] / size, 3)
         bend, rise = spline.derivative(2)(at), np.abs(spline(at) - spline(at[0]))
-        # Where much is read presses differ by their gains, which looks like bends: half of what bends counts over it.
+        # At large readings presses differ by their gains, which resembles bends: half of the bend counts over it.
         each = [np.sqrt(np.sqrt(np.mean(np.square(b), axis=1))) for b in (bend, bend / (LITTLE + rise))]
         monitor = np.mean([m / max(float(m.mean()), 1e-12) for m in each], axis=0)
         inner = len(basis.t) - 7
@@ -253,7 +253,7 @@ class FittedResponse(Response):
         smooth: np.ndarray | None = None,
         before: np.ndarray | float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return spline weights, with an offset for every episode fitted beside and left out, and how smooth they are.
+        """Return spline weights, with an offset for every episode fitted as well and left out, and how smooth they are.
 
         Args:
             rows: Which of the rows read, shape (m,), bool.
@@ -270,7 +270,7 @@ class FittedResponse(Response):
         gram = matrix.T @ matrix
         scale = float(np.mean(np.diag(gram)))
         penalty = np.full(len(gram), RIDGE * scale)
-        penalty[count:] = 1e-2 * scale  # offsets are small: the spline takes what they share
+        penalty[count:] = 1e-2 * scale  # offsets are small: the spline takes their common part
         rough = np.zeros_like(gram)
         rough[:count, :count] = _roughness(basis)
         # Both matrices are diagonal in these: one factorization for all weights of bending.
@@ -341,9 +341,9 @@ class FittedResponse(Response):
 def _roughness(basis: BSpline) -> np.ndarray:
     """Return the quadratic form of weights that is the integral of a spline's squared curvature, shape (k, k).
 
-    Curvature is told by divided differences of the weights (general P-splines: Li & Cao, arXiv 2201.06808, 2022). Plain
-    ones take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit is
-    that of plain differences between evenly spaced knots.
+    Curvature is estimated by divided differences of the weights (general P-splines: Li & Cao, arXiv 2201.06808, 2022).
+    Plain ones take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit
+    is that of plain differences between evenly spaced knots.
     """
     apart = np.diff((basis.t[1:-3] + basis.t[2:-2] + basis.t[3:-1]) / 3)
     bend = np.zeros((len(apart) - 1, len(apart) + 1))
@@ -376,7 +376,7 @@ def _smoothness(size: np.ndarray, target: np.ndarray, noise: np.ndarray) -> np.n
 def _shaken(left: np.ndarray, course: Course) -> np.ndarray:
     """Return the noise of means of rows times the root of their number [each stream's unit], shape (streams,).
 
-    Told by second differences of successive means of what a response leaves; 0 where there are none.
+    Estimated by second differences of successive means of a response's residual; 0 where there are none.
     """
     found = np.zeros((0, left.shape[1]))
     for rows in np.split(np.arange(len(left)), np.flatnonzero(np.diff(course.episode)) + 1):
@@ -388,7 +388,7 @@ def _shaken(left: np.ndarray, course: Course) -> np.ndarray:
 
 
 def about_means(residual: np.ndarray, course: Course) -> np.ndarray:
-    """Return sums of squares about each episode's mean, shape (episodes, streams); what was not read counts as 0.
+    """Return sums of squares about each episode's mean, shape (episodes, streams); missing readings count as 0.
 
     Args:
         residual: Of the rows read, shape (m, streams); NaN where nothing was read.

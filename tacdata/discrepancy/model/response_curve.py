@@ -14,7 +14,7 @@ from tacdata.discrepancy.model.laws.law import ContactLaw, laws
 from tacdata.discrepancy.statistics.gram_fit import FOLDS, fold_of
 
 TOUCHES = np.linspace(-0.05, 0.1, 7)
-"""Where the skin may begin, below what the recordings say [stroke]."""
+"""Where the skin may begin, below the recorded depth [stroke]."""
 INTERVALS = (6, 12, 25, 50)
 """Of the splines that laws are held against."""
 RIDGE = 1e-9
@@ -28,12 +28,12 @@ DEEPER = 0.02
 FOLLOWS = 0.05
 """A law that leaves more of the change of the readings is none worth telling [1]."""
 MIDDLE = (0.1, 0.9)
-"""Quantiles of the channels' numbers that are told [1]."""
+"""Quantiles of the channels' numbers that are reported [1]."""
 
 
 @dataclass(frozen=True)
 class ResponseCurve:
-    """The contact law that follows best, and splines beside it."""
+    """The contact law that follows best, and splines for comparison."""
 
     law: ContactLaw
     numbers: tuple[float, float]
@@ -131,7 +131,7 @@ def _worse(left: np.ndarray, best: np.ndarray) -> bool:
 
 
 def _held_out(law: ContactLaw, places: list[_Place]) -> tuple[ContactLaw, np.ndarray, np.ndarray]:
-    """Return a law, its number in each channel of each place, and what it leaves of each left-out episode."""
+    """Return a law, its number in each channel of each place, and its residual of each left-out episode."""
     grid = [(touch, shape) for touch in TOUCHES for shape in law.shapes]
     shapes, numbers, every = np.array([shape for _, shape in grid]), [], []
     for place in places:
@@ -159,7 +159,7 @@ def _risen(law: ContactLaw, depth: np.ndarray, shape: float) -> np.ndarray:
 
 
 def _splines(place: _Place, intervals: int) -> np.ndarray:
-    """Return what splines leave of each left-out episode, shape (episodes asked,)."""
+    """Return the splines' residual of each left-out episode, shape (episodes asked,)."""
     left = np.zeros(int(place.episode.max()) + 1)
     for fold in np.unique(place.folds[place.folds >= 0]):
         out = place.folds == fold

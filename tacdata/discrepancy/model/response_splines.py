@@ -1,4 +1,4 @@
-"""What a fitted response may still take up, as it comes out of the chain: its splines, gone through the effects."""
+"""Degrees of freedom of a fitted response at the end of the chain: its splines, passed through the effects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SMALL_SHARE = 0.01
 
 
 class SplineResponse(Response):
-    """A response whose channels are all alike but for a little of one spline each; the last has none."""
+    """A response whose channels are all equal but for a little of one spline each; the last has none."""
 
     fitted = True
     form_error = FORM_ERROR
@@ -48,12 +48,12 @@ class SplineResponse(Response):
 
 
 def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np.ndarray | None:
-    """Return what a unit of each spline adds to a reading, at the rows read, shape (m, splines).
+    """Return the contribution of a unit of each spline to a reading, at the rows read, shape (m, splines).
 
     Where an effect changes the force in another way, each stream has its own: shape (m, channels + 1, splines).
 
     A model must not be blamed for splines that do not go through its own effects: a delayed response is made of delayed
-    splines. What differs between channels is left out: features are shared by all. So is what a press remembers of
+    splines. Differences between channels are left out: features are shared by all. So is a press's memory of
     others: splines of another place would go on in this one, as freedom that the response does not have.
 
     Args:
@@ -73,7 +73,7 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
 
 
 def _through(course: Course, response: FittedResponse, acting: Sequence[Placed]) -> np.ndarray:
-    """Return what a unit of each spline adds to a reading, gone through effects, shape (m, splines)."""
+    """Return the contribution of a unit of each spline to a reading, passed through effects, shape (m, splines)."""
     none = np.zeros((course.rows, response.width + 1))
     plain = replace(course, readings=none, centers=None, force=None, apart=True)
     little = SMALL_SHARE * max(float(np.abs(response.force(course.tip, course.tool)).max()), 1e-12)

@@ -1,4 +1,4 @@
-"""Compliance in series with what is pressed, told by specimens of other stiffness without a model or a gauge.
+"""Compliance in series with the specimen, estimated from specimens of other stiffness without a model or a gauge.
 
 A machine gives way by C F. One specimen's curve takes that up: nobody knows its law. But the frame is the same for
 all specimens, and a stiff one bends it more: with the right C, one contact law follows them all (direct method of
@@ -28,16 +28,16 @@ NOISE = 5.0
 SPECIMENS, EACH = 3, 3
 """Fewer specimens, or presses of each, say nothing. A power and a compliance fit any two curves."""
 STIFFER = 3.0
-"""The stiffest is so many times as stiff as the softest, or they bend the frame alike [1]."""
+"""The stiffest is so many times as stiff as the softest, or they bend the frame equally [1]."""
 CLOSES = 0.5
-"""Share of what a common law leaves beyond the noise that the compliance must close [1]."""
+"""Share of a common law's residual beyond the noise that the compliance must close [1]."""
 SURE = 3.8
 """The compliance over its standard error [1]: as an effect that raced."""
 
 
 @dataclass(frozen=True)
 class SeriesCompliance:
-    """What specimens of other stiffness say of a compliance in series."""
+    """Estimate of a compliance in series from specimens of other stiffness."""
 
     compliance: float
     """C [mm over the unit of the load]."""
@@ -89,7 +89,7 @@ def series_compliance(course: Course) -> SeriesCompliance | None:
     error = float(np.sqrt((count - 1) / count * np.square(each - each.mean()).sum()))
     better, worse, chance = without - with_it, with_it - own, sum(len(p.load) - 2 for p in presses)
     shown = 0 < with_it.sum() - chance <= (1 - CLOSES) * (without.sum() - chance) or with_it.sum() <= chance
-    # Where a power of each specimen's own says more, the specimens differ by their law.
+    # Where a power of each specimen's own explains more, the specimens differ by their law.
     differ = worse.mean() > worse.std(ddof=1) / np.sqrt(count)
     most = max(kept, key=lambda s: float(better[of == s].sum()))
     # Noise in the load bends all curves a little: one specimen at least must show it plainly.
@@ -127,7 +127,7 @@ class _Press:
         return float(np.square(self.depth - self.depth.mean()).sum())
 
     def products(self, power: float) -> tuple[float, float, float]:
-        """Return z.z, z.F and F.F: depth z and load F beside the press's own touch and factor of a power law."""
+        """Return z.z, z.F and F.F: depth z and load F given the press's own touch and factor of a power law."""
         law = np.stack([np.ones_like(self.load), self.load ** (1 / power)], axis=1)
         both = np.stack([self.depth, self.load], axis=1)
         left = both - law @ np.linalg.lstsq(law, both, rcond=None)[0]
@@ -135,12 +135,12 @@ class _Press:
 
 
 def _left(products: np.ndarray, c: float) -> np.ndarray:
-    """Return what a compliance leaves of each press, shape (presses,)."""
+    """Return the residual of each press under a compliance, shape (presses,)."""
     return products[:, 0] - 2 * c * products[:, 1] + c**2 * products[:, 2]
 
 
 def _noise(made: np.ndarray, count: int) -> float:
-    """Return the mean square of one specimen beside the power and compliance that fit it best [mm^2].
+    """Return the mean square of one specimen given the power and compliance that fit it best [mm^2].
 
     Args:
         made: Products of its presses, shape (presses, powers, 3).

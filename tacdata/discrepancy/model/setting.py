@@ -1,4 +1,4 @@
-"""What is judged, and with what."""
+"""Input of a judgement: course, response, effects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tacdata.chain import Course, Response
 from tacdata.effects import Effect, GainKind, LikeGain, Placed, library, load
 
 NUISANCE = {"channel_gain": 0.05}
-"""What calibration leaves open of a response that was not fitted: standard deviations in the effects' own units."""
+"""Calibration uncertainty of a response that was not fitted: standard deviations in the effects' own units."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Setting:
 
     @property
     def absorbed(self) -> frozenset[str]:
-        """Effects that calibration takes up: nuisances, and what all channels' gains have in common."""
+        """Effects that calibration takes up: nuisances, and the common factor of all channels' gains."""
         if self.response.fitted:
             return frozenset()
         force = self.course.force is not None

@@ -25,7 +25,7 @@ class Spec:
     document: dict[str, Any]
     """As in the file (`schemas/model_spec.schema.json`)."""
     folder: Path
-    """What names of files in it are relative to."""
+    """Folder that names of files in it are relative to."""
 
     @property
     def content_hash(self) -> str:

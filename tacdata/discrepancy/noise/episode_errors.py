@@ -1,4 +1,4 @@
-"""Sizes of episode errors, and noise, estimated from what an over-rich fit leaves of the residual."""
+"""Sizes of episode errors, and noise, estimated from the residual of an over-rich fit."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class ErrorSizes:
     odd: np.ndarray
     """Episodes that err by far more than the others, shape (k,), int64."""
     counts: np.ndarray
-    """What each episode counts among the others of its place [1], shape (episodes,)."""
+    """Weight of each episode among the others of its place [1], shape (episodes,)."""
 
 
 @dataclass(frozen=True)
 class EpisodeErrors:
-    """Estimates episode errors from a residual beside columns that any response may need."""
+    """Estimates episode errors from a residual, given columns that any response may need."""
 
     residual: np.ndarray
     """Measured less predicted [each stream's unit], shape (m, streams); NaN where missing."""
@@ -49,12 +49,12 @@ class EpisodeErrors:
     context: np.ndarray
     """Group of rows that share features, shape (m,), int64."""
     features: np.ndarray | None
-    """What the response may take up [1], shape (m, k)."""
+    """Degrees of freedom of the response [1], shape (m, k)."""
     rise: np.ndarray
-    """What presses add to each stream [its unit], shape (m, streams)."""
+    """Rise of each stream under presses [its unit], shape (m, streams)."""
 
     def noise(self, errors: np.ndarray) -> Noise:
-        """Return the noise beside errors of pose, shape (m, streams, kinds)."""
+        """Return the noise besides errors of pose, shape (m, streams, kinds)."""
         course, relative = self.course, readings.relative_scale(self.residual, self.rise, self.course)
         residual = readings.beside_depth(self.residual, course)
         known = readings.first_guess(residual, course, relative)
@@ -77,14 +77,14 @@ class EpisodeErrors:
         return replace(known, offsets=process, random_walk=walk, walk_rate=rate, tag=tag)
 
     def left(self, known: Noise, errors: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
-        """Return what an over-rich fit leaves of the residual, shape (m, streams), float32.
+        """Return the residual of an over-rich fit, shape (m, streams), float32.
 
-        Its weights hardly depend on the sizes of the errors beside it: one fit serves all their estimates.
+        Its weights hardly depend on the sizes of the errors fitted with it: one fit serves all their estimates.
 
         Args:
             known: Noise.
             errors: Of pose, shape (m, streams, kinds).
-            counts: What each episode counts, shape (episodes,); all alike, unless given.
+            counts: Weight of each episode, shape (episodes,); equal, unless given.
         """
         columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
         best = self._best(columns, Whitener(self.course, known, self.context, self.features, errors), counts)
@@ -93,13 +93,13 @@ class EpisodeErrors:
     def poses(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> ErrorSizes:
         """Return the estimated size of episodes' own errors of pose.
 
-        What goes with place, depth, rate or session is no error of an episode's own: those that repeat one another have
-        a mean of their own. Where places are not visited again, a few successive episodes have one.
+        A difference that depends on place, depth, rate or session is no error of an episode's own: those that repeat
+        one another have a mean of their own. Where places are not visited again, a few successive episodes have one.
 
         Args:
-            known: Noise, with what an episode's gains err by.
-            errors: What errors of one standard deviation of their prior change, shape (m, streams, kinds).
-            left: What an over-rich fit leaves, shape (m, streams).
+            known: Noise, with the errors of an episode's gains.
+            errors: Effect of errors of one standard deviation of their prior, shape (m, streams, kinds).
+            left: Residual of an over-rich fit, shape (m, streams).
         """
         course, kinds, place = self.course, errors.shape[2], self._places()
         plain = Whitener(course, known, self.context, self.features, np.zeros_like(errors[:, :, :1]))
@@ -128,7 +128,7 @@ class EpisodeErrors:
         Args:
             known: Noise without own gains.
             errors: Of pose, shape (m, streams, kinds).
-            left: What an over-rich fit leaves, shape (m, streams).
+            left: Residual of an over-rich fit, shape (m, streams).
         """
         whitener = Whitener(self.course, known, self.context, self.features, errors)
         score, information = whitener.stream_scores(left, self.rise)

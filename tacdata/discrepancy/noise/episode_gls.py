@@ -1,11 +1,11 @@
-"""Generalized least squares (GLS) beside the errors of each episode.
+"""Generalized least squares (GLS) with random errors of each episode.
 
 The covariance of an episode's whitened rows is 1 + A A' + T T'. A is its own offset of every stream. T holds its errors
 of pose, which all streams share, and its gain error of each stream. Columns are multiplied by the root of the inverse,
 so that inner products are those of GLS (Aitken 1935). The inverse is Woodbury's: only small matrices are inverted.
 Features that are free are projected out afterwards.
 
-An episode's gain errors have mean zero, weighted by information: what all streams do alike is an error of depth.
+An episode's gain errors have mean zero, weighted by information: a common change of all streams is an error of depth.
 """
 
 from __future__ import annotations
@@ -17,33 +17,33 @@ import numpy as np
 from scipy.linalg import block_diag
 
 RIDGE = 1e-7
-"""Ridge of what no row excites, over the mean of what rows do [1]."""
+"""Ridge of unexcited directions, over the mean of the excited ones [1]."""
 MOST_TOGETHER = 40
-"""Most episodes of a place whose scores are told together: the cost grows with the cube."""
+"""Most episodes of a place whose scores are computed together: the cost grows with the cube."""
 
 
 @dataclass(frozen=True)
 class EpisodeErrorModel:
-    """What the episodes of one place err by themselves, whitened; streams first."""
+    """Per-episode random effects (offset, pose, gain) at one place, whitened; first axis: stream."""
 
     offset: np.ndarray
     """A constant [1], shape (streams, n)."""
     prior: np.ndarray
     """Its standard deviation in each episode, in noise scales [1], shape (episodes,); inf leaves it free."""
     gain_error: np.ndarray | None = None
-    """What one standard deviation of a stream's own gain changes [1], shape (streams, n)."""
+    """Effect of one standard deviation of a stream's own gain [1], shape (streams, n)."""
     pose_errors: np.ndarray | None = None
-    """What one standard deviation of each error of pose changes [1], shape (streams, n, kinds)."""
+    """Effect of one standard deviation of each error of pose [1], shape (streams, n, kinds)."""
     features: np.ndarray | None = None
-    """What all episodes may take up together, each stream by itself [1], shape (streams, n, p); (1, n, p) where they,
-    and the offsets, are alike in all streams."""
+    """Columns common to all episodes, each stream by itself [1], shape (streams, n, p); (1, n, p) where they,
+    and the offsets, are equal in all streams."""
     random_walk: np.ndarray | None = None
-    """What one standard deviation of each mode of a stream's random walk changes [1], shape (streams, n, modes)."""
+    """Effect of one standard deviation of each mode of a stream's random walk [1], shape (streams, n, modes)."""
 
 
 @dataclass(frozen=True)
 class JointScores:
-    """What a residual says of columns of which each episode has its own, and how much it knows."""
+    """Score vector and information matrix of episode-specific columns."""
 
     episodes: np.ndarray
     """Numbers of the episodes, shape (n,), int64."""
@@ -54,14 +54,14 @@ class JointScores:
 
 
 class FactoredErrors:
-    """What the episodes of one place err by, factored: takes it out of any columns."""
+    """Factored covariance of the episodes of one place: whitens any columns."""
 
     def __init__(self, spans: Sequence[slice], own: EpisodeErrorModel, like: FactoredErrors | None = None) -> None:
-        """Factor what episodes, each given by its rows, err by.
+        """Factor the error covariance of episodes, each given by its rows.
 
         Args:
             spans: Rows of each episode.
-            own: What they err by.
+            own: Their random effects.
             like: Errors with the same offsets and random walks, which are not factored again.
         """
         gain_error = None if own.gain_error is None else own.gain_error[:, :, None]
@@ -90,7 +90,7 @@ class FactoredErrors:
         return 0.0 if self._free is None else self._free.freedom
 
     def take_out(self, columns: np.ndarray) -> None:
-        """Make columns, in place, what generalized least squares sees of them.
+        """Whiten columns in place for generalized least squares.
 
         Args:
             columns: Whitened, shape (streams, n, k).
@@ -102,7 +102,7 @@ class FactoredErrors:
         self.project(columns)
 
     def project(self, white: np.ndarray) -> None:
-        """Leave, in place, what features leave of noise as generalized least squares sees it: white (streams, n, k)."""
+        """Remove the features' part of whitened noise, in place: white (streams, n, k)."""
         if self._free is None:
             return
         weights = self._free.weights([white[:, rows] for rows, _, _ in self._episodes])
@@ -138,8 +138,8 @@ class FactoredErrors:
     def stream_scores(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return scores and information of columns that each stand in one stream of one episode.
 
-        Like the products with what `without` makes of such columns, but for streams times episodes of them at once.
-        Streams must not have gains of their own beside.
+        Like the products with the columns that `without` returns, but for streams times episodes of them at once.
+        Streams must not have gains of their own as well.
 
         Args:
             left: A residual, as `without` returns it, shape (streams, n).
@@ -174,13 +174,13 @@ class _Offsets:
         self._columns = np.concatenate([constant, modes], axis=2)
         turned = self._columns.transpose(0, 2, 1)
         root = _root(turned.astype(np.float64) @ self._columns)
-        if np.isinf(prior):  # what is free is taken out whole
+        if np.isinf(prior):  # unpenalized directions are projected out
             root[:, 0], root[:, :, 0] = 0.0, 0.0
             root[:, 0, 0] = 1.0
         self._pull = (root @ turned).astype(np.float32)
 
     def part(self, block: np.ndarray) -> np.ndarray:
-        """Return what to take off columns (streams, m, k) so that it is accounted for."""
+        """Return the correction to subtract from columns (streams, m, k) to account for it."""
         return self._columns[: len(block)] @ (self._pull[: len(block)] @ block)
 
     def rooted(self, block: np.ndarray) -> np.ndarray:
@@ -200,7 +200,7 @@ class _Errors:
 
     def __init__(self, streams: int, rows: int, pose: np.ndarray | None, gain_error: np.ndarray | None) -> None:
         given = [part for part in (pose, gain_error) if part is not None]
-        # What a stream does in each of T's columns that are not another stream's: pose, then its own gain.
+        # Part of a stream in each of T's columns that are not another stream's: pose, then its own gain.
         self._own = np.concatenate([np.zeros((streams, rows, 0), dtype=np.float32), *given], axis=2)
         self._kinds = 0 if pose is None else pose.shape[2]
         self._mean = None
@@ -243,7 +243,7 @@ class _Errors:
         return self._own @ own.astype(np.float32)
 
     def part(self, block: np.ndarray) -> np.ndarray:
-        """Return what to take off columns (streams, m, k) to have them times the root of the inverse of 1 + T T'."""
+        """Return the correction of columns (streams, m, k) that multiplies them by (1 + T T')^-1/2."""
         return self.times(self.root @ self.inner(block))
 
 
@@ -257,8 +257,8 @@ class _Free:
         self._errors: list[_Errors] = []
 
     def take(self, shared: np.ndarray, errors: _Errors) -> None:
-        """Take an episode's features in, shape (streams, m, p), or (1, m, p) where streams are alike."""
-        exact = shared.astype(np.float64)  # splines of few rows are nearly alike: single precision loses their rank
+        """Take an episode's features in, shape (streams, m, p), or (1, m, p) where streams are equal."""
+        exact = shared.astype(np.float64)  # splines of few rows are nearly collinear: single precision loses their rank
         self._blocks = self._blocks + exact.transpose(0, 2, 1) @ exact
         shared = np.broadcast_to(shared, (self._streams, *shared.shape[1:]))
         self._shared.append(shared)
@@ -266,7 +266,7 @@ class _Free:
         self._errors.append(errors)
 
     def factor(self) -> None:
-        """Invert what is the same for all columns."""
+        """Invert the part common to all columns."""
         streams, width = self._streams, self._blocks.shape[1]
         mean = np.einsum("spp->s", self._blocks) / width
         floor = RIDGE * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
@@ -326,7 +326,7 @@ class _Free:
         return inside + np.einsum("sk,kl,sl->s", turned, np.einsum("spk,spl->kl", joint, pose), turned)
 
     def fitted(self, episode: int, weights: np.ndarray) -> np.ndarray:
-        """Return what weights change in an episode, shape (streams, m, k)."""
+        """Return the change of an episode by weights, shape (streams, m, k)."""
         errors, joint = self._errors[episode], self._joints[episode]
         flat = joint.reshape(joint.shape[0] * joint.shape[1], joint.shape[2])
         through = errors.root @ (flat.T @ weights.reshape(len(flat), -1))

@@ -2,8 +2,8 @@
 
 To first order the measured streams of an episode are y = f + A theta + B beta + Z z + e:
 
-- f the model's prediction, A theta what effects would add,
-- B beta what the response itself may still take up (splines of a fitted response, constant offsets): projected out,
+- f the model's prediction, A theta the contribution of effects,
+- B beta the response's own degrees of freedom (splines of a fitted response, constant offsets): projected out,
 - Z z the episode's own errors, with a prior,
 - e autocorrelated noise: an AR(1) filter and each stream's scale whiten it.
 
@@ -40,7 +40,7 @@ class EpisodeGrams:
         return self._sums[key]
 
     def beside(self, columns: np.ndarray, ridge: np.ndarray, episodes: np.ndarray) -> Beside:
-        """Return the same beside columns that are free of bounds, fitted to some episodes."""
+        """Return the same given columns that are free of bounds, fitted to some episodes."""
         key = (columns.tobytes(), ridge.tobytes(), np.asarray(episodes).tobytes())
         if key not in self._beside:
             self._beside[key] = Beside(self.gram, self.of(episodes), columns, ridge)

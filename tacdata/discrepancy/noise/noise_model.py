@@ -22,11 +22,11 @@ class Noise:
     offsets: OffsetProcess | None = None
     """How episodes' offsets go on from one to the next; None leaves each free."""
     gain_error: np.ndarray | None = None
-    """What one standard deviation of an episode's own gain of a stream changes [its unit], shape (n, streams)."""
+    """Effect of one standard deviation of an episode's own gain of a stream [its unit], shape (n, streams)."""
     missing: np.ndarray | None = None
     """Which values were not read, shape (n, streams), bool; None: all were."""
     random_walk: np.ndarray | None = None
-    """What one standard deviation of each mode of the random walk within an episode changes [noise scales], shape
+    """Effect of one standard deviation of each mode of the random walk within an episode [noise scales], shape
     (n, modes); None: there is none."""
     walk_rate: float = 0.0
     """Rate of that random walk [noise scales squared a second]."""
@@ -37,7 +37,7 @@ class Noise:
     have a free offset for each place and know nothing of the response. None: there is no tag."""
 
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> Noise:
-        """Return the noise of some rows, shape (n,), bool; ``episodes`` are those left, if they are numbered anew."""
+        """Return the noise of some rows, shape (n,), bool; ``episodes`` are those left, if they are renumbered."""
         each = {name: getattr(self, name) for name in ("gain_error", "missing", "random_walk", "relative_scale")}
         kept = {name: None if value is None else value[rows] for name, value in each.items()}
         return replace(self, **kept, offsets=None if self.offsets is None else self.offsets.of(rows, episodes))

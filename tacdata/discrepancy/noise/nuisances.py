@@ -1,4 +1,4 @@
-"""What recordings may be off by that is no effect: calibration, an episode's own errors, a recording's set-up."""
+"""Nuisances of recordings: calibration, an episode's own errors, a recording's set-up."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tacdata.effects import Placed, library, load
 IDLE = 0.01
 """Prior standard deviation of a reading without load [largest rise]."""
 POSE_PRIOR = (0.02, 0.02, 0.01)
-"""Prior standard deviations of an episode's errors of x, y and depth, beside a table [mm]."""
+"""Prior standard deviations of an episode's errors of x, y and depth, with a table [mm]."""
 FITTED_DEPTH_PRIOR = 0.01
-"""The same for the depth beside a fitted response [stroke]."""
+"""The same for the depth with a fitted response [stroke]."""
 FITTED_GAIN_PRIOR = 0.01
-"""Prior standard deviation of an episode's gain beside a fitted response [1]."""
+"""Prior standard deviation of an episode's gain with a fitted response [1]."""
 SET_UP_FACTOR = 2.0
 """Prior of a recording's set-up error over that of an episode's error [1]."""
 MOST_SET_UPS = 24
@@ -32,8 +32,8 @@ MOST_SET_UPS = 24
 def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
     """Return the nuisances' columns (n, streams, k) and the weights of their priors (k,).
 
-    Calibration's (a gain of each channel, then what is known of each without load) and a table's error, unless the
-    response is fitted; then what recordings of several strokes are off one another.
+    Calibration's (a gain of each channel, then the known state of each without load) and a table's error, unless the
+    response is fitted; then the offsets between recordings of several strokes.
     """
     course, response = setting.course, setting.response
     if response.fitted:
@@ -57,7 +57,7 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
 
 
 def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
-    """Return what recordings that hold several strokes are off one another (n, streams, k), and weights (k,).
+    """Return columns of the offsets between recordings of several strokes (n, streams, k), and weights (k,).
 
     A recording is set up once: its strokes share errors of pose and gain, which are no drift from one to the next.
     """
@@ -72,17 +72,17 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
 
 
 def pose_errors(setting: Setting, placed: Sequence[Placed], predicted: Prediction | None = None) -> np.ndarray:
-    """Return what an episode's own errors of pose change, at one standard deviation, shape (n, streams, kinds).
+    """Return the effect of an episode's own errors of pose, at one standard deviation, shape (n, streams, kinds).
 
     Args:
         setting: With the model's response.
         placed: Its effects.
-        predicted: What it predicts, where that is known already.
+        predicted: Its prediction, where that is known already.
     """
     course, response = setting.course, setting.response
     slope = depth_slope(course, response, list(placed))
     if response.fitted:
-        # Where the response follows what was read, gains are as much each episode's own as depths.
+        # Where the response follows the readings, gains are as much each episode's own as depths.
         rise = Streams.of(course).rise(predicted or predict(course, response, list(placed)), response)
         rise[:, course.channels :] = 0.0
         return np.stack([slope * FITTED_DEPTH_PRIOR * course.stroke, rise * FITTED_GAIN_PRIOR], axis=2)

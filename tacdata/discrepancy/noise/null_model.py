@@ -32,7 +32,7 @@ ROUNDS = 3
 SETTLED = 0.1
 """...until none changes by more than this share [1]."""
 ODD = 0.3
-"""Where an episode counts less, the over-rich fit beside which errors are estimated is made anew by counts [1]."""
+"""Where an episode counts less, the over-rich fit for the estimate of errors is repeated with its weights [1]."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class NullModel:
     features: np.ndarray | None
     """What the response may take up [1], shape (m, k)."""
     errors: np.ndarray
-    """What an episode's own errors of pose change [each stream's unit], shape (m, streams, kinds)."""
+    """Effect of an episode's own errors of pose [each stream's unit], shape (m, streams, kinds)."""
     ridge: np.ndarray
     """Weights of their priors [1], shape (k,)."""
     beside: np.ndarray
@@ -58,7 +58,7 @@ class NullModel:
     folds: np.ndarray
     """Fold of each episode, shape (episodes,), int64."""
     whitener: Whitener
-    """Takes nuisances out of columns, beside the model as it was given."""
+    """Takes nuisances out of columns, for the model as it was given."""
     odd: np.ndarray
     """Episodes that err by far more than the others, shape (k,), int64."""
     draws: np.ndarray
@@ -84,7 +84,7 @@ class NullModel:
         sizes: np.ndarray | None = None,
         spread: float = 0.0,
     ) -> NullModel:
-        """Return the null model of the rows read, with what follows from its parts."""
+        """Return the null model of the rows read, with its derived quantities."""
         white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), NOISE_DRAWS))
         nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
         return cls(
@@ -105,16 +105,16 @@ class NullModel:
         )
 
     def whitener_for(self, setting: Setting, placed: Sequence[Placed], predicted: Prediction | None = None) -> Whitener:
-        """Return what takes nuisances out of columns beside a model's response.
+        """Return the cleaner that projects nuisances out of columns, given a model's response.
 
-        What the response takes up, and an episode's own errors of pose and gain, go through the model's effects: those
-        of another one would hold its effect, of which any share might then be every episode's error. They keep the
-        estimated size: a model with larger readings is not allowed larger errors for it.
+        The response's degrees of freedom, and an episode's own errors of pose and gain, pass through the model's
+        effects: those of another one would hold its effect, of which any share might then be every episode's error.
+        They keep the estimated size: a model with larger readings is not allowed larger errors for it.
 
         Args:
             setting: With the model's response.
             placed: Its effects, given ones first.
-            predicted: What it predicts, where that is known already.
+            predicted: Its prediction, where that is known already.
         """
         course, before = setting.course, self.whitener.features
         features = taken_up(course, setting.response, placed)
@@ -130,7 +130,7 @@ class NullModel:
         return Whitener(course.reduced, noise, self.context, features, errors, self.whitener)
 
     def whiteners(self, setting: Setting, fewer: Course) -> tuple[Whitener, Whitener]:
-        """Return what takes nuisances out of columns of all rows read, and of those of fewer.
+        """Return the cleaners of columns of all rows read, and of fewer rows.
 
         Args:
             setting: With the model's response and effects, and all readings.
@@ -160,7 +160,7 @@ class NullModel:
         return Whitener(reduced, noise, context, features, errors), some
 
     def projected_draws(self, whitener: Whitener) -> np.ndarray:
-        """Return what a cleaner leaves of the draws [noise scales], shape (m, streams, draws), float32."""
+        """Return the cleaned draws [noise scales], shape (m, streams, draws), float32."""
         return self._shaken if whitener is self.whitener else whitener.projected(self.draws)
 
     @cached_property
@@ -169,7 +169,7 @@ class NullModel:
 
 
 def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> np.ndarray:
-    """Return what an episode's error changes in one model, of the size that it has in each episode of another.
+    """Rescale one model's pose (or gain) error columns to the per-episode norms of another's.
 
     Pose: shape (m, streams, kinds), the size of each kind over all streams. Gains: shape (m, streams), that of each.
 
@@ -187,7 +187,7 @@ def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> n
 
 
 def _together(*modes: np.ndarray | None) -> np.ndarray | None:
-    """Return modes of several causes, each shape (m, modes), beside one another; None for none."""
+    """Return modes of several causes, each shape (m, modes), side by side; None for none."""
     there = [own for own in modes if own is not None]
     return np.concatenate(there, axis=1) if there else None
 
@@ -213,13 +213,13 @@ def null_model(setting: Setting) -> NullModel:
     prior, own = errors, ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64), np.ones(reduced.episodes))
     before, spread = np.zeros(errors.shape[2] + 1), LEAST_GAIN_ERROR
     for turn in range(ROUNDS):
-        # Errors of pose and of gain explain much of the same: each is estimated beside the other.
+        # Errors of pose and of gain explain much of the same: each is estimated given the other.
         known = replace(known, gain_error=None)
         spread = measured.gains(known, errors, left)
         known = replace(known, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
         own = measured.poses(known, prior, left)
         if turn == 0 and own.counts.min() < ODD:
-            # The fit bends to follow an episode unlike all others, and leaves its neighbours what it takes off it.
+            # The fit bends to follow an outlying episode, and moves its residual to its neighbours.
             left = measured.left(known, prior * own.sizes, own.counts)
             own = measured.poses(known, prior, left)
         errors = prior * own.sizes

@@ -2,15 +2,17 @@
 
 A stream's offset in an episode is the sum of three parts: a level of its place and session, an Ornstein-Uhlenbeck
 process in time, and the episode's own error. Their variances are those of restricted maximum likelihood (REML:
-Patterson & Thompson, Biometrika 58, 1971, 545) beside a straight line. REML leaves slow processes undecided: of the
-time constants that are likely, the one counts by which a drift is least certain. What all channels share, as a warm-up
-does, or what goes with a measured temperature, is no evidence of the process either: it is tested against it.
+Patterson & Thompson, Biometrika 58, 1971, 545) with a straight line. REML leaves slow processes undecided: of the
+time constants that are likely, the one counts by which a drift is least certain. A common change of all channels, as a
+warm-up causes, or a dependence on a measured temperature, is no evidence of the process either: it is tested against
+it.
 
 An offset is read as a mean over the rows without contact, and a mean moves less than the process does: its covariance
 is that of means. An episode's own offset is the mean over all of it.
 
-Episodes are made independent by their innovations (the Cholesky factor of the offsets' covariance): what the earlier
-offsets, read without contact, predict is taken off. An effect that follows the clock must then exceed this drift.
+Episodes are made independent by their innovations (the Cholesky factor of the offsets' covariance): the part that the
+earlier offsets, read without contact, predict is taken off. An effect that follows the clock must then exceed this
+drift.
 """
 
 from __future__ import annotations
@@ -33,9 +35,9 @@ FREE_LEVEL = 1e3
 FEWEST_OFFSETS = 6
 """REML: with fewer episodes no process is estimated, and every offset is free."""
 MANY_CHANNELS = 8
-"""REML: from so many channels on, what they share is left out."""
+"""REML: from so many channels on, their common part is left out."""
 SETTLING = (0.7, 1.5, 3.0, 6.0, 12.0)
-"""Common wander: rates of what settles [over the time of all episodes]."""
+"""Common wander: rates of settling [over the time of all episodes]."""
 TOGETHER_Z = 1.64
 """Common wander: it is larger from so many standard errors of its variance on (5 %, one-sided) [1]."""
 POINTS = 40
@@ -54,7 +56,7 @@ LIKELY = 1.0
 
 @dataclass(frozen=True)
 class OffsetProcess:
-    """What is known of episodes' offsets before they are read."""
+    """Prior of episodes' offsets."""
 
     covariance: np.ndarray
     """Of the means where nothing presses [noise scales squared], shape (episodes, episodes)."""
@@ -96,11 +98,11 @@ class OffsetProcess:
         return weights, spread
 
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> OffsetProcess:
-        """Return what is known if only some rows were read.
+        """Return the prior if only some rows were read.
 
         Args:
             rows: Whether each row is kept, shape (m,), bool.
-            episodes: Those that are left, numbered anew; all, unless given.
+            episodes: Those that are left, renumbered; all, unless given.
         """
         number = self.episode[rows]
         if episodes is None:
@@ -137,7 +139,7 @@ def offset_process(
     """Return how offsets drift; None if there are too few episodes to estimate it.
 
     Args:
-        residual: What an over-rich fit leaves, shape (m, streams); NaN where nothing was read.
+        residual: Residual of an over-rich fit, shape (m, streams); NaN where nothing was read.
         course: With the rows read alone.
         scale: Standard deviation of the innovations of rows, shape (streams,).
         memory: Correlation of successive rows [1].
@@ -188,7 +190,7 @@ class _Spans:
 
     @classmethod
     def of(cls, course: Course, weight: np.ndarray) -> _Spans:
-        """Return those of a course of which rows say what the offset is, each by its weight, shape (m,)."""
+        """Return those of a course of which rows determine the offset, each by its weight, shape (m,)."""
         time = _times(course)
         quiet, whole, share = [], [], (np.arange(POINTS) + 0.5) / POINTS
         edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
@@ -237,7 +239,7 @@ def _mean_alike(first: np.ndarray, second: np.ndarray, length: float) -> float:
 def _shared(offsets: np.ndarray, course: Course, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return offsets in the directions that all channels share, and in all others, shapes (episodes, k).
 
-    What settles or drifts alike in all channels, or by one factor of their readings at rest, is no chance: it would
+    A common settling or drift of all channels, or one proportional to their readings at rest, is systematic: it would
     hide in the process.
 
     Args:
@@ -267,15 +269,15 @@ def _variance_ratio(
 ) -> float:
     """Return how much larger variances are where channels wander together [1]: 1 where they surely do not.
 
-    Common noise of all channels is quick, too; what settles or warms up is slow, and has no part in this.
+    Common noise of all channels is quick, too; settling and warm-up are slow, and have no part in this.
 
     Args:
         shared: Offsets in directions that channels share [noise scales], shape (episodes, k).
-        process: What REML says of the other directions.
+        process: REML estimate from the other directions.
         error: Variance of each that is known [1].
         spans: Their times.
         levels: Of each.
-        warmth: What else a drift may go with, shape (episodes, k).
+        warmth: Further covariates of a drift, shape (episodes, k).
     """
     walk, length, own = process
     few = shared[:MOST_OFFSETS]
@@ -339,7 +341,7 @@ def _reml(
         error: Variance of each that is known [1].
         spans: Their times.
         levels: Of each.
-        warmth: What else a drift may go with, shape (episodes, k).
+        warmth: Further covariates of a drift, shape (episodes, k).
     """
     offsets, error, time = offsets[:MOST_OFFSETS], error[:MOST_OFFSETS], spans.time
     basis = _slow(time, levels, warmth)
@@ -373,7 +375,7 @@ def _reml(
 
 
 def _slow(time: np.ndarray, levels: Sequence[np.ndarray], warmth: np.ndarray) -> np.ndarray:
-    """Return what is no evidence of the process: unknown levels, what goes with warmth, and last a straight line."""
+    """Return columns that are no evidence of the process: unknown levels, covariates, and last a straight line."""
     known = [level[:MOST_OFFSETS, None] == np.unique(level[:MOST_OFFSETS]) for level in levels]
     clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
     return np.column_stack([*known, warmth[:MOST_OFFSETS] / max(float(np.abs(warmth).max(initial=0.0)), 1e-9), clock])
@@ -386,5 +388,5 @@ def _complement(basis: np.ndarray) -> np.ndarray:
 
 
 def _doubt(covariance: np.ndarray, basis: np.ndarray) -> float:
-    """Return the variance of the last column's weight beside the others, for offsets of a covariance [1]."""
+    """Return the variance of the last column's weight given the others, for offsets of a covariance [1]."""
     return float(np.linalg.pinv(basis.T @ np.linalg.solve(covariance, basis), hermitian=True)[-1, -1])

@@ -26,7 +26,7 @@ QUIET_ROWS = 3
 
 
 def modes(rate: float, course: Course, memory: float) -> np.ndarray | None:
-    """Return what one standard deviation of each mode changes [noise scales], shape (m, modes); None for none.
+    """Return the effect of one standard deviation of each mode [noise scales], shape (m, modes); None for none.
 
     Args:
         rate: Of the random walk [noise scales squared a second].
@@ -56,7 +56,7 @@ def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float
     """Return the rate of the random walk [noise scales squared a second], 0 where it is unknown.
 
     Args:
-        rest: What an over-rich fit leaves [each stream's unit], shape (m, streams); NaN where nothing was read.
+        rest: Residual of an over-rich fit [each stream's unit], shape (m, streams); NaN where nothing was read.
         course: With the rows read alone.
         scale: Standard deviation of the innovations of rows, shape (streams,).
         memory: Correlation of successive rows [1].
@@ -98,6 +98,6 @@ def walk_rate(rest: np.ndarray, course: Course, scale: np.ndarray, memory: float
 
 
 def _halved(values: np.ndarray) -> np.ndarray:
-    """Return by how much the means of two halves (n, streams) differ, over what white noise of 1 makes of that [1]."""
+    """Return the difference of the means of two halves (n, streams), over that expected of unit white noise [1]."""
     first, second = np.array_split(values, 2)
     return (second.mean(axis=0) - first.mean(axis=0)) / np.sqrt(1 / len(first) + 1 / len(second))

@@ -23,11 +23,11 @@ FEWEST_DIFFERENCES = 150
 def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np.ndarray | None:
     """Return how much larger noise is in each value than without load [1], shape (n, streams); None: it is not.
 
-    Told by second differences, which what a model lacks hardly touches.
+    Estimated by second differences, which a missing effect hardly touches.
 
     Args:
         residual: Shape (n, streams).
-        rise: What presses add to each stream, shape (n, streams).
+        rise: Rise of each stream under presses, shape (n, streams).
         course: Whose rows.
     """
     own = np.abs(rise[:, : course.channels])
@@ -36,7 +36,7 @@ def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np
     at, read = share[1:-1][inside], np.isfinite(second)
     quiet = read & (at <= LOAD_EDGES[1])
     count, power = quiet.sum(axis=0), np.sum(np.square(second), axis=0, where=quiet)
-    # A stream that mostly stands still without load, or was not read, has no information.
+    # A stream that is mostly constant without load, or was not read, has no information.
     informative = np.sum(quiet & (second != 0), axis=0) > 0.5 * count
     if count[informative].sum() < FEWEST_DIFFERENCES:
         return None
@@ -93,7 +93,7 @@ def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | Non
 
 
 def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
-    """Return autocorrelated noise, estimated from what an over-rich fit leaves.
+    """Return autocorrelated noise, estimated from the residual of an over-rich fit.
 
     Args:
         leftover: Shape (n, streams).
@@ -143,7 +143,7 @@ def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -
         both = (power[1:] > 1.0) & (power[:-1] > 1.0)
         gaps.append(np.diff(gain, axis=0)[both])
         known.append((1 / np.maximum(power[1:], 1e-9) + 1 / np.maximum(power[:-1], 1e-9))[both])
-    none = np.zeros(0)  # a single press: what its splines follow says nothing of gains
+    none = np.zeros(0)  # a single press: its splines absorb all information on gains
     return spread_of(np.concatenate([none, *gaps]), np.concatenate([none, *known]))
 
 
@@ -152,7 +152,7 @@ MEDIAN_CHI2 = 0.4549
 FEWEST_GAPS = 6
 """Spread: fewer differences of successive episodes estimate none."""
 EQUAL_WEIGHTS = 40
-"""Spread: the best known differences, so many, weigh alike: no few of them decide."""
+"""Spread: the best known differences, so many, have equal weights: no few of them decide."""
 
 
 def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
@@ -185,16 +185,16 @@ def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
 
 
 DEPTH_INTERVALS = 10
-"""Tag: intervals of the function of depth beside which its noise is estimated."""
+"""Tag: intervals of the function of depth that is fitted for the estimate of its noise."""
 FEWEST_VIEWS = 100
 """Tag: fewer views estimate no function of depth."""
 
 
 def beside_depth(residual: np.ndarray, course: Course) -> np.ndarray:
-    """Return residuals in which a tag's are without what goes with depth, shape (n, streams).
+    """Return residuals in which a tag's are without their function of depth, shape (n, streams).
 
-    Splines take that out of readings beside a fitted response, and nothing does it for a tag: a frame that gives way
-    would be noise of the gauge that sees it, a hundred times what it is. Each way has a function of its own.
+    Splines take that out of readings with a fitted response, and nothing does it for a tag: a frame that gives way
+    would be noise of the gauge that sees it, a hundred times too large. Each way has a function of its own.
 
     Args:
         residual: Shape (n, streams).
@@ -246,5 +246,5 @@ def tag_offset_spread(residual: np.ndarray, course: Course, known: Noise) -> flo
 
 
 def still(known: Noise, streams: int) -> Noise:
-    """Return noise that whitens nothing, so that what is left keeps its memory and size."""
+    """Return noise that whitens nothing, so that residuals keep their memory and size."""
     return replace(known, scale=np.ones(streams), memory=0.0)

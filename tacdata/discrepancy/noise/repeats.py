@@ -1,4 +1,4 @@
-"""Episodes that repeat one another: what they differ by is chance, and no effect of depth or rate."""
+"""Episodes that repeat one another: their differences are random, and no effect of depth or rate."""
 
 from __future__ import annotations
 

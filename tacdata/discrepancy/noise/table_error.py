@@ -1,4 +1,4 @@
-"""How far a table of solved presses is off: waves over depth, in part alike in all presses.
+"""How far a table of solved presses is off: waves over depth, in part common to all presses.
 
 A mesh touches an indenter node by node. So the error goes up and down with depth. It differs from place to place. It is
 the same down and up, at any rate. The prior is a Gaussian process over depth, as a cosine series.
@@ -13,7 +13,7 @@ from tacdata.chain import Course
 MODES = 16
 """Cosine series: the shortest wave is an eighth of the deepest press [1]."""
 COMMON = 0.25
-"""Share of the error that all presses have alike (`benchmarks/fem_bases`) [1]."""
+"""Share of the error common to all presses (`benchmarks/fem_bases`) [1]."""
 REPEATED = 2.0
 """By how much more it counts: presses of one place do not average it [1]."""
 
@@ -21,7 +21,7 @@ REPEATED = 2.0
 def modes(error: float, rise: np.ndarray, scale: np.ndarray, course: Course) -> np.ndarray | None:
     """Return the modes of each press and stream [noise scales], shape (m, modes). Without an error there are none.
 
-    A mode is what one standard deviation changes.
+    A mode is the change by one standard deviation.
 
     Args:
         error: Root mean square error of the table's loads, over that of the loads [1].
@@ -39,7 +39,7 @@ def modes(error: float, rise: np.ndarray, scale: np.ndarray, course: Course) -> 
 def common(error: float, rise: np.ndarray, course: Course) -> np.ndarray:
     """Return the modes that all presses share, shape (m, streams, modes).
 
-    A mode is what one standard deviation changes.
+    A mode is the change by one standard deviation.
 
     Args:
         error: Root mean square error of the table's loads, over that of the loads [1]; 0 for no modes.

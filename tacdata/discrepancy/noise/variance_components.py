@@ -3,7 +3,7 @@
 The errors e of a run of episodes tell the scores S = I e + noise of covariance I, I their joint information. Errors are
 the mean of a group of episodes, which is free, and each episode's own: e = G m + u. The sizes of u are those under
 which S is likeliest, all kinds and episodes at once (Patterson & Thompson, Biometrika 58, 1971, 545). Kinds that change
-readings almost alike explain each other. So do episodes of one place, which share its response.
+readings almost equal explain each other. So do episodes of one place, which share its response.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SURE = 2.0
 T_FREEDOM = 4.0
 """Degrees of freedom of the t distribution by which episodes count: a few odd ones hardly do [1]."""
 ROUNDS = 20
-"""Most estimates of what each episode counts..."""
+"""Most estimates of the episodes' weights..."""
 SETTLED = 0.05
 """...until none changes by more [1]."""
 MOST_TOGETHER = 48
@@ -34,7 +34,7 @@ MOST_TOGETHER = 48
 ROUNDED = 1e-6
 """Information that is less, over the largest, is rounding [1]."""
 UNINFORMED = 1e-4
-"""Information added to an episode's own: what it has no information on is unknown, not zero [1]."""
+"""Information added to an episode's own: a direction without information is unknown, not zero [1]."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class Components:
     episodes: np.ndarray
     """Numbers of the episodes, shape (n,), int64."""
     own: np.ndarray
-    """Each one's own errors, as they would be told without any expectation of them [1], shape (n, kinds)."""
+    """Each one's own errors, as estimated without a prior [1], shape (n, kinds)."""
     unsure: np.ndarray
     """Their covariance [1], shape (n, kinds, kinds)."""
     counts: np.ndarray
-    """What each episode counts [1], shape (n,)."""
+    """Weight of each episode [1], shape (n,)."""
 
 
 def components(told: Sequence[JointScores], groups: Sequence[np.ndarray], least: float, most: float) -> Components:
@@ -100,7 +100,7 @@ def together(told: Sequence[JointScores]) -> list[JointScores]:
 
 
 def one_by_one(told: Sequence[JointScores]) -> list[JointScores]:
-    """Return a run for each episode, in their order: what it says by itself."""
+    """Return a run for each episode, in their order: its own estimate."""
     kinds, each = told[0].score.shape[1], []
     for run in told:
         for k, episode in enumerate(run.episodes):
@@ -110,7 +110,7 @@ def one_by_one(told: Sequence[JointScores]) -> list[JointScores]:
 
 
 def _sound(run: JointScores) -> JointScores:
-    """Return a run without information that is rounding: what a response takes up is known of no episode."""
+    """Return a run without information that is rounding: directions that a response absorbs are known of no episode."""
     values, vectors = np.linalg.eigh(0.5 * (run.information + run.information.T))
     kept = values > ROUNDED * max(float(values[-1]), 1e-300)
     inside = vectors[:, kept]
@@ -157,7 +157,7 @@ def _posterior(
 
 
 def _weights(errors: np.ndarray, spread: np.ndarray, log: np.ndarray) -> np.ndarray:
-    """Return what each episode counts, shape (n,)."""
+    """Return the weight of each episode, shape (n,)."""
     kinds = errors.shape[1]
     power = np.sum((np.square(errors) + np.diagonal(spread, axis1=1, axis2=2)) / np.exp(2 * log), axis=1)
     return (T_FREEDOM + kinds) / (T_FREEDOM * _consistent(kinds) + power)
@@ -175,7 +175,7 @@ def _alone(
 
 
 def _positive(matrices: np.ndarray) -> np.ndarray:
-    """Return symmetric matrices (n, k, k) with what is negative of them taken as 0."""
+    """Return symmetric matrices (n, k, k) with negative eigenvalues set to 0."""
     values, vectors = np.linalg.eigh(0.5 * (matrices + np.swapaxes(matrices, 1, 2)))
     return (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
 

@@ -1,4 +1,4 @@
-"""The whitener: columns as generalized least squares sees them. What is the same for all columns is factored once."""
+"""The whitener of columns for generalized least squares. The part common to all columns is factored once."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Colour:
     """The scale and the memory of noise, by which readings are whitened."""
 
     own: np.ndarray
-    """What a reading is multiplied by [1 / its unit], shape (n, streams), float32; 0 where nothing is known."""
+    """Factor of a reading [1 / its unit], shape (n, streams), float32; 0 where nothing is known."""
     before: np.ndarray
-    """What the one before is multiplied by and taken off [1 / unit], shape (n, streams), float32; 0 in first rows."""
+    """Factor of the one before, which is subtracted [1 / unit], shape (n, streams), float32; 0 in first rows."""
     unknown: np.ndarray | None
     """Where nothing is known, as it or the one before is missing, shape (n, streams), bool; None: nowhere."""
 
@@ -65,7 +65,7 @@ def whiten(values: np.ndarray, course: Course, noise: Noise) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Place:
-    """Rows of the episodes of one place, with what they err by."""
+    """Rows of the episodes of one place, with their error covariance."""
 
     rows: np.ndarray
     """Shape (m,), int64."""
@@ -80,7 +80,7 @@ class _Place:
 
 
 class Whitener:
-    """Whitens columns, and projects out what the response may take up, place by place."""
+    """Whitens columns, and projects out the response's degrees of freedom, place by place."""
 
     def __init__(
         self,
@@ -91,14 +91,14 @@ class Whitener:
         pose_errors: np.ndarray,
         like: Whitener | None = None,
     ) -> None:
-        """Factor what is the same for all columns.
+        """Factor the part common to all columns.
 
         Args:
             course: Whose rows.
             noise: Noise model.
-            context: Group of rows that share features, shape (n,); an episode lies in one.
-            features: What the response may take up, shape (n, k), or (n, streams, k) where it differs between streams;
-                None for nothing but offsets.
+            context: Group of rows that share features, shape (n,); an episode is in one.
+            features: Degrees of freedom of the response, shape (n, k), or (n, streams, k) where it differs between
+                streams; None for nothing but offsets.
             pose_errors: Change by an episode's pose errors of one standard deviation, shape (n, streams, kinds).
             like: Of the same course, context and noise, but for gains: its offsets are not factored again.
         """
@@ -132,7 +132,7 @@ class Whitener:
             if features is not None:
                 there = _each(features[group])
                 used = np.abs(there).max(axis=(0, 1)) > 1e-9
-                # Where noise is not alike in all streams, whitened features are not.
+                # Where noise is not equal in all streams, whitened features are not.
                 shared = _turned(one.white(there[:, :, used], group))
                 if ahead is not None:
                     ones = _turned(one.white(np.ones((len(group), 1, 1)), group)[:, :, 0])
@@ -237,7 +237,7 @@ class Whitener:
         return result
 
     def projected(self, white: np.ndarray) -> np.ndarray:
-        """Return what is left of noise, drawn white, shape (n, streams, draws): features take up some of it."""
+        """Return cleaned noise, drawn white, shape (n, streams, draws): features absorb some of it."""
         result = np.zeros(white.shape, dtype=np.float32)
         for place in self._places:
             own = _turned(white[place.rows].astype(np.float32)) * (place.offset != 0)[:, :, None]
@@ -278,7 +278,7 @@ def _spans(group: np.ndarray, course: Course) -> list[tuple[slice, slice]]:
 
 
 def _follow(white: np.ndarray, offset: np.ndarray, expected: np.ndarray) -> None:
-    """Take off an episode's columns, in place, what the offsets of the episodes before let one expect.
+    """Take off an episode's columns, in place, their expectation by the offsets of the episodes before.
 
     Args:
         white: Whitened, shape (streams, n, columns).
@@ -299,7 +299,7 @@ def _turned(values: np.ndarray) -> np.ndarray:
 
 
 def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """Return features of each stream, shape (streams, n, p), or (1, n, p) if they are alike; 0 where nothing was read.
+    """Return features of each stream, shape (streams, n, p), or (1, n, p) if they are equal; 0 where nothing was read.
 
     Args:
         shared: Whitened features, shape (streams or 1, n, p).

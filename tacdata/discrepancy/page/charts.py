@@ -68,7 +68,7 @@ def shares_bar(parts: Sequence[tuple[str, str, float]]) -> str:
 def map_of(title: str, rows: Sequence[str], columns: Sequence[str], values: np.ndarray, most: float) -> str:
     """Return a heat map of mean squares over the noise, shape (rows, columns); NaN where nothing was read.
 
-    The deepest colour stands for ``most``: maps beside one another have the same.
+    The deepest colour is ``most``: adjacent maps share it.
     """
     wide, high, first = 104, 24, 150
     parts = [
@@ -102,7 +102,7 @@ class _Axis:
         self._begin, self._scale = begin, (end - begin) / max(self.high - self.low, 1e-12)
 
     def at(self, value: float) -> float:
-        """Return where a value lies [px]."""
+        """Return the place of a value [px]."""
         return self._begin + (value - self.low) * self._scale
 
 

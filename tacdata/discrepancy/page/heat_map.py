@@ -18,7 +18,7 @@ AT_TOUCH = 0.005
 
 @dataclass(frozen=True)
 class HeatMap:
-    """Mean squares of what a model leaves, over the noise."""
+    """Mean squares of a model's residual, over the noise."""
 
     rows: tuple[str, ...]
     """Phases, each at a slow and a fast rate where it moves."""

@@ -1,4 +1,4 @@
-"""The verdict as one page of HTML: what was found, how sure, and what to do."""
+"""The verdict as one page of HTML: findings, their confidence, and the next step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LOOPS = {Family.SKIN_MEMORY.value, Family.FRICTION_AND_PLAY.value, Family.DELAY_
 """Families whose effects show as loops over depth."""
 REST, NOISE = "left: a press's own pose and gain, and what has no name", "noise"
 PARTED = ("phase", "depth", "rate")
-"""Kinds of slices that stand before and after beside the map."""
+"""Kinds of slices shown before and after, next to the map."""
 TAKEN_OUT = "each press's own pose and gain taken out"
 FILLED = 0.5
 """Share of its fields in which a map has readings enough, at least."""
@@ -48,7 +48,7 @@ def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
 
     Args:
         verdict: `schemas/verdict.schema.json`.
-        found: Readings beside the model.
+        found: Readings and the model's predictions.
     """
     presses = telling(found)
     parts = [
@@ -69,7 +69,7 @@ def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
 
 
 def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return figures in large print, each a value and what it is."""
+    """Return figures in large print, each a value and its name."""
     data, sealed = verdict["data"], verdict["sealed"]
     tiles = [(str(data["episodes"]), "presses"), (str(data["channels"]), "channels")]
     for e in verdict["effects"]:
@@ -111,7 +111,7 @@ def _loops(verdict: dict[str, Any], presses: list[ToldPress]) -> Part:
         return Part("")
     pictures = []
     for p in presses:
-        # Beside the readings themselves a loop is too thin to be seen.
+        # On the scale of the readings a loop is too thin to be seen.
         lines = [("measured", p.measured - p.before), ("after", p.after - p.before)]
         pictures.append(charts.curves(f"{p.name}, {p.stream}", p.depth, lines, ("depth [mm]", "beyond the model")))
     legend = (("measured", "measured, less the model as it was"), ("after", "what the effects add to it"))
@@ -189,7 +189,7 @@ def _apart(by: float) -> str:
 
 
 def _folded(verdict: dict[str, Any]) -> list[Part]:
-    """Return what cannot be judged, by reason, and what is known and not modelled."""
+    """Return the effects that cannot be judged, by reason, and those known and not modelled."""
     reasons: dict[str, list[str]] = {}
     for name, reason in verdict["unjudgeable"].items():
         reasons.setdefault(reason, []).append(load(name).spoken)

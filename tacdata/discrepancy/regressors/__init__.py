@@ -1,1 +1,1 @@
-"""What each effect would add to the readings, as regression columns."""
+"""Contribution of each effect to the readings, as regression columns."""

@@ -1,4 +1,4 @@
-"""Candidates: what every effect would add to these recordings, as columns beside the residual."""
+"""Candidates: contribution of every effect to these recordings, as columns to regress the residual on."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def build(
 
     Args:
         course: The recordings.
-        response: What the chain starts from.
+        response: Input of the chain.
         placed: Effects that the model has already.
         effects: Effects to try.
         absorbed: Names of effects that calibration takes up.
@@ -124,7 +124,7 @@ def build(
 
 
 class StandIn(Response):
-    """A response without channels, to ask effects what they think of fitted ones and others."""
+    """A response without channels, for queries of effects about fitted ones and others."""
 
     def __init__(self, fitted: bool) -> None:
         """Say whether it was fitted."""
@@ -144,14 +144,14 @@ class StandIn(Response):
 
 
 def _unjudgeable(effect: Effect, course: Course, response: Response) -> str:
-    """Return why an effect cannot be judged; a tag sees what a fitted response would take up."""
+    """Return why an effect cannot be judged; a tag sees the part that a fitted response would absorb."""
     if response.fitted and course.tag is not None and effect.seen_by_tag:
         return effect.unjudgeable(course, StandIn(False))
     return effect.unjudgeable(course, response)
 
 
 def _absorbed(effect: Effect, absorbed: Collection[str]) -> str:
-    """Return why an effect is not tried by itself: what calibration takes up cannot be tested beside it."""
+    """Return why an effect is not tried by itself: an effect that calibration absorbs cannot be tested with it."""
     return "read off the calibration of each channel's gain" if effect.name in absorbed else ""
 
 
@@ -177,7 +177,7 @@ def _columns(
     now: np.ndarray,
     share: float = 1.0,
 ) -> tuple[list[np.ndarray], list[float], list[float]]:
-    """Return what an effect changes at a share of its typical sizes, over that share, and the bounds."""
+    """Return the change by an effect at a share of its typical sizes, over that share, and the bounds."""
     made, low, high = [], [], []
     rest = {
         p.name: np.full(course.channels, p.default) if p.per_channel else np.array(p.default) for p in effect.amplitudes

@@ -11,7 +11,7 @@ from tacdata.effects import AtRest, Effect, Placed
 LEAST = 0.08
 """A shorter delay is found to first order [s]."""
 LEAVES = 0.7
-"""A delay is tried if it leaves this share of what depth does not explain of the readings, or less [1]..."""
+"""A delay is tried if it leaves this share of the readings' variance about a function of depth, or less [1]..."""
 EARLY_LEAVES = 0.3
 """...and readings that are early, if they leave this share: a skin that relaxes seems early, too [1]."""
 

@@ -30,7 +30,7 @@ def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndar
 
 
 def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
-    """Return columns of what changes over a session, shape (n, streams, k), float32: gains and depths with the clock.
+    """Return columns of changes over a session, shape (n, streams, k), float32: gains and depths with the clock.
 
     They separate slow changes from differences between visits of a place; they are no evidence themselves.
     """
@@ -45,7 +45,7 @@ def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray
 
 
 def histories(course: Course) -> np.ndarray:
-    """Return what a path remembers, each of size about 1, shape (n, k)."""
+    """Return the histories of a path, each of size about 1, shape (n, k)."""
     share = depth_share(course)
     speed = course.speed
     fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)

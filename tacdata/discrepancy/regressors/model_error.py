@@ -1,4 +1,4 @@
-"""Model error: what an effect's equation may be wrong by, as regressors with a prior."""
+"""Model error: error of an effect's equation, as regressors with a prior."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """What the equations of placed effects may be off about, beside what they say."""
+    """Errors of the equations of placed effects."""
 
     values: np.ndarray
     """Columns at one standard deviation [each stream's unit], shape (n, streams, k), float32."""
     at: np.ndarray
     """Which placed effect each is of, shape (k,), int64."""
     parts: np.ndarray
-    """What each placed effect adds to all others [each stream's unit], shape (n, streams, placed), float32."""
+    """Contribution of each placed effect to all others [each stream's unit], shape (n, streams, placed), float32."""
 
 
 def model_errors(
     course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()
 ) -> ModelErrors:
-    """Return what may be off; no columns without placed effects.
+    """Return the regressors; no columns without placed effects.
 
-    A large effect whose equation is a little wrong leaves what small effects explain: what lies along these columns is
-    no evidence of another one.
+    A large effect whose equation is a little wrong leaves a residual that small effects explain: a part along these
+    columns is no evidence of another one.
     """
     streams, every = Streams.of(course), list(given)
     none = np.zeros((len(course.read), streams.count, 0), dtype=np.float32)

@@ -1,6 +1,6 @@
 """Saturated models: all that a family of effects might do, whatever its law, as columns.
 
-A family's library has laws with few numbers. Its saturated model has what such laws have in common, with many: gains
+A family's library has laws with few numbers. Its saturated model has their common structure, with many: gains
 that change over the session and over the sensor, depths by place and order, readings that hang behind by any time.
 """
 
@@ -19,7 +19,7 @@ from tacdata.discrepancy.regressors.stack import side_by_side
 from tacdata.effects import Family, Placed
 
 WAVES = 6
-"""Half waves over a session: what changes within a sixth of it is seen."""
+"""Half waves over a session: a change within a sixth of it is seen."""
 GAIN_WAVES = 4
 """The same for gains, which differ over the sensor, too."""
 STEPS = (1 / 3, 1 / 2, 2 / 3)
@@ -40,16 +40,16 @@ FEW, MANY = 0.5, 2.0
 
 @dataclass(frozen=True)
 class _Ways:
-    """What columns are made from: how streams change, and the histories of each row."""
+    """Input of columns: changes of streams, and the histories of each row."""
 
     course: Course
     streams: Streams
     rise: np.ndarray
-    """What presses add, shape (m, streams)."""
+    """Rise under presses, shape (m, streams)."""
     slope: np.ndarray
     """Change of every stream with a tenth of the stroke, shape (m, streams)."""
     full: np.ndarray
-    """What presses add to each channel in every row, shape (n, channels)."""
+    """Rise of each channel under presses in every row, shape (n, channels)."""
     share: np.ndarray
     """Depth, over the largest [1], shape (n,)."""
     leaving: np.ndarray
@@ -58,7 +58,7 @@ class _Ways:
     """Share of the session that is over [1], shape (n,)."""
 
     def of_channels(self, values: np.ndarray) -> np.ndarray:
-        """Return values of channels, shape (n, channels), as a column; what else is measured does not change."""
+        """Return values of channels, shape (n, channels), as a column; other streams do not change."""
         column = np.zeros_like(self.rise)
         column[:, : values.shape[1]] = values[self.streams.rows]
         return column
@@ -74,7 +74,7 @@ def saturated(course: Course, response: Response, placed: list[Placed]) -> dict[
 
     Args:
         course: The recordings.
-        response: What the chain starts from.
+        response: Input of the chain.
         placed: Effects that the model has.
     """
     streams, said = Streams.of(course), predict(course, response, placed)
@@ -140,7 +140,7 @@ def _pose(ways: _Ways, response: Response, placed: list[Placed]) -> list[np.ndar
     histories = [place * one for place in places for one in within]
     histories += [*orders, *(order * ways.leaving for order in orders[:2])]
     columns = [ways.slope * history[rows][:, None] for history in histories]
-    if response.fitted:  # what differs by place is its own, and it knows no sides
+    if response.fitted:  # differences between places are its own, and it knows no sides
         return columns
     aside = [*places, *(place * ways.leaving for place in places[:3]), *orders[:3]]
     for axis in (0, 1):
@@ -150,7 +150,7 @@ def _pose(ways: _Ways, response: Response, placed: list[Placed]) -> list[np.ndar
 
 
 def _places(course: Course) -> list[np.ndarray]:
-    """Return what may go with the place that is pressed: a plane, a saddle, and one side against the other."""
+    """Return functions of the pressed place: a plane, a saddle, and one side against the other."""
     at = course.tip[:, :2] - np.median(course.tip[:, :2], axis=0)
     x, y = (at / np.maximum(np.abs(at).max(axis=0), 1e-6)).T
     each = [np.ones(course.rows), x, y, x * x, x * y, y * y, np.tanh(SIDE * x), np.tanh(SIDE * y)]
@@ -178,7 +178,7 @@ def _memory(ways: _Ways) -> list[np.ndarray]:
     course, deepest = ways.course, running_max(ways.share, ways.course.row_site)
     before = _earlier(course)[course.episode]
     fresh = np.exp(-before / MANY)
-    # What was pressed as deep before has met that depth: it is softer there, and only there.
+    # Skin that was pressed as deep before is softer there, and only there.
     met = (ways.share < deepest - 1e-3).astype(float)
     for history in (deepest - ways.share, fresh, fresh * ways.share, np.exp(-before / FEW), met):
         columns += ways.times(history)
@@ -228,7 +228,7 @@ def _curve(ways: _Ways) -> list[np.ndarray]:
 
 
 def _spread(ways: _Ways) -> list[np.ndarray]:
-    """What other channels read: those beside each, and all."""
+    """Readings of other channels: those next to each, and all."""
     course, full = ways.course, ways.full
     mixed = [np.broadcast_to(full.mean(axis=1, keepdims=True), full.shape)]
     if course.centers is not None:

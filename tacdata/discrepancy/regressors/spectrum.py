@@ -31,7 +31,7 @@ class Spectrum(Effect):
     )
 
     def __init__(self, by_radius: float, by_depth: bool) -> None:
-        """Take what the times and the shares grow with.
+        """Take the variables that the times and the shares depend on.
 
         Args:
             by_radius: Power of the tool's radius by which times grow [1].

@@ -64,7 +64,7 @@ class Tangent:
     values: np.ndarray
     """Change a step [each stream's unit], shape (n, streams, knobs), float32."""
     columns: np.ndarray
-    """Where they stand beside others, shape (knobs,), int64."""
+    """Their place among others, shape (knobs,), int64."""
 
     def at(self, first: int) -> Tangent:
         """Return the same with columns counted from ``first``."""
@@ -83,11 +83,11 @@ def knobs_of(placed: Sequence[Placed], channels: int) -> list[Knob]:
 def tangents(
     course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = (), run: Chain | None = None
 ) -> Tangent:
-    """Differentiate the chain by all numbers of the placed effects, those given beside them kept.
+    """Differentiate the chain by all numbers of the placed effects, the other given ones kept.
 
     Args:
         course: The recordings.
-        response: What the chain starts from.
+        response: Input of the chain.
         placed: Effects whose numbers move.
         given: Effects whose numbers stay.
         run: The chain of those given, then those placed, where it was run already.

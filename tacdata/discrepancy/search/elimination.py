@@ -1,4 +1,4 @@
-"""Backward elimination: every effect of the answer must be needed beside the others, and beyond chance."""
+"""Backward elimination: every effect of the answer must be needed in addition to the others, and beyond chance."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CHAIN_ERROR = 0.01
 SWAPS = 4
 """How often a rival may take the place of an effect."""
 LARGEST_P = 0.05
-"""Corrected p-value from which on an effect is dropped beside others [1]."""
+"""Corrected p-value from which on an effect is dropped from several [1]."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Answer:
     findings: tuple[FoundEffect, ...]
     model: Refined
     problem: Problem
-    """What may be missing beside it."""
+    """Candidates in addition to it."""
     comparisons: tuple[RivalModels, ...] = ()
     """Of each effect, where rivals were tried."""
 
@@ -43,7 +43,7 @@ def eliminate(setting: Setting, selection: Selection) -> Answer:
     """Drop effects that are not needed, or not beyond chance, and try rivals of the rest.
 
     Args:
-        setting: What is judged.
+        setting: Input of the judgement.
         selection: The effects that forward selection found.
     """
     answer = _needed(setting, selection, selection.model, SWAPS)
@@ -113,8 +113,8 @@ def two_lags(
 ) -> tuple[Refined, bool]:
     """Return a model with two lags where no single one explains the episodes, and whether there may be two.
 
-    To first order all lags are one. The chain itself must tell them, each alone and two at a time. What lies within
-    the form error of a single one is open. A delay has no such error: what is beyond the chain's own is a second lag.
+    To first order all lags are one. The chain itself must distinguish them, each alone and two at a time. A gain within
+    the form error of a single one is open. A delay has no such error: a gain beyond the chain's own is a second lag.
     """
     own = [k for k, p in enumerate(model.placed) if _is_lag(p.effect)]
     if len(own) != 1 or len(model.placed) >= MOST_EFFECTS:
@@ -170,7 +170,7 @@ def _behind(effect: Effect, lag: float) -> Placed:
 
 
 def _p_values(setting: Setting, selection: Selection, model: Refined) -> list[float]:
-    """Return each effect's corrected p-value: of the step that asked for it, or beside the others."""
+    """Return each effect's corrected p-value: of the step that asked for it, or given the others."""
     least, result = dict(selection.least_p), []
     for at, placed in enumerate(model.placed):
         called = placed.effect.called

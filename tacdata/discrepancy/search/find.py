@@ -21,7 +21,7 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
 
     Args:
         setting: Recordings, response, library.
-        note: Is told what is being done.
+        note: Called with each step.
         until: The last step to make, one of `STEPS`.
     """
     note("gate: is there a gap")
@@ -34,7 +34,7 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
     if until != "decide":
         return _findings(given, selection, given.problem, _fitted(selection), until)
     note("rivals and leftovers")
-    # Beside the answer's noise only what is left is looked at: nothing is tried there.
+    # With the answer's noise only the residual is examined: nothing is tried there.
     problem = prepare(setting, selection.null, tested=False, among=()) if selection.model.placed else given.problem
     return _findings(given, selection, problem, eliminate(setting, selection), until)
 
@@ -47,12 +47,12 @@ def _fitted(selection: Selection) -> Answer:
 
 
 def _findings(given: Gate, selection: Selection, problem: Problem, answer: Answer, until: str) -> Findings:
-    """Put together what was found.
+    """Put together the findings.
 
     Args:
         given: The model as it was given, with its own noise.
         selection: With the noise of the answer.
-        problem: The model as it was given, beside that noise.
+        problem: The model as it was given, with that noise.
         answer: The effects.
         until: The last step.
     """

@@ -17,14 +17,14 @@ from tacdata.effects import Placed
 NAMED_Z = 3.8
 """Necessity: an effect that was chosen among all is named from so many standard errors on [1].
 
-The best of some 150 independent columns lies beyond that once in a hundred times.
+The best of some 150 independent columns is beyond that once in a hundred times.
 """
 STEPS = ("gate", "locate", "fit", "decide")
 """Steps of the workflow, each of which may be the last.
 
 - gate: is there anything to explain?
 - locate: where the residual lives; nothing is fitted.
-- fit: what fits best; no rivals, no leftovers.
+- fit: the best fit; no rivals, no leftovers.
 - decide: all.
 """
 
@@ -49,7 +49,7 @@ class FoundEffect:
     selected: float = 1.0
     """Share of bootstrap samples of the episodes in which its mechanism explains most [1]."""
     corrected_p: float | None = None
-    """P-value corrected for all candidates [1]; None for what calibration shows, which did not race."""
+    """P-value corrected for all candidates [1]; None for findings of calibration, which did not race."""
     needed: float = NAMED_Z
     """From which necessity on it is named [1]."""
     selected_family: float = 1.0
@@ -80,16 +80,16 @@ class RivalModels:
 
 @dataclass(frozen=True)
 class Findings:
-    """What the search found."""
+    """Findings of the search."""
 
     gap: bool
     """Whether anything is missing."""
     tests: ScoreTests
-    """Of all candidates beside the model as it was given."""
+    """Of all candidates with the model as it was given."""
     effects: tuple[FoundEffect, ...]
     """The effects of the answer."""
     left: Leftovers
-    """What is still predictable with the effects in place."""
+    """Part that is still predictable with the effects in place."""
     explained: float
     """Fall of half the whitened sum of squares by the effects [1]."""
     energy: tuple[np.ndarray, np.ndarray]
@@ -97,13 +97,13 @@ class Findings:
     values: np.ndarray
     """Whitened values behind each episode [1], shape (episodes,)."""
     given: Problem
-    """The model as it was given, beside its own noise, with all that was tried."""
+    """The model as it was given, with its own noise and all candidates."""
     problem: Problem
-    """The same beside the noise that the answer leaves; where there is an answer, nothing is tried beside it."""
+    """The same with the noise estimated under the answer; where there is an answer, it has no candidates."""
     final: Problem
     """The model with the effects in place."""
     limits: dict[str, float]
-    """Effect -> detection limit beside the answer [typical sizes]; inf where it is not excited."""
+    """Effect -> detection limit given the answer [typical sizes]; inf where it is not excited."""
     gains: np.ndarray
     """Gain of each channel beyond the response's, as calibration finds it [1], shape (channels,); 0 if fitted, NaN for
     channels that these presses do not stir."""
@@ -118,7 +118,7 @@ class Findings:
 
     @property
     def share_left(self) -> float:
-        """Share of what could be explained that the effects leave [1]."""
+        """Share of the explainable sum of squares that the effects leave [1]."""
         whole = self.left.gain + max(self.explained, 0.0)
         return self.left.gain / whole if whole > 0 else 0.0
 

@@ -15,7 +15,7 @@ INFORMED = 3.0
 
 
 def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit some candidates, with nuisances and what is placed, to some episodes.
+    """Fit some candidates, with nuisances and the placed effects, to some episodes.
 
     Returns:
         Columns (from 0) and their coefficients; the candidates' first.
@@ -42,7 +42,7 @@ def gained(
 
 
 def _beside(problem: Problem, episodes: np.ndarray) -> tuple[np.ndarray, Beside]:
-    """Return the columns without bounds, and the Gram matrices beside them."""
+    """Return the columns without bounds, and the Gram matrices given them."""
     free = np.concatenate([problem.model_errors, problem.nuisances]).astype(int)
     ridge = np.concatenate([np.ones(len(problem.model_errors)), problem.ridge])
     return free, problem.grams.beside(free, ridge, episodes)
@@ -51,7 +51,7 @@ def _beside(problem: Problem, episodes: np.ndarray) -> tuple[np.ndarray, Beside]
 def _bounded(
     problem: Problem, beside: Beside, chosen: Sequence[Candidate]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns of candidates and of what is placed, their coefficients, and those of columns without bounds."""
+    """Return columns of candidates and placed effects, their coefficients, and those of columns without bounds."""
     moving, own = problem.tangent.columns, [c.columns for c in chosen]
     columns = np.concatenate([*own, moving]).astype(int)
     rooms = np.array([k.room(problem.placed) for k in problem.tangent.knobs]).reshape(-1, 2)

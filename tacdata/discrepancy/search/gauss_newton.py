@@ -32,7 +32,7 @@ KNOWN = 0.5
 LARGEST_LEVERAGE = 0.9
 """CR3: largest leverage of an episode [1]."""
 CONVERGED = 1.1
-"""A fitted response has converged if it leaves at most so much of what its next correction would leave [1]."""
+"""A fitted response has converged if it leaves at most so much of the residual after its next correction [1]."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class Refined:
     place: np.ndarray
     """Group of rows that share a response's features, shape (m,), int64."""
     projected_draws: np.ndarray
-    """What it leaves of the null model's draws of noise [noise scales], shape (m, streams, draws), float32."""
+    """Its residual of the null model's draws of noise [noise scales], shape (m, streams, draws), float32."""
     whitener: Whitener
-    """What took nuisances out of it, and what its response may take up."""
+    """Cleaner of its nuisances, and its response's degrees of freedom."""
     freedom: float
     """Degrees of freedom that its response takes up [1]; another response has others where effects move the pose."""
     ending: Callable[[], _State]
@@ -115,7 +115,7 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
     """Fit the numbers of placed effects on the chain itself.
 
     Args:
-        setting: What is judged.
+        setting: Input of the judgement.
         placed: Effects with a first guess of their numbers.
         null: Null model, kept.
         steps: Most Gauss-Newton steps.
@@ -172,7 +172,7 @@ def _own(response: Response) -> Response:
 
 
 def corrected(setting: Setting, placed: Sequence[Placed]) -> Response:
-    """Return the response beside effects whose numbers stay: a fitted one takes up what they leave to it."""
+    """Return the response given effects of fixed parameters: a fitted one absorbs the rest."""
     if not isinstance(setting.response, FittedResponse) or not placed:
         return setting.response
     response = setting.response.copied()
@@ -182,12 +182,12 @@ def corrected(setting: Setting, placed: Sequence[Placed]) -> Response:
 
 @dataclass(frozen=True)
 class _View:
-    """What a model leaves, nuisances fitted."""
+    """Residual of a model, nuisances fitted."""
 
     clean: np.ndarray
     """Whitened residual [1], shape (m, streams, 1)."""
     whitener: Whitener
-    """What took nuisances out of it."""
+    """Cleaner of its nuisances."""
     energy: np.ndarray
     left: np.ndarray
     chain: Chain | None
@@ -203,7 +203,7 @@ class _State:
     fall: float
     """Of half the sum of squares by the move, to first order [1]."""
     found: EpisodeGrams
-    """Of what is left, and the derivatives by knobs and nuisances."""
+    """Of the residual, and the derivatives by knobs and nuisances."""
     best: np.ndarray
     """Coefficients of those."""
     weight: np.ndarray
@@ -233,10 +233,10 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
 def _unconverged(
     rest: np.ndarray, course: Course, response: Response, whitener: Whitener, scale: np.ndarray
 ) -> np.ndarray:
-    """Return what a response should have taken up and did not: half the sum of squares, shape (episodes,).
+    """Return the part that a response should have absorbed and did not: half the sum of squares, shape (episodes,).
 
-    What splines may take up is projected out of the residual, as if they had. Where effects are far from linear in
-    load, corrections need not converge. Then that counts.
+    The splines' space is projected out of the residual, as if they had absorbed it. Where effects are far from linear
+    in load, corrections need not converge. Then that counts.
     """
     if not isinstance(response, FittedResponse) or whitener.features is None:
         return np.zeros(course.episodes)
@@ -303,7 +303,7 @@ def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, kno
 
 
 def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed]) -> None:
-    """Let a fitted response take up what the effects leave to it, twice: they act on it."""
+    """Let a fitted response absorb the effects' residual, twice: they act on it."""
     course, streams = setting.course, Streams.of(setting.course)
     keep = streams.channels + streams.force
     features = taken_up(course, response, [*setting.given, *placed])

@@ -7,7 +7,7 @@ well as many. (Means over episodes of the difference in fit do not: of 48 episod
 
 Where a response is fitted, the two models project out different functions:
 
-- What the second's response may take up is projected out of the difference d first (Frisch & Waugh, Econometrica 1,
+- The space of the second's response is projected out of the difference d first (Frisch & Waugh, Econometrica 1,
   1933, 387). The residual has nothing of that summed over a place's episodes, but much in single ones.
 - Noise n alone makes the models differ by V = |(1 - P2) P1 n|^2, P1 and P2 their projections; draws of noise estimate
   V. By chance V is the score's mean, too, and is taken off. The score's variance beyond that of the true difference,
@@ -44,7 +44,7 @@ Pooled = dict[bool, PooledExcess | None]
 
 @dataclass(frozen=True)
 class ModelError:
-    """What a model's equations may be wrong by: regressors with a prior, beside the nuisances."""
+    """Errors of a model's equations: regressors with a prior, in addition to the nuisances."""
 
     columns: np.ndarray
     """Whitened, at one standard deviation [1], shape (m, streams, k), float32."""
@@ -66,7 +66,7 @@ class ModelError:
 
         Returns:
             Their Gram matrix of each episode, and by how much more half the sum of squares of the residual falls than
-            that of residual less difference: what both models miss counts against neither.
+            that of residual less difference: an effect that both models miss counts against neither.
         """
         both = np.concatenate([np.stack([residual, difference], axis=2), self.columns], axis=2)
         gram = episode_grams(both, self.course, self.null.nuisances, self.null.inner).gram
@@ -86,7 +86,7 @@ class ModelError:
 
 @dataclass(frozen=True)
 class NoiseDifference:
-    """What noise alone makes of the difference of two models, and of its score."""
+    """Effect of noise alone on the difference of two models, and on its score."""
 
     square: float
     """V, the difference's sum of squares [noise scales squared]."""
@@ -100,8 +100,8 @@ class NoiseDifference:
         """Estimate it from draws of noise.
 
         V is half of |(P2 - P1) n|^2 and of the first response's further degrees of freedom. Places and streams are
-        nearly independent. The variance is V for responses that are much alike, and 2 V for those that have nothing in
-        common.
+        nearly independent. The variance is V for responses that are almost equal, and 2 V for those that have nothing
+        in common.
         """
         if first.projected_draws is second.projected_draws:
             return cls(0.0, 0.0, 0.0)
@@ -133,9 +133,9 @@ def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelErr
 
     Args:
         first: A model at its optimum.
-        second: Another one of the same episodes, beside the same null model.
+        second: Another one of the same episodes, with the same null model.
         pooled: Shrinkage priors.
-        error: Model error of the second: what it explains does not count against the second.
+        error: Model error of the second: the part that it explains does not count against the second.
     """
     more, less = _further_amplitudes(first, second), _further_amplitudes(second, first)
     loss = second.loss - first.loss - 0.5 * (more - less)
@@ -170,7 +170,7 @@ def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelErr
 def necessity(setting: Setting, model: Refined, without: Refined, null: NullModel, pooled: Pooled) -> float:
     """Return by how many standard errors a model is better than one with fewer effects [1].
 
-    What the fewer effects' own equations may be wrong by is no evidence of others.
+    The model error of the fewer effects is no evidence of others.
     """
     need = j_statistic(model, without, pooled)
     if need < NEEDED_Z or not without.placed:

@@ -16,7 +16,7 @@ from tacdata.discrepancy.statistics.gram_fit import eliminated, gains, solve, t_
 
 @dataclass(frozen=True)
 class Leftovers:
-    """What columns of no effect still predict of held-out episodes (five-fold cross-validation)."""
+    """Part of held-out episodes that columns of no effect still predict (five-fold cross-validation)."""
 
     gain: float
     """Fall of half the whitened sum of squares, held out, summed over episodes [1]; 0 or more."""
@@ -74,7 +74,7 @@ def _stream_gains(problem: Problem, residual: np.ndarray, columns: np.ndarray, s
 
 
 def own_histories(problem: Problem) -> np.ndarray:
-    """Return what a path remembers, alone and times depth, whitened and without nuisances, shape (m, k)."""
+    """Return the histories of a path, alone and times depth, whitened and without nuisances, shape (m, k)."""
     null, course = problem.null, problem.setting.course
     own = histories(course)[course.read]
     depth = course.reduced.tip[:, 2]

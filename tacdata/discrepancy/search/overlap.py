@@ -1,4 +1,4 @@
-"""Overlap: how much of what one effect does those in the model might do in other forms."""
+"""Overlap: share of one effect that those in the model might explain in other forms."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from tacdata.discrepancy.regressors.candidates import Candidate
 from tacdata.discrepancy.search.problem import Problem
 
 RIDGE = 1e-6
-"""Ridge of what no row excites, over the mean of what rows do [1]."""
+"""Ridge of unexcited directions, over the mean of the excited ones [1]."""
 
 
 def overlap(problem: Problem, candidates: Sequence[Candidate]) -> float:
-    """Return the largest share of a candidate's columns that what is placed could explain press by press [1].
+    """Return the largest share of a candidate's columns that the placed effects could explain press by press [1].
 
-    Every press has amounts of its own of what the equations of what is placed may be off about, and of what its numbers
-    move: what is left then looks like no form of it, however large that is.
+    Every press has amounts of its own of the placed effects' model error, and of their tangent space:
+    the remainder then resembles no form of them, however large they are.
 
     Args:
-        problem: With columns for what is placed.
+        problem: With columns for the placed effects.
         candidates: Shapes of an effect; 0 without any.
     """
     beside = np.concatenate([problem.tangent.columns, problem.model_errors]).astype(int) + 1

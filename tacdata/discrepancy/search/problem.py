@@ -21,7 +21,7 @@ from tacdata.effects import Placed
 
 @dataclass(frozen=True)
 class Problem:
-    """One state of the model with everything that may be missing beside it."""
+    """One state of the model with all candidates."""
 
     setting: Setting
     null: NullModel
@@ -29,21 +29,21 @@ class Problem:
     board: CandidateColumns
     grams: EpisodeGrams
     tangent: Tangent
-    """Columns by which what is placed already may still move."""
+    """Columns by which the placed effects may still move."""
     model_errors: np.ndarray
-    """Columns of what the equations of what is placed may be off about, from 0, shape (k,), int64."""
+    """Columns of the model error of the placed effects, from 0, shape (k,), int64."""
     nuisances: np.ndarray
     """Columns of nuisances, from 0, shape (k,), int64."""
     generic: np.ndarray
     """Columns that belong to no effect, from 0, shape (k,), int64."""
     rise: float
-    """What presses add to all readings, root of the sum of squares in noise scales [1]."""
+    """Rise of all readings under presses, root of the sum of squares in noise scales [1]."""
     parts: np.ndarray
-    """Columns of what each effect that is placed adds to the others, from 0, shape (placed,), int64."""
+    """Columns of each placed effect's contribution to the others, from 0, shape (placed,), int64."""
     of_errors: np.ndarray
     """Which placed effect each of the model errors is of, shape (k,), int64."""
     numerics: int | None = None
-    """Column of what the response itself is off about, from 0; None if it has no numerics."""
+    """Column of the response's own error, from 0; None if it has no numerics."""
 
     @property
     def candidates(self) -> list[Candidate]:
@@ -57,11 +57,11 @@ class Problem:
 
     @property
     def fixed(self) -> np.ndarray:
-        """Columns that stand beside every candidate: nuisances, what is placed, what its equations may be off about."""
+        """Columns fitted with every candidate: nuisances, placed effects, their model error."""
         return np.concatenate([self.nuisances, self.tangent.columns, self.model_errors]).astype(int)
 
     def fixed_ridge(self, moving: float) -> np.ndarray:
-        """Return the weights of their priors; ``moving``: of what is placed [1]."""
+        """Return the weights of their priors; ``moving``: of the placed effects [1]."""
         return np.concatenate([self.ridge, np.full(len(self.tangent.columns), moving), np.ones(len(self.model_errors))])
 
     @property
@@ -70,7 +70,7 @@ class Problem:
         return self.null.folds
 
     def without(self, at: int) -> Problem:
-        """Return the same without one placed effect, to first order: candidates stay as they are beside it."""
+        """Return the same without one placed effect, to first order: candidates keep their columns."""
         gram, own = self.grams.gram.copy(), int(self.parts[at]) + 1
         gram[:, 0] += gram[:, own]
         gram[:, :, 0] += gram[:, :, own]
@@ -99,13 +99,13 @@ def prepare(
     tested: bool = True,
     among: Collection[Form] | None = None,
 ) -> Problem:
-    """Build columns beside what is placed and reduce them.
+    """Build columns given the placed effects and reduce them.
 
     Args:
-        setting: What is judged.
+        setting: Input of the judgement.
         null: Its nuisances and noise.
         placed: Effects that the model has.
-        tested: Whether it will be tested: what belongs to no effect and the response's own error are for tests alone.
+        tested: Whether it will be tested: columns of no effect and the response's own error are for tests alone.
         among: Effects and shapes that are tried; all, unless given.
     """
     course, response = setting.course, setting.response
@@ -143,7 +143,7 @@ def prepare(
 
 
 def _numerics(setting: Setting, placed: Sequence[Placed]) -> np.ndarray | None:
-    """Return what a response is off about, shape (m, streams, 1); None where it has no numerics."""
+    """Return the error of a response, shape (m, streams, 1); None where it has no numerics."""
     rough = setting.response.rougher()
     if rough is None:
         return None

@@ -31,7 +31,7 @@ MINOR = 0.3
 """Forward selection: a further effect must explain this share of the model error that resembles it [1]."""
 
 PHYSICAL = 0.5
-"""Forward selection: a set within physical bounds goes first if it explains this share of what the best does [1]."""
+"""Forward selection: a set within physical bounds goes first if it explains this share of the best one's part [1]."""
 
 Note = Callable[[str], None]
 
@@ -41,13 +41,13 @@ class Selection:
     """A model on its way: so many effects selected."""
 
     null: NullModel
-    """Noise and nuisances, estimated beside the effects."""
+    """Noise and nuisances, estimated given the effects."""
     nothing: Refined
-    """The model as it was given, beside the same noise."""
+    """The model as it was given, with the same noise."""
     model: Refined
     """The model with the effects."""
     problem: Problem
-    """What may be missing beside them."""
+    """Candidates in addition to them."""
     tests: ScoreTests
     """Of that."""
     explained: tuple[tuple[Effect, float], ...] = ()
@@ -86,7 +86,7 @@ def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None
     """Refine each set on the chain; return the best if it is needed, None if none is.
 
     Args:
-        selection: So far; what is late is tried beside the first effect, or alone.
+        selection: So far; late effects are tried with the first effect, or alone.
         sets: Effects to add.
     """
     late = selection.late
@@ -120,7 +120,7 @@ def _called(placed: Sequence[Placed]) -> set[str]:
 def physical_first(tried: list[Refined], current: Refined) -> list[Refined]:
     """Return models, the best first, but those with a number at a physical bound behind those without.
 
-    A stand-in that would need an unphysical size is never named. What it stands in for may explain a little less.
+    Candidates at a physical bound are never named. So one within bounds is preferred even if it fits slightly worse.
 
     Args:
         tried: Models that add to the current one.
@@ -134,12 +134,12 @@ def physical_first(tried: list[Refined], current: Refined) -> list[Refined]:
 
 
 def _at_bound(model: Refined, current: Refined) -> bool:
-    """Return whether a number of what a model adds is at a physical bound."""
+    """Return whether a parameter of a model's added effects is at a physical bound."""
     return any(model.bounds(k) for k in range(len(current.placed), len(model.placed)))
 
 
 def _is_minor(selection: Selection, best: Refined) -> bool:
-    """Return whether what a model adds is no more than the model error of the effects before."""
+    """Return whether a model's added effects are within the model error of the effects before."""
     if not selection.model.placed:
         return False
     added = shares(best, len(selection.model.placed), selection.model.loss - best.loss)
@@ -149,9 +149,9 @@ def _is_minor(selection: Selection, best: Refined) -> bool:
 
 
 def _added(setting: Setting, selection: Selection, best: Refined) -> Selection:
-    """Return the selection with a model's effects; its noise is estimated anew beside them.
+    """Return the selection with a model's effects; its noise is estimated again given them.
 
-    Noise that was estimated beside a large missing effect is too large.
+    Noise that was estimated without a large effect is too large.
     """
     added = shares(best, len(selection.model.placed), selection.model.loss - best.loss)
     null = null_model(replace(setting, response=best.response, given=(*setting.given, *best.placed)))
@@ -174,7 +174,7 @@ def least_p_values(
 
 
 def shares(model: Refined, before: int, more: float) -> list[tuple[Effect, float]]:
-    """Return a model's effects but the first ``before``, each with an equal share of what they explain."""
+    """Return a model's effects but the first ``before``, each with an equal share of the part that they explain."""
     added = [p.effect for p in model.placed[before:]]
     return [(effect, more / len(added)) for effect in added]
 
@@ -182,13 +182,13 @@ def shares(model: Refined, before: int, more: float) -> list[tuple[Effect, float
 def model_error_energy(
     explained: list[tuple[Effect, float]], further: list[Effect], response: Response, problem: Problem | None = None
 ) -> float:
-    """Return how much of what further effects explain may be the model error of those before them.
+    """Return the share of further effects' gain that may be the model error of those before them.
 
     In the unit of ``explained``, as the fall of half the sum of squares. An effect of the same ambiguity group looks
-    like another form of what is there, and takes more of it.
+    like another form of a placed one, and takes more of it.
 
     Args:
-        explained: Effects, each with what it explains.
+        explained: Effects, each with its explained part.
         further: Those that would be added.
         response: Its own error counts, too.
         problem: With model error columns, by which the overlap with a further effect is measured; it is taken as
@@ -208,11 +208,11 @@ def model_error_energy(
 
 
 def without_minor(tried: list[Refined], current: Refined) -> Refined:
-    """Return the best model, or the best with one effect less if what the last adds is model error.
+    """Return the best model, or the best with one effect less if the last one's gain is model error.
 
     Args:
         tried: Models, the best first.
-        current: What they were added to.
+        current: Model that they were added to.
     """
     best = tried[0]
     fewer = [other for other in tried if len(other.placed) < len(best.placed)]

@@ -34,9 +34,9 @@ SIMPLER = RIVAL_Z**2 / 2
 OTHER_FORMS = 2
 """Other forms of the effect's own mechanism that are tried, the best to first order."""
 SLACK, PREPARED = 0.8, 12
-"""Rivals: told beside the whole answer, so many are prepared afresh; `CLOSE`, `BEHIND`, `FAR_Z` have this slack [1]."""
+"""Rivals: ranked given the whole answer, so many are prepared again; slack of `CLOSE`, `BEHIND`, `FAR_Z` [1]."""
 ALIKE = 0.7
-"""Rivals: shapes are prepared that explain this share of what the effect's best one does [1]."""
+"""Rivals: shapes are prepared that explain this share of the effect's best one [1]."""
 SPECTRUM_STEPS = 3
 """Gauss-Newton steps of a spectrum, which is nearly linear in its shares."""
 BOOTSTRAPS = 200
@@ -69,7 +69,7 @@ def try_rivals(
         current: The model with all effects.
         without: The model without the one.
         at: Its number.
-        beside: What may be missing beside all effects: it tells which rivals are worth preparing without the one.
+        beside: Candidates in addition to all effects: they rank the rivals that are worth preparing without the one.
         need: The one's necessity.
         pooled: Shrinkage priors.
         late: Delays and filters to begin with: to first order long ones are not seen.
@@ -102,7 +102,7 @@ def try_rivals(
         level = required_margin(mine.effect, best[name].effect)
         margins[name], losses[name] = j_statistic(current, other, pooled), other.loss - current.loss
         if margins[name] >= level:
-            # Its equation may be wrong by a little: what that explains is nothing against it.
+            # Its equation may be wrong by a little: the part explained by that does not count against it.
             error = ModelError.of(begin, other, null, len(without.placed))
             margins[name] = j_statistic(current, other, pooled, error)
         by_spectra = margins[name] < max(level, RIVAL_Z) and spectra.both(mine.effect, best[name].effect)
@@ -125,7 +125,7 @@ def try_rivals(
         other = in_its_place(name)
         forms[name] = j_statistic(current, other, pooled)
         ahead = forms[name] < -AHEAD and other.half_bic < current.half_bic
-        # A form that contains this one is ahead by chance, or by a part of what the other effects are off about.
+        # A form that contains this one is ahead by chance, or by a part of the other effects' model error.
         wider = other.placed[-1].effect.nested(other.placed[-1].values)
         if ahead and wider is not None and wider.effect.name == mine.effect.name:
             ahead = necessity(begin, other, current, null, pooled) >= NEEDED_Z
@@ -157,7 +157,7 @@ class Spectra:
     """Laws of linear memory that are held against each other by all mixtures of times, instead of by their own.
 
     A law with the right mechanism and the wrong mixture may be behind one with the wrong mechanism. Of two spectra with
-    as many numbers only what their times go with is left: the tool's radius, or nothing.
+    as many numbers only the variable of their times is left: the tool's radius, or nothing.
     """
 
     begin: Setting
@@ -235,14 +235,14 @@ def _worth_preparing(
     """Return the effects and shapes that may be close in the place of one.
 
     Args:
-        told: Without the one to first order: columns are those beside it.
-        gain: What each of its candidates explains.
+        told: Without the one to first order: columns are those given it.
+        gain: Part that each of its candidates explains.
         best: Effect -> its best shapes.
         taken: Mechanisms of the whole answer.
         always: Effects that are prepared whatever they explain.
     """
     still = _still(told)
-    # The others are not at their optimum without the one: what their numbers explain is no rival's.
+    # The others are not at their optimum without the one: the part that their parameters explain is no rival's.
     bare = replace(told, model_errors=told.model_errors[:0])
     moved = _still(bare) - _still(replace(bare, tangent=Tangent([], told.tangent.values, told.tangent.columns[:0])))
     each = {name: own - moved for name, own in _first_order_gains(told, best).items()}

@@ -27,13 +27,13 @@ from tacdata.discrepancy.statistics.gram_fit import eliminated, flips
 DRAWS = 999
 """Draws of the null distribution: the least p-value is 0.001."""
 PRESENT_Z = 2.0
-"""Shrinkage: beyond this score a candidate may be there; the others' prior is estimated beside it [1]."""
+"""Shrinkage: beyond this score a candidate may be there; the others' prior is estimated given it [1]."""
 TABLE_ERROR = 0.0002
-"""Numerics: what has no memory and explains a smaller share of the rise may be a table's interpolation error [1]."""
+"""Numerics: an effect without memory and of a smaller share of the rise may be interpolation error of a table [1]."""
 SPLINE_ERROR = 0.0005
-"""Numerics: the same for columns of no effect beside a fitted response, whose slope and bends are inexact [1]."""
+"""Numerics: the same for columns of no effect with a fitted response, whose slope and bends are inexact [1]."""
 NUMERICS_FACTOR = 3.0
-"""Numerics: a candidate must explain so many times what it finds in the response's own error [1]."""
+"""Numerics: a candidate must explain so many times its part of the response's own error [1]."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class ScoreTests:
 
 
 def score_tests(problem: Problem, seed: int = 0) -> ScoreTests:
-    """Test every candidate beside nuisances and what is placed.
+    """Test every candidate given nuisances and the placed effects.
 
     Args:
         problem: The candidates' columns.
@@ -66,7 +66,7 @@ def score_tests(problem: Problem, seed: int = 0) -> ScoreTests:
     priors = _priors(problem, scores, "")
     z = np.array([s.z_score(priors[own]) for s, own in zip(scores, clock, strict=True)])
     if z.max(initial=0.0) > PRESENT_Z:
-        # What is there makes the scores of all that resemble it scatter: the prior is estimated beside it.
+        # A true effect makes the scores of all that resemble it scatter: the prior is estimated given it.
         best = problem.candidates[int(np.argmax(z))]
         beside = np.concatenate([problem.fixed, best.columns]).astype(int)
         ridge = np.concatenate([problem.fixed_ridge(0.0), np.zeros(len(best.columns))])
@@ -109,7 +109,7 @@ def _along_numerics(problem: Problem, total: np.ndarray, index: np.ndarray) -> f
 
 
 def _explained(total: np.ndarray, index: np.ndarray, of: int) -> float:
-    """Return the square of what columns explain of one other [1]."""
+    """Return the squared multiple correlation of columns with one other [1]."""
     pull = total[index, of]
     return float(max(pull @ np.linalg.pinv(total[np.ix_(index, index)], hermitian=True) @ pull, 0.0))
 

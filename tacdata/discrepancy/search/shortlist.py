@@ -1,4 +1,4 @@
-"""The shortlist: effects, and one pair of effects, worth refining beside what a model has."""
+"""The shortlist: effects, and one pair of effects, worth refining in addition to a model's own."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def shortlist(problem: Problem, tested: ScoreTests) -> list[list[Candidate]]:
 
     significant = {c.effect.name for c, p in zip(problem.candidates, tested.p, strict=True) if p <= ALPHA}
     ranked = sorted(((_gain(problem, [c]), c) for c in free), key=lambda item: -item[0])
-    # The fee of many numbers, as a drift of each channel has, may hide what the test found.
+    # The penalty of many parameters, as a drift of each channel has, may hide a finding of the test.
     singles = ranked[:TOP] + [one for one in ranked[TOP:] if one[1].effect.name in significant]
     held = {c.effect.name: held_out(problem, [c]) for _, c in singles}
     order = [c for _, c in singles if c.effect.name in significant and held[c.effect.name].sum() > 0]

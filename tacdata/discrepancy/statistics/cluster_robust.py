@@ -3,7 +3,7 @@
 The score of an episode is the inner product of its residual with the regressor, after generalized least squares.
 Its variance is estimated by a sandwich over episodes, which holds whatever the noise within an episode is:
 
-- HC3: each episode's score is that beside a fit without it (MacKinnon & White, J. Econometrics 29, 1985, 305).
+- HC3: each episode's score is that given a fit without it (MacKinnon & White, J. Econometrics 29, 1985, 305).
 - Clusters: where successive episodes correlate, runs of them count as one.
 - Small samples: an F distribution with the degrees of freedom that the leverages leave (Bell & McCaffrey, Survey
   Methodology 28, 2002, 169).
@@ -31,7 +31,7 @@ FLOOR = 1e-300
 PRIOR_FREEDOM = 2.0
 """Shrinkage: most prior degrees of freedom, over the number of effects: fewer show as a spread of their ratios [1]."""
 INDEPENDENT = 0.5
-"""Shrinkage: share of the effects that are independent of one another; many look alike [1]."""
+"""Shrinkage: share of the effects that are independent of one another; many are collinear [1]."""
 LEAST_EXCESS = 1.0
 """Shrinkage: least prior excess. Less than the noise expects is chance, or an overestimated noise [1]."""
 SURELY = 1.0
@@ -59,7 +59,7 @@ class ClusteredScore:
     expected_variance: float = 1.0
     """`variance` under the noise model [1]."""
     bootstrap_freedom: float = 1.0
-    """Degrees of freedom of what `bootstrap` draws: at most those that the clusters span [1]."""
+    """Degrees of freedom of the draws of `bootstrap`: at most those that the clusters span [1]."""
 
     @property
     def variance(self) -> float:
@@ -118,7 +118,7 @@ def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | No
     Estimated by medians: the few effects that resemble a missing one do not count.
 
     Args:
-        effects: Effect -> scores of its shapes, which are much alike.
+        effects: Effect -> scores of its shapes, which are nearly collinear.
     """
     excited = [[s for s in shapes if np.any(s.total)] for shapes in effects.values()]
     excited = [shapes for shapes in excited if shapes]
@@ -129,7 +129,7 @@ def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | No
     log = np.log(excess) - digamma(half) + np.log(half)
     middle = float(np.median(log))
     chance, independent = float(np.mean(polygamma(1, half))), INDEPENDENT * len(excited)
-    # A spread of ratios is one beyond the standard error of what chance makes of it.
+    # A spread of ratios is one beyond its standard error under chance.
     spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - chance * (1 + SURELY * np.sqrt(2 / independent))
     most = PRIOR_FREEDOM * len(excited)
     freedom = min(2 * _trigamma_inverse(spread), most) if spread > 0 else most

@@ -7,7 +7,7 @@ import numpy as np
 FOLDS = 5
 """Cross-validation: number of folds."""
 JITTER = 1e-9
-"""Weight on every coefficient, over the mean information of a column: some may be alike [1]."""
+"""Weight on every coefficient, over the mean information of a column: some may be collinear [1]."""
 MOST_SETS = 10
 """Active sets: most steps for each coefficient..."""
 SETTLED = 1e-10
@@ -70,7 +70,7 @@ def bounded(matrix: np.ndarray, target: np.ndarray, low: np.ndarray, high: np.nd
 
 
 class Beside:
-    """Gram matrices beside columns that are free of bounds: these are taken out once, and fits are of a few columns."""
+    """Gram matrices given columns that are free of bounds: these are taken out once, and fits are of a few columns."""
 
     def __init__(self, gram: np.ndarray, total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> None:
         """Take them out.
@@ -94,7 +94,7 @@ class Beside:
     def fit(
         self, columns: np.ndarray, ridge: np.ndarray, low: np.ndarray, high: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the coefficients of some columns as `solve` does, and those of the free ones beside them."""
+        """Return the coefficients of some columns as `solve` does, and those of the free ones."""
         index = columns + 1
         matrix = self._rest[np.ix_(index, index)] + np.diag(ridge)
         mean = (float(np.trace(matrix)) + self._trace) / max(len(index) + len(self._index), 1)
@@ -103,7 +103,7 @@ class Beside:
         return values, self._through[:, 0] - self._through[:, index] @ values
 
     def gains(self, columns: np.ndarray, values: np.ndarray, episodes: np.ndarray) -> np.ndarray:
-        """Return by how much coefficients, and the free ones beside them, lower half the sum of squares of episodes."""
+        """Return the decrease of half the sum of squares of episodes by coefficients and the free ones."""
         key, index = np.asarray(episodes).tobytes(), self._at[columns + 1]
         if key not in self._left:
             self._left[key] = self._without(self._gram[episodes])
@@ -113,7 +113,7 @@ class Beside:
         return 0.5 * (self._gram[episodes, 0, 0] - left[:, 0, 0]) + linear - 0.5 * square
 
     def _without(self, gram: np.ndarray) -> np.ndarray:
-        """Return Gram matrices of what the free columns leave of the others, without those themselves."""
+        """Return Gram matrices of the other columns after projecting out the free ones."""
         through = self._through[:, self._kept]
         half = gram[:, :, self._kept] - gram[:, :, self._index] @ through
         return half[:, self._kept] - through.T @ half[:, self._index]
@@ -143,7 +143,7 @@ def flips(episodes: int, count: int, seed: int = 0) -> np.ndarray:
 def eliminated(gram: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
     """Return each episode's Gram matrix with some columns regressed out by the fit to all episodes.
 
-    Rows and columns of what was taken out become 0.
+    Rows and columns of the removed ones become 0.
     """
     if not len(columns):
         return gram

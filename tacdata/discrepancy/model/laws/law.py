@@ -1,4 +1,4 @@
-"""What a contact law's file holds: a class that says how readings rise with depth."""
+"""Contents of a contact law's file: a class for the rise of readings with depth."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class ContactLaw(ABC):
     """How readings rise with depth, but for a factor of each channel."""
 
     title: ClassVar[str]
-    """What it is, in words."""
+    """Description, as a phrase."""
     source: ClassVar[str]
     """Where it comes from."""
     shapes: ClassVar[tuple[float, ...]] = (0.0,)
