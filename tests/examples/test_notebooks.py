@@ -35,6 +35,10 @@ CHECKS = {
     "a_verdict": lambda names: names["verdict"].status == "named",
     "import_a_csv": lambda names: len(names["session"]) == 4,
     "look_at_a_session": lambda names: names["peak"].argmax() == 19,
+    "simulate_and_pretrain": lambda names: names["simulated"].episodes == 4,
+    # Neo-Hookean silicone under a ball of 4 mm, 0.8 mm deep: 0.65 N.
+    "solve_a_press": lambda names: 0.6 < abs(names["solution"].force[names["deepest"], 2]) < 0.7,
+    "train_on_eight_presses": lambda names: abs(names["prediction"].depth.max() - names["peak"]) < 0.3,
 }
 """Notebook -> whether its result is right, by the names that its cells bind."""
 

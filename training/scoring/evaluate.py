@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from tacdata import provenance, schemas
+from tacdata.display import Displayed
 from tacdata.training.frames.frames import EpisodeSpan, Frames
 from tacdata.training.frames.trials import at_full_depth
 from tacdata.training.frames.windows import Windows
@@ -52,8 +53,8 @@ class EpisodeResult:
     """Valid frames at full depth [bool], shape (n,)."""
 
 
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, repr=False)
+class Evaluation(Displayed):
     """Scores with their origin."""
 
     document: dict[str, Any]
@@ -64,6 +65,20 @@ class Evaluation:
     """Role of the episodes in training: "test", or "other dataset"."""
     checkpoint_hash: str
     """Identity of the checkpoint."""
+
+    def description(self) -> list[str]:
+        """Return the lines that `repr` shows: the medians of the frames in contact."""
+        frames, network = self.document["frames"], self.document["checkpoint"]["name"]
+        scores = self.document["contact_frames"]
+        peak, rmse, centroid, iou = (
+            "none" if (median := scores[name]["median"]) is None else f"{median:.3f}{unit}"
+            for name, unit in (("peak_error", " mm"), ("contact_rmse", " mm"), ("centroid_error", " px"), ("iou", ""))
+        )
+        return [
+            f"Evaluation of {network} on {len(self.episodes)} episodes of the part {self.part}",
+            f"{frames['in_contact']} of {frames['scored']} frames in contact; medians over these:",
+            f"peak error {peak}, contact RMSE {rmse}, centroid error {centroid}, IoU {iou}",
+        ]
 
 
 def evaluate(

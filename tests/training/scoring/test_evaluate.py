@@ -78,6 +78,7 @@ def test_only_the_test_episodes_of_the_own_dataset_count(frames, trained):
     result = evaluate(trained, frames)
     assert tuple(e.span.number for e in result.episodes) == trained.split.test
     assert result.part == "test"
+    assert repr(result).startswith("Evaluation of ") and len(repr(result).splitlines()) == 3
     counted = result.document["frames"]
     length = 24
     assert counted["scored"] == length * len(trained.split.test)
