@@ -179,9 +179,11 @@ def decide(
             status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
     if status in ("named", INCOMPLETE) and refuted(shown):
         status, reason = "unknown", Reason.SEALED
-    if status == "named" and not found.gap and not borne_out(shown):
-        # Behind a closed gate, sealed episodes alone bear a gain out.
-        levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
+    if status in ("named", INCOMPLETE) and not borne_out(shown):
+        # Behind a closed gate, sealed episodes alone show a gain. A name whose sealed interval holds zero is suspected.
+        unshown = shown is not None and sealed and shown.interval[0] <= 0
+        if unshown or (status == "named" and not found.gap):
+            levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
     if checks.contradictions:
         status, reason = "unknown", Reason.CONTRADICTION
     elif checks.too_few:
