@@ -36,7 +36,7 @@ def test_every_long_test_says_why_and_names_rooms_that_exist():
 
 
 def test_words_decide_no_long_test_and_constants_do(tmp_path):
-    texts = ('"""One."""\nA = 1  # so\n', '"""Two."""\n\nA = 1\n', '"""One."""\nA = 2\n')
+    texts = ('"""One."""\nA = 1  # so\n', '"""Two."""\n\nA = 1\n"""A count."""\n', '"""One."""\nA = 2\n')
     paths = [tmp_path / f"{k}.py" for k in range(3)]
     for path, text in zip(paths, texts, strict=True):
         path.write_text(text)
