@@ -174,7 +174,7 @@ def _example(values: np.ndarray) -> Any:
 
 
 def label_of(entry: str | dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str], where: str) -> str:
-    """Return a word of a trial: given, from the path, or what most rows of a column hold.
+    """Return a word of a trial: constant, from the path, or the most frequent one of a column.
 
     Args:
         entry: As in the mapping: a word, {part: name, pattern: ...} or {column: name, file: name}.

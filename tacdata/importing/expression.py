@@ -1,4 +1,4 @@
-"""Arithmetic on columns, as a mapping writes it: ``set_point - position_error``. No code: only what stands below."""
+"""Arithmetic on columns, as a mapping writes it: ``set_point - position_error``. Only the operators below, no code."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rat
     """Return the sensor of an import, and its assumed values.
 
     Args:
-        entry: ``sensor`` of the mapping: a sensor file's path beside it, or what is known.
-        folder: Where the mapping lies.
+        entry: ``sensor`` of the mapping: a sensor file's path relative to it, or the known properties.
+        folder: Folder of the mapping.
         channels: Channels in the data.
         rate: Their measured rate [Hz].
 

@@ -131,7 +131,7 @@ class _Import:
                 self.failures.append((named or self.source.name, error))
 
     def _copied(self, files: FileSet) -> str:
-        """Return that a set of files holds, byte by byte, what one before it holds; empty if it does not.
+        """Return a note that a set of files is a copy, byte by byte, of one before it; empty if it is not.
 
         A copy is no second measurement: counted as one, it would make every error look smaller.
         """

@@ -104,7 +104,7 @@ def check_source(source: Path) -> None:
 
 
 def files_below(folder: Path) -> list[Path]:
-    """Return the files below a folder, sorted; a folder that counts as one stands for all that is in it."""
+    """Return the files below a folder, sorted; a folder that counts as one file replaces its contents."""
     found = []
     for path in sorted(folder.iterdir()):
         found += [path] if is_one(path) else files_below(path) if path.is_dir() else []
@@ -227,7 +227,7 @@ def without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
 
 
 def side_by_side(parts: list[SourceTable], titles: list[str], options: dict[str, Any]) -> SourceTable:
-    """Return tables next to each other, as of two boards with one clock. A title stands before names that repeat.
+    """Return tables next to each other, as of two boards with one clock. Names that repeat get a title in front.
 
     Raises:
         FormatError: If their clocks differ, or they have no column of times.
@@ -315,7 +315,7 @@ def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
 
 
 def _in_tables(found: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) -> list[tuple[dict[str, str], Path]]:
-    """Return each table of the files that fits the entry's, as "Run {n}" does, with its parts beside the path's."""
+    """Return each table of the files that fits the entry's, as "Run {n}" does, with its parts added to the path's."""
     fitting = [
         ({**parts, **match.groupdict()}, path)
         for parts, path in found

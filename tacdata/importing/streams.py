@@ -36,11 +36,11 @@ class Stream:
     """Zero of the clock. Streams with the same zero share a clock; "aligned" fits all."""
     notes: tuple[str, ...] = ()
     assumed: bool = False
-    """Whether no file and no mapping says the unit."""
+    """Whether neither the file nor the mapping gives the unit."""
     doubts: tuple[str, ...] = ()
-    """What was set aside or mended in its rows, as sentences."""
+    """Rows that were set aside or mended, as sentences."""
     stated_rate: float = 0.0
-    """Rate that the source states beside its times [Hz]; 0 if it states none."""
+    """Rate that the source states in addition to its times [Hz]; 0 if it states none."""
     steps_back: tuple[str, ...] = ()
     """Row and size of each step back at which a stretch of the source ends, as words."""
 
@@ -67,7 +67,7 @@ class ImportedStreams:
     """Whether the position is a depth, so that its zero is the skin's surface."""
     notes: tuple[str, ...] = field(default=())
     doubts: tuple[str, ...] = ()
-    """What was set aside or mended in the rows of any stream, as sentences."""
+    """Rows of any stream that were set aside or mended, as sentences."""
 
     @property
     def all(self) -> tuple[Stream, ...]:
@@ -246,7 +246,7 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[li
 def _readings(
     table: SourceTable, names: list[str], missing: list[float], entry: dict[str, Any], name: str
 ) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return columns as numbers without codes, unless the mapping trusts them; and what is missing, as sentences."""
+    """Return columns as numbers without codes, unless the mapping trusts them; and notes on missing values."""
     values = numbers(table, names, missing, name)
     return (values, ()) if entry.get("trusted") else without_codes(values, name, rails=name == "taxels")
 

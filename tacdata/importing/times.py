@@ -27,7 +27,7 @@ FASTEST_UNSAID, FASTEST_DATE, SLOWEST_UNSAID = 5000.0, 500.0, 1.0
 LATEST = 9.2e9
 """Times beyond cannot be held as 64 bits of nanoseconds [s]."""
 NO_UNIT = {"", "unix", "epoch", "posix", "utc", "gmt", "local", "time", "timestamp", "a.u.", "-"}
-"""What stands in brackets behind a clock's name and is no unit (compared in lower case)."""
+"""Words in brackets behind a clock's name that are no unit (compared in lower case)."""
 
 
 def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.ndarray, str]:
@@ -279,7 +279,7 @@ def _iso(texts: list[str]) -> list[datetime | None] | None:
 
 
 def _pointed(text: str) -> str:
-    """Return a time with a point before the parts of a second, where a comma stands."""
+    """Return a time with a point in place of a comma before the parts of a second."""
     return re.sub(r"(:\d{2}),(\d+)", r"\1.\2", text)
 
 

@@ -89,7 +89,7 @@ SCALE = re.compile(
 WIDE_BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d\u3010\u3011\uff5b\uff5d", "()[][]{}")
 """Brackets of Chinese and Japanese programs, and ours."""
 WORDS = ("IN", "MIN")
-"""What "V_IN" and "T_MIN" end in is no unit."""
+"""Endings of names that are no unit, as of "V_IN" and "T_MIN"."""
 CLOCKS = r"(time|t|zeit|elapsed|timestamp|clock)"
 """Names behind which a capital S is seconds, and no siemens."""
 BRACKETED = r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*"
@@ -193,7 +193,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def clock_unit(name: str) -> str:
-    """Return the unit of time that stands anywhere in a clock's name: "millis", "ms_rel", "time_10ms"; "" if none."""
+    """Return the unit of time at any position in a clock's name: "millis", "ms_rel", "time_10ms"; "" if none."""
     if _factor(bare := name.strip().removesuffix("()"), "s") and len(bare) > 1:
         return bare
     words = re.findall(r"\d+(?:\.\d+)?[A-Za-z]+|[A-Za-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name))

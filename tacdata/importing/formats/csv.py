@@ -30,7 +30,7 @@ SHOWN = 40
 FEW_LINES, LONG, MOST_TURNED = 64, 10, 64 * 1024 * 1024
 """Most lines, smallest ratio of fields to lines, and largest size [byte] of a text whose lines are columns."""
 TAIL, FEWEST = 16 * 1024, 20
-"""Bytes and rows at a file's end by which a number that is cut off is told."""
+"""Bytes and rows at a file's end from which a truncated number is recognized."""
 UNREADABLE = 0.01
 """Largest share of a column's cells that hold no number and are missing [1]; above it the file is refused."""
 SNIFFED, HEAD = 256 * 1024, 4096
@@ -46,7 +46,7 @@ LARGEST = 256 * 1024 * 1024
 RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
 """How a serial monitor marks when a line came."""
 MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
-"""Byte order marks and what they announce; the longer ones first."""
+"""Byte order marks and their encodings; the longer ones first."""
 
 
 class Csv(SourceFormat):
@@ -66,8 +66,8 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
     Args:
         path: Where it comes from, for messages.
         data: The text.
-        options: What the mapping says of it; see `SourceFormat.read`.
-        notes: What is known already; notes on the rows are added.
+        options: Of this file in the mapping; see `SourceFormat.read`.
+        notes: Notes so far; those on the rows are added.
 
     Raises:
         FormatError: If it has no rows of numbers.
@@ -265,7 +265,7 @@ def _parsed(
     """Parse with the column types of the layout.
 
     Returns:
-        Columns by name, the number of lines of another width, and what is missing, as sentences.
+        Columns by name, the number of lines of another width, and notes on missing values, as sentences.
     """
     import pyarrow as pa
 

@@ -23,7 +23,7 @@ class Json(SourceFormat):
     endings = (".json", *LINES)
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
-        """Read what has rows. See the base."""
+        """Read the lists that have rows. See the base."""
         text = path.read_text(encoding="utf-8-sig")
         by_line = path.suffix.lower() in LINES
         whole = _by_line(path, text) if by_line else json.loads(text)
@@ -39,7 +39,7 @@ class Json(SourceFormat):
 
 
 def _by_line(path: Path, text: str) -> list[Any]:
-    """Return what each line holds."""
+    """Return the value of each line."""
     rows = []
     for number, line in enumerate(text.splitlines(), 1):
         try:

@@ -25,11 +25,11 @@ class Mat(SourceFormat):
     endings = (".mat",)
 
     def tables(self, path: Path) -> tuple[str, ...]:
-        """Return the variables if they are trials: tables or structures, named alike but for a number; see the base."""
+        """Return the variables if they are trials: tables or structures, named by number; see the base."""
         try:
             loaded = _loaded(path)
         except NotImplementedError:
-            return ("",)  # `read` says what to do
+            return ("",)  # `read` raises the error with the remedy
         names = [name for name in loaded if not name.startswith("__")]
         whole = all(isinstance(loaded[name], dict) or (np.ndim(loaded[name]) in (2, 3)) for name in names)
         alike = len({re.sub(r"\d+", "#", name) for name in names}) == 1
@@ -84,7 +84,7 @@ def _readable(variables: dict[str, Any]) -> bool:
 
 
 def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
-    """Return the arrays of a variable by name; what holds neither numbers nor texts is added to ``lost``."""
+    """Return the arrays of a variable by name; the names of other contents are added to ``lost``."""
     if isinstance(value, dict):
         found: dict[str, np.ndarray] = {}
         for key, inner in value.items():

@@ -109,7 +109,7 @@ def _fields(array: np.ndarray, inside: str = "") -> Iterator[tuple[str, np.ndarr
 
 
 def _shapes(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) -> list[str]:
-    """Return what is taken for granted of a file of one array: which of its axes is time."""
+    """Return the assumption about a file of one array: which of its axes is time."""
     array = np.squeeze(next(iter(arrays.values())))
     if len(arrays) > 1 or array.dtype.names or options.get("trial_axis") is not None:
         return []

@@ -93,7 +93,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _parts(path: Path) -> list[str]:
-    """Return the names of a bag's files in their order; only this one if no metadata.yaml says otherwise."""
+    """Return the names of a bag's files in their order; only this one unless a metadata.yaml lists others."""
     import yaml
 
     described = path.parent / "metadata.yaml"

@@ -47,7 +47,7 @@ MAGIC = {
     b"\xfd7zXZ": "xz",
     b"\x28\xb5\x2f\xfd": "zstd",
 }
-"""First bytes of files and what they are."""
+"""First bytes of files and the kind of file that begins so."""
 
 CONVERSIONS = {
     ".xls": "open it in Excel or LibreOffice and save it as .xlsx",
@@ -77,7 +77,7 @@ class SourceTable:
     doubts: tuple[str, ...] = ()
     """Values that were left out because they cannot be measurements, as sentences."""
     rate: float = 0.0
-    """Rows a second as the file states them beside its columns [Hz]; 0 if it states none."""
+    """Rate that the file states outside its columns [Hz]; 0 if it states none."""
 
     def column(self, name: str) -> np.ndarray:
         """Return a column's values, or one column of a table in it, named ``name[k]`` (from 0).
@@ -183,13 +183,13 @@ def zipped_size(path: Path) -> int:
 
 
 def kind_of_bytes(data: bytes) -> str:
-    """Return what kind of file begins with these bytes, whatever its name says; "" if it is not known."""
+    """Return the kind of file that begins with these bytes, whatever its ending; "" if it is not known."""
     return next((kind for mark, kind in MAGIC.items() if data.startswith(mark)), "")
 
 
 @contextmanager
 def _in_words(path: Path, name: str) -> Iterator[None]:
-    """Turn what a library raises into an error of the file's format."""
+    """Turn an exception of a library into an error of the file's format."""
     try:
         yield
     except (TacdataError, ModuleNotFoundError):
@@ -197,7 +197,7 @@ def _in_words(path: Path, name: str) -> Iterator[None]:
     except Exception as error:
         # A damaged file can raise anything in the library that reads it: zlib.error, EOFError, struct.error, ...
         words = " ".join((str(error) or type(error).__name__).split())
-        # What the library held goes now: Python 3.12 crashes at its end if a parser is left that stopped half way.
+        # The library's objects go now: Python 3.12 crashes at its end if a parser is left that stopped half way.
         traceback.clear_frames(error.__traceback__)
         if name == "xlsx":  # the one that parses XML; the collection takes a tenth of a second
             gc.collect()
@@ -209,7 +209,7 @@ def _in_words(path: Path, name: str) -> Iterator[None]:
 
 
 def _really(path: Path, name: str) -> str:
-    """Return what a file is if it is something else than it is read as, as "is a PNG image and "; else ""."""
+    """Return a file's real kind if it is another than it is read as, as "is a PNG image and "; else ""."""
     if not path.is_file():
         return ""
     with path.open("rb") as stream:

@@ -97,7 +97,7 @@ def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[Source
 
 @dataclass(frozen=True)
 class _Marks:
-    """What a sheet shows beside the values of its cells."""
+    """Properties of a sheet other than the values of its cells."""
 
     merged: tuple[tuple[int, int, int, int], ...] = ()
     """First and last row and column of each merged range, from 0."""
@@ -165,7 +165,7 @@ def _text(cell: Any) -> str:
     if cell is None:
         return ""
     if isinstance(cell, str):
-        return " ".join(cell.split())  # a line break in a header stands between name and unit
+        return " ".join(cell.split())  # a header may have a line break between name and unit
     if isinstance(cell, datetime | time):
         return cell.isoformat(*([" "] if isinstance(cell, datetime) else []))
     return repr(cell) if isinstance(cell, float) else str(cell)

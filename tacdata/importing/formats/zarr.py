@@ -26,9 +26,9 @@ WIDEST = 4096
 
 
 class Zarr(SourceFormat):
-    """Arrays by name, without ``data/``; a column ``episode`` counts from 0 where the store says where episodes end.
+    """Arrays by name, without ``data/``; a column ``episode`` counts from 0 where the store has the ends of episodes.
 
-    Rows are time: the first axis of an array. What lies in the other axes becomes a table.
+    Rows are time: the first axis of an array. The other axes become columns of a table.
     """
 
     endings = (".zarr",)

@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class CodePolicy:
-    """What is a code. None of it was tuned on data."""
+    """Criteria for a code. None of it was tuned on data."""
 
     huge: float = 9e29
     """Size from which a number is no reading in any unit: instruments write 9.9e37, 1e30, 4.44e49 or -1e105."""
@@ -37,7 +37,7 @@ def without_codes(
         values: Numbers as in the file [any], shape (rows, k).
         name: Their stream, for the sentences.
         rails: Whether they come from a converter, whose largest number is no reading.
-        policy: What is a code.
+        policy: Criteria for a code.
     """
     codes = np.zeros(values.shape, dtype=bool)
     for column in range(values.shape[1]):

@@ -18,7 +18,7 @@ from tacdata.importing.times import NEVER
 
 @dataclass(frozen=True)
 class OrderPolicy:
-    """Limits of what a clock may do. None was tuned on data: each is a count of rows or intervals."""
+    """Limits of a plausible clock. None was tuned on data: each is a count of rows or intervals."""
 
     late: float = 5.0
     """Largest step back of a row that came late [usual intervals]."""
@@ -50,7 +50,7 @@ class TimeOrder:
     time_ns: np.ndarray
     """Time of each row [ns], shape (rows,), int64; wraps undone."""
     notes: tuple[str, ...]
-    """What was undone, cut and set aside, as sentences."""
+    """Repairs, cuts and rows set aside, as sentences."""
     steps_back: tuple[str, ...] = ()
     """The row and the size of each step back at which a stretch ends, as words."""
 

@@ -15,7 +15,7 @@ from tacdata.importing.streams import ImportedStreams, Stream
 
 @dataclass(frozen=True)
 class PathPolicy:
-    """Limits of what a position may do. None was tuned on data."""
+    """Limits of a plausible position. None was tuned on data."""
 
     longest: int = 3
     """Longest dropout whose value varies [rows]. One whose value is constant may be longer."""

@@ -70,7 +70,7 @@ def presses_of(
 
     Args:
         mapping: The mapping's document.
-        beside: Folder of the mapping, where its sensor file lies.
+        beside: Folder of the mapping, to which the sensor file's path is relative.
         tables: Name under ``files`` -> rows.
         parts: {part} of the paths -> its text.
         record: The import record so far.
@@ -114,7 +114,7 @@ def _of_stretch(
     centre: tuple[float, float],
     record: dict[str, Any],
 ) -> Iterator[ImportedPress | Refusal]:
-    """Yield the recordings of a stretch, and what cannot be one."""
+    """Yield the recordings of a stretch, and a refusal for each part that cannot be one."""
     scheduled = read_schedule(mapping, tables, streams.taxels)
     if streams.position is None and not scheduled:
         raise FormatError(
@@ -274,7 +274,7 @@ def _indenter(mapping: dict[str, Any]) -> tuple[Indenter, str]:
 
 
 def centre_of(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[float, float]:
-    """Return the median place [mm] of a machine over whole tables, before trials are cut; 0 where no column says it.
+    """Return the median place [mm] of a machine over whole tables, before trials are cut; 0 without such columns.
 
     The median of each trial would put all presses at one place.
     """
@@ -338,7 +338,7 @@ def _shifted(streams: ImportedStreams, shift_ns: int) -> ImportedStreams:
 def _known(
     entries: dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str], section: str
 ) -> dict[str, float]:
-    """Return what the mapping states of a trial, each a number: given, from the path, or the median of a column."""
+    """Return the numbers that a mapping gives for a trial: constant, from the path, or the median of a column."""
     found = {}
     for name, entry in entries.items():
         where = f"{section}: {name}"

@@ -1,1 +1,1 @@
-"""Looking at foreign files first: what is in them, and a mapping to start from, with questions."""
+"""Inspects foreign files first: their contents, and a mapping to start from, with questions."""

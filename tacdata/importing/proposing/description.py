@@ -1,4 +1,4 @@
-"""What is in foreign files: one table of each kind, and a listing for a person."""
+"""Contents of foreign files: one table of each kind, and a listing for a person."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class FoundKind:
     """Of the first one, below the source."""
     count: int = 1
     options: dict[str, Any] = field(default_factory=dict)
-    """What a mapping has to say under the file to read it so."""
+    """Options that a mapping needs under the file to read it so."""
     words: dict[int, list[str]] = field(default_factory=dict)
-    """Number of a # of the kind -> the words that it stands for."""
+    """Number of a # of the kind -> the words in its place."""
     parts: tuple[str, ...] = ()
     """Kinds that are parts of one trial, in their order."""
     join: str = ""
@@ -67,7 +67,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
                 found[key] = FoundKind(table, name_below, 1, options)
         except ModuleNotFoundError:
             raise
-        except Exception as error:  # a README beside the data is no error
+        except Exception as error:  # a README among the data is no error
             if is_one(source) and isinstance(error, TacdataError):
                 raise
             words = error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}"
@@ -179,7 +179,7 @@ def _joined_kind(order: PartsInOrder, found: dict[str, FoundKind]) -> FoundKind:
 
 
 def _words(keys: list[str], whole: str) -> dict[int, list[str]]:
-    """Return what stands in each folder that was put together, by the number of its #."""
+    """Return the names of each level of folders that were put together, by the number of its #."""
     words: dict[int, list[str]] = {}
     steps = whole.partition(INSIDE)[0].split("/")
     for level, step in enumerate(steps[:-1]):
@@ -192,7 +192,7 @@ def _words(keys: list[str], whole: str) -> dict[int, list[str]]:
 def _columns(table: SourceTable) -> list[str]:
     names = list(table.columns)
     if len(names) == 1 and 0 < table.inner(names[0]) <= SHOWN:
-        # An array without names: a person tells its columns by what they hold.
+        # An array without names: a person recognizes its columns by their values.
         names = [f"{names[0]}[{k}]" for k in range(table.inner(names[0]))]
     lines = [_line(table, name) for name in names[:SHOWN]]
     return lines + ([f"    and {len(names) - SHOWN} more columns"] if len(names) > SHOWN else [])
@@ -215,7 +215,7 @@ def _line(table: SourceTable, name: str) -> str:
 
 
 def _says(name: str, unit: str) -> bool:
-    """Return whether a column's name says its unit already."""
+    """Return whether a column's name contains its unit already."""
     return any(f"{left}{unit}{right}" in name for left, right in ("[]", "()", "{}"))
 
 

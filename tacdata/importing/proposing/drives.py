@@ -1,4 +1,4 @@
-"""What moves where no column is a position, and columns that part strokes and no trials."""
+"""Substitutes for a missing depth or rate, and columns that separate strokes instead of trials."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from tacdata.importing.proposing.strokes import CLEAR
 from tacdata.importing.units import plain
 
 MEANT = ("strain", "angle", "force")
-"""What may stand for a depth, best first."""
+"""Roles that may replace a depth, best first."""
 ONE_WAY, WIDE, APART = 0.8, 0.5, 0.2
 """Half a stroke ends this share of its range from its beginning, and spans this share of the whole. The next one
 begins at its end, to within this share."""
 ALIKE = 0.9
-"""Share of the steps in which two lengths move alike, from which one is a copy of the other."""
+"""Share of the steps in which two lengths move equally, from which one is a copy of the other."""
 RATES = tuple(step * 10.0**power for power in (-1, 0, 1, 2) for step in (1, 2, 5))[:10]
 """Rates that are guessed where no column is a time [1/s]."""
 LASTS = 2.0
@@ -26,7 +26,7 @@ LASTS = 2.0
 
 
 def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]]) -> str:
-    """Let another drive stand for a missing depth; return what to ask, or "".
+    """Use another drive in place of a missing depth; return the question that this raises, or "".
 
     A hinge drives a sensor as a stage does. So does a hand over a load cell.
     """
@@ -52,7 +52,7 @@ def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str
 
 
 def length_of(table: SourceTable, name: str) -> str:
-    """Return the unit of what stands for a depth: um where no press is so deep."""
+    """Return the unit of a column used as a depth: um where no press is so deep."""
     return "um" if float(np.nanmax(np.abs(table.column(name).astype(float)))) > DEEPEST else "mm"
 
 
@@ -78,8 +78,8 @@ def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
     """Return whether labels part strokes into halves, as "1-Stretch" and "1-Recover" do.
 
     Args:
-        labels: What the column says in each row, shape (rows,).
-        axis: What moves, shape (rows,).
+        labels: The column's value in each row, shape (rows,).
+        axis: The moving axis, shape (rows,).
     """
     edges = [0, *(np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist(), len(labels)]
     runs = [axis[a:b][np.isfinite(axis[a:b])] for a, b in pairwise(edges)]

@@ -10,7 +10,7 @@ NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 """A number in a file's name: "run_0.2" and "run_1" are two runs of one kind."""
 SIGNED, PLACED = re.compile(r"[-+]#"), re.compile(r"(?<![A-Za-z])([xyzXYZ])[-+]#")
 PART = "#"
-"""Stands for what differs."""
+"""Replaces the parts that differ."""
 INSIDE = "::"
 """Between a file's path and the table inside it."""
 
@@ -31,7 +31,7 @@ def numberless(text: str) -> str:
 
 
 def merged(kinds: list[str]) -> str | None:
-    """Return one kind that stands for several, with # for words that differ; None if they lie at other depths."""
+    """Return one kind for several, with # for words that differ; None if they are at other depths."""
     outer, inner = zip(*(kind.partition(INSIDE)[::2] for kind in kinds), strict=True)
     paths = [PurePath(path) for path in outer]
     if len({len(path.parts) for path in paths}) > 1 or len({path.suffix for path in paths}) > 1:
@@ -44,7 +44,7 @@ def merged(kinds: list[str]) -> str | None:
 
 
 def _one(names: list[str]) -> str:
-    """Return what names have in common, cut at a sign between words, with # for the rest."""
+    """Return the common beginning and end of names, cut at a sign between words, with # for the rest."""
     if len(set(names)) == 1:
         return names[0]
     begin = re.sub(r"[^-_ .]*$", "", _common(names))

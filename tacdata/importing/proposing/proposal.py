@@ -1,4 +1,4 @@
-"""Proposes a mapping for foreign files, and asks a person what the files do not say."""
+"""Proposes a mapping for foreign files, and asks a person for values that the files lack."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from tacdata.importing.times import layouts_of, times
 from tacdata.importing.units import factor, plain
 
 SPECIMEN = re.compile(r"(?:specimen|spec|sample|material|coupon|probe)[-_ ]?$", re.IGNORECASE)
-"""What stands in a path before the number or the name of a specimen."""
+"""Text in a path before the number or the name of a specimen."""
 PLACE = re.compile(r"(?<![A-Za-z])([xyXY])[-_=]?$")
-"""What stands in a path before a place."""
+"""Text in a path before a place."""
 SHORTEST = 0.02
 """Strokes below are hardly in mm [mm]."""
 MATERIAL = re.compile(
     r"ecoflex|dragon|pdms|sylgard|silicon|rubber|latex|vhb|tpu|foam|gel|agilus|ninja|elast|neopren|solaris|smooth",
     re.IGNORECASE,
 )
-"""Words of folders that name what soft sensors are made of."""
+"""Words of folders that name materials of soft sensors."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ class Proposal:
 
     mapping: dict[str, Any]
     questions: tuple[str, ...]
-    """What a person has to say or to look at, as sentences."""
+    """Values that a person has to give or to check, as sentences."""
 
 
 def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
-    """Return a mapping for the kinds of files, as far as names and values allow, and what to ask."""
+    """Return a mapping for the kinds of files, as far as names and values allow, and its open questions."""
     asked: list[str] = []
     kinds = without_summaries(kinds, asked)
     aliases: dict[str, str] = {}
@@ -130,7 +130,7 @@ def _place(
         lengths = found.get("depth", [])
         lengths = lengths[:1] + [name for name in lengths[1:] if not is_copy(table, lengths[0], name)]
         if len(lengths) > 1 and "displacement" not in document.get("measured", {}):
-            # A second length is a gauge beside the drive; it separates compliance from the skin's deformation.
+            # A second length is a gauge in addition to the drive; it separates compliance from the skin's deformation.
             told = {"file": alias, "columns": lengths[1:2], "unit": plain(table.units.get(lengths[1], "")) or "mm"}
             document.setdefault("measured", {})["displacement"] = told
         for key in ("force", "temperature"):
@@ -165,7 +165,7 @@ def _motion(
         axis = table.column(name).astype(float)
         motion = pressing_axis(time_ns, axis, _deviation(table, channels, axis))
     except (FormatError, ValueError):
-        return  # said where the clock was read
+        return  # reported where the clock was read
     is_depth = "depth" in found
     if is_depth and motion.lifted:
         position["z"], is_depth = position.pop("depth"), False
@@ -226,7 +226,7 @@ def _each_press(depth: np.ndarray) -> list[slice]:
 
 
 def _in_mm(unit: str) -> float:
-    """Return a unit's factor, 1 where it is no length: that is said when the mapping is tried."""
+    """Return a unit's factor, 1 where it is no length: the trial run of the mapping reports that."""
     try:
         return factor(unit or "mm", "mm", "")
     except FormatError:
@@ -263,7 +263,7 @@ def _deviation(table: SourceTable, channels: list[str], axis: np.ndarray) -> np.
 
 
 def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
-    """Return where a file says which specimen was pressed: in a column, or in its path; {} if nowhere."""
+    """Return where a file names the pressed specimen: in a column, or in its path; {} if nowhere."""
     for name in roles.get("specimen", []):
         if len({str(value) for value in entry.table.columns[name].tolist() if value is not None}) > 1:
             return {"file": alias, "column": name}

@@ -1,4 +1,4 @@
-"""What each column of a foreign table is, by its name, its unit and its values."""
+"""The role of each column of a foreign table, by its name, its unit and its values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tacdata.importing.times import times
 from tacdata.importing.units import OTHERS, plain, quantity_of, split_unit
 
 BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|actual|trans(lation)?)"
-"""What a coordinate in a column's name is one of."""
+"""Bodies whose coordinates a column may hold."""
 GUESSES = {
     "time": (
         r"(x_value|time|t|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
@@ -64,12 +64,12 @@ GUESSES = {
 PLACE = r"(tip|tcp|pos(ition)?s?|pose|xyz|probe|indenter|stage|ee(_?pos)?|end_?effector|robot(_?pos)?)"
 """Name of an array whose first three columns are a place."""
 GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
-"""Words that mark a length as measured beside the commanded one."""
+"""Words that mark a length as measured, in addition to the commanded one."""
 DEGREES = ("degc", "c", "k", "degf")
 ROWS = 50
 """Rows of a text column that are tried as times."""
 EVEN = 1e-4
-"""Steps that scatter by less are alike even [step]."""
+"""Steps that scatter by less are uniform [step]."""
 NAMED = re.compile(r"_?(id|no|nr|number|index)$")
 """Ends of names of columns that number things, and so read nothing."""
 
@@ -114,7 +114,7 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
     if not roles["channels"] and "force" not in roles:
         roles["channels"] = roles.pop("strain", []) + roles.pop("angle", [])
     if "time" in roles and f"{roles['time'][0]}'" in table.columns:
-        # Blocks of several trials stand beside each other: each name comes again.
+        # Blocks of several trials are placed next to each other: each name comes again.
         roles = {role: [name for name in names if not name.endswith("'")] for role, names in roles.items()}
     return roles
 
@@ -176,7 +176,7 @@ def _most_evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None
     rising = {}
     for name in roles["channels"]:
         steps = np.diff(table.columns[name])
-        if (steps >= 0).all() and (steps > 0).mean() > 0.5:  # a row of places stands still for many rows
+        if (steps >= 0).all() and (steps > 0).mean() > 0.5:  # a row of places is constant over many rows
             usual = float(np.median(steps))
             rising[name] = float(np.median(np.abs(steps - usual))) / usual if usual > 0 else np.inf
     if rising:
@@ -186,7 +186,7 @@ def _most_evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None
 
 
 def _lone_array(table: SourceTable) -> str:
-    """Return the name of the only array of a table, next to which at most a number of the trial stands; else ""."""
+    """Return the name of the only array of a table that has at most a trial number besides it; else ""."""
     names = [name for name in table.columns if name != "trial"]
     return names[0] if len(names) == 1 and table.inner(names[0]) else ""
 

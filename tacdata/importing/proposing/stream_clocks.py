@@ -18,7 +18,7 @@ STEADY = 0.9
 def own_clocks(
     document: dict[str, Any], tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]], asked: list[str]
 ) -> None:
-    """Give a position the clock before it where another clock stands before the channels of the same file."""
+    """Give a position the clock column before it if the channels of the same file follow another clock column."""
     position, alias = document.get("position", {}), document["taxels"]["file"]
     if position.get("file") != alias or not roles[alias]["channels"]:
         return

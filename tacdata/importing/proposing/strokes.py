@@ -13,19 +13,19 @@ from tacdata.importing.times import NEVER
 PAUSE, TIMES = 1.0, 10.0
 """A pause is longer than this [s], and than this many steps between rows."""
 SURE = 0.5
-"""Correlation of position and readings from which the sign is told."""
+"""Correlation of position and readings above which the sign is certain."""
 LIFTED, CLEAR = 0.2, 0.05
 """A length that stays farther from 0 than this share of its range is a height. Presses are cut at the other."""
 
 
 @dataclass(frozen=True)
 class PressingAxis:
-    """What the path says."""
+    """Properties of the path along the pressing axis."""
 
     sign: int
     """1 where the axis grows into the skin, -1 where it falls."""
     at_zero: bool
-    """Whether 0 is among its values, or just beside them."""
+    """Whether 0 is among its values, or just outside their range."""
     lifted: bool
     """Whether it never comes near zero, as a machine's height and no depth does."""
     pause: float

@@ -34,7 +34,7 @@ POLICY = TrialPolicy()
 
 @dataclass
 class _Outcome:
-    """What the sets of files become."""
+    """Outcome of importing the sets of files."""
 
     presses: list[ImportedPress] = field(default_factory=list)
     rests: list[float] = field(default_factory=list)
@@ -43,7 +43,7 @@ class _Outcome:
 
 
 def tried(source: Path, mapping: dict[str, Any], beside: Path, policy: TrialPolicy = POLICY) -> str:
-    """Return what some of the files become by a mapping, or why they become nothing, as a sentence.
+    """Return the outcome of importing some of the files by a mapping, or why nothing is imported, as a sentence.
 
     Args:
         source: The files.

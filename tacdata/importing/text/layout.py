@@ -38,7 +38,7 @@ SHEET_ERRORS = (
     "#VALOR!",
     "#NUM.",
 )
-"""What a spreadsheet writes for a cell without a value; it begins like a comment and is none."""
+"""Error values of spreadsheets, in cells without a value; they begin like a comment and are none."""
 MISSING = (
     "",
     "nan",
@@ -76,7 +76,7 @@ MISSING = (
 """Texts that stand for a missing value in any file: C, LibreOffice, Fortran and spreadsheets write some of them."""
 DELIMITERS = ("\t", ";", ",", "|", " ")
 GUESSED = ("delimiter", "decimal")
-"""Options of a mapping that can be told from the file instead."""
+"""Options of a mapping that can be inferred from the file instead."""
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(([.,' \u00a0\u202f])\d{3})(\2\d{3})*([.,]\d+)?")
 """A number with a sign between its thousands."""
 SAMPLE, TAIL = 2000, 100
@@ -84,7 +84,7 @@ SAMPLE, TAIL = 2000, 100
 
 
 LABELS = ("unit", "units", "einheit")
-"""What stands before the units of a line, and is none."""
+"""Words before the units of a line that are no unit."""
 LINES_OF_HEADER = 6
 """A header with numbers has hardly more lines."""
 
@@ -94,7 +94,7 @@ class TextLayout:
     """The layout of a text file."""
 
     delimiter: str
-    """The delimiter; a blank stands for any white space."""
+    """The delimiter; a blank means any white space."""
     decimal: str
     """Decimal sign: a point or a comma."""
     skip: int
@@ -108,7 +108,7 @@ class TextLayout:
 
 
 def is_comment(line: str, missing: tuple[str, ...] = ()) -> bool:
-    """Return whether a line is a comment: it begins like one, and not with a text that stands for a missing value."""
+    """Return whether a line is a comment: it begins like one, and not with a text for a missing value."""
     bare = line.lstrip().lstrip("\"'")
     return bare.startswith(COMMENTS) and not bare.startswith((*SHEET_ERRORS, *(text for text in missing if text)))
 
@@ -150,13 +150,13 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
 
 
 def _as_given(options: dict[str, Any]) -> str:
-    """Return what the mapping says of the layout, as the end of a sentence."""
+    """Return the layout that the mapping gives, as the end of a sentence."""
     given = [f"{name} {options[name]!r}" for name in GUESSED if name in options]
     return f", read with {' and '.join(given)} as the mapping says" if given else ""
 
 
 def _otherwise(text: str, options: dict[str, Any], origin: str) -> str:
-    """Return what would read a file that the mapping's delimiter or decimal sign does not; "" if nothing would."""
+    """Return a layout that reads a file which the mapping's delimiter or decimal sign does not; "" if there is none."""
     rest = {name: value for name, value in options.items() if name not in GUESSED}
     if len(rest) == len(options):
         return ""
@@ -250,7 +250,7 @@ def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
         if len(row) != width:
             continue
         told = [is_number(row[k], decimal) and row[k] not in MISSING for k in numeric]
-        # A word among the numbers of the first rows makes no header of them: one without numbers stands before.
+        # A word among the numbers of the first rows makes no header of them: the row before has no numbers.
         above = rows[number - 1] if number else []
         named = len(above) == width and not any(is_number(above[k], decimal) for k in numeric)
         # A header of several lines may tell a rate or a date first: names without a number follow.
@@ -262,7 +262,7 @@ def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
 
 
 def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return the names of columns and their units from the lines of a header, the last of which stands above the rows.
+    """Return the names of columns and their units from the lines of a header, the last of which precedes the rows.
 
     Names may stand above units, and groups above or below both. A name of several columns has its group before it.
     """
