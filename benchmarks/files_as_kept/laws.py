@@ -1,4 +1,4 @@
-"""What skins and machines do, by laws of other forms than the library's. Nothing here imports tacdata."""
+"""Laws of skins and machines, of other forms than the library's. Nothing here imports tacdata."""
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def stretched(share, tau, beta):
 
 
 def preisach(inputs, width, cells=40):
-    """Return what relays switch on and off at thresholds apart by about a width make of inputs from 0 to 1."""
+    """Return the output of relays whose thresholds are apart by about a width (Preisach), inputs from 0 to 1."""
     up, down = np.meshgrid(*[np.linspace(0, 1, cells)] * 2, indexing="ij")
     up, down = up[up >= down], down[up >= down]
     weight, on, made = np.exp(-(((up - down) / width) ** 2)), np.zeros(len(up), bool), []

@@ -16,7 +16,7 @@ from sets import SETS
 
 
 def imported(folder, kept):
-    """Import a set as proposed, then as a person answers; return what happened."""
+    """Import a set as proposed, then as a person answers; return the counts."""
     from tacdata import documents
     from tacdata.importing.imported_session import import_session
     from tacdata.importing.proposing.description import described
@@ -62,7 +62,7 @@ def judged(out, name, seed):
 
 
 def outcome(row):
-    """Return what a verdict says of what is there, as in ../real_kinds."""
+    """Return whether a verdict fits the true effects, as in ../real_kinds."""
     mechanisms, families = set(row["mechanisms"]), set(row["families"])
     effects = row["verdict"]["effects"]
     named = [e for e in effects if e["status"] == "named" and e.get("level", "form")]

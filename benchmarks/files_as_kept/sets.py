@@ -1,6 +1,6 @@
 """Recordings in the files in which labs keep them: each function writes one set below a folder.
 
-What they hold is drawn from a seed. Nothing here imports tacdata.
+Their contents are drawn from a seed. Nothing here imports tacdata.
 """
 
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ TAXELS = np.array([(x, y) for y in (-4.0, 0.0, 4.0) for x in (-4.0, 0.0, 4.0)])
 
 @dataclass(frozen=True)
 class Kept:
-    """A set as it lies on a lab's disk."""
+    """A set as a lab keeps it on disk."""
 
     source: str
     """File or folder that is imported."""
@@ -24,7 +24,7 @@ class Kept:
     """True of it; empty: nothing is hidden."""
     families: tuple = ()
     answers: dict = field(default_factory=dict)
-    """What a person who knows the lab answers to the proposal's questions: parts of the mapping."""
+    """Answers to the proposal's questions by a person who knows the lab: parts of the mapping."""
 
 
 def written(path, lines, encoding="utf-8"):
@@ -93,7 +93,7 @@ def foam(folder, rng):
 
 
 def capacitance(folder, rng):
-    """Eight capacitances beside a force: one array without names, pauses between presses, rows that were lost."""
+    """Eight capacitances and a force: one array without names, pauses between presses, rows that were lost."""
     places = np.array([(x, y) for y in (-3.0, 3.0) for x in (-9.0, -3.0, 3.0, 9.0)])
     kernel = laws.stretched(rng.uniform(0.18, 0.3), rng.uniform(0.8, 3.0), rng.uniform(0.4, 0.6))
     gain, begin, rows = 1 + 0.1 * rng.standard_normal(8), 0.0, []

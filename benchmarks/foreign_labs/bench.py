@@ -1,4 +1,4 @@
-"""Single presses: a stage that logs where it is, and a board that logs what it reads, each with its own stamps."""
+"""Single presses: a stage that logs its position, and a board that logs its readings, each with its own stamps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import path
 from recordings import channels, encoder, stamps
 
 BEGIN = 1000.0
-"""What the clock says when the first press begins [s]."""
+"""The clock when the first press begins [s]."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Bench:
     latency: float = 0.0
     """How late the board's stamps are [s]."""
     ahead: float = 0.0
-    """How far ahead the stage's clock is, as the mapping says [s]."""
+    """How far ahead the stage's clock is, by the mapping [s]."""
     lag: float = 0.0
     """Time constant of a low pass behind the transducers [s]."""
     gains: Callable | None = None
@@ -56,7 +56,7 @@ class Bench:
             at = stamps(rng, time[-1], self.rate, self.jitter, self.lost)
             said = board.said(time, reading, at)
             said = self.spoilt(said, k) if self.spoilt else said
-            # Drawn even where nobody keeps it: what is drawn later depends on it.
+            # Drawn even where nobody keeps it: later draws depend on it.
             stage = self._stage(rng, clock, time, depths, tip - off, loads, place if several else None)
             stamped = at + clock + self.latency
             if self.together:

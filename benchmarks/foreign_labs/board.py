@@ -1,4 +1,4 @@
-"""Channels under a layer: what each reads of its load, how it wanders, and what noise is on it."""
+"""Channels under a layer: response to the load, drift and noise of each."""
 
 from math import exp
 
@@ -94,7 +94,7 @@ class Board:
         return low_pass(reading, lag) if lag else reading
 
     def said(self, time, reading, at):
-        """Return what is said at given times [s]: with noise, drift and levels, shape (rows, channels)."""
+        """Return the logged readings at given times [s]: with noise, drift and levels, shape (rows, channels)."""
         clean = np.stack([np.interp(at, time, reading[:, i]) for i in range(self.channels)], 1)
         kicks = self.rng.standard_normal(clean.shape)
         noise, last = np.empty_like(kicks), self.rng.standard_normal(self.channels)

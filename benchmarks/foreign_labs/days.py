@@ -1,4 +1,4 @@
-"""Presses on several days: a sensor that is mounted anew each morning, a folder and a mapping a day."""
+"""Presses on several days: a sensor that is mounted again each morning, a folder and a mapping a day."""
 
 import numpy as np
 import path

@@ -1,4 +1,4 @@
-"""Thirty labs, each with a sensor, a protocol and files of its own; what its function says first is what is hidden."""
+"""Thirty labs, each with a sensor, a protocol and files of its own; its function's docstring is the hidden effect."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Lab:
 
     @property
     def hidden(self):
-        """What is hidden, in words."""
+        """The hidden effect, in words."""
         return self.make.__doc__
 
     def write(self, folder, name, first=SEED):

@@ -7,7 +7,7 @@ import path
 from recordings import channels, encoder, stamps
 
 TOUCHED = 20.0
-"""Where the stage stands when the tool touches the skin [mm]."""
+"""Position of the stage when the tool touches the skin [mm]."""
 
 
 @dataclass(frozen=True)

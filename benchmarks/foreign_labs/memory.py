@@ -1,4 +1,4 @@
-"""What a pressed layer remembers, stepped in time: each class turns the load of an elastic layer into its own.
+"""Memory of a pressed layer, stepped in time: each class turns the load of an elastic layer into its own.
 
 `begin` is called before every run, `load` for every step with the layer, its indentation and the one before [mm]; it
 returns a load [N].
@@ -20,7 +20,7 @@ class Relaxation:
         self.lasting = 1 - sum(self.shares)
 
     def begin(self, place):
-        """Forget what was."""
+        """Clear the state."""
         self.parts = [0.0] * len(self.shares)
 
     def load(self, layer, depth, before):
@@ -55,18 +55,18 @@ class Friction:
 
     @staticmethod
     def _sum(values):
-        # Added one by one: sum() carries what rounding loses, which would change the last digits of what is recorded.
+        # Added one by one: sum() carries rounding errors along, which would change the last digits of the recordings.
         total = 0.0
         for value in values:
             total += value
         return total
 
     def begin(self, place):
-        """Forget what was."""
+        """Clear the state."""
         self.stops = [0.0] * len(self.slips)
 
     def load(self, layer, depth, before):
-        """Return the load with what the elements hold [N]."""
+        """Return the load with that of the elements [N]."""
         elastic = layer.elastic(depth)
         rise = elastic - layer.elastic(before)
         self.stops = [min(max(stop + rise, -slip), slip) for stop, slip in zip(self.stops, self.slips, strict=True)]
@@ -91,7 +91,7 @@ class SmoothFriction:
         self.size, self.travel, self.power = size, travel, power
 
     def begin(self, place):
-        """Forget what was."""
+        """Clear the state."""
         self.state = 0.0
 
     def load(self, layer, depth, before):
@@ -106,7 +106,7 @@ class SmoothFriction:
 
 
 class Network:
-    """A second network beside the first flows faster the more it carries (Bergström and Boyce)."""
+    """A second, parallel network flows faster the more it carries (Bergström and Boyce)."""
 
     FASTEST = 400.0
     """Its flow at most, over `rate` [1]."""
@@ -118,7 +118,7 @@ class Network:
         self.stiffness, self.strength, self.rate, self.power = stiffness, strength, rate, power
 
     def begin(self, place):
-        """Forget what was."""
+        """Clear the state."""
         self.flowed = 0.0
 
     def load(self, layer, depth, before):
@@ -140,7 +140,7 @@ class Softening:
         self.most = {}
 
     def begin(self, place):
-        """Go on with what was kept of the place."""
+        """Go on with the state of the place."""
         self.place = place
 
     def load(self, layer, depth, before):

@@ -1,4 +1,4 @@
-"""What a lab writes: CSV files, and a mapping that says what stands in them."""
+"""Files of a lab: CSV files, and a mapping of their columns."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,7 +58,7 @@ def stamps(rng, seconds, rate, jitter, lost=0.0):
 
 
 def encoder(rng, depths):
-    """Return depths as an encoder says them [mm]: noise of 0.5 um, steps of 1 um."""
+    """Return depths as an encoder reads them [mm]: noise of 0.5 um, steps of 1 um."""
     return np.round((depths + 0.0005 * rng.standard_normal(len(depths))) / 0.001) * 0.001
 
 

@@ -1,7 +1,7 @@
 """Hidden effects in thirty made-up labs' recordings: python run.py OUT [--labs d01 d12 ...].
 
 Every data set is written as CSV with a mapping, goes through `tacdata import` and `tacdata discrepancy`, and is scored
-against what was put in. The judge sees sessions alone.
+against the hidden effects. The judge sees sessions alone.
 """
 
 import argparse
@@ -59,7 +59,7 @@ def judged(folder, engine):
 
 
 def result(name, seed, verdict, seconds):
-    """Return what came of a data set, as it is kept in result.json."""
+    """Return the outcome of a data set, as it is kept in result.json."""
     lab = LABS[name]
     effects = [{k: e[k] for k in ("mechanism", "effect", "status", "alternatives")} for e in verdict["effects"]]
     return {

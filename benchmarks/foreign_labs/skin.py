@@ -1,4 +1,4 @@
-"""A pressed layer and the rig that holds it: from where a rig says the tool is to indentation and load."""
+"""A pressed layer and the rig that holds it: from the rig's commanded depth to indentation and load."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Skin:
         return self.stiffness * (depth**first / first + self.stiffening * depth**second / second)
 
     def pressed(self, depths, place=ONLY):
-        """Return indentations [mm] and loads [N], shape (n,), under depths that the rig says, a row a `STEP`."""
+        """Return indentations [mm] and loads [N], shape (n,), under commanded depths, a row a `STEP`."""
         if self.memory is not None:
             self.memory.begin(place)
         found, loads = np.empty(len(depths)), np.empty(len(depths))
@@ -52,7 +52,7 @@ class Skin:
         return found, loads
 
     def _given_way(self, carriage, force):
-        """Return the indentation [mm] and the load [N] that balance, from the last load, by halving what is left."""
+        """Return the indentation [mm] and the load [N] that balance, by halving steps from the last load on."""
         if not self.compliance:
             return carriage, 0.0
         depth = carriage - self.compliance * force

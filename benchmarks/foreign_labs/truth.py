@@ -1,16 +1,16 @@
-"""What is true of a data set, and how a verdict stands beside it."""
+"""True effects of a data set, and the score of a verdict against them."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What was hidden."""
+    """Hidden effects."""
 
     names: tuple = ()
     """Mechanisms that are there; all are to be named."""
     best: str = "nothing"
-    """What the recordings can show at best, in words."""
+    """The best finding that the recordings allow, in words."""
     also: tuple = ()
     """Names that are as right, in place of `names`."""
     shows: bool = True
@@ -18,10 +18,10 @@ class Truth:
 
 
 def outcome(verdict, truth):
-    """Return what came of a verdict, in words.
+    """Return the score of a verdict, in words.
 
-    right: exactly the truth is named, or nothing where nothing shows. in part: one of two is named, and nothing else
-    told. set with it, set without it: something is ambiguous, and the truth is, or is not, among all that is told.
+    right: exactly the truth is named, or nothing where nothing shows. in part: one of two is named, and nothing else.
+    set with it, set without it: something is ambiguous, and the truth is, or is not, among all names listed.
     unknown: with the truth suspected, or other things, or nothing. missed: none. wrong: a name that is not there.
     """
     names, right = set(truth.names), {*truth.names, *truth.also}

@@ -1,4 +1,4 @@
-"""What may be true of a foreign rig, stepped in time; no form is the library's."""
+"""Possible true effects of a foreign rig, stepped in time; no form is the library's."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from protocols import STEP
 
 @dataclass
 class Rig:
-    """What lasts from trial to trial."""
+    """State that persists from trial to trial."""
 
     size: float
     """How strong the effect is, 1 as usual."""
@@ -24,7 +24,7 @@ def _still(rig, trial, values):
 
 @dataclass(frozen=True)
 class Effect:
-    """One truth: each part takes the rig, the trial and what it changes, a row every `STEP`."""
+    """One truth: each part takes the rig, the trial and the values that it changes, a row every `STEP`."""
 
     called: tuple = ()
     """Names that a verdict may rightly give."""
@@ -61,7 +61,7 @@ def _compliance(rig, trial, depth):
 
 
 def _relaxation(rig, trial, depth, load):
-    """Three terms; what a trial left relaxes on between trials."""
+    """Three terms; the rest of a trial's memory relaxes on between trials."""
     late = np.zeros_like(load)
     for tau, share in ((0.3, 0.3), (2.0, 0.4), (12.0, 0.3)):
         ended, last = rig.kept.get(tau, (trial.begin, np.zeros(load.shape[1])))

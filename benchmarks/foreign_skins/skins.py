@@ -1,4 +1,4 @@
-"""Soft sensors as other labs build them: what each channel says of depth, without any history."""
+"""Soft sensors as other labs build them: each channel's reading as a function of depth, without any history."""
 
 from dataclasses import dataclass
 

@@ -1,9 +1,9 @@
-"""What a lab might do without the workflow, on the same recordings; each answers as the workflow does.
+"""Methods that a lab might use without the workflow, on the same recordings; each answers as the workflow does.
 
 noop: the model as it is. affine: a gain and an offset a channel. nominal: every nominal parameter refitted. lasso: all
 effects at once, the penalty by cross-validation. bic: effects one by one while Bayes' criterion, rows taken as
 independent, falls by more than ten. ridge: a free regression of the residual on histories of the path, which names
-nothing and bounds what can be closed.
+no effect and bounds the part that can be closed.
 """
 
 import time
@@ -18,7 +18,7 @@ MOST = 4
 
 
 def answered(setting, method):
-    """Return a verdict's least fields, what the model says with and without what was found, and CPU seconds."""
+    """Return a verdict's least fields, the model's prediction before and after correction, and CPU seconds."""
     from tacdata.chain import predict
     from tacdata.discrepancy.noise.null_model import null_model
     from tacdata.discrepancy.search.problem import prepare
@@ -150,7 +150,7 @@ def _descend(gram, columns, penalty, values, rounds=60):
 
 
 def _ridge(course, signal):
-    """Return what a regression of every channel's residual on its own history and the path says, rows read."""
+    """Return a regression of every channel's residual on its own history and the path, rows read."""
     rows = course.read
     idle = np.median(signal[course.tip[:, 2] <= 0], axis=0)
     rise, clock = signal - idle, (course.time / course.time[-1])[:, None]

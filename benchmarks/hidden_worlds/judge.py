@@ -1,6 +1,6 @@
 """Judge one world: python judge.py FOLDER. It holds recordings.npz, task.json and table.npz.
 
-Runs as a process of its own in that folder; opening what is true, or the code that made it, ends it.
+Runs as a process of its own in that folder; opening the truth, or the code that made it, ends it.
 """
 
 import json
@@ -15,7 +15,7 @@ FORBIDDEN = ("truth", "worlds")
 
 
 def guard(event, given):
-    """Refuse to open what only the scorer may see."""
+    """Refuse to open files for the scorer alone."""
     if event == "open" and isinstance(given[0], str | bytes):
         parts = Path(given[0].decode() if isinstance(given[0], bytes) else given[0]).parts
         if any(name in parts for name in FORBIDDEN):
@@ -58,7 +58,7 @@ def course_of(data):
 
 
 def setting_of(folder, course, without=(), **switches):
-    """Return what the engine is asked.
+    """Return the setting that the engine is to judge.
 
     Args:
         folder: The world's.
@@ -97,7 +97,7 @@ def spec_of(folder):
 
 
 def answered(folder, without=(), **switches):
-    """Return the verdict's document, what the model says with and without what was found, and CPU seconds."""
+    """Return the verdict's document, the model's prediction before and after correction, and CPU seconds."""
     from tacdata.chain import predict
     from tacdata.discrepancy.data.checks import check
     from tacdata.discrepancy.judge import judge

@@ -17,13 +17,13 @@ from worlds.physics import KNOWN
 HERE = Path(__file__).parent
 REPOSITORY = HERE.parents[1]
 ROOMS = ("chain", "effects", "discrepancy")
-"""What makes up the engine."""
+"""Packages of the engine."""
 LONGEST = 300
 """A judge that takes longer is stopped, and scored as crashed [s]."""
 
 
 def engine_of(root, rooms=ROOMS):
-    """Return what names an engine: the hash of its rooms' files, and the commit they stand in."""
+    """Return the identity of an engine: the hash of its packages' files, and their commit."""
     digest = hashlib.sha256()
     for path in sorted(p for room in rooms for p in (root / "tacdata" / room).rglob("*")):
         if path.suffix in (".py", ".yaml", ".json"):
@@ -33,7 +33,7 @@ def engine_of(root, rooms=ROOMS):
 
 
 def judged(world, root, options):
-    """Have one world judged by a process that sees nothing else; return its answer and what its model says."""
+    """Have one world judged by a process that sees nothing else; return its answer and its model's prediction."""
     with tempfile.TemporaryDirectory(prefix="judge-") as name:
         folder = Path(name)
         for path in world.iterdir():
@@ -72,7 +72,7 @@ def wanted(arguments):
 
 
 def main(arguments):
-    """Judge what is not judged yet."""
+    """Judge the worlds without a verdict."""
     out, kept = arguments.out, arguments.out / "verdicts" / arguments.label
     kept.mkdir(parents=True, exist_ok=True)
     options = json.loads(arguments.options)
@@ -106,7 +106,7 @@ def line(answer):
 
 
 def chosen(words=None):
-    """Return what was typed, or is given."""
+    """Return the arguments of the command line, or those given."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("blocks", nargs="+", choices=[*BLOCKS, "all"])

@@ -9,7 +9,7 @@ from scoring.outcome import accepted
 
 
 def main(out, label, beside, dump):
-    """Write the report of a label beside others."""
+    """Write the report of a label compared with others."""
     rows = gathered.rows(out, label)
     if not rows:
         raise SystemExit(f"no verdicts in {out / 'verdicts' / label}")

@@ -1,7 +1,7 @@
 """Put known effects into real recordings and judge them: python semi_synthetic.py SOURCE OUT [--mapping FILE].
 
-Recordings keep their own noise and their own physics; what is put in is known exactly. The control is the recordings as
-they are, and each half of them by itself: two halves of one recording must not get different names.
+Recordings keep their own noise and their own physics; the added effect is known exactly. The control is the recordings
+as they are, and each half of them by itself: two halves of one recording must not get different names.
 """
 
 import argparse
@@ -117,7 +117,7 @@ def tacdata(engine, *words):
 
 
 def line(name, injection, verdict):
-    """Return a line of the table: what was put in, what was said, whether it holds it."""
+    """Return a line of the table: the added effect, the verdict, whether it holds the effect."""
     sets = [{e["mechanism"], *e["alternatives"]} for e in verdict["effects"]]
     certain = [e["mechanism"] for e in verdict["effects"] if e["status"] == "named" and verdict["status"] != "unknown"]
     wrong = [c for c in certain if c not in injection.called]

@@ -2,8 +2,8 @@
 
     python run.py DATA OUT
 
-DATA holds the folders friction_damper and linear_actuator as their authors publish them. OUT is filled, and what is
-there is not made again. The table is printed as Markdown.
+DATA holds the folders friction_damper and linear_actuator as their authors publish them. OUT is filled; files that
+exist are not made again. The table is printed as Markdown.
 """
 
 import json
@@ -46,7 +46,7 @@ def halves(session, folder):
 
 
 def main(data, out):
-    """Make what is missing, and print the table."""
+    """Make the missing files, and print the table."""
     out.mkdir(exist_ok=True)
     for name, (source, mapping) in SETS.items():
         if not (out / name).exists():

@@ -1,6 +1,6 @@
 """Ask the workflow about one world: python ask.py FOLDER COUNT. Writes verdict.json; next.json where it is ambiguous.
 
-Runs as a process of its own in that folder; opening what is true, or the code that made it, ends it.
+Runs as a process of its own in that folder; opening the truth, or the code that made it, ends it.
 """
 
 import json
@@ -23,7 +23,7 @@ from tacdata.revision.next_presses.plan import choose, plan_of
 from tacdata.revision.next_presses.rivals import rivals
 
 TRAVEL = 6.0
-"""What the guide does at most [mm/s]."""
+"""Largest speed of the guide [mm/s]."""
 LIMITS = AxisLimits(np.full(3, 1e4), np.full(3, TRAVEL))
 """The worlds' guide turns at once [mm/s^2, mm/s]."""
 

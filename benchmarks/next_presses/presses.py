@@ -8,7 +8,7 @@ SPEEDS = (0.15, 6.0)
 LEAST = 0.8
 """The least time in the air after a press [s]."""
 KEYS = ("time", "episode", "readings", "path_time", "path_episode", "path", "force", "tag", "temperature")
-"""What has a row a reading, or a row of the path."""
+"""Arrays with a row a reading, or a row of the path."""
 
 
 def added(press):

@@ -1,6 +1,6 @@
 """How many presses settle an ambiguous verdict, recommended or random: python run.py OUT [--help].
 
-A line of OUT/worlds.jsonl for each world; worlds that have one are not done again. What the workflow answered is kept
+A line of OUT/worlds.jsonl for each world; worlds that have one are not done again. The workflow's answers are kept
 in OUT/asked, so that a run that was stopped in a world goes on there. `--score` prints the figures alone.
 """
 
@@ -29,7 +29,7 @@ from worlds.cases import cases, inseparable  # noqa: E402
 from worlds.physics import KNOWN  # noqa: E402
 
 ENGINE = (*ROOMS, "revision")
-"""What judges and recommends."""
+"""Packages that judge and recommend."""
 STEADY = (
     "latency",
     "low_pass_filter",
@@ -51,7 +51,7 @@ STEADY = (
 )
 """Effects that do not depend on how long the session is: presses added change nothing of those before.
 
-Each in the library's own form: what is between two names is settled by no press.
+Each in the library's own form: an effect between two names is settled by no press.
 """
 SIZES = (1.0, 4.0)
 """Sizes of effects, in those of the aliases, which are a few micrometres and milliseconds."""
@@ -108,7 +108,7 @@ def answered(case, more, table, count):
 
 
 def settled(case, verdict):
-    """Return what a verdict settles: the names that it gives, and whether all are right; None where it gives none."""
+    """Return the names that a settled verdict gives, and whether all are right; None without names."""
     given = [c for c in claims(verdict) if c[0] is not None]
     if not given or not verdict["status"].startswith("named"):
         return None
@@ -116,7 +116,7 @@ def settled(case, verdict):
 
 
 def by_recommendation(case, following, table):
-    """Add recommended presses, each time those of the last verdict, until one settles it; return what came."""
+    """Add recommended presses, each time those of the last verdict, until one settles it; return the record."""
     more, done, plan = [], [], list(following)
     for count in STEPS:
         # A plan of fewer presses is recorded again from its beginning.
@@ -130,7 +130,7 @@ def by_recommendation(case, following, table):
 
 
 def by_chance(case, like, settle, table):
-    """Add random presses as long as recommended ones until a verdict settles it; return the number, and what came."""
+    """Add random presses as long as recommended ones until a verdict settles it; return the number, and the record."""
     rng, done, more = np.random.default_rng([case.seed, 21]), [], []
     before = protocol.KNOWN[case.settings["protocol"]](np.random.default_rng([case.seed, 11]), EPISODES)
     counts = [t * settle for t in TIMES] if settle else [STEPS[-1]]
@@ -150,7 +150,7 @@ def told(verdict):
 
 
 def line(case, table):
-    """Return what came of one world; None of its counts where its first verdict is not ambiguous."""
+    """Return the record of one world; None of its counts where its first verdict is not ambiguous."""
     verdict, following, _ = asked(case, [], table, STEPS[-1])
     row = {
         "id": case.identity,
@@ -212,7 +212,7 @@ def score(rows):
 
 
 def main(given):
-    """Do what is not done yet."""
+    """Judge the worlds without a record."""
     given.out.mkdir(parents=True, exist_ok=True)
     path, table = given.out / "worlds.jsonl", (given.out / "nominal.npz").resolve()
     rows = [json.loads(text) for text in path.read_text().splitlines()] if path.exists() else []

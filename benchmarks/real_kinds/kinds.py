@@ -1,4 +1,4 @@
-"""Kinds of recordings that other labs publish: how they press, what they read, and what is true of it.
+"""Kinds of recordings that other labs publish: protocol, quantities read, and true effects.
 
 Nothing here imports tacdata. Laws are integrated in time and have other forms than the library's.
 """
@@ -37,7 +37,7 @@ class Kind:
     trials: Callable
     """From a generator to presses."""
     read: Callable
-    """From press, what lasts between presses, strength and laws to tip and readings, a row every `STEP`."""
+    """From press, state kept between presses, strength and laws to tip and readings, a row every `STEP`."""
     channels: int = 1
     rate: float = 25.0
     """Readings a second [Hz]."""
@@ -47,7 +47,7 @@ class Kind:
     gauge: bool = False
     """Whether a laser looks at the tip."""
     force: bool = False
-    """Whether a load cell lies below."""
+    """Whether there is a load cell below."""
     fair: tuple = field(default=())
     """Further names that are fair in a set."""
 
@@ -82,7 +82,7 @@ def late(values, tau, start=0.0):
 
 
 def remembered(trial, kept, load, spectrum):
-    """Return what a load leaves behind: a weighted sum of lags that go on between presses."""
+    """Return the memory of a load: a weighted sum of lags that go on between presses."""
     total = np.zeros_like(load)
     for tau, weight in spectrum:
         ended, last = kept.get((trial.place, tau), (trial.begin, np.zeros(load.shape[1])))

@@ -68,7 +68,7 @@ def judged(out, engine, name, share, which, seed):
 
 
 def outcome(row):
-    """Return what a verdict says of what is there."""
+    """Return whether a verdict fits the true effects."""
     kind, alone = KINDS[row["kind"]], row["share"] == 1
     mechanisms = set() if alone else set(kind.mechanisms)
     families = set() if alone else set(kind.families)

@@ -1,8 +1,8 @@
-"""Shapes that a real skin leaves beside a curve of depth: python shapes.py ../../../shared/data/eflesh_magnetic.
+"""Shapes of a real skin's residual from a curve of depth: python shapes.py ../../../shared/data/eflesh_magnetic.
 
 Thirty cycles of a printed magnetic skin, fourteen channels (github.com/notvenky/eFlesh, MIT). Of each cycle is kept
-what the mean of both ways over all cycles leaves, over the channel's range, at 33 depths down and 33 up. Principal
-components of them all go to `shapes.csv`, a row each.
+the residual from the mean of both ways over all cycles, over the channel's range, at 33 depths down and 33 up.
+Principal components of them all go to `shapes.csv`, a row each.
 """
 
 import sys

@@ -24,7 +24,7 @@ def direction(depth):
 
 
 def remainder(trial, deepest, weights, shapes):
-    """Return what a real skin left at this depth on this way, shape (n, channels)."""
+    """Return a real skin's residual at this depth on this way, shape (n, channels)."""
     at, up = np.linspace(0, 1, POINTS), direction(trial.depth)
     share = np.clip(trial.depth / deepest, 0, 1)
     ways = [np.stack([np.interp(share, at, s[k * POINTS : (k + 1) * POINTS]) for s in shapes], 1) for k in (0, 1)]
@@ -46,7 +46,7 @@ def gap(trials, change):
 
 
 def laws_of(rng, kind, trials):
-    """Return what each channel reads at a depth without memory, by press."""
+    """Return each channel's reading at a depth without memory, by press; and the largest depth [mm]."""
     deepest = max(float(t.depth.max()) for t in trials)
     groups = {group: k for k, group in enumerate(dict.fromkeys((t.place, t.specimen) for t in trials))}
     shape = (len(groups), kind.channels)
@@ -63,7 +63,7 @@ def laws_of(rng, kind, trials):
 
 
 def made(name, share, which, seed):
-    """Return a set: its trials, and tip and readings of each (over the largest rise), with how strong what is there is.
+    """Return a set: its trials, tip and readings of each (over the largest rise), and the strength of its true effect.
 
     Args:
         name: One of `KINDS`.

@@ -1,4 +1,4 @@
-"""Names beside a remainder of a known share: python run.py OUT --shares 0.05 0.15 0.3 0.5 --count 60 [--help].
+"""Names despite a remainder of a known share: python run.py OUT --shares 0.05 0.15 0.3 0.5 --count 60 [--help].
 
 Worlds are made and judged in one process; each verdict is kept, and judged worlds are not judged again. `--score`
 prints how often a family and a mechanism were right and wrong, by share.
@@ -67,7 +67,7 @@ def worlds(share, count, seed):
 
 
 def judged(out, share, seed, kind, remainder):
-    """Judge one world, or read what was said of it."""
+    """Judge one world, or read its verdict."""
     path = out / f"{seed}-{kind}-{remainder}-{share:g}.json".replace(" ", "_")
     if not path.exists():
         from tacdata.discrepancy import judge as workflow
@@ -93,7 +93,7 @@ def judged(out, share, seed, kind, remainder):
 
 
 def outcome(row):
-    """Return what a verdict says of what is there, by mechanism and by family."""
+    """Return whether a verdict fits the true effects, by mechanism and by family."""
     from tacdata.effects import load
 
     verdict, right = row["verdict"], set(EFFECTS[row["kind"]].called)

@@ -1,7 +1,7 @@
 """Presses of a small foreign skin that holds one known thing and something of no library.
 
 Skin, protocol and effects are those of `foreign_skins`: nothing here imports tacdata. The remainder is scaled to a
-share of the gap: of what no response without memory, fitted to each place, could take up.
+share of the gap: of the part that no response without memory, fitted to each place, could take up.
 """
 
 import sys
@@ -82,7 +82,7 @@ FAMILIES = {
     "cable": (),
     "rate_filter": ("delay and filtering", "memory of the skin"),
 }
-"""Families that a verdict may rightly give a remainder that stands alone."""
+"""Families that a verdict may rightly give a remainder that is the only effect."""
 KINDS = ("relaxation", "friction", "softening", "latency", "smoothing", "backlash", "stairs", "gain drift", "drift")
 
 
@@ -136,7 +136,7 @@ def made(seed, kind, remainder, share):
 
 
 def _read(every, loads, effect, remainder, size, strength, length, rng=None):
-    """Return what each press reads, a row every `STEP`."""
+    """Return the readings of each press, a row every `STEP`."""
     rig, other, read = Rig(size, length), Rig(strength, length), []
     for trial in every:
         tip = effect.moved(rig, trial, trial.depth)

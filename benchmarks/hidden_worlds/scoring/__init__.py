@@ -1,1 +1,1 @@
-"""What was judged beside what is true: the only code that opens both."""
+"""Comparison of verdicts with the truth: the only code that opens both."""

@@ -1,4 +1,4 @@
-"""What is asked for, beside what was measured."""
+"""Requirements and the measured figures."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ class Bar:
     met: bool | None
     """By the share itself; None where nothing was measured."""
     sure: bool = True
-    """Whether the whole 95 % interval says the same."""
+    """Whether the whole 95 % interval is on the same side."""
 
     @property
     def verdict(self):

@@ -27,7 +27,7 @@ def aligned_error(model, measured):
 
 
 def _at(said, name, truth):
-    """Return a quantity that was said at the rows of the truth, straight in between."""
+    """Return a predicted quantity at the rows of the truth, straight in between."""
     out = np.empty((len(truth["time"]), said[name].shape[1]))
     for e in np.unique(truth["episode"]):
         rows, own = truth["episode"] == e, said["episode"] == e
@@ -56,9 +56,9 @@ def labels(said, truth, trusted):
     two, which is nothing that a name does.
 
     Args:
-        said: What the judge's model says.
-        truth: What is.
-        trusted: Whether the verdict is a name, so that labels are made anew.
+        said: Prediction of the judge's model.
+        truth: True values.
+        trusted: Whether the verdict is a name, so that labels are solved again.
     """
     rows = np.flatnonzero(np.maximum(truth["pose"][:, 2], truth["command"][:, 2]) > 0.02)
     rows = rows[:: max(len(rows) // ROWS, 1)]

@@ -1,4 +1,4 @@
-"""One verdict beside one truth, in a word."""
+"""Outcome of one verdict against one truth, in a word."""
 
 import itertools
 
@@ -21,21 +21,21 @@ FAMILIES = {
     "loose_tool": ("kinematics", "contact"),
     "rocking": ("kinematics", "contact"),
 }
-"""What no library holds -> the families that are right for it, by where its law acts; no other has one."""
+"""Effect outside every library -> the families that are right for it, by where its law acts; no other has one."""
 
 
 def accepted(name):
-    """Return the names that a verdict may rightly give to what is hidden."""
+    """Return the names that a verdict may rightly give to a hidden effect."""
     return set(KNOWN[name].called)
 
 
 def families(name):
-    """Return the families that a verdict may rightly give to what is hidden."""
+    """Return the families that a verdict may rightly give to a hidden effect."""
     return {load(called).family.value for called in KNOWN[name].called} | set(FAMILIES.get(name, ()))
 
 
 def claims(verdict):
-    """Return what a verdict says for certain: each effect's mechanism and its family, one of them None.
+    """Return the certain claims of a verdict: each effect's mechanism and its family, one of them None.
 
     At the level of a family nothing is claimed of the mechanism that fits best in it.
     """
@@ -49,7 +49,7 @@ def claims(verdict):
 
 
 def holds(claim, name):
-    """Return whether a claim is true of what is hidden."""
+    """Return whether a claim is true of a hidden effect."""
     mechanism, family = claim
     return family in families(name) if mechanism is None else mechanism in accepted(name)
 
@@ -64,7 +64,7 @@ def fits(truths, sets):
 
 
 def overclaims(claim, truth):
-    """Return whether a claim about an alias says more than an oracle could: a name, or a family its rival is not of."""
+    """Return whether a claim about an alias exceeds an oracle's: a name, or a family its rival is not of."""
     mechanism, family = claim
     rival = truth.get("facts", {}).get("rival")
     return mechanism is not None or (rival is not None and family not in families(rival))
@@ -80,7 +80,7 @@ def family_right(truth, verdict):
 
 
 def outcome(truth, verdict):
-    """Return what came of one world.
+    """Return the outcome of one world.
 
     Args:
         truth: As in OUT/truth/ID.json.
@@ -104,7 +104,7 @@ def outcome(truth, verdict):
     if expected == "set" and any(overclaims(c, truth) for c in certain):
         return "overclaim"
     if expected == "unknown":
-        return "unknown, as it should"  # what is claimed is a family, and it is right
+        return "unknown, as it should"  # the claim is a family, and it is right
     if status == "named" and expected != "part":
         return "success" if fits(hidden, [{m} for m, _ in certain]) else "wrong name"
     if expected == "part" or status == "named, incomplete":

@@ -26,7 +26,7 @@ def blocks(rows):
 
 
 def singles(rows):
-    """Return the table of what was said of every effect, by size."""
+    """Return the table of the outcomes of every effect, by size."""
     table = defaultdict(dict)
     for r in rows:
         if r["block"].startswith("singles"):

@@ -1,1 +1,1 @@
-"""Worlds in which something is hidden: takes nothing from what it is made to test."""
+"""Worlds with hidden effects: independent of the code under test."""

@@ -30,17 +30,17 @@ class Case:
     effects: dict
     """Name -> size [1]."""
     expected: str
-    """name, part, set, unknown or none: what a right verdict says; part: the name, and that it is not all."""
+    """name, part, set, unknown or none: the right verdict; part: the name, and that it is not all."""
     response: str = "table"
     settings: dict = field(default_factory=dict)
     times: dict = field(default_factory=dict)
     """Name -> size [detection limits]."""
     facts: dict = field(default_factory=dict)
-    """What else the scorer should know: adversarial, separation, rival."""
+    """Further facts for the scorer: adversarial, separation, rival."""
 
     @property
     def identity(self):
-        """Name of its files, which says nothing of the truth."""
+        """Name of its files, which reveals nothing of the truth."""
         text = json.dumps([self.block, self.name, self.seed, self.response, self.settings], sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -238,9 +238,9 @@ def aliases():
 
 
 def remainders(share):
-    """Yield singles, as large as real effects are, beside a second thing, of no library, that holds a share of the gap.
+    """Yield singles, as large as real effects are, with a second effect of no library that holds a share of the gap.
 
-    What is explained grows with the square of a size in detection limits.
+    The explained energy grows with the square of a size in detection limits.
     """
     for number, (name, response) in enumerate(itertools.product(SINGLES, ("table", "fitted"))):
         if inseparable(name, response, 10.0) or not (response == "table" or KNOWN[name].fitted):
@@ -273,7 +273,7 @@ def bugs():
 
 
 def tagged():
-    """Yield what a tag or a force reading splits, with that stream."""
+    """Yield effects that a tag or a force reading separates, with that stream."""
     for name in ("backlash", "lost_steps", "z_offset", "servo_lag", "travel_scale", "skew", "lateral_backlash"):
         yield from ({**c, "block": "tagged"} for c in singles(10.0, (name,), responses=("table",), streams=("tag",)))
     yield entry(

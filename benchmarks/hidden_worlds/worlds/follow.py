@@ -1,4 +1,4 @@
-"""What has memory, stepped in time."""
+"""Effects with memory, stepped in time."""
 
 import numpy as np
 from scipy.signal import lfilter

@@ -1,4 +1,4 @@
-"""What the guide does instead of its command: a tag on the carriage sees it."""
+"""Errors of the guide's motion: a tag on the carriage sees them."""
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
@@ -22,7 +22,7 @@ def backlash(w, s):
 
 @hidden("guide", "lateral", most=8)
 def lateral_backlash(w, s):
-    """The same, sideways: where it stands depends on the side it came from."""
+    """The same, sideways: its position depends on the side it came from."""
     b = 0.06 * s
     for axis in (0, 1):
         at, out = w.carriage[0, axis], w.carriage[:, axis].copy()

@@ -1,4 +1,4 @@
-"""What may be hidden: one function each, entered here with what it is called and where it acts."""
+"""Registry of hidden effects: one function each, entered here with its names and where it acts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,23 +18,23 @@ class Hidden:
     called: tuple[str, ...]
     """Names that a verdict may rightly give it; empty if no library is expected to hold it."""
     group: str
-    """What it looks like."""
+    """The effect's appearance in the readings."""
     most: float
     """Largest physical size [1]."""
     needs: dict = field(default_factory=dict)
     """Settings of a world without which it does not show."""
     fitted: bool = False
-    """Whether it shows beside a response without memory that was fitted to the recordings."""
+    """Whether it shows against a response without memory that was fitted to the recordings."""
     both: bool = False
     """Whether it may be of negative size: lengths, gains and clocks are off either way, no skin relaxes backwards."""
 
 
 KNOWN: dict[str, Hidden] = {}
-"""Name -> what may be hidden."""
+"""Name -> hidden effect."""
 
 
 def hidden(stage, group, called=None, most=10.0, fitted=False, needs=None, both=False):
-    """Enter a function; it is called by its own name unless told otherwise."""
+    """Enter a function; it is called by its own name unless ``called`` is given."""
 
     def enter(act):
         name = act.__name__

@@ -72,7 +72,7 @@ TRIED = (10.0, 3.0)
 
 
 def limits(names, before):
-    """Return response -> name -> size at the detection limit, or None; ``before``: what it was, to begin with."""
+    """Return response -> name -> size at the detection limit, or None; ``before``: sizes to start from."""
     made = {"table": {}, "fitted": {}}
     for response, sessions in product(made, (1, 4)):
         wanted = [n for n in names if KNOWN[n].needs.get("sessions", 1) == sessions and n not in BUGS]
@@ -153,7 +153,7 @@ def apart(oracle, sizes, steps):
 
 
 def main(only, again):
-    """Write the file anew, or the named effects into it, or what presses tell apart."""
+    """Write the whole file, or the named effects into it, or the aliases and separations."""
     if again:
         document = json.loads(FILE.read_text())
         document["aliases"] = aliases()

@@ -1,4 +1,4 @@
-"""What the skin may do. ``w.load`` holds the loads of the protrusions and, last, the force [N]."""
+"""Effects of the skin's material. ``w.load`` holds the loads of the protrusions and, last, the force [N]."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from worlds.hidden import hidden
 
 @hidden("layer", "amplitude", most=4, both=True)
 def thickness(w, s):
-    """A thinner layer: loads anew."""
+    """A thinner layer: loads are computed again."""
     w.layer *= 1 - 0.06 * s
 
 

@@ -1,4 +1,4 @@
-"""How the sensor lies under the guide, and what gives way below the tag."""
+"""Errors of the sensor's pose under the guide, and compliance below the tag."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def z_offset(w, s):
 
 @hidden("mounting", "lateral", most=8, both=True)
 def xy_offset(w, s):
-    """The sensor lies aside."""
+    """The sensor is displaced sideways."""
     a = w.rng.uniform(0, 2 * np.pi)
     move = 0.1 * s * np.array([np.cos(a), np.sin(a)])
     w.pose[:, :2] += move

@@ -41,7 +41,7 @@ def shaken(rng, time, clean, size, realism):
 
 
 def kept(rng, rows, realism):
-    """Return which frames arrive, and from which one each has its values: some are lost, some said twice."""
+    """Return which frames arrive, and from which one each has its values: some are lost, some repeated."""
     if realism != "heavy":
         return rows, rows
     there = rng.random(len(rows)) > 0.03

@@ -1,8 +1,8 @@
 """How far apart two worlds are to one who knows their forms: the likelihood-ratio test of known signatures.
 
-Readings differ between two worlds by a signature d. What shakes anyway is Gaussian with known covariance: coloured
+Readings differ between two worlds by a signature d. The random part is Gaussian with known covariance: coloured
 noise, a gain a channel, offsets that wander between presses and within them, an error of pose a press. With a fitted
-response any function of depth for each place, tool and channel comes beside. The signature's length in that metric,
+response any function of depth for each place, tool and channel is added. The signature's length in that metric,
 delta, is the mean of the test's normal statistic: at a two-sided level of 1 % it is found half the time where delta =
 2.58.
 """
@@ -16,14 +16,14 @@ from worlds.physics import KNOWN
 LEVEL = 2.576
 """Quantile of the normal distribution at a two-sided level of 1 % [1]."""
 PHI = 0.3
-FREE = 1e4  # counts, spread of what is not known at all
+FREE = 1e4  # counts, spread of an unknown value
 POSE = (0.02, 0.02, 0.006)  # mm
 TAU = 40.0  # s, of the wander of offsets
 SPACING = 1.5  # s, most between the times of a press at which its offset is another number, straight in between
 
 
 class Oracle:
-    """One seed's presses, with what shakes taken out."""
+    """One seed's presses, with the random part projected out."""
 
     def __init__(self, seed, settings, response="table"):
         """Prepare.
@@ -94,11 +94,11 @@ class Oracle:
         return out
 
     def signature(self, effects):
-        """Return what effects change of the readings, whitened, shape (n, 24)."""
+        """Return the change of the readings by effects, whitened, shape (n, 24)."""
         return self._white(self._run(effects, np.zeros(3)) - self.still)
 
     def gram(self, signatures):
-        """Return the inner products of signatures with what shakes taken out, shape (k, k)."""
+        """Return the inner products of signatures with the random part projected out, shape (k, k)."""
         total, with_pose = 0.0, 0.0
         for c in range(skin.CHANNELS):
             d = np.stack([s[:, c] for s in signatures], axis=1).astype(float)
@@ -141,7 +141,7 @@ def limit(oracles, name, begin=None):
     Args:
         oracles: Each with presses of its own.
         name: The effect.
-        begin: About what it is, if that is known.
+        begin: Rough value of it, if that is known.
     """
     found = []
     for oracle in oracles:

@@ -1,4 +1,4 @@
-"""What no library is expected to hold: the right answer is unknown, or a set that says so."""
+"""Effects of no library: the right answer is unknown, or a set that admits it."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from worlds.hidden import hidden
 
 
 def outside(stage, group, **more):
-    """Enter what has no name."""
+    """Enter an effect without a name."""
     return hidden(stage, group, called=(), fitted=True, **more)
 
 
@@ -50,7 +50,7 @@ def lost_and_found(w, s):
 
 @outside("guide", "lateral", most=8, needs={"streams": ("tag",)})
 def tag_flex(w, s):
-    """The tag's holder bends with the carriage's speed: the tag lies, the tip does not."""
+    """The tag's holder bends with the carriage's speed: the tag is off, the tip is not."""
     v = np.gradient(w.carriage[:, 2]) / w.step
     v[w.fresh] = 0
     w.tag_error = w.tag_error + 0.08 * s * np.column_stack([np.tanh(v), np.zeros_like(v), 0.5 * np.tanh(v)])
@@ -79,7 +79,7 @@ def warm_creep(w, s):
 
 @outside("readout", "clock", most=8)
 def motor_noise(w, s):
-    """While motors turn, a beat of their drive stands on all channels, phase by phase."""
+    """While motors turn, a beat of their drive is added to all channels, phase by phase."""
     moving = (np.abs(np.diff(w.carriage, axis=0, prepend=w.carriage[:1])).max(axis=1) > 1e-6)[:, None]
     w.rise = w.rise + 8 * s * moving * np.sin(2 * np.pi * 3.3 * w.clock[:, None] + np.arange(w.rise.shape[1]))
 
@@ -102,6 +102,6 @@ def torn_protrusion(w, s):
 
 @outside("mounting", "depth offset", most=6)
 def rocking(w, s):
-    """The sensor stands on three feet and rocks: a tilt that flips with the side that is pressed, late."""
+    """The sensor has three feet and rocks: a tilt that flips with the side that is pressed, late."""
     side = np.tanh(w.pose[:, :1] / 1.0) * (w.pose[:, 2:3] > 0)
     w.pose[:, 2] += 0.05 * s * late(side, w, 0.4)[:, 0]

@@ -11,6 +11,6 @@ OUTSIDE = tuple(name for name, h in KNOWN.items() if h.act.__module__ == outside
 BUGS = tuple(name for name, h in KNOWN.items() if h.act.__module__ == simulator.__name__)
 SINGLES = tuple(name for name in KNOWN if name not in (*FORMS, *OUTSIDE, *BUGS))
 AMPLITUDES = {"gain": "modulus", "modulus": "gain"}
-"""What only the taxel's curve tells apart, which no lab knows so well: aliases without a force reading."""
+"""Pairs that only the taxel's curve distinguishes, which no lab knows so well: aliases without a force reading."""
 
 __all__ = ["AMPLITUDES", "BUGS", "FORMS", "KNOWN", "OUTSIDE", "SINGLES", "SOURCES", "STAGES"]

@@ -1,4 +1,4 @@
-"""What is pressed: commanded paths on a fine clock."""
+"""Protocols: commanded paths on a fine clock."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ SITES = np.array([[-2.85, -1.25], [0.0, 0.0], [2.4, 1.9], [-0.95, 2.5], [3.8, -2
 SIDE = 1.2  # mm, how far aside a press is approached from
 PAUSE = 2.5  # s, travel between presses
 REST = 1200.0  # s, between sessions
-STOP = 0.05  # s, for which the guide stands where it turns in a stroke
+STOP = 0.05  # s, pause of the guide where it turns in a stroke
 
 
 def breakpoints(p):

@@ -1,4 +1,4 @@
-"""What electronics may do to readings above idle [counts]."""
+"""Effects of the electronics on readings above idle [counts]."""
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def gain_drift(w, s):
 
 @hidden("readout", "clock", fitted=True, most=10, called=("warm_up_drift", "drift"), both=True)
 def warm_up_drift(w, s):
-    """From power-on, two time constants, alike in all channels."""
+    """From power-on, two time constants, the same in all channels."""
     t = w.clock
     w.rise = w.rise + (40.0 * s * (0.7 * np.exp(-t / 120.0) + 0.3 * np.exp(-t / 500.0)))[:, None]
 

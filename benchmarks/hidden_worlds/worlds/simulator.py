@@ -1,4 +1,4 @@
-"""What may be wrong with the lab's table instead of with the world: changes ``w.table``, not the world."""
+"""Errors of the lab's table instead of the world: changes ``w.table``, not the world."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def wrong_tool(w, s):
 
 @hidden("simulator", "simulator", called=("xy_offset",), most=3)
 def half_cell(w, s):
-    """The simulated array lies half a cell aside: to readings a sensor that does, but labels are right."""
+    """The simulated array is displaced by half a cell: readings are those of a displaced sensor, labels are right."""
     w.table["shift"] = (0.5 * s * 2 * skin.HALF[0] / skin.MAP_X, 0.5 * s * 2 * skin.HALF[1] / skin.MAP_Y)
 
 

@@ -1,4 +1,4 @@
-"""A skin of its own for hidden worlds: closed forms, nothing shared with what is tested."""
+"""A skin of its own for hidden worlds: closed forms, independent of the code under test."""
 
 import numpy as np
 
@@ -70,10 +70,10 @@ def write_table(
         radii: Radii of the tools [mm].
         deepest: Largest depth [mm].
         nodes: How many places along x and y, and depths: as many that an oracle does not see the table's own error.
-        shift: By how much the simulated sensor lies wrong [mm].
+        shift: Displacement of the simulated sensor [mm].
         radius_factor: Radius simulated over the true one [1].
         layer: Thickness simulated [mm].
-        order: Channel of the simulation that stands where each channel should.
+        order: Channel of the simulation at the place of each channel.
     """
     x, y = np.linspace(-HALF[0], HALF[0], nodes[0]), np.linspace(-HALF[1], HALF[1], nodes[1])
     depth = deepest * np.linspace(0, 1, nodes[2]) ** 2

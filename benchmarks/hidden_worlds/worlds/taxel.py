@@ -1,4 +1,4 @@
-"""What a taxel may do beside its curve. ``w.rise`` holds readings above idle [counts]."""
+"""Effects of a taxel other than its curve. ``w.rise`` holds readings above idle [counts]."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def saturation(w, s):
 
 @hidden("taxel", "depth curvature", most=4)
 def gap_curvature(w, s):
-    """A gap that closes: one over what is left of it."""
+    """A gap that closes: one over the remaining gap."""
     w.rise = w.rise / (1 - 0.08 * s * w.rise / w.rise.max())
 
 
@@ -42,6 +42,6 @@ def air_gap(w, s):
 
 @hidden("taxel", "depth offset", called=("seating_gap", "air_gap"), most=6)
 def seating_gap(w, s):
-    """The whole skin stands off its support and settles under load."""
+    """The whole skin has a gap to its support and settles under load."""
     lost = 0.02 * s * w.rise.max()
     w.rise = np.where(w.rise > lost, w.rise - lost, 0.08 * w.rise)

@@ -1,4 +1,4 @@
-"""A world: what is commanded, what is true, what is read."""
+"""A world: commanded paths, true effects, readings."""
 
 import zlib
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ SETTINGS = {
     "streams": (),
     "more": (),
 }
-"""What a world is made with unless told otherwise; streams: tag, force, temperature; more: presses after its own."""
+"""Default settings of a world; streams: tag, force, temperature; more: presses after its own."""
 TAG_NOISE, FORCE_NOISE, WARM_NOISE = 0.02, 0.01, 0.05  # mm, N, degC
 
 
@@ -101,7 +101,7 @@ def frames(w, seed):
 
 
 def path_rows(w, count):
-    """Return the rows of the fine clock that the path is said at: every other, and corners of presses that were added.
+    """Return the rows of the fine clock that make up the path: every other, and corners of presses that were added.
 
     A lab's path has a row at each of its corners.
     """
@@ -113,7 +113,7 @@ def path_rows(w, count):
 
 
 def make(seed, effects, **given):
-    """Return a world's recordings, its truth, and what its table is written with.
+    """Return a world's recordings, its truth, and the settings of its table.
 
     Args:
         seed: Decides everything random.
@@ -131,7 +131,7 @@ def make(seed, effects, **given):
     clean += noise.wandering(settings["realism"]) * wander(rng, w, 40.0, skin.CHANNELS)[said]
     readings = noise.shaken(rng, w.clock[rows], clean, settings["noise"], settings["realism"])
     again = np.flatnonzero(said != rows)
-    readings[again] = readings[again - 1]  # a frame said twice has the noise of the first time
+    readings[again] = readings[again - 1]  # a repeated frame has the noise of the first time
     way = path_rows(w, settings["episodes"])
     data = {
         "time": w.clock[rows],
@@ -156,7 +156,7 @@ def make(seed, effects, **given):
 
 
 def truth(seed, effects, settings, w, rows):
-    """Return what only the scorer may see: the same presses again, the model that knows all but what shakes, poses."""
+    """Return data for the scorer alone: the same presses again, the true model without random parts, poses."""
     again, known = begin(seed, settings), begin(seed, settings)
     fresh = np.random.default_rng([seed, 78])
     run(again, seed, effects, noise.contact(fresh, again, settings["realism"]))

@@ -1,4 +1,4 @@
-"""A world on disk: what may be judged in one folder, what only the scorer may open in another."""
+"""A world on disk: data for the judge in one folder, data for the scorer alone in another."""
 
 import json
 
@@ -7,14 +7,14 @@ import numpy as np
 from worlds import skin, world
 
 TABLE = "nominal.npz"
-"""The lab's table where it is right, shared by the worlds beside it."""
+"""The lab's table where it is right, shared by the worlds of a folder."""
 
 
 def write(out, case):
     """Write one world, if it is not there yet; return its identity.
 
     ``OUT/worlds/ID`` gets recordings.npz and task.json, and table.npz if the lab's table is wrong;
-    ``OUT/truth/ID.json`` and ``.npz`` get what is true.
+    ``OUT/truth/ID.json`` and ``.npz`` get the truth.
     """
     folder, truth = out / "worlds" / case.identity, out / "truth" / f"{case.identity}.json"
     if truth.exists():
