@@ -1,4 +1,4 @@
-"""What the slowest member of a batch costs, and what one that stalls costs the others.
+"""Cost of the slowest member of a batch, and of a member that stalls, to the others.
 
     python benchmarks/batch_members.py [--device cuda:0] [--presses 8] [--json FILE]
 
@@ -38,7 +38,7 @@ STALLS = PressRequest(FlatPunch(1.0, 0.1), 0.3, 0.2, 0.0, (0.5, 1.0, 1.6), tilt_
 
 @dataclass
 class Member:
-    """What one press of a batch took."""
+    """Cost of one press of a batch."""
 
     states: int = 0
     steps: int = 0

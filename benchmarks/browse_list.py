@@ -1,4 +1,4 @@
-"""What it costs to open a dataset of many episodes as a list, and one episode of it.
+"""Cost of opening a dataset of many episodes as a list, and one episode of it.
 
     python benchmarks/browse_list.py --episodes 1000
 

@@ -1,4 +1,4 @@
-"""Poses of AprilTag cubes against the truth of rendered images, and what an image costs on one core.
+"""Poses of AprilTag cubes against the truth of rendered images, and the cost of an image on one core.
 
     python benchmarks/cube_poses.py [--images 60] [--only clean,blur] [--json FILE]
 
@@ -186,7 +186,7 @@ def errors(pose: CubePose, truth: np.ndarray) -> tuple[float, float]:
 
 
 def cost_of[T](work: Callable[[], T]) -> tuple[T, float]:
-    """Return a result and what it cost [ms of CPU]."""
+    """Return a result and its cost [ms of CPU]."""
     begun = time.process_time()
     result = work()
     return result, 1000 * (time.process_time() - begun)
@@ -243,7 +243,7 @@ def followed(images: int, seed: int) -> dict[str, float]:
 
 
 def costs(images: int) -> Iterator[tuple[str, float]]:
-    """Yield what is looked at and its cost [ms of CPU, median]."""
+    """Yield a description of the images and their cost [ms of CPU, median]."""
     random = np.random.default_rng(1)
     aside = {"position": [0.0, -12.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
     names = ("thumb", "index", "middle")

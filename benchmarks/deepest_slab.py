@@ -67,7 +67,7 @@ def even(begin: float, end: float, edge: float) -> np.ndarray:
 def lines(middle: float, half: float, edge: float, request: PressRequest) -> np.ndarray:
     """Return the lines of one axis [mm]: even below the indenter, growing outside."""
     if isinstance(request.indenter, FlatPunch):
-        inner, outer = 1.5, 2.2  # the fillet lies between 1.7 and 2 mm
+        inner, outer = 1.5, 2.2  # the fillet is between 1.7 and 2 mm
         ring = even(inner, outer, edge / 2)
         below = np.concatenate([-ring[::-1], even(-inner, inner, edge)[1:-1], ring])
         edge /= 2

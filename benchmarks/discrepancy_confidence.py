@@ -41,7 +41,7 @@ def names(folder):
 
 
 def counted(folder, key):
-    """Return how many files say what of a key."""
+    """Return the number of files for each value of a key."""
     told = (json.loads(path.read_text()).get(key) for path in sorted(folder.glob("*.json")))
     return dict(sorted(Counter(value for value in told if value).items()))
 

@@ -140,7 +140,7 @@ def _press_table() -> bytes:
 
 
 def importer(folder: Path) -> Callable[[Path], object]:
-    """Return what imports one table with columns t, depth and cap0 into a session that is then removed."""
+    """Return a function that imports one table with columns t, depth and cap0 into a session, which is then removed."""
     from tacdata.importing.imported_session import import_session
 
     mapping = folder / "import.yaml"
@@ -257,7 +257,7 @@ def main() -> None:
             faults: dict[str, int] = {}
             for seed in range(chosen.tries):
                 rng = np.random.default_rng(seed)
-                # A name of its own: readers may remember what they read under one.
+                # A name of its own: readers may cache contents by name.
                 path = folder / f"damaged_{seed}{ending}"
                 path.write_bytes(damaged(data, KINDS[seed % len(KINDS)], others, rng))
                 signal.alarm(LONGEST)

@@ -40,7 +40,7 @@ START = 1_700_000_000_000_000_000
 
 
 def rig_of(seed):
-    """Return a demo rig whose cameras stand a little elsewhere than its file says, and where they truly stand."""
+    """Return a demo rig whose cameras are a little off the poses in its file, and their true poses."""
     rng = np.random.default_rng([seed, 13])
     cameras, truth = {}, {}
     for name, place in EYES.items():
@@ -76,7 +76,7 @@ def rig_of(seed):
 
 
 def view(hand, finger, camera, eye, begin, seconds, rng, mirrored, hidden):
-    """Return what one camera saw of a finger; noise differs from image to image as the face turns away."""
+    """Return one camera's view of a finger; noise differs from image to image as the face turns away."""
     times = begin + np.arange(int(seconds * RATE)) / RATE + rng.uniform(0, 1 / RATE)
     world = np.linalg.inv(eye)
     poses = np.array([world @ hand.tip(finger, t) for t in times])

@@ -1,4 +1,4 @@
-"""What a press of the training plan costs as `tacdata label` does it.
+"""Cost of a press of the training plan as `tacdata label` solves it.
 
     python benchmarks/label_cost.py [--presses 8] [--spreads]
 

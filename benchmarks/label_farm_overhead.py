@@ -1,4 +1,4 @@
-"""What the farm costs beside the solves: the queue, the store, and a run with a model that takes no time.
+"""Cost of the farm in addition to the solves: the queue, the store, and a run with a model that takes no time.
 
 Run ``python benchmarks/label_farm_overhead.py [--jobs 2000] [--workers 1 2]``; one JSON line a figure.
 """

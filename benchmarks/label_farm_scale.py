@@ -1,7 +1,7 @@
-"""The farm at size: time to plan 100,000 presses, to resume beside a million labels, and memory over a long run.
+"""The farm at size: time to plan 100,000 presses, to resume with a million labels, and memory over a long run.
 
 Run ``python benchmarks/label_farm_scale.py [--plan 100000] [--stored 1000000] [--run 5000]``; one JSON line a figure.
-Recordings are stand-ins of a few bytes that give one press each from memory: what reading a real one costs is timed by
+Recordings are stand-ins of a few bytes that give one press each from memory: the cost of reading a real one is timed by
 itself. Presses are solved by a stand-in that takes no time.
 """
 

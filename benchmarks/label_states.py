@@ -1,4 +1,4 @@
-"""What labels lose between the states that are solved, on the way down and up, and whether they say so.
+"""Error of labels between the states that are solved, on the way down and up, and whether they state it.
 
     python benchmarks/label_states.py [--presses 4] [--seed 7]
 

@@ -33,7 +33,7 @@ from tacdata.virtual_rig.world.hand import draw_hand
 
 KINDS = ("late", "late to the end", "late from the start", "bursts", "slow", "lost", "always late")
 """How images come on a busy host: 0.2 s late for ten seconds, in the middle, to the end, or from before the start; late
-now and then; a camera that skips what it has no time for; lost images; 0.2 s late all the time.
+now and then; a camera that skips images for lack of time; lost images; 0.2 s late all the time.
 """
 BEFORE = 5.0
 """Time for which the camera is open before the recording [s]."""
@@ -84,7 +84,7 @@ def slow(first, seconds, begin, rng):
 
 
 def streams(hand, camera, eye, made, stamped, seconds, rng):
-    """Return what one camera saw of all fingers, with the times that the reader of a recording would give."""
+    """Return one camera's view of all fingers, with the times that the reader of a recording would give."""
     times, arrivals = made
     arrival, device = (START + np.rint(values * 1e9).astype(np.int64) for values in (arrivals, times))
     device = device - START + 7_000_000_000_000 if stamped else np.full(len(times), -1)
@@ -167,7 +167,7 @@ def judged(seed, kind, seconds, folder):
 
 
 def coverage(hand, tracked):
-    """Return the share of frames whose truth lies outside of 3 standard deviations, and the largest error [mm]."""
+    """Return the share of frames whose truth is outside of 3 standard deviations, and the largest error [mm]."""
     outside, worst = [], 0.0
     for name, found in tracked.tracks.items():
         truth = np.array([hand.tip(name, (t - START) * 1e-9)[:3, 3] for t in tracked.time_ns])
@@ -210,7 +210,7 @@ def line(row):
 
 
 def report(rows):
-    """Print what all recordings come to."""
+    """Print the figures over all recordings."""
     accused = [r for r in rows if any(part in words for words in r["remarks"] for part in ACCUSING)]
     wrong = [r for r in rows if not r["refused"] and r["outside"] > 0.01]
     refused = Counter(r["kind"] for r in rows if r["refused"])

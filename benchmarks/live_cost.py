@@ -1,4 +1,4 @@
-"""What an estimate of `tacdata live` costs on one core, and how old it is when it leaves.
+"""Cost of an estimate of `tacdata live` on one core, and its age when it leaves.
 
     python benchmarks/live_cost.py [--frames N] [--json FILE]
 

@@ -110,7 +110,7 @@ class Eye(Camera):
 
 
 def header() -> Header:
-    """Return what a recording is headed with."""
+    """Return the header of a recording."""
     plan = Plan.from_document(
         {
             "version": "1.0",

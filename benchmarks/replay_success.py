@@ -42,7 +42,7 @@ TRAINING = 100
 
 
 def demonstration(seed, thing):
-    """Return what `tacdata track` would make of one grasp or wipe."""
+    """Return one grasp or wipe as `tacdata track` would make it."""
     task, rng = CASES[thing], np.random.default_rng([seed, 17])
     hand, (rig, eyes) = draw_hand(seed, task, thing), rig_of(seed)
     seconds = np.arange(int(PERIOD * FRAMES)) / FRAMES
@@ -87,7 +87,7 @@ def judged(thing, hands, scenes):
 
 
 def compared(thing, hands, scenes, table):
-    """Print and return what every arm held, a row for each stiffness or challenge."""
+    """Print and return how often every arm held, a row for each stiffness or challenge."""
     scene, gains = scene_of(CASES[thing], thing), {"compensated": read_gains().of(CASES[thing])}
     tried = [Trials(demonstration(seed, thing), gains, scene) for seed in range(hands)]
     rows = sweep(tried, scene, scenes) if table == "sweep" else challenged(tried, scene, scenes)

@@ -1,4 +1,4 @@
-"""The same mesh and the same law in another code: how far its answer lies from ours.
+"""The same mesh and the same law in another code: distance of its solution from ours.
 
     python benchmarks/same_mesh.py CASE [--peer getfem | calculix] [--out FOLDER] [--set step=0.1 ...]
 
@@ -30,7 +30,7 @@ PEERS = {"getfem": GetFEM, "calculix": CalculiX}
 
 
 def compare(case: Case, mesh: SkinMesh, ours: Answer, theirs: Answer) -> list[dict]:
-    """Return the rows of the table: our answer against theirs, with what both cost."""
+    """Return the rows of the table: our answer against theirs, with the cost of both."""
     request, skin = case.request, case.sensor.skin
     shape = (request.indenter, request.x, request.y, request.yaw)
     reference = reference_of(theirs, grid(skin.size_x, skin.size_y), lambda *given: in_contact(*shape, *given))

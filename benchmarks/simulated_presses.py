@@ -1,4 +1,4 @@
-"""What a simulated press costs, from the plan to a frame of the dataset: solving, writing, and how large it becomes.
+"""Cost of a simulated press, from the plan to a frame of the dataset: solving, writing, and how large it becomes.
 
 Presses of the first specimen of a plan, in the order of their numbers; as many again are solved before, so that
 kernels are compiled. CPU seconds on one thread of a CPU, wall seconds on a GPU.

@@ -1,4 +1,4 @@
-"""What an equilibrium of the default skin costs and how far it is from converged: a ladder of meshes, one press.
+"""Cost of an equilibrium of the default skin and its distance from convergence: a ladder of meshes, one press.
 
 Prints a table and, with ``--json FILE``, the figures. Time is CPU time of one process on one core; errors are against
 the finest mesh of the run, so they show convergence, not truth (`tests/skin` holds the model against other codes).

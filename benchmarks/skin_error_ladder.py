@@ -3,8 +3,8 @@
     python benchmarks/skin_error_ladder.py [--cells 6 8 10 12 16] [--json FILE]
 
 A slab of 6 x 6 x 2 mm, bottom bonded, under a sphere of 2 mm radius at depths of 0.25, 0.5 and 0.75 mm, on structured
-meshes; the finest stands for the truth. For every pair of the others the error is stated from the coarser
-(`tacdata.skin.validity.mesh_error`) and held against what the finest says.
+meshes; the finest is taken for the truth. For every pair of the others the error is stated from the coarser
+(`tacdata.skin.validity.mesh_error`) and compared with the finest.
 """
 
 from __future__ import annotations

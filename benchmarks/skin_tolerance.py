@@ -1,4 +1,4 @@
-"""What the solver's tolerance leaves of the exact solution on one mesh, and what tighter settings cost.
+"""Error by the solver's tolerance against the exact solution on one mesh, and the cost of tighter settings.
 
     python benchmarks/skin_tolerance.py [--device cuda:0]
 

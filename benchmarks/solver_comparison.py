@@ -1,4 +1,4 @@
-"""The same presses on what a user would pick instead: time per equilibrium and error, side by side, in one run.
+"""The same presses on codes that a user would pick instead: time per equilibrium and error, side by side, in one run.
 
     python benchmarks/solver_comparison.py --out FOLDER [--reference FOLDER] [--peers FOLDER --install]
         [--only tacdata,getfem] [--slab-depths 0.25 0.5] [--sensor-depths 0.25] [--coarse]
@@ -72,7 +72,7 @@ def case_document(name: str, depths: list[float], mesh: dict[str, float]) -> dic
 
 
 def entries(name: str, arguments: argparse.Namespace) -> list[Entry]:
-    """Return what is to run on a press, cheapest codes first."""
+    """Return the entries to run on a press, cheapest codes first."""
     peers, coarse = arguments.peers, {"outer": 0.8}
     found = [Entry("tacdata, 1.1 mm", Ours(), ROUGH), Entry("tacdata, 0.8 mm", Ours(), coarse)]
     if not arguments.coarse:
@@ -88,13 +88,13 @@ def entries(name: str, arguments: argparse.Namespace) -> list[Entry]:
 
 
 def contact_of(case: Case):
-    """Return the test of what is in contact, for `differences`."""
+    """Return the test of contact, for `differences`."""
     request = case.request
     return lambda *given: in_contact(request.indenter, request.x, request.y, request.yaw, *given)
 
 
 def reference(name: str, case: Case, arguments: argparse.Namespace, scratch: Path) -> tuple[Reference, str]:
-    """Return what the errors are against, and its name."""
+    """Return the reference of the errors, and its name."""
     points = grid(case.sensor.skin.size_x, case.sensor.skin.size_y)
     stored = {"slab": "A1", "sensor": "B2"}[name]
     if arguments.reference and (arguments.reference / f"{stored}.parquet").exists():
@@ -219,7 +219,7 @@ def draw(rows: list[dict], path: Path) -> None:
 
 
 def run_press(name: str, depths: list[float], arguments: argparse.Namespace, absent: list) -> tuple[list[dict], str]:
-    """Run everything on one press; what cannot run goes into ``absent`` with the reason."""
+    """Run everything on one press; a code that cannot run goes into ``absent`` with the reason."""
     scratch = arguments.out / name
     first = write_case(case_document(name, depths, {"outer": 0.8}), scratch)
     against, what = reference(name, first, arguments, scratch / "reference")

@@ -1,10 +1,10 @@
-"""How loads change with the skin's thickness, by finite elements, beside the equation of `tacdata.effects.thickness`.
+"""Loads over the skin's thickness, by finite elements, compared with the equation of `tacdata.effects.thickness`.
 
     python benchmarks/thickness_spread.py [--more 0.05] [--x 1.6] [--y 0.7] [--radius 4]
 
 Solves a press of a sphere into the skin as it is, to its sides (for the gradient of the loads) and into one that is
-thicker (meshed anew), and fits the change by a common gain a and by how each load falls off, a q + k (2 q + r grad q).
-Prints both, and how much of what a gain alone leaves the fit explains. Some eight minutes on one core.
+thicker (meshed again), and fits the change by a common gain a and by how each load falls off, a q + k (2 q + r grad q).
+Prints both, and how much of the residual of a gain alone the fit explains. Some eight minutes on one core.
 """
 
 import argparse

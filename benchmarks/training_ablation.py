@@ -47,7 +47,7 @@ RECIPES: dict[str, TrainingSettings] = {
 
 
 def main() -> None:
-    """Train what is missing, print the table."""
+    """Train the missing networks, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset", type=Path)
     parser.add_argument("out", type=Path)

@@ -2,7 +2,7 @@
 
     python benchmarks/training_data.py OUT [--presses 216] [--speed 8] [--device cpu] [--stage record|label|pack]
 
-| dataset | session | what for |
+| dataset | session | purpose |
 |---|---|---|
 | `main` | 216 presses, nine shapes, random sites, depths and speeds, specimen 1 | to learn from, and all splits |
 | `rates` | two shapes, four sites, two depths, three speeds, twice, specimen 1 | the split by rate |
@@ -11,9 +11,9 @@
 | `wearing` | 57 presses with a prism on twelve specimens | centroid-aligned IoU per participant |
 
 `all` holds `main`, `rates` and `other` together. A specimen is a virtual rig with a seed of its own: other gains,
-stiffness and noise, and put down anew; it has the name of a sensor file of its own. Presses of the same
+stiffness and noise, and put down again; it has the name of a sensor file of its own. Presses of the same
 configuration share one label. Recording takes some 10 minutes at speed 8; labels 14 s a press and core on a CPU
-(about 350 different presses), or a few minutes on a card (--device cuda:0). What is there is not made again.
+(about 350 different presses), or a few minutes on a card (--device cuda:0). Existing files are not made again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What it costs to open a long recording with `tacdata view`: processor seconds, wall clock, what is drawn.
+"""Cost of opening a long recording with `tacdata view`: processor seconds, wall clock, streams drawn.
 
     python benchmarks/view_open.py --minutes 10 --rate 100
 
@@ -88,7 +88,7 @@ def write(folder: Path, minutes: float, rate: float, camera_rate: float, labelle
         while taken < len(exposed) and exposed[taken] <= at:
             _image(writer, taken, int(exposed[taken]), images[taken % len(images)])
             taken += 1
-        if k % 200 == 0:  # the writer refuses what its thread cannot keep up with; a recorder is far slower
+        if k % 200 == 0:  # the writer refuses data that its thread cannot keep up with; a recorder is far slower
             time.sleep(0.12 if camera_rate else 0.005)
     _moves(writer, 60 * minutes)
     fits = {"taxels": fit(time_ns + LINK, np.arange(len(time_ns)), nominal_ns=1e9 / rate)}
@@ -148,7 +148,7 @@ def made_label(episode) -> Label:
 
 
 def opened(path: Path, target: Path) -> dict[str, float]:
-    """Return wall clock and processor seconds of `tacdata view PATH --save TARGET`, and what it wrote."""
+    """Return wall clock, processor seconds and size of the file of `tacdata view PATH --save TARGET`."""
     command = [sys.executable, "-m", "tacdata.cli", "view", str(path), "--save", str(target)]
     before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)

@@ -11,7 +11,7 @@ KINDS = {}
 ONE, LATER, ALL = "one", "later", "all"
 """Which presses a fault concerns."""
 UNKNOWABLE = "not knowable"
-"""What one session cannot show: shown, but not counted."""
+"""Faults that one session cannot show: printed, but not counted."""
 
 
 def kind(group, sizes, whole=ONE):
@@ -131,7 +131,7 @@ def clock_steps(p, size, rng):
 
 @kind("time", (3, 10, 40))
 def rate_is_wrong(p, size, rng):
-    """Sample more slowly than said [%]."""
+    """Sample more slowly than nominal [%]."""
     p.sampled(RATE * (1 - size / 100))
 
 

@@ -1,4 +1,4 @@
-"""The skin of a session, drawn by its seed: no two answer alike, and none answers as the check's own model does."""
+"""The skin of a session, drawn by its seed: responses differ between sessions and from the check's own model."""
 
 import numpy as np
 from scipy.signal import lfilter
@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 OFFSET, SLOPE, NOISE = 9000.0, 2500.0, 5.0
 """Idle reading [counts], answer at 1 mm [counts], noise [counts]."""
 INDENTERS = {"ball": (3.0, 1.0, 1.0), "small ball": (1.5, 0.8, 0.7)}
-"""Name -> radius [mm], its width and its answer beside those of the first [1]."""
+"""Name -> radius [mm], width and response relative to those of the first [1]."""
 
 
 class Skin:
@@ -20,7 +20,7 @@ class Skin:
         self.exponent = rng.uniform(1.0, 1.6)
         """Power of the depth."""
         self.width, self.widening = rng.uniform(1.6, 2.4), rng.uniform(0.0, 0.4)
-        """Width of what a press excites [mm], and by how much it grows with depth [1]."""
+        """Width of the excited region [mm], and by how much it grows with depth [1]."""
         self.creep, self.lasting = rng.uniform(0.0, 0.12), 10 ** rng.uniform(-1.3, 0.2)
         """Share of the answer that comes late [1], and how late [s]."""
         self.edge = rng.uniform(0.0, 0.2)

@@ -40,7 +40,7 @@ SINGLES = ("relaxation", "latency", "crosstalk", "xy_offset", "frame_compliance"
 
 
 def solved(unit, device, capacity, out):
-    """Solve a unit's own skin and its bases; return what it took."""
+    """Solve a unit's own skin and its bases; return their costs."""
     sensor, begun = sensor_of(unit), time.time()
     settings = TableSettings(device=device, capacity=capacity)
     for base in BASES:
@@ -91,7 +91,7 @@ def made_of(table):
 
 
 def wanted(seed, repeats):
-    """Return the cases: nulls beside a table, and a few singles of ten limits."""
+    """Return the cases: nulls with a table, and a few singles of ten limits."""
     nulls = [c for r in range(repeats) for c in cases("nulls", seed, r)]
     singles = [c for c in cases("singles10", seed, 0) if c.name in SINGLES]
     kept = [c for c in (*nulls, *singles) if c.response == "table"]
@@ -130,7 +130,7 @@ def judged(out, seed, repeats, workers, units, bases, most):
 
 
 def scored(out):
-    """Print what the verdicts say, by unit and base."""
+    """Print the outcomes of the verdicts, by unit and base."""
     print("| unit | base | nulls | quiet | named | singles of ten limits | right | wrong |")
     print("|---|---|---:|---:|---:|---:|---:|---:|")
     for unit, base in ((u, b) for u in UNITS for b in BASES):

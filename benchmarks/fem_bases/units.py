@@ -5,7 +5,7 @@ from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor, default_sensor
 
 UNITS = {"default": {}, "thin": {"thickness": 2.2}, "thick": {"thickness": 4.4}, "stout": {"protrusion_radius": 0.9}}
-"""What of the skin differs from the default sensor [mm]."""
+"""Dimensions of the skin that differ from the default sensor [mm]."""
 
 
 def sensor_of(unit):

@@ -13,12 +13,12 @@ from tacdata.health.advice import RECALIBRATE, REGISTER, TARE, WIRING
 COUNT = SENSOR.taxels.count
 COLUMNS = SENSOR.taxels.columns
 SIDE = 0.15
-"""How much deeper a tool stands [mm]."""
+"""How much deeper a tool presses [mm]."""
 
 
 @dataclass(frozen=True)
 class Planted:
-    """A fault and what should be said of it."""
+    """A fault and the right advice."""
 
     fault: Fault
     do: str

@@ -1,6 +1,6 @@
 """Faults planted at a unit's second visit: does `tacdata health` say so, and does it accuse healthy units?
 
-Prints a table: how often the right advice named the right channels, how often it said something else beside it, and how
+Prints a table: how often the right advice named the right channels, how often it came with other advice, and how
 often healthy units were accused; shares with Wilson's interval at 95 %. ``python run.py --clean 30 --units 10``; units
 below 2000 were looked at while the room was built, so held-out ones begin there.
 """
@@ -30,7 +30,7 @@ def first_visit(seed: int, folder: Path) -> Visit:
 
 
 def advised(before: Visit, seed: int, folder: Path, planted: Planted | None) -> tuple[Advice, ...]:
-    """Return what is advised at the second visit."""
+    """Return the advice at the second visit."""
     place = record(folder / f"again-{seed}", seed, 1, planted.fault if planted else None)
     try:
         return advice(history([before, read_visit(place)]))

@@ -1,7 +1,7 @@
 """Visits of one unit: the virtual rig's skin pressed by the health plan, recorded without its clock.
 
-The unit is drawn by its seed. A visit is drawn by its number: the sensor is put down and registered anew, the tool is
-mounted anew, the room is a little warmer. Faults change the unit's truth, or its readings.
+The unit is drawn by its seed. A visit is drawn by its number: the sensor is put down and registered again, the tool
+is mounted again, the room is a little warmer. Faults change the unit's truth, or its readings.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PLAN = Plan.from_document(shipped_plan("health", SENSOR), "health")
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with the unit at a visit."""
+    """A fault of the unit at a visit."""
 
     truth: Callable[[Truth, np.random.Generator], Truth] = lambda truth, rng: truth
     """Changes the unit."""

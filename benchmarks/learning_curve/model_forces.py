@@ -1,9 +1,9 @@
-"""What the network that ships errs where nothing is unknown: it gets the model's own forces, without noise.
+"""Error of the network that ships where nothing is unknown: it gets the model's own forces, without noise.
 
     python benchmarks/learning_curve/model_forces.py SOLVED --contacts CONTACTS
 
-The presses are those of `run.py`. What it errs here is its own: neither gains nor noise nor another skin are in it.
-What it errs more on a rig comes from these.
+The presses are those of `run.py`. This error is the network's own: neither gains nor noise nor another skin are in it.
+The additional error on a rig comes from these.
 """
 
 from __future__ import annotations

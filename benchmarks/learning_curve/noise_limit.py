@@ -1,8 +1,8 @@
-"""What overlap the virtual rig's noise allows: the best possible predictor, over the depth of the contact.
+"""Overlap that the virtual rig's noise allows: the best possible predictor, over the depth of the contact.
 
     python benchmarks/learning_curve/noise_limit.py SOLVED --out OUT [--rigs 3] [--runs RUNS --presses 100]
 
-With --runs, the folder that `run.py` wrote, the network that it fitted stands beside: on the same presses held out, at
+With --runs, the folder that `run.py` wrote, the fitted network is added to the table: on the same presses held out, at
 the edge, and on shapes that it never saw.
 
 The library holds every frame of the solved presses with the readings that the rig would give without noise and drift. A

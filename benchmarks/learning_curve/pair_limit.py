@@ -1,11 +1,11 @@
-"""How well two contacts near each other can be told from one frame: the Cramer-Rao bound of the rig's own noise.
+"""Accuracy of two contacts near each other from one frame: the Cramer-Rao bound of the rig's own noise.
 
     python benchmarks/learning_curve/pair_limit.py [--rigs 3]
 
 Two balls press the virtual rig side by side. Unknown are place and depth of each, six numbers; the skin is known. The
 bound is the least spread that any unbiased estimate of these numbers has (H. Cramer, Mathematical Methods of
-Statistics, 1946, ch. 32). A network does not know the skin, so it errs more; what it errs beyond the bound is not
-noise. Contacts must not overlap: the forces of both are then added. One ball alone stands beside, with three unknown
+Statistics, 1946, ch. 32). A network does not know the skin, so it errs more; its error beyond the bound is not
+noise. Contacts must not overlap: the forces of both are then added. One ball alone is listed, too, with three unknown
 numbers.
 """
 

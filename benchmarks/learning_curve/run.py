@@ -42,7 +42,7 @@ UNSEEN = ("square", "ring", "prism")
 """Shapes that no press to train on has."""
 REST = 0.9
 """Time before a press over which its readings are tared [s]."""
-torch.set_num_threads(1)  # rigs may be run beside each other
+torch.set_num_threads(1)  # rigs may be run in parallel
 
 
 def rig_frames(folder: Path, rig: int, only: Callable[[Press], bool] = lambda press: True) -> Frames:
@@ -122,7 +122,7 @@ def part(frames: Frames, kept: list[EpisodeSpan]) -> Frames:
 
 
 def at_edge(span: EpisodeSpan, sensor: Sensor) -> bool:
-    """Return whether a press lies outside the taxels' centres."""
+    """Return whether a press is outside the taxels' centres."""
     x, y = np.abs(sensor.taxels.centers).max(axis=0)
     return abs(span.x) > x or abs(span.y) > y
 

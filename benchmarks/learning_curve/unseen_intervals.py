@@ -1,4 +1,4 @@
-"""What share of errors lies inside a pixel's interval on shapes that no press trained on has.
+"""Share of errors inside a pixel's interval on shapes that no press trained on has.
 
     python benchmarks/learning_curve/unseen_intervals.py SOLVED --out OUT [--presses 40] [--leave-out 5] [--rigs 1]
 

@@ -1,4 +1,4 @@
-"""How alike a pressed prism looks on specimens that a network never saw: centroid-aligned IoU, as `tacdata protocols`.
+"""Overlap of a pressed prism between unseen specimens: centroid-aligned IoU, as `tacdata protocols`.
 
     python benchmarks/learning_curve/wearing.py SOLVED --out OUT [--from shipped] [--own 10]
 

@@ -53,7 +53,7 @@ def train_graphed(
         run: Folder to write.
         steps: Steps, over which the rate falls.
         until: When training must be done [s since 1970]; the rate falls sooner if need be.
-        lines: How often the loss on the validation presses is told.
+        lines: How often the loss on the validation presses is reported.
         shown: Called with each line of progress.
     """
     place = torch.device("cuda")

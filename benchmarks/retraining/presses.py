@@ -1,4 +1,4 @@
-"""Solved presses as frames in memory, made by all cores: what `tacdata simulate --out` writes, without the files.
+"""Solved presses as frames in memory, made by all cores: the output of `tacdata simulate --out`, without the files.
 
 Ten thousand episodes take a quarter of an hour to write as a dataset, one after the other. A card is lent for less.
 """
@@ -29,7 +29,7 @@ CHUNK = 64
 MOVED = 0.04
 """Way of the tip between two frames in contact that are both learned from [mm]."""
 _HELD, _IDLE = 8, 3
-"""Of frames that are alike, one in so many is learned from: while the tip holds, and out of contact [count]."""
+"""Of equal frames, one in so many is learned from: while the tip holds, and out of contact [count]."""
 _HELD_MOST = 3
 """Frames of a hold that are learned from [count]."""
 _KEYS = {
@@ -81,7 +81,7 @@ def read(solved: Path, packed: Path, files: int | None = None) -> Frames:
     """Return packed presses as one set of frames.
 
     Args:
-        solved: Folder of the solved presses, which says what they are drawn from.
+        solved: Folder of the solved presses, which names the settings that they are drawn from.
         packed: Folder that `pack` wrote.
         files: How many of its files; all if left out.
     """

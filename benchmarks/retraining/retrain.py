@@ -1,13 +1,13 @@
-"""Makes the network that ships anew, on a card that is lent for minutes: solve, train variants side by side, score.
+"""Retrains the network that ships, on a card that is lent for minutes: solve, train variants side by side, score.
 
     python benchmarks/retraining/retrain.py solve WORK --out OUT --seconds 480
     python benchmarks/retraining/retrain.py train WORK --out OUT --seconds 330
     python benchmarks/retraining/retrain.py score WORK --out OUT --seconds 200
     python benchmarks/retraining/retrain.py final WORK --out OUT --seconds 300 --variants chosen
 
-Each part ends at its time, keeps what is done in WORK, and goes on with it when it is called again. OUT gets what is to
-be kept: solved presses of the learning curve's benchmark, networks, scores.json, and times.json, which says what took
-how long. On a machine without a card give --device cpu and few presses.
+Each part ends at its time, keeps its results in WORK, and goes on with them when it is called again. OUT gets the
+results: solved presses of the learning curve's benchmark, networks, scores.json, and times.json, which lists the time
+of each part. On a machine without a card give --device cpu and few presses.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class SolvedSet:
     presses: int
     seed: int
     after: float = 5.0
-    """Time that is left for what comes behind it [s], on a card."""
+    """Time that is left for the following parts [s], on a card."""
     kept: bool = False
     """Whether its files go to OUT."""
 
@@ -62,7 +62,7 @@ the first is to hold all of them."""
 
 
 class Clock:
-    """The time that a part has, and a file that says what took how long."""
+    """The time that a part has, and a file of the times that parts took."""
 
     def __init__(self, out: Path, part: str, seconds: float) -> None:
         """Start it."""
@@ -203,7 +203,7 @@ def score(work: Path, out: Path, seconds: float, names: list[str], final: bool) 
 
 
 def _in_words(function: Any, *given: Any) -> Any:
-    """Call a function; what it raises becomes words, as not every exception survives the way between processes."""
+    """Call a function; exceptions become words, as not every one survives the way between processes."""
     try:
         return function(*given)
     except Exception:

@@ -1,7 +1,7 @@
 """Scores networks as the learning curve's benchmark does, on rigs and presses of other seeds than its own.
 
 The benchmark's rigs 0 to 2 and 100 to 111 and its presses of seed 0 stay unseen: a variant is chosen here, on rigs 20
-to 22 and 300 to 305 and on presses of seed 1. What is chosen is scored there once.
+to 22 and 300 to 305 and on presses of seed 1. The chosen one is scored there once.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def on_rig(
     start: str, rig_presses: Path, contacts: Path, rig: int, out: Path, counts: tuple[int, ...] = (PRESSES,)
 ) -> dict[str, Any]:
     """Return the scores of a network fitted to a rig, with ten presses and perhaps with other numbers of them."""
-    shutil.rmtree(out, ignore_errors=True)  # what was broken off
+    shutil.rmtree(out, ignore_errors=True)  # an incomplete run
     frames, others = run.rig_frames(rig_presses, rig), run.rig_frames(contacts, rig)
     unseen = [span for span in frames.episodes if span.indenter in run.UNSEEN]
     edge = [span for span in frames.episodes if span not in unseen and run.at_edge(span, frames.sensor)]
@@ -39,7 +39,7 @@ def on_rig(
     document = learning_curve(run.part(frames, rest), pretrained(start), out, counts, (rig,), networks=(), threads=1)
     held = run.part(frames, list(frames.spans(tuple(document["held_out"]))))
     rows: dict[int, dict[str, Any]] = {}
-    for count in [n for n in counts if (out / f"pretrained-{n}-{rig}").is_dir()]:  # what there are presses for
+    for count in [n for n in counts if (out / f"pretrained-{n}-{rig}").is_dir()]:  # counts with presses
         network = checkpoint.load(out / f"pretrained-{count}-{rig}").network
         rows[count] = {"held out": run.scores(network, held)}
         for name, spans in (("unseen shapes", unseen), ("edge", edge)):
@@ -53,7 +53,7 @@ def worn(
     start: str, rig_presses: Path, out: Path, fitted_to: int = RIGS[0], wearers: range = WEARERS
 ) -> dict[str, float]:
     """Return the aligned overlap of prisms on rigs that a network never saw, fitted to one other rig."""
-    shutil.rmtree(out, ignore_errors=True)  # what was broken off
+    shutil.rmtree(out, ignore_errors=True)  # an incomplete run
     network = wearing.fitted(rig_presses, fitted_to, 30, pretrained(start), out)
     prisms, means = wearing.prisms(rig_presses), []
     for rig in wearers:
@@ -65,7 +65,7 @@ def worn(
 
 
 def on_forces(start: str, rig_presses: Path, contacts: Path) -> dict[str, Any]:
-    """Return what a network errs on the model's own forces: nothing is unknown but the press."""
+    """Return the error of a network on the model's own forces: nothing is unknown but the press."""
     network = pretrained(start).network
     network.is_calibrated = False  # it takes forces as they are
     frames = model_forces.exact(rig_presses)

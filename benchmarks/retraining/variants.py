@@ -1,4 +1,4 @@
-"""Networks that are trained beside each other on the same presses, and how one of them is trained in a given time."""
+"""Networks that are trained in parallel on the same presses, and how one of them is trained in a given time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tacdata.training.train import Progress, train
 BROAD = {"gain_jitter": 0.1, "scale_jitter": 0.25, "exponent_jitter": 0.15}
 """How far a unit may be from the model, as the network that ships was trained until now [1]."""
 NARROW = {"gain_jitter": 0.04, "scale_jitter": 0.12, "exponent_jitter": 0.06}
-"""What remains of it after a calibration with ten presses. A network that must allow for more rounds what it sees:
+"""The part of it that a calibration with ten presses leaves. A network that must allow for more rounds its input:
 two shapes whose readings differ by less than the gains' spread get the mean of their maps [1]."""
 MIDDLE = {"gain_jitter": 0.05, "scale_jitter": 0.15, "exponent_jitter": 0.1, "spread_jitter": 0.3}
 """Between them, and with loads that spread less far or farther: the network that ships [1, mm^2]."""
@@ -43,9 +43,9 @@ _VALIDATION = 4.0
 _HELD, _VALIDATED = 8, 120
 """Presses of a card's run that are held out, and that tell the loss [count]."""
 _AFTER = 10.0
-"""Time for what is behind the last step [s]."""
+"""Time for the work after the last step [s]."""
 _AROUND = 100.0
-"""Time for what is before the first epoch and after the last: reading, calibration, intervals, readings seen [s]."""
+"""Time before the first epoch and after the last: reading, calibration, intervals, readings seen [s]."""
 
 
 def settings(name: str, epochs: int, batch: int, start: Checkpoint | None = None) -> TrainingSettings:
@@ -80,10 +80,10 @@ def train_one(
         name: One of `VARIANTS`.
         solved: Folder of the solved presses.
         packed: Their frames.
-        runs: Where runs lie.
+        runs: Folder of the runs.
         out: Where NAME.safetensors is put.
         until: When it must be done [s since 1970].
-        device: What it trains on.
+        device: Device of the training.
         batch: Frames a step.
         start: The network that it goes on from; random weights if left out.
         shown: Called with each line of progress.
@@ -141,11 +141,11 @@ def _nearly_all(split: Split) -> Split:
 
 
 class _Enough(Exception):
-    """The trial has told how long a step takes."""
+    """The trial has measured how long a step takes."""
 
 
 def _step_seconds(frames: Frames, recipe: TrainingSettings, run: Path, device: str) -> float:
-    """Return how long a step takes [s], beside whatever else runs on this machine: the mean after the first quarter."""
+    """Return how long a step takes [s] under the load of this machine: the mean after the first quarter."""
     times: list[float] = []
 
     def count(progress: Progress) -> None:

@@ -60,7 +60,7 @@ def indenter_grid(case: Case, spacing: float) -> np.ndarray:
     request = case.request
     reach = request.indenter.footprint(max(request.depths) + 0.4, 0.0)
     counts = [2 * max(4, int(np.ceil(2 * r / spacing))) + 1 for r in reach]
-    # A square grid drawn into the disc of the footprint: no corner lies higher than the rim.
+    # A square grid drawn into the disc of the footprint: no corner is higher than the rim.
     s, t = np.meshgrid(*(np.linspace(-1, 1, c) for c in counts), indexing="ij")
     x, y = s * np.sqrt(1 - t**2 / 2), t * np.sqrt(1 - s**2 / 2)
     x, y = reach[0] * x * (1 - 1e-9), reach[1] * y * (1 - 1e-9)
@@ -71,7 +71,7 @@ def indenter_grid(case: Case, spacing: float) -> np.ndarray:
 
 
 def board_plate(center: np.ndarray, half: float, height: float) -> np.ndarray:
-    """Return a square of the board, shape (3, 3, 3) [mm]; turned over, as the skin lies above it."""
+    """Return a square of the board, shape (3, 3, 3) [mm]; turned over, as the skin is above it."""
     s = np.linspace(-half, half, 3)
     x, y = np.meshgrid(center[0] + s, center[1] + s, indexing="ij")
     return np.stack([x, y, np.full_like(x, height)], axis=-1)

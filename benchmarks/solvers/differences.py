@@ -1,4 +1,4 @@
-"""How far one code's answer lies from another's: forces, and the depth field over the whole outer face."""
+"""Distance of one code's solution from another's: forces, and the depth field over the whole outer face."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Reference:
-    """What answers are held against."""
+    """The solution that others are compared with."""
 
     depth: np.ndarray
     """Depths [mm], shape (d,)."""

@@ -18,7 +18,7 @@ def interpreter(folder: Path, name: str, module: str) -> Path | None:
 
 
 def install(folder: Path, name: str, requirement: str) -> str | None:
-    """Make the environment ``folder/name`` with ``requirement`` and NumPy; return what went wrong, or None."""
+    """Make the environment ``folder/name`` with ``requirement`` and NumPy; return the error, or None."""
     place = folder / name
     folder.mkdir(parents=True, exist_ok=True)
     if uv := shutil.which("uv"):

@@ -33,7 +33,7 @@ class GetFEM(Peer):
     contact: str = "lagrangian"
     """"lagrangian". Or, without friction, "active set": multipliers at nodes that close mean gaps or are 0."""
     multiplier: str = "FEM_PK(3,2)"
-    """Finite element of the multipliers; their traces on the contact faces are what counts."""
+    """Finite element of the multipliers; only their traces on the contact faces count."""
     augmentation: float = 10.0
     """Augmentation of the Lagrangian over Young's modulus [1/mm]."""
     volume_rule: str = "IM_TETRAHEDRON(2)"

@@ -66,7 +66,7 @@ def _axial(outward: str, upward: str) -> list[tuple[str, str]]:
 
 
 def _beyond(coordinate: str, half: float) -> str:
-    """Return how far a coordinate lies outside [-half, half], with its sign."""
+    """Return how far a coordinate is outside [-half, half], with its sign."""
     return f"(pos_part({coordinate}-{half!r})-pos_part(-{coordinate}-{half!r}))"
 
 

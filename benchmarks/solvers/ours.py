@@ -28,7 +28,7 @@ class Ours(Peer):
         return None
 
     def solve(self, case: Case, mesh: SkinMesh, folder: Path) -> Answer:
-        """Solve the case from depth 0 on; the state at 0 holds what starting costs."""
+        """Solve the case from depth 0 on; the state at 0 holds the cost of the start."""
         depths = [d for d in case.request.depths if d > 0]
         folder.mkdir(parents=True, exist_ok=True)
         for stale in ("press.json", "press.parquet"):

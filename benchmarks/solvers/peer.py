@@ -1,7 +1,7 @@
-"""What a file of this folder holds: one code that can solve a press.
+"""A peer: one code that can solve a press; one a file of this folder.
 
-`Peer.missing` says in words what has to be installed, `Peer.solve` solves a case in a process of its own and answers
-with displacements of the outer face, forces, and what they cost. One thread each, so that CPU seconds compare.
+`Peer.missing` names the packages to install, `Peer.solve` solves a case in a process of its own and answers
+with displacements of the outer face, forces, and their cost. One thread each, so that CPU seconds compare.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "CCX_NP
 
 
 class PeerError(Exception):
-    """A code is missing, cannot solve such a press, or gave up; says which."""
+    """A code is missing, cannot solve such a press, or gave up; the message states which."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a code says of a press, at d depths."""
+    """A code's solution of a press, at d depths."""
 
     depth: np.ndarray
     """Depths [mm], shape (d,)."""
@@ -48,7 +48,7 @@ class Answer:
     protrusion_force: np.ndarray
     """Vertical force on each protrusion [N], shape (d, t); t = 0 without a board."""
     residual: np.ndarray
-    """What the code itself gives as its residual, shape (d,); NaN if it gives none."""
+    """The residual that the code itself gives, shape (d,); NaN if it gives none."""
     seconds: np.ndarray
     """Wall time of each equilibrium [s], shape (d,)."""
     cpu_seconds: np.ndarray
@@ -58,7 +58,7 @@ class Answer:
     dofs: int
     """Unknowns [1]."""
     note: str = ""
-    """What a reader must know, such as "not settled at 1 mm"."""
+    """A caveat for the reader, such as "not settled at 1 mm"."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Process:
     """A finished process."""
 
     output: str
-    """What it printed."""
+    """Its output."""
     seconds: float
     """Wall time [s]."""
     cpu_seconds: float
@@ -82,7 +82,7 @@ class Peer(ABC):
 
     @abstractmethod
     def missing(self) -> str | None:
-        """Return what has to be installed, or None if the code can run."""
+        """Return the packages to install, or None if the code can run."""
 
     @abstractmethod
     def solve(self, case: Case, mesh: SkinMesh, folder: Path) -> Answer:
@@ -97,7 +97,7 @@ def run_alone(command: list[str], folder: Path, limit: float = 3600.0) -> Proces
     """Run a command with one thread in ``folder``, at most ``limit`` seconds.
 
     Raises:
-        PeerError: If it fails or takes too long, with the end of what it printed.
+        PeerError: If it fails or takes too long, with the end of its output.
     """
     environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
     folder.mkdir(parents=True, exist_ok=True)
@@ -129,8 +129,8 @@ def outer_face(mesh: SkinMesh) -> tuple[np.ndarray, np.ndarray]:
 def within_reach(case: Case, mesh: SkinMesh) -> np.ndarray:
     """Return which outer triangles the indenter can come near, shape (f,), bool.
 
-    A triangle counts if a node of it lies less than 0.3 mm under the indenter at the greatest depth, were the face
-    still flat; the face bulges by less than that beside the contact.
+    A triangle counts if a node of it is less than 0.3 mm under the indenter at the greatest depth, were the face
+    still flat; the face bulges by less than that next to the contact.
     """
     request = case.request
     origin = touch(case.sensor, OuterFace(mesh), request) - [0.0, 0.0, max(request.depths)]

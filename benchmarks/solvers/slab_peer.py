@@ -1,4 +1,4 @@
-"""What the peers from PyPI share: a sphere on a slab, a grid of linear tetrahedra, an interpreter of their own."""
+"""Base of the peers from PyPI: a sphere on a slab, a grid of linear tetrahedra, an interpreter of their own."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class SlabPeer(Peer):
     """A code that makes its own grid of the slab."""
 
     requirement: ClassVar[str]
-    """What pip installs."""
+    """The package that pip installs."""
     module: ClassVar[str]
-    """What is imported; also the name of its environment."""
+    """The imported module; also the name of its environment."""
     script: ClassVar[str]
     """File in `alone/` that solves the press."""
 
@@ -43,7 +43,7 @@ class SlabPeer(Peer):
 
     @abstractmethod
     def settings(self, case: Case) -> dict[str, Any]:
-        """Return what the script wants beyond geometry, material and depths."""
+        """Return the script's settings beyond geometry, material and depths."""
 
     def solve(self, case: Case, mesh: SkinMesh, folder: Path) -> Answer:
         """Hand size, material and sphere to the script."""

@@ -3,7 +3,7 @@
     /usr/bin/python3 getfem_press.py MESH.npz PRESS.json RESULT.npz
 
 MESH.npz: nodes (n, 3), tets (e, 10), outer (f, 6), protrusions (p, 6), taxel (p,), fixed (n,).
-PRESS.json: what `benchmarks/solvers/getfem.py` writes: law and shape as GWFL text, numbers, quadrature, depths.
+PRESS.json: written by `benchmarks/solvers/getfem.py`: law and shape as GWFL text, numbers, quadrature, depths.
 RESULT.npz: depth, displacement (d, n, 3), force (d, 3), protrusion_force (d, t), residual, newton, seconds,
 cpu_seconds (d,), dofs, setup_cpu_seconds.
 
@@ -221,7 +221,7 @@ class Press:
 
 
 def main(mesh_file, press_file, result_file):
-    """Solve the press and write what came out."""
+    """Solve the press and write the result."""
     getfem.util_trace_level(0)
     getfem.util_warning_level(0)
     began = time.process_time()

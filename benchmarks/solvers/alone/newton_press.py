@@ -70,7 +70,7 @@ def build(press):
 
 
 def main(press_file, result_file):
-    """Solve the press and write what came out."""
+    """Solve the press and write the result."""
     began = time.process_time()
     with open(press_file) as file:
         press = json.load(file)

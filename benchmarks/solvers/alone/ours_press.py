@@ -12,7 +12,7 @@ from tacdata.cases.case import read_case, solve_case
 
 
 def main(case: Path, out: Path) -> None:
-    """Solve; write times.json beside the results. The first depth must be 0: it carries what a press costs at first."""
+    """Solve; write times.json next to the results. The first depth must be 0: it carries the cost of the start."""
     torch.set_num_threads(1)
     marks = [(time.perf_counter(), time.process_time())]
     solve_case(read_case(case), out, lambda depth: marks.append((time.perf_counter(), time.process_time())))
