@@ -11,7 +11,7 @@ def pool(workers):
 
 
 def end_with_parent():
-    """End this process as soon as its parent is gone: a killed parent tells its workers nothing."""
+    """End this process as soon as its parent is gone: a killed parent does not end its workers."""
     threading.Thread(target=_watch, args=(parent_process(),), daemon=True).start()
 
 

@@ -74,7 +74,7 @@ def train_one(
     start: Checkpoint | None = None,
     shown: Callable[[str], None] = print,
 ) -> None:
-    """Train a variant until a time; a trial tells how many epochs fit.
+    """Train a variant until a time; a trial measures how many epochs fit.
 
     Args:
         name: One of `VARIANTS`.

@@ -2,7 +2,7 @@
 
     python examples/closed_loop/closed_loop.py --out loop
 
-The rig's depth drive has play that no file tells of. Twelve presses at one speed cannot tell it from a lag or from
+The rig's depth drive has play that no file states. Twelve presses at one speed cannot separate it from a lag or from
 friction; `tacdata revise` writes the presses that can, the rig records them, and the second verdict names it. Then the
 model gets the effect, the paths of the labels move, and the gap is shown before and after (`loop/*/card.html`).
 """

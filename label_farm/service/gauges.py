@@ -45,7 +45,7 @@ class Gauges:
     """Throughput by the minute, and each worker's share of a processor and its memory. Any thread may call."""
 
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
-        """Begin with nothing; ``clock`` tells the time [s since 1970]."""
+        """Begin with nothing; ``clock`` gives the time [s since 1970]."""
         self._now, self._lock = clock, Lock()
         self._minutes: deque[Minute] = deque(maxlen=KEPT)
         self._totals: tuple[int, int] | None = None

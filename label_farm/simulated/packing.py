@@ -26,7 +26,7 @@ from tacdata.labels import Label, PathSolution
 from tacdata.recording.episode import Episode
 
 _STREAM = 43
-"""Tells the random numbers of readings from those of presses and specimens."""
+"""Separates the random numbers of readings from those of presses and specimens."""
 
 
 def simulated_episode(simulation: Simulation, number: int, solution: PathSolution) -> tuple[Episode, Label]:

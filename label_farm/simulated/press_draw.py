@@ -16,7 +16,7 @@ _TRIES = 200
 """How often a press is drawn again before the plan counts as impossible."""
 _PURPOSE = "simulated"
 _STREAM = 41
-"""Tells the random numbers of presses from those of specimens and noise."""
+"""Separates the random numbers of presses from those of specimens and noise."""
 
 
 def draw_press(plan: SimulationPlan, sensor: Sensor, seed: int, number: int) -> Press:

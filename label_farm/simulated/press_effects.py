@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tacdata.recording.episode import Episode
 
 _STREAM = 44
-"""Tells the random numbers of effects from those of presses, specimens and noise."""
+"""Separates the random numbers of effects from those of presses, specimens and noise."""
 _ON_LOADS = ("mechanics", "contact")
 """Stages in which an effect changes forces."""
 

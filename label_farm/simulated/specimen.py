@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 _STREAM = 42
-"""Tells the random numbers of specimens from those of presses and noise."""
+"""Separates the random numbers of specimens from those of presses and noise."""
 _FARTHEST = 2.0
 """Largest distance of a drawn value from its mean, over the standard deviation [1]."""
 _INCOMPRESSIBLE = 0.495

@@ -25,7 +25,7 @@ def quiet_rows(course: Course) -> np.ndarray:
 
 
 def told_at_rest(course: Course) -> tuple[np.ndarray | None, str]:
-    """Return each channel's reading without contact, shape (channels,), or None and why it tells no gain.
+    """Return each channel's reading without contact, shape (channels,), or None and why it gives no gain.
 
     Args:
         course: The recordings; those with the rows read alone will do.

@@ -141,7 +141,7 @@ def _largest(values: np.ndarray) -> float:
 
 
 def _unchecked(path: JointPath) -> list[str]:
-    """Describe which speeds and accelerations were not held against a limit, as none is known."""
+    """Describe which speeds and accelerations were not compared with a limit, as none is known."""
     sentences = []
     if path.collisions.reason:
         sentences.append(f"whether links touch each other was not checked: {path.collisions.reason}")

@@ -173,7 +173,7 @@ def _by_number() -> Any:
     for number, name in reversed(list(enumerate(_shapes()))):
         kind: type[Indenter] = registry.load(ROOM, BASE, name, Indenter)
         function = kind.distance_function()
-        # By a name of its own: Warp tells functions apart by their names.
+        # By a name of its own: Warp distinguishes functions by their names.
         chain = wp.func(_link(number, function, chain) if chain else _last(function), name=f"pair_{name}")
     return chain
 

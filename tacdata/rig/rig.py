@@ -84,7 +84,7 @@ class Envelope:
         """Return where a rise from ``position`` to machine ``height`` ends [mm].
 
         Raises:
-            DeviceError: If that is outside: the guide stands elsewhere than the rig file allows.
+            DeviceError: If that is outside: the guide is beyond the limits of the rig file.
         """
         x, y, z = position
         top = x, y, max(z, height)

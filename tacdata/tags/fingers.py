@@ -21,7 +21,7 @@ FARTHEST = 0.5
 class Finger:
     """A finger with its cube.
 
-    The fingertip's frame: origin on the pad, x along the finger to its end, z out of the pad towards what is
+    The fingertip's frame: origin on the pad, x along the finger to its end, z out of the pad towards the object
     touched, right-handed.
     """
 

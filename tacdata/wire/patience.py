@@ -26,7 +26,7 @@ class Patience:
     ) -> None:
         """Allow ``seconds`` [s of a clock that runs at ``rate``], and never less than ``floor`` [s, real time].
 
-        ``step`` [s, real time] should be longer than the time between two looks. ``host`` tells the time.
+        ``step`` [s, real time] should be longer than the time between two looks. ``host`` gives the time.
         """
         self._host, self._limit, self._step = host, max(seconds / rate, floor), step
         self.restart()

@@ -294,7 +294,7 @@ def _shrunk(square: np.ndarray, product: np.ndarray) -> tuple[np.ndarray, np.nda
     gain = np.divide((square * channel_gain).sum(axis=0), weight, out=np.full(len(weight), mean), where=weight > 0)
     concentration = np.divide((square**2).sum(axis=0), weight, out=np.zeros_like(weight), where=weight > 0)
     degrees_of_freedom = (weight - concentration).sum()
-    # Where each channel was touched by one press alone, nothing tells how far two presses disagree.
+    # Where each channel was touched by one press alone, the disagreement of two presses is unknown.
     several = degrees_of_freedom > 1e-9 * weight.sum()
     within = (square * (channel_gain - gain) ** 2).sum() / degrees_of_freedom if several else np.inf
     # Of how many equal presses a channel's estimate is worth, and how much they tell.

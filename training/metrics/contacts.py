@@ -7,7 +7,7 @@ pixels whose way uphill ends there. Hills are found by flooding from the deepest
 one with the least sum of distances (H. W. Kuhn, Naval Research Logistics 2 (1955) 83).
 
 A prediction is smoother than the pressed shape. The pass between near contacts is filled in, and the top of a wide one
-has dents. The region's outline tells these apart: two contacts make it long. So in a long region a low hill counts
+has dents. The region's outline distinguishes these: two contacts make it long. So in a long region a low hill counts
 already, in a round one only a high one.
 """
 

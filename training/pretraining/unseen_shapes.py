@@ -25,7 +25,7 @@ from tacdata.training.splits.split import VALIDATION_SHARE, Split, share
 from tacdata.training.train import Progress, train
 
 _SEED = 47
-"""Tells the random numbers of groups from those of training."""
+"""Separates the random numbers of groups from those of training."""
 
 
 def calibrate_on_unseen_shapes(

@@ -72,7 +72,7 @@ DEEPEST = 2
 
 
 def contents(folder: Path) -> dict[Path, Kind]:
-    """Return what can be viewed in a folder that holds no recordings itself, by path."""
+    """Return the viewable contents of a folder that holds no recordings itself, by path."""
     members = kinds()
     paths = [path for level in range(1, DEEPEST + 1) for path in sorted(folder.glob("/".join(["*"] * level)))]
     entries: dict[Path, Kind] = {}

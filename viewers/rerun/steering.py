@@ -2,7 +2,7 @@
 
 A window is asked through Rerun's own client. The viewer in a browser runs a script that `viewers.rerun.shield` adds
 to its page. The script takes the moment from the address (``at=TIMELINE@NANOSECONDS``) or from the page around it.
-It tells that page which moment is shown.
+It sends that page the moment to show.
 """
 
 from __future__ import annotations

@@ -157,7 +157,7 @@ def inseparable(name, response, times):
 
 
 def clear(name, response):
-    """Return the size [detection limits] at which an oracle finds an effect and tells it from any rival."""
+    """Return the size [detection limits] at which an oracle finds an effect and separates it from any rival."""
     apart = limits()["separations"].get(response, {}).get(name, {})
     steps = sorted((float(times), max(entry[0], 1e-3)) for times, entry in apart.items())
     below, above = [s for s in steps if s[1] < LEVEL], [s for s in steps if s[1] >= LEVEL]

@@ -66,7 +66,7 @@ SETS = {
 """Protocol -> effects that it may not tell apart, each a rival of the others; responses."""
 EPISODES = {"poor": 24}
 STEPS = (3.0, 10.0, 40.0)
-"""Sizes at which singles are held against their rivals, in detection limits."""
+"""Sizes at which singles are compared with their rivals, in detection limits."""
 TRIED = (10.0, 3.0)
 """Sizes at which an inseparable truth is taken, in detection limits; the largest at which it stays inseparable."""
 

@@ -3,7 +3,7 @@
 Two cameras see the same fingers. If one is moved, the distance between their two paths jumps, and stays. Which of them
 moved is decided by the fingers' motion: through the eyes of the moved camera every finger jumps, through those of the
 other none does. From the bump on the moved camera's place is a state of the filter with a wide prior, as if it were
-another camera. So its sightings still tell the motion, and the other camera tells the place.
+another camera. So its sightings still give the motion, and the other camera gives the place.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ AGREEING = 0.5
 SPACED = 0.2
 """Largest interval between sightings over which a camera's path is interpolated [s]."""
 WINDOW = 3.0
-"""Time on each side of a bump in which the motion tells which camera moved [s]."""
+"""Time on each side of a bump in which the motion shows which camera moved [s]."""
 CANDIDATES = 4
 """Sightings on each side of the likeliest moment at which the bump may have been [count]."""
 DECISIVE = 5.0

@@ -28,7 +28,7 @@ UNTIMED = 0.02
 
 
 TIMELY = 0.02
-"""Largest standard uncertainty of an image's time with which it tells of motion, cameras and tags [s]."""
+"""Largest standard uncertainty of an image's time with which it is used for motion, cameras and tags [s]."""
 NEARLY_ALL = 0.99
 """Share of a camera's images that must be that well timed [1]."""
 

@@ -143,7 +143,7 @@ def _place(
 
 
 def _whole_strokes(table: SourceTable, found: dict[str, list[str]], asked: list[str]) -> None:
-    """Let no column part trials that tells halves of strokes."""
+    """Let no column separate trials that marks halves of strokes."""
     moving = found.get("depth") or found.get("z")
     if not moving or "trial" not in found or "[" in moving[0]:
         return

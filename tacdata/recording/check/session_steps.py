@@ -1,4 +1,4 @@
-"""Do all answers step within a session, in place, in strength or in height? Each press is held against all others.
+"""Do all answers step within a session, in place, in strength or in height? Each press is compared with all others.
 
 A regression explains the differences between presses by their depth, site, speed and indenter, and by a steady drift.
 A step from one press on is a further column (the Chow test with an unknown break). Strength is the amplitude of the

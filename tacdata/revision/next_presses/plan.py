@@ -55,12 +55,12 @@ class Choice:
 
     @property
     def best(self) -> Pair:
-        """The pair that it tells apart best."""
+        """The pair that it separates best."""
         return max(self.nats, key=lambda pair: self.nats[pair])
 
 
 def choose(held: Comparison, found: list[Rival], machine: MachineLimits, presses: int = PRESSES) -> list[Choice]:
-    """Return the most informative presses, the best first; fewer if no press tells the rivals apart.
+    """Return the most informative presses, the best first; fewer if no press separates the rivals.
 
     Pairs that `PLANS` plans of the best press would leave open earn nothing.
 

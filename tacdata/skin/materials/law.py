@@ -41,8 +41,8 @@ class Law(ABC):
     """A strain energy density W(F), isotropic, with W = 0 and P = 0 at F = I; NaN where det F <= 0."""
 
     splits_volume: ClassVar[bool] = True
-    """Whether the volumetric part is kappa/2 (J - 1)^2 by itself. Only then may it be averaged over elements: what is
-    left of another form without it is unbounded below at single points."""
+    """Whether the volumetric part is kappa/2 (J - 1)^2 by itself. Only then may it be averaged over elements: the
+    rest of another form without it is unbounded below at single points."""
 
     @classmethod
     def example(cls) -> Self:

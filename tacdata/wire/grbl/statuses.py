@@ -64,7 +64,7 @@ class Statuses:
         return True
 
     def forget(self) -> None:
-        """Forget all queries, and an offset that no report tells. A reset changes it."""
+        """Forget all queries, and an offset that no report states. A reset changes it."""
         self._queries.clear()
         if not self._tells_offset and self._is_work:
             self.offset, self.unplaced = None, "Idle"
