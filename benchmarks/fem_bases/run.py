@@ -40,7 +40,7 @@ SINGLES = ("relaxation", "latency", "crosstalk", "xy_offset", "frame_compliance"
 
 
 def solved(unit, device, capacity, out):
-    """Solve a unit's own skin and its bases; return their costs."""
+    """Solve a unit's own skin and its bases; print the time of each."""
     sensor, begun = sensor_of(unit), time.time()
     settings = TableSettings(device=device, capacity=capacity)
     for base in BASES:

@@ -1,4 +1,4 @@
-"""Thirty labs, each with a sensor, a protocol and files of its own; its function's docstring is the hidden effect."""
+"""Thirty labs, each with a sensor, a protocol and files of its own; its docstring names the hidden effect."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

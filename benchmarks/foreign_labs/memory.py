@@ -55,7 +55,7 @@ class Friction:
 
     @staticmethod
     def _sum(values):
-        # Added one by one: sum() carries rounding errors along, which would change the last digits of the recordings.
+        # Added one by one: sum() compensates for rounding, which would change the last digits of the recordings.
         total = 0.0
         for value in values:
             total += value

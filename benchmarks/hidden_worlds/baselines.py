@@ -150,7 +150,7 @@ def _descend(gram, columns, penalty, values, rounds=60):
 
 
 def _ridge(course, signal):
-    """Return a regression of every channel's residual on its own history and the path, rows read."""
+    """Return the fit of a regression of every channel's residual on its own history and the path, rows read."""
     rows = course.read
     idle = np.median(signal[course.tip[:, 2] <= 0], axis=0)
     rise, clock = signal - idle, (course.time / course.time[-1])[:, None]

@@ -46,7 +46,7 @@ def gap(trials, change):
 
 
 def laws_of(rng, kind, trials):
-    """Return each channel's reading at a depth without memory, by press; and the largest depth [mm]."""
+    """Return the function from press and depth to readings without memory, and the largest depth [mm]."""
     deepest = max(float(t.depth.max()) for t in trials)
     groups = {group: k for k, group in enumerate(dict.fromkeys((t.place, t.specimen) for t in trials))}
     shape = (len(groups), kind.channels)

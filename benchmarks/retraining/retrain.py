@@ -203,7 +203,7 @@ def score(work: Path, out: Path, seconds: float, names: list[str], final: bool) 
 
 
 def _in_words(function: Any, *given: Any) -> Any:
-    """Call a function; exceptions become words, as not every one survives the way between processes."""
+    """Call a function; exceptions become texts, as not every one survives the way between processes."""
     try:
         return function(*given)
     except Exception:
