@@ -248,6 +248,7 @@ class SkinModel:
         """Return the indenter as it presses in each state of a press at depths [mm]."""
         start, turn = touch(self.sensor, self.skin.face, request), rotation(request)
         risen, slots = rise(request.indenter, turn), self.skin.tractions.slots
+        # Skin that hangs in a frame may sag deeper than the shape, so only touching nodes are bounded there (0021).
         borne = self.skin.board or "bottom" in self.sensor.contact.bonded
         shapes = []
         for depth, state in zip(depths, states, strict=True):

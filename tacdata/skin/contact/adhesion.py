@@ -72,9 +72,11 @@ def _pull(distance, law: str):
             n = R * normal(local, q)
             s = wp.max(g, zero) / length
             t = strength * shape(s)
+            # Inside the shape the traction stays that of gap 0, so the potential continues linearly.
             wp.atomic_add(energy, b, weight * (t * wp.min(g, zero) - strength * length * reserve(s)))
             if g > zero:
                 stiffness_along = strength * slope(s) / length
+                # Without it the stiffness is that of a majorant, and steps go down in energy (0013).
                 if stiffness_along < zero:
                     stiffness_along = stiffness_along * friction_tangent[b]
                 stiffness[f, k, 0, b] = stiffness_along

@@ -87,6 +87,7 @@ class ContactSurface:
         """Nodes that may carry a multiplier, shape (s,), bool."""
         self._mean_nodes = self.mortar.means(nodes[:, :, None].contiguous())
         """Mean undeformed place under each hat [mm], shape (s, 3, 1)."""
+        # Only the slab (z > 0) stretches with a member's thickness; protrusions keep their size, as in `Elasticity`.
         rise = torch.zeros_like(nodes)
         rise[:, 2] = nodes[:, 2].clamp_min(0.0)
         self._mean_rise = self.mortar.means(rise[:, :, None].contiguous())
@@ -132,6 +133,8 @@ class ContactSurface:
     def start(self, pose: Pose) -> ContactHistory:
         """Return the history of members without contact, the shape at ``pose``."""
         place = pose.place.clone()
+        # Infinite gaps keep friction out of the state at the touch; its gaps become the first history
+        # (`Batch._touched`).
         gap = torch.full((self.count, place.shape[1]), torch.inf, dtype=torch.float64, device=place.device)
         anchor = torch.zeros(self.count, 3, place.shape[1], dtype=torch.float64, device=place.device)
         return ContactHistory(anchor, anchor.clone(), gap, place)
@@ -168,6 +171,7 @@ class ContactSurface:
         pressed, place = list(self.by_shape(conditions)), self._mean_place(u, conditions)
         gap = self._gaps(u, place, pose, members, pressed)
         c = self.activation * conditions.modulus
+        # The shift by ``near`` adds close nodes at the start of a load step, while their pressures are unknown (0019).
         active = (multiplier - c * (gap - near) > 0) & self.able[:, None]
         pressure = torch.where(active, multiplier, 0.0)
         nodal, normal = torch.zeros_like(total), self._zeros(u, 3)
@@ -181,6 +185,7 @@ class ContactSurface:
                 outputs=[argument(nodal), argument(normal), int(not self.flat), argument(turn)],
                 device=self.device,
             )
+        # A mean of unit vectors is shorter than 1 under a curved shape, and 0 on faces out of contact.
         normal = normal / torch.linalg.vector_norm(normal, dim=1, keepdim=True).clamp_min(1e-12)
         local, shear, force, stiffness = (self._zeros(u, size) for size in (3, 3, 3, 6))
         wp.launch(
@@ -240,6 +245,7 @@ class ContactSurface:
         violation = torch.where(
             forces.pressure > 0, forces.gap.abs(), (-forces.gap).clamp_min(0.0) * self.able[:, None]
         )
+        # Pressures may be negative before Newton's method has converged.
         load = forces.pressure.abs() * self.area[:, None]
         mean = (load * violation).sum(dim=0) / load.sum(dim=0).clamp_min(1e-30)
         return violation.amax(dim=0), mean
@@ -280,6 +286,7 @@ class ContactSurface:
     ) -> torch.Tensor:
         """Return mean gaps [mm], shape (s, b); above a plane they are those of the mean places."""
         if self.flat:
+            # The third column of the rotation is the plane's normal.
             return torch.einsum("ib,sib->sb", pose.turn[:, 2], place - pose.place)
         gap = self._zeros(u)
         for distance, chosen in pressed:

@@ -26,5 +26,6 @@ class ContactHistory(Columns):
 
     def accept(self, forces: ContactForces, pose: Pose, which: torch.Tensor) -> None:
         """Make the present state of the members in ``which``, shape (b,), the one that friction starts from."""
+        # A gap closes only to the solver's tolerance. The remainder would delay friction (`share_in_contact`).
         gap = torch.where(forces.pressure > 0, torch.zeros_like(forces.gap), forces.gap)
         self.put_where(which, type(self)(forces.local, forces.shear, gap, pose.place))

@@ -83,6 +83,7 @@ def friction_cone_projection(trial: wp.vec3d, limit: wp.float64, tangent: wp.flo
     size = wp.length(trial)
     if size > limit:
         scale = limit / size
+        # The derivative of limit t / |t| by t is scale (I - t t^T / |t|^2); this is its second part.
         derivative = (tangent / (size * size)) * wp.outer(trial, trial)
     return scale, derivative
 
@@ -108,6 +109,7 @@ def normal_function(distance: wp.Function) -> wp.Function:
     @wp.func
     def normal(p: wp.vec3d, q: Parameters):
         h, zero = wp.float64(1.0e-6), wp.float64(0.0)  # mm
+        # The factor 1 / (2 h) of the differences cancels in the normalization.
         return wp.normalize(
             wp.vec3d(
                 distance(p + wp.vec3d(h, zero, zero), q) - distance(p - wp.vec3d(h, zero, zero), q),
@@ -132,6 +134,7 @@ def curvature_function(distance: wp.Function) -> wp.Function:
         y = (normal(p + wp.vec3d(zero, h, zero), q) - normal(p - wp.vec3d(zero, h, zero), q)) / (wp.float64(2.0) * h)
         z = (normal(p + wp.vec3d(zero, zero, h), q) - normal(p - wp.vec3d(zero, zero, h), q)) / (wp.float64(2.0) * h)
         half = wp.float64(0.5)
+        # A distance has a symmetric Hessian, and conjugate gradients need one; differences are symmetric only nearly.
         return wp.mat33d(
             x[0],
             half * (x[1] + y[0]),
@@ -212,6 +215,7 @@ def pressure_kernel(distance: wp.Function) -> wp.Kernel:
             values[a] = pressure[j, b]
             if active[j, b]:
                 some = 1
+        # Most faces are out of contact: end before the distance function is evaluated.
         if some == 0:
             return
         q = parameters_of(members.indenter, b)
@@ -282,6 +286,7 @@ def friction(
     share = share_in_contact(history.gap[j, b], wp.dot(step, n))
     stick = surface.stick * members.modulus[b] * share
     trial = tangential * (at_node(history.held, j, b) - stick * (place_now - at_node(history.anchor, j, b)))
+    # An active node may pull until Newton's method has converged; Coulomb's disc has no negative radius.
     scale, projection = friction_cone_projection(
         trial, coefficient * wp.max(pressure[j, b], wp.float64(0.0)), friction_tangent[b]
     )

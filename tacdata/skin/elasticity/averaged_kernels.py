@@ -98,6 +98,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
             H = gradient(values, mesh, e, q, s)
             least = wp.min(least, wp.determinant(wp.identity(n=3, dtype=real) + H))
             K = cofactor_change(H)
+            # The law's stress has kappa j cof F of the point's own j; the average replaces that j.
             excess = kappa * (at_point(averages, mesh, q) - volume_change(H, K))
             P = (stress_of(H, c) + excess * shifted(K, real(1.0))) * (mesh.weights[e, q] * s)
             for a in range(10):
@@ -160,6 +161,7 @@ def averaged_kernels(law_name: str, real: type) -> SimpleNamespace:
         for q in range(4):
             H = gradient(values, mesh, e, q, s)
             j = volume_change(H, cofactor_change(H))
+            # Summed over the points, w j times the average is b^T Q b.
             extra = real(0.5) * bulk_of(c) * j * (at_point(averages, mesh, q) - j)
             wp.atomic_add(total, b, (energy_of(H, c) + extra) * (mesh.weights[e, q] * s))
 

@@ -73,6 +73,7 @@ class AveragedVolume:
         self.law, self.corners, self.elements = law, len(corner), len(mesh.tets)
         self._device = device
         tets = tets.reshape(-1, 4)
+        # Two matrices, as only the slab's volume scales with a member's thickness; the kernel adds them.
         mass = [corner_mass(tets, weights * part[:, None], self.corners) for part in (~slab, slab)]
         pattern = sp.csr_matrix(sum(abs(m) for m in mass) + sp.identity(self.corners, format="csr") * 0)
         pattern.sort_indices()
@@ -121,6 +122,7 @@ class AveragedVolume:
     def _average(self, sums: torch.Tensor, conditions: Conditions) -> torch.Tensor:
         """Return Q times sums over the corners' surroundings, shape (c, b)."""
         average = torch.zeros_like(sums)
+        # The first pass starts from 0 and gives the lumped average; the corrections follow.
         for _ in range(CORRECTIONS + 1):
             corrected = torch.empty_like(sums)
             wp.launch(

@@ -68,10 +68,12 @@ def element_functions(real: type) -> SimpleNamespace:
 
     @wp.func
     def slope(mesh: ElementData, e: int, q: int, a: int, s: real):
+        # The undeformed slab is s times as thick as the mesh, so derivatives by z are 1 / s of the mesh's.
         return vec3(mesh.slopes[e, q, a, 0], mesh.slopes[e, q, a, 1], mesh.slopes[e, q, a, 2] / s)
 
     @wp.func
     def gradient(values: Nodal, mesh: ElementData, e: int, q: int, s: real):
+        # The displacement gradient, not F: at small strain F - I would lose digits (0007).
         H = mat33()
         for a in range(10):
             g = slope(mesh, e, q, a, s)

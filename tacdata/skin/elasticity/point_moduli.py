@@ -69,6 +69,7 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
                 if i % 3 == 2:
                     scale = w / s
                 change = wp.max(change, wp.abs(values[e, q, 45 + i, at] - cof[i // 3, i % 3] * scale) / scale)
+            # Values of unprepared lanes are infinite; "not <=" also catches NaN.
             if not change <= moved:
                 mean = real(0.0)
                 for a in range(4):
@@ -80,9 +81,11 @@ def moduli_kernel(law_name: str, real: type) -> wp.Kernel:
                     scale = w
                     if i % 3 == 2:
                         scale = w / s
+                    # The point's own volumetric stiffness is subtracted here; `product` adds its average.
                     dP = scale * (tangent_of(H, D, c) + kappa * (excess * cross(F, D) - cof[i // 3, i % 3] * cof))
                     values[e, q, 45 + i, at] = cof[i // 3, i % 3] * scale
                     for row in range(i // 3, 3):
+                        # Each row r above has 9 r numbers before its diagonal block and 6 in it.
                         first = 9 * row * (row - 1) // 2 + 6 * row
                         x, y, z = dP[row, 0], dP[row, 1], dP[row, 2] / s
                         if row > i // 3:

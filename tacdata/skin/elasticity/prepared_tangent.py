@@ -40,6 +40,7 @@ class PreparedTangent:
     def forget(self, which: torch.Tensor) -> None:
         """Reset members, by index."""
         if len(self._lane):
+            # The last number is an entry of the cofactor: an infinite one counts as moved at the next update.
             self._values[:, :, -1, self._lane[which]] = torch.inf
 
     def update(self, u: torch.Tensor, conditions: Conditions, member: torch.Tensor) -> None:
@@ -83,6 +84,7 @@ class PreparedTangent:
         self._begin(1)
         self.update(u, conditions, self._lane)
         blocks = -(-fields // LANES)
+        # Every lane is a copy of the one state, so that its fields are multiplied eight at a time.
         self._values = self._values[..., :1].expand(-1, -1, -1, LANES * blocks).contiguous()
         self._bulk, self._thickness = (
             values[:1].expand(LANES * blocks).contiguous() for values in (self._bulk, self._thickness)
@@ -95,6 +97,7 @@ class PreparedTangent:
         block, place = torch.unique(torch.div(lane, LANES, rounding_mode="floor"), return_inverse=True)
         place, count = LANES * place + lane % LANES, len(block)
         lanes = (LANES * block[:, None] + torch.arange(LANES)).ravel()
+        # A vector of lanes is multiplied as a whole; members that are not asked for get zeros.
         wide = torch.zeros(*p.shape[:2], len(lanes), dtype=p.dtype)
         wide[:, :, place] = p
         direction, moduli, mesh = self._lanes(wide), self._lanes(self._values), body.data[self._dtype]

@@ -34,6 +34,7 @@ def _sweep(a: torch.Tensor) -> None:
     pivot = torch.empty(count, ROWS, ROWS, dtype=a.dtype, device=a.device)
     column = torch.empty(count, size, ROWS, dtype=a.dtype, device=a.device)
     for start in range(0, size, ROWS):
+        # The pivot's rows of ``column`` are 0, so the product below leaves them for "put".
         _launch("take", a, tuple(column.shape), a, start, start + ROWS, column, pivot)
         _invert(pivot)
         swept = column @ pivot

@@ -114,6 +114,7 @@ class KrylovSpace:
         columns = torch.arange(shape[2], device=remainder.device)
         for _ in range(limit):
             start = self._count
+            # Directions of earlier blocks come first: they cost no product with the matrix.
             if start:
                 share = self._w[:start] @ remainder
                 solution += self._z[:start].T @ share
@@ -126,6 +127,7 @@ class KrylovSpace:
             if not len(columns):
                 break
             self._extend(z[:, :, still])
+            # No independent direction is left in single precision: `solve` recomputes the residual in double.
             if self._count == start:
                 break
         return solution.to(torch.float64).reshape(shape)
@@ -140,6 +142,7 @@ class KrylovSpace:
             if self._count:
                 share = self._w[: self._count] @ w
                 w = w - self._w[: self._count].T @ share
+                # Each operation on w is repeated on z, so that w = A z holds.
                 z = z - self._z[: self._count].T @ share
             squares, turn = torch.linalg.eigh((w.T @ w).to(torch.float64))
             independent = squares > (_INDEPENDENT * longest) ** 2

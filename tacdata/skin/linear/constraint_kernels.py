@@ -80,6 +80,7 @@ def describe(
         return
     s = wp.int32(slot[j, b])
     zero = wp.float32(0.0)
+    # A flat surface has one mortar row a node, along z, and no friction directions.
     if flat == 1:
         put_row(rows, b, s, base + j, wp.vec3(wp.float32(normal[j, 2, b]), zero, zero), zero, zero)
         return
@@ -99,6 +100,7 @@ def describe(
     xx, yy, zz = wp.float32(friction[j, 0, b]), wp.float32(friction[j, 1, b]), wp.float32(friction[j, 2, b])
     xy, yz, xz = wp.float32(friction[j, 3, b]), wp.float32(friction[j, 4, b]), wp.float32(friction[j, 5, b])
     D = wp.mat33(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+    # The stiffness along the slip is near 0 with the tangent, so D^-1 needs a bound.
     softness = SOFT * scale[b]
     tt = wp.dot(t, D * t) + wp.float32(1.0) / wp.max(softness * between(table, first, first, t, t), _LEAST)
     vv = wp.dot(v, D * v) + wp.float32(1.0) / wp.max(softness * between(table, first, first, v, v), _LEAST)
@@ -131,8 +133,10 @@ def assemble(
         )
         if i == j:
             value += rows.give[b, i, 0]
+        # Both tangents of a node are neighbours in this order; only they are coupled by D^-1.
         elif j == i - 1:
             value += rows.give[b, i, 1]
+    # A unit matrix beyond the member's constraints keeps the padded matrix positive definite.
     elif i == j:
         value = wp.float32(1.0)
     compliance[g, i, j] = value

@@ -52,6 +52,8 @@ class ConstraintPreconditioner:
             contacts: Of each surface.
             modulus: Young's modulus of each member [MPa], shape (b,).
         """
+        # K0 has the nominal modulus. Compliance is inversely proportional to the modulus, so one factor per member
+        # suffices.
         self.scale = (self._modulus / modulus).to(torch.float32)
         changed = self.rows.update(contacts, self.scale)
         self.solver.update(self.rows.sizes, changed, self.rows.most, self.rows.compliance, modulus.device)
@@ -73,6 +75,8 @@ class ConstraintPreconditioner:
         r = residual.reshape(-1, residual.shape[-1])
         which = torch.arange(r.shape[1], device=r.device) if member is None else member
         scale = self.scale[which]
+        # Block elimination: the unconstrained z first, its violation v of the constraints, their forces y, then z with
+        # them.
         z = self.rest.apply(r) * scale
         y = torch.zeros(len(which), self.rows.most, device=r.device)
         if any(self.rows.sizes):
@@ -94,4 +98,5 @@ class ConstraintPreconditioner:
 
 def compliance_solver(device: str) -> FactoredCompliance | InvertedCompliance:
     """Return the solver of the compliance for a device."""
+    # Triangular solves are sequential and slow on a GPU; an inverse is one batched product there (0007).
     return FactoredCompliance() if device == "cpu" else InvertedCompliance()

@@ -110,6 +110,7 @@ class ActiveRows:
         capacity = -(-max(self.sizes) // self._step) * self._step
         rows, device = self._held, scale.device
         if len(scale) > len(rows.own) or capacity > self.most or rows.own.device != device:
+            # Room never shrinks: tensors stay where recorded CUDA graphs expect them.
             self._held = rows = _Rows(max(len(scale), len(rows.own)), max(capacity, self.most), device)
         self._table = self._rest.table(self._used())
         new = _Rows(len(scale), self.most, device)
@@ -157,6 +158,7 @@ class ActiveRows:
         """Return changes of mean gaps [mm], by contact, shape (s, b), as values of the constraints, shape (b, a)."""
         values = torch.zeros(self.most + 1, len(self.sizes), device=self._held.own.device)
         for active, slot, gap in zip(self._active, self._slots, gaps, strict=True):
+            # Nodes that are not active write to an additional last row, which is dropped.
             values.scatter_(0, torch.where(active, slot, self.most), gap.to(torch.float32))
         return values[:-1].T.contiguous()
 
@@ -165,6 +167,7 @@ class ActiveRows:
         if not self.most:
             return [torch.zeros(active.shape, dtype=torch.float64, device=y.device) for active in self._active]
         return [
+            # Slots before a member's first active node are negative; their values are replaced by 0.
             torch.where(active, y.T.gather(0, slot.clamp_min(0)).to(torch.float64), 0.0)
             for active, slot in zip(self._active, self._slots, strict=True)
         ]

@@ -95,6 +95,7 @@ class CudaConjugateGradients:
     ) -> ActiveColumns:
         # Others, whose right-hand side is 0, fill the columns up.
         member = mask.to(torch.int32).argsort(descending=True, stable=True)[: self._columns(count)]
+        # Make every narrower width too: the batch shrinks through them.
         for width in (*range(self._step, len(member), self._step), len(member)):
             if width not in self._columns_of:
                 self._columns_of[width] = ActiveColumns(at, width, self._preconditioner, self._rest.padded)

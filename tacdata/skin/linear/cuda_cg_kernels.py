@@ -155,6 +155,7 @@ def judge(
     beta[b] = wp.float32(0.0)
     if going[b] == 1:
         if first[b] == 1:
+            # At first p is x itself, so p q is its squared energy norm.
             goal[b] = wp.max(curvature[b], wp.float32(0.0)) * tolerance[0] * tolerance[0]
             if rho_new[b] <= goal[b]:
                 going[b] = 0

@@ -33,6 +33,7 @@ def runtime() -> Any | None:
         [path] = [str(file.locate()) for file in files("mkl") or () if file.name.startswith("libmkl_rt.so")]
         library = ctypes.CDLL(path)
     except (PackageNotFoundError, OSError, ValueError):
+        # ValueError: the package contains no such library, or more than one.
         return None
     library.MKL_Set_Interface_Layer(_INT32)
     library.MKL_Set_Threading_Layer(_SEQUENTIAL)
@@ -72,6 +73,7 @@ class PardisoFactor:
         Raises:
             SolveError: If memory does not hold so many.
         """
+        # PARDISO reads right-hand sides one after another in memory.
         columns = np.ascontiguousarray(rhs.T, dtype=np.float32)
         solution = np.empty_like(columns)
         code = self._call(_SOLVE, columns, solution)
@@ -93,6 +95,7 @@ class _Memory:
     def __init__(self, library: Any, size: int) -> None:
         self.size = size
         self._library = library
+        # MKL requires a handle of 64 zeros at the first call.
         self._handle = np.zeros(64, dtype=np.int64)
         self._parameters = np.zeros(64, dtype=np.int32)
         self._parameters[list(_PARAMETERS)] = list(_PARAMETERS.values())
@@ -107,6 +110,7 @@ class _Memory:
         """Return the library's error code, 0 for none; ``rhs`` and ``solution`` of shape (b, n)."""
         error = ctypes.c_int(0)
         values, starts, columns = map(_at, matrix)
+        # In MKL's order: pt, maxfct, mnum, mtype, phase, n, a, ia, ja, perm, nrhs, iparm, msglvl, b, x, error.
         self._library.pardiso(
             _at(self._handle),
             _number(1),

@@ -83,6 +83,7 @@ def projected_conjugate_gradients(
             break
         q = product(at, p)
         curvature = _dot(p, q)
+        # Near an instability the tangent may be indefinite: the member then keeps the x of the step before (0013).
         going = curvature > 0
         alpha = torch.where(going, rho / curvature, 0.0)
         x = x.addcmul(p, alpha)

@@ -25,6 +25,7 @@ def rest_stiffness(mesh: SkinMesh, material: Material, averaged: bool = False) -
     lumped.
     """
     mu = material.shear_modulus
+    # With averages, kappa enters by `averaged_stiffness` below.
     lam = (0.0 if averaged else material.bulk_modulus) - 2 * mu / 3
     slopes, weights = mesh.shape_gradients()
     count = len(mesh.tets)
@@ -197,6 +198,7 @@ class DenseRest:
 
     def __init__(self, stiffness: sp.csr_matrix, unfixed: np.ndarray, rows: sp.csr_matrix, device: str) -> None:
         """Invert; arguments as of `rest_solver`, ``unfixed`` the degrees of freedom that are not held."""
+        # Two matrices in double precision while the inverse is made (0007).
         need = 2 * 8 * len(unfixed) ** 2
         have = need if device == "cpu" else torch.cuda.mem_get_info(device)[0]
         if need > have:

@@ -100,6 +100,7 @@ def sweep_kernels(dtype: torch.dtype) -> SimpleNamespace:
         """Read the columns from ``start`` to ``end``, the block on the diagonal apart."""
         b, i, c = wp.tid()
         value = real(0.0)
+        # Only the lower triangle is up to date: entries above the pivot are read from their mirror images.
         if i < start:
             value = a[b, start + c, i]
         elif i < end:

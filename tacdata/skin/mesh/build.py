@@ -54,6 +54,7 @@ def mesh_key(sensor: Sensor, settings: MeshSettings) -> str:
     """Return the name under which a mesh is kept: a hash of its inputs (32 hex digits)."""
     centers = sensor.taxels.centers.tolist() if sensor.skin.protrusion_radius else []
     document = asdict(settings)
+    # A tip size changes nothing without protrusions, so it must not make another key.
     if settings.tip is None or not sensor.skin.protrusion_radius:
         document.pop("tip")
     made_from = {"recipe": RECIPE, "skin": sensor.skin.identity, "protrusions": centers, "settings": document}

@@ -20,6 +20,7 @@ LEAST_RATIO = 1.3
 
 def coarser(settings: MeshSettings, ratio: float) -> MeshSettings:
     """Return settings whose edge lengths are ``ratio`` [1] times as long."""
+    # Only the edge length of the focus scales; its place and radii describe the shape.
     focus = settings.focus and (*settings.focus[:3], ratio * settings.focus[3], *settings.focus[4:])
     return replace(
         settings,
@@ -33,6 +34,7 @@ def coarser(settings: MeshSettings, ratio: float) -> MeshSettings:
 
 def edge_ratio(fine: SkinMesh, coarse: SkinMesh) -> float:
     """Return the edge length of a coarser mesh over that of a finer one [1], by the triangles of their outer faces."""
+    # On one face the number of triangles goes with the inverse square of their edges.
     return float(np.sqrt(len(fine.outer) / len(coarse.outer)))
 
 

@@ -37,6 +37,7 @@ def tetrahedron_quadrature() -> tuple[np.ndarray, np.ndarray]:
     """Return the 4-point rule, exact to degree 2: points (4, 3) and weights (4,) that sum to 1/6."""
     a, b = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
     points = np.full((4, 3), a)
+    # The first point is near corner 0, whose barycentric coordinate is not among the three.
     points[1:][np.eye(3, dtype=bool)] = b
     return points, np.full(4, 1 / 24)
 
@@ -99,6 +100,7 @@ def triangle_quadrature(subdivisions: int = 1) -> tuple[np.ndarray, np.ndarray]:
             all_points.append((points + np.array([i, j])) / n)
             all_weights.append(weights / n**2)
             if i + j < n - 1:
+                # Sub-triangles that point the other way get the rule rotated by half a turn.
                 all_points.append((np.array([i + 1, j + 1]) - points) / n)
                 all_weights.append(weights / n**2)
     return np.concatenate(all_points), np.concatenate(all_weights)

@@ -111,6 +111,7 @@ class SkinMesh:
     def save(self, path: Path) -> None:
         """Write the mesh as an NPZ file: first under a temporary name."""
         path.parent.mkdir(parents=True, exist_ok=True)
+        # NumPy would append .npz to a name without it.
         temporary = path.with_name(f".{path.name}.{os.getpid()}.npz")
         np.savez_compressed(temporary, **{f.name: getattr(self, f.name) for f in fields(self)})
         temporary.replace(path)

@@ -313,6 +313,7 @@ class Batch:
         state.put(columns, proposed)
         self._at.unknowns = state
         self._at.near = torch.where(which, near, self._at.near)
+        # An infinite residual: the start of a load step has no predecessor to be compared with.
         self._before = torch.where(which, torch.inf, self._before)
 
     def _step(self, residual: Residual) -> None:
@@ -337,6 +338,7 @@ class Batch:
         limit = torch.where(at.near > 0, _ANY, residual.relative)
         self._base, self._before = at.unknowns, torch.where(first, limit.clamp_min(_STARTED), limit)
         at.unknowns = self._base.plus(Unknowns(advanced, changes))
+        # Only the first step of a load step adds near nodes to the active set (0019).
         at.near = torch.zeros_like(at.near)
 
     def _release(self, columns: list[int]) -> None:

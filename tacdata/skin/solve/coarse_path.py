@@ -27,6 +27,7 @@ class CoarsePath:
         states = [(at, state.single()) for at, state in reached if at > 0]
         if not states:
             return None
+        # The undeformed skin is the state at depth 0.
         parts = [states[0][1].zeros(), *(state for _, state in states)]
         return cls(np.array([0.0, *(at for at, _ in states)]), Unknowns.joined(parts))
 

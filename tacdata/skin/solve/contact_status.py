@@ -25,6 +25,7 @@ class ContactStatus:
     def changed(self, contacts: Sequence[ContactForces], friction: torch.Tensor) -> torch.Tensor:
         """Return in which members a node has another status than was noted, shape (b,), bool."""
         change = torch.zeros_like(friction, dtype=torch.bool)
+        # Not strict: before the first step there is no noted status, and so no change.
         for previous, current in zip(self._before, self._of(contacts, friction), strict=False):
             change |= (previous != current).any(dim=0)
         return change

@@ -100,6 +100,7 @@ class StateReader:
     def states(self, reached: Equilibria, with_displacement: bool = True) -> list[Equilibrium]:
         """Return the states that columns of a batch have reached, displacements only if they are wanted."""
         column = reached.column
+        # Contact computes the force on the skin; results state its reaction on the indenter.
         force = -reached.contacts[0].force[:, column]
         load = torch.zeros(self._taxels, len(column), dtype=torch.float64, device=force.device)
         area = torch.zeros_like(load)

@@ -56,6 +56,7 @@ class LoadPath:
     def _propose(self) -> None:
         way = self.depths[self._wanted] - self.depth
         step = min(max(way, -min(self._step, self.lift)), min(self._step, self.longest))
+        # The wanted depth itself, not a sum: `found` compares depths to 1e-12 mm.
         self.attempt = self.depths[self._wanted] if step == way else self.depth + step
         self.newton, self._best, self._best_at = 0, math.inf, 0
 
@@ -116,6 +117,7 @@ class LoadPath:
         reached = abs(self.depths[self._wanted] - self.depth) <= 1e-12
         if reached:
             self._wanted += 1
+            # `_propose` limits each direction by its own bound.
             self._step = max(self.longest, self.lift)
         else:
             self._step = min(2 * self._step, max(self.longest, self.lift))

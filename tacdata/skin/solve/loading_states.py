@@ -58,6 +58,7 @@ class LoadingStates:
         """Interpolate unknowns, float64, at depths [mm], shape (b,)."""
         after = (self._depth < depth).sum(dim=0).minimum(self._count - 1).clamp_min(1)
         low, high = (self._depth.gather(0, row[None])[0] for row in (after - 1, after))
+        # Rows that are not filled have infinite depth: then the last state is used as it is.
         share = torch.where(torch.isfinite(high), (depth - low) / (high - low), 0.0)
         lower, upper = (self._row(row) for row in (after - 1, after))
         flat = lower + share * (upper - lower).to(torch.float64)

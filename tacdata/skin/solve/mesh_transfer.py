@@ -77,6 +77,7 @@ def _located(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.nd
     count = min(_NEAREST, len(corners))
     near = KDTree(corners.mean(axis=1)).query(points, count)[1].reshape(len(points), count)
     first, sides = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    # A triangle in space has two sides: its matrix is not square.
     inverse = np.linalg.pinv(sides)
     best, elements, shortest = (
         np.zeros((len(points), corners.shape[1])),

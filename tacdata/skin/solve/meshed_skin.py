@@ -92,6 +92,7 @@ class MeshedSkin:
     def rest(self) -> RestSolver:
         """The inverse of the stiffness at rest; costs seconds, once."""
         material = self.sensor.material
+        # Three rows a node on the outer face, whose normals turn; on the flat board one, along z.
         faces = [(self.mesh.outer, np.eye(3))]
         if self.board:
             faces.append((self.mesh.protrusions, np.eye(3)[2:]))
@@ -141,6 +142,7 @@ class MeshedSkin:
 
     def batch(self, requests: Sequence[PressRequest], capacity: int) -> Batch:
         """Return an idle batch for presses by the shapes of ``requests``, so many at a time."""
+        # The board just touches the tips of the undeformed protrusions.
         idle, floor = self.conditions.pressed_by(requests[0].indenter), -self.sensor.skin.protrusion_tip
         return Batch(self.newton(requests), idle, len(self.mesh.nodes), capacity, floor)
 

@@ -122,6 +122,7 @@ class Newton:
 
     def is_bad(self, limit: torch.Tensor, residual: Residual) -> torch.Tensor:
         """Return which members' step failed, shape (b,): residual more than doubled, or an element nearly inverted."""
+        # Negated comparisons: NaN counts as a failed step.
         return ~(residual.relative <= torch.clamp_min(2.0 * limit, 0.3)) | ~(residual.volume >= _LEAST_VOLUME)
 
     def step(
@@ -141,6 +142,7 @@ class Newton:
         contacts = [forces.tangent for forces in residual.contacts]
         self.preconditioner.update(contacts, at.conditions.modulus)
         size = residual.scale
+        # Right-hand sides of about norm 1, as the GPU's solver rounds to half precision; x is scaled back below.
         r = torch.where(mask, residual.force / size, 0.0).to(_WORK)
         gaps = [torch.where(mask & own.tangent.active, -own.gap / size, 0.0) for own in residual.contacts]
         linearization = self.tangent.at(at.u.to(_WORK), at.conditions, contacts, None if self._cuda else mask)
@@ -152,6 +154,7 @@ class Newton:
                 self.product, linearization, self.preconditioner, r, gaps, mask, stopping
             )
         # Inactive multipliers end at 0.
+        # The solvers return -p in newtons; multipliers are tractions, hence sign and area.
         changes = tuple(
             torch.where(mask, own.pressure - multiplier - force * size / surface.area[:, None], 0.0)
             for surface, own, multiplier, force in zip(

@@ -214,6 +214,7 @@ def highest(
     m2 = two * _jacobian(b, c, d, e, f, zero, half) - half * (j00 + j01)
     least = wp.min(wp.min(wp.min(j00, j10), wp.min(j01, m0)), wp.min(m1, m2))
     most = wp.max(wp.max(wp.max(j00, j10), wp.max(j01, m0)), wp.max(m1, m2))
+    # One sign and within a factor of two: the map is nearly affine, and one start of the search suffices.
     mild = least > half * most or most < half * least
     # The flat triangle of the corners: its inverse is where the search starts.
     s, t = _flat(p1) - a, _flat(p2) - a

@@ -27,6 +27,7 @@ def curve(nodes: np.ndarray, targets: np.ndarray, tets: np.ndarray) -> np.ndarra
     points, _ = elements.tetrahedron_quadrature()
     slopes = elements.tetrahedron_gradients(points)
     straight = np.linalg.det(np.einsum("eai,qaj->eqij", nodes[tets], slopes))
+    # A node taken back may fold a neighbouring element, which is then found in the next pass.
     for _ in range(5):
         jacobian = np.einsum("eai,qaj->eqij", curved[tets], slopes)
         bad = np.any(np.linalg.det(jacobian) < _KEEP * straight, axis=1)

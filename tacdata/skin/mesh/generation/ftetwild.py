@@ -45,6 +45,7 @@ def ftetwild(
         np.savez(
             request, vertices=vertices, faces=faces, points=points, cells=cells, size=size, edge=edge, envelope=envelope
         )
+        # With -P no file in the user's working folder can shadow a module of the child.
         line = [sys.executable, "-P", "-m", __name__, str(request), str(result)]
         done = subprocess.run(line, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
         if done.returncode or not result.exists():

@@ -94,6 +94,7 @@ def _target(sensor: Sensor, surface: OwnSurface) -> _Target:
     points, triangles, parent = smooth(corners, np.asarray(hull.faces)).divided(_CHORD)
     a, b, c = (points[triangles[:, k]] for k in range(3))
     outer = points[triangles[part[parent] == PARTS.index("outer")]].reshape(-1, 3)
+    # Divergence theorem: signed tetrahedra from the origin to every triangle.
     volume = float(np.einsum("ij,ij->", np.cross(a, b), c) / 6)
     creases = Creases.of(corners, np.asarray(hull.faces))
     return _Target(hull, Nearest(points, triangles), parent, part, volume, outer, creases)

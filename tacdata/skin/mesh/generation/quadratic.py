@@ -37,6 +37,7 @@ def quadratic(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> SkinMes
     body = with_middles(snapped.vertices, snapped.tets)
     faces, taxel = snapped.faces, snapped.taxel
     z = snapped.vertices[faces][:, :, 2]
+    # A face of the underside may have all corners on one rim; it is flat on z = 0.
     is_bump = np.all(taxel[faces] >= 0, axis=1) & ~np.all(np.abs(z) < _ON, axis=1)
     outer = body.triangles(faces[np.all(np.abs(z - skin.thickness) < _ON, axis=1)])
     bumps = body.triangles(faces[is_bump])
@@ -46,6 +47,7 @@ def quadratic(sensor: Sensor, vertices: np.ndarray, tets: np.ndarray) -> SkinMes
     sides = (inset.min(axis=1) < _ON) & (nodes[:, 2] > -_ON)
     bottom = np.zeros(len(nodes), dtype=bool)
     bottom[body.triangles(faces[np.all(np.abs(z) < _ON, axis=1)]).ravel()] = True
+    # Bend last: snapping and naming compare with the planes of the flat pad.
     return SkinMesh(bend(skin, nodes), body.tets, outer, bumps, bump_taxel, sides, bottom)
 
 

@@ -22,6 +22,7 @@ def surface(sensor: Sensor, tip: float | None = None) -> trimesh.Trimesh:
         return slab
     parts = [slab]
     for x, y in sensor.taxels.centers:
+        # The prism reaches into the slab: the union joins bodies that overlap, not bodies that share a face.
         bump = Protrusion.of(skin).hull(min(0.5 * skin.thickness, skin.protrusion_radius), tip)
         bump.apply_translation([x, y, 0])
         parts.append(bump)

@@ -32,6 +32,7 @@ def true_volume(sensor: Sensor) -> float:
         hull = read_closed(find(skin.surface.file, skin.surface.sha256, "skin"), skin.surface.scale, "skin")
         points, triangles, _ = smooth(np.asarray(hull.vertices, float), np.asarray(hull.faces)).divided(_CHORD)
         a, b, c = (points[triangles[:, k]] for k in range(3))
+        # Divergence theorem: signed tetrahedra from the origin to every triangle.
         return float(np.einsum("ij,ij->", np.cross(a, b), c) / 6)
     points, weights = np.polynomial.legendre.leggauss(_POINTS)
     half = np.array([skin.size_x, skin.size_y, skin.thickness]) / 2
