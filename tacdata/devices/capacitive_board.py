@@ -127,10 +127,12 @@ class CapacitiveBoard(TaxelBoard):
                 if not self._stopped.is_set():
                     self._break(error)
                 return
+            # Before decoding, whose duration would count as latency of the link.
             arrival_ns = self.clock.now_ns()
             if not data:
                 continue
             with self._changed:
+                # The first bytes, for the error of a stream in which no frame was found.
                 self._seen += data[: max(0, 4096 - len(self._seen))]
                 frames = self._decoder.feed(data, arrival_ns)
                 if frames and not begun:
@@ -140,9 +142,8 @@ class CapacitiveBoard(TaxelBoard):
                 self._changed.notify_all()
 
     def _forget_partial_frame(self) -> None:
-        # The port is opened in the middle of a frame. Bytes before the first good one are no fault of the stream,
-        # and
-        # is reported only if it was longer than a frame.
+        # The port is opened in the middle of a frame: a few bytes before the first good one are no fault of the stream.
+        # Two damaged frames, or more bytes than some frames have, are noted.
         counts, rest = self.counts, 4 * self.format.size if self.format.encoding == "binary" else 4096
         if counts.corrupt > 1 or counts.garbage_bytes > rest:
             counts.notes.append(f"{counts.garbage_bytes} B, {counts.corrupt} frames were damaged at first")

@@ -215,6 +215,7 @@ class Grbl(MotionController):
         x, y, z = position
         self._queue(self._duration(np.array(position), speed))
         self._target, self._moved = np.array(position), True
+        # G53: machine coordinates; G90: absolute; G94: feed in mm/min; G21: mm; G1: a straight move.
         return self._send(f"G53G90G94G21G1X{x:.4f}Y{y:.4f}Z{z:.4f}F{60 * speed:.3f}")
 
     def rise(self, position: tuple[float, float, float], speed: float) -> Motion:
@@ -260,6 +261,7 @@ class Grbl(MotionController):
         """Send ``~``."""
         link = self._opened()
         link.rearm()
+        # The hold delays the end of the queued motion by its own duration.
         self._ends_ns += self.clock.now_ns() - self._held_ns
         link.realtime(b"~")
 
@@ -340,6 +342,7 @@ class Grbl(MotionController):
         last = self._opened().last
         start = self._target if self._target is not None else last.position if last else position
         length = float(np.linalg.norm(position - start))
+        # An upper bound: along a diagonal the slowest axis need not be the limit.
         slowest = min(speed, float(self.max_rate.min()))
         return length / slowest + slowest / float(self.acceleration.min()) if length else 0.0
 
@@ -382,6 +385,7 @@ class Grbl(MotionController):
             "reset_at_opening": "yes" if link.resets else "no",
             "state_at_opening": state,
             "homed_at_opening": "yes" if homed else "no",
+            # Adding 0.0 turns -0.0 into 0.0, which is printed without a sign.
             "position_at_opening": ",".join(f"{value:.3f}" for value in position + 0.0),
         }
         if link.resets and not self._answers.homing:

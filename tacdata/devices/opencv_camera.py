@@ -382,6 +382,7 @@ def _decoded(data: bytes, device_ns: int = -1) -> _Grabbed:
     import cv2
 
     if data.startswith(b"\xff\xd8"):
+        # FF D8 begins a JPEG file, FF D9 ends it.
         end = data.rfind(b"\xff\xd9")
         if end < 0:
             return _Grabbed(None, device_ns=device_ns)

@@ -84,6 +84,7 @@ def onset(height: np.ndarray, answer: np.ndarray, power: float | None = None) ->
     place, width, best = whole
     foot = height >= place - FOOT
     near = _fit(height[foot], answer[foot], powers) if foot.sum() >= 8 and answer[foot][-1] > CLEAR else None
+    # Contact is anywhere within a step of the approach: the standard deviation of a uniform distribution.
     model = float(np.median(-np.diff(height))) / np.sqrt(12)
     if near is not None and abs(near[0] - place) > 2 * np.hypot(near[1], width):
         model = float(np.hypot(model, near[0] - place))
@@ -135,12 +136,14 @@ def _misfits(height: np.ndarray, answer: np.ndarray, trial: np.ndarray, powers: 
     hinge = np.maximum(trial[:, None, None] - height, 0.0) ** powers[None, :, None]
     weight = np.ones_like(hinge)
     residual = np.broadcast_to(answer, hinge.shape)
+    # Iteratively reweighted least squares: at given weights b and A have closed forms.
     for _ in range(4):
         total = weight.sum(axis=-1)
         mean_h, mean_y = (weight * hinge).sum(axis=-1) / total, (weight * answer).sum(axis=-1) / total
         off_h, off_y = hinge - mean_h[..., None], answer - mean_y[..., None]
         slope = (weight * off_h * off_y).sum(axis=-1) / np.maximum((weight * off_h**2).sum(axis=-1), 1e-30)
         residual = off_y - slope[..., None] * off_h
+        # 1.4826 times the median absolute deviation is a Gaussian's standard deviation.
         spread = np.maximum(1.0, 1.4826 * np.median(np.abs(residual), axis=-1))[..., None]
         weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(residual), 1e-12))
     size = np.abs(residual)

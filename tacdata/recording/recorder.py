@@ -138,6 +138,7 @@ class Recorder:
             return self._open_and_record(session, wanted, confirm)
         except BaseException as error:
             if isinstance(error, BadReadings) and self._paused(error):
+                # A person has just agreed to go on; the summary needs no second yes.
                 return self.run(lambda summary: True)
             self._interruption.last_words()
             error.add_note(self._ending(self._guard.loss(), error))
@@ -297,6 +298,7 @@ class Recorder:
     ) -> tuple[Session, Position]:
         """Carry out the sync tap and use the latencies that it measures; return the session and the position [mm]."""
         position = self._change_indenter(tap, position, streams)
+        # The tap has to show the whole delay, so nothing is subtracted in its own recording.
         before, self._latencies = self._latencies, {}
         streams.set_latencies({})
         course = tap_motion.steps(tap, self.plan, self.rig.registration_for(tap.indenter_name))
@@ -349,6 +351,7 @@ class Recorder:
 
     def _close(self, writer: EpisodeWriter, streams: RigStreams, broken_off: str = "") -> None:
         streams.catch_up()
+        # Before `record_into`, which resets the counts.
         counts = streams.counts
         streams.record_into(None)
         reason = f"broken off: {broken_off}" if broken_off else ""

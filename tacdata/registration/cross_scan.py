@@ -67,19 +67,22 @@ def cross_scan(
     center = np.array(guess, dtype=float)
     lines, spread = [], []
     for axis, step in zip(axes, pitch, strict=True):
-        # The presses alternate between the line's halves, so that drift and the skin's memory do not favour one side.
+        # In a random order (always the same for a taxel), so that drift and the skin's memory favour no side.
         offsets = np.linspace(-REACH * step, REACH * step, PRESSES)
         order = np.random.default_rng(taxel).permutation(PRESSES)
         answer = np.zeros(PRESSES)
         for k in order.tolist():
             place = center + offsets[k] * axis
             answer[k] = _press(probe, place, surface(*place.tolist()), depth)[taxel]
+        # An answer is the difference of two means of `FRAMES` readings each.
         found = symmetric_center(offsets, answer, float(noise[taxel]) * np.sqrt(2 / FRAMES))
         if found is None:
             raise _silent(taxel, answer, float(noise[taxel]))
+        # The second line crosses the centre that the first line found.
         center = center + found.place * axis
         lines.append((offsets, answer))
         spread.append(found.uncertainty)
+    # Variances along the two lines, as variances along the machine's axes.
     ux, uy = np.sqrt((axes.T**2) @ np.array(spread) ** 2).tolist()
     return Cross(taxel, float(center[0]), float(center[1]), (ux, uy), tuple(lines))
 

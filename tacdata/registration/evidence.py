@@ -114,6 +114,7 @@ def touch_evidence(
     contact = _first_answer(probe, place, heights, idle.mean, noise)
     if contact is None:
         raise _contradiction(f"no channel answers down to machine height {heights[-1]:.2f} mm", expected, limit)
+    # The search resolves the contact to one step only.
     if contact > expected + limit + COARSE:
         raise _contradiction(f"the skin answers already at machine height {contact:.2f} mm", expected, limit)
     touch = approach(probe, "the touch before the first press", place, contact, contact - BELOW, noise)

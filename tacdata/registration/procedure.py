@@ -131,6 +131,7 @@ def _touches(
             rise = float(np.hypot(x, y)) * np.tan(np.radians(settings.most_tilt + 1.0))
             top = min(top, touches[0].onset.height + expected - guess.origin[2] + QUIET_RISE + rise)
         above = max(top, touches[-1].onset.height + settings.above if touches else top)
+        # First straight up, then sideways: a tilted skin may be higher at the next place.
         probe.go((touches[-1].x, touches[-1].y, above) if touches else (mx, my, above), LIFT_SPEED)
         probe.go((mx, my, above), LIFT_SPEED)
         touches += touch_off(probe, name, (mx, my), top, lowest, noise, settings.repeats)

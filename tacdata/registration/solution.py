@@ -81,6 +81,7 @@ def fit_rigid_motion(sensor: np.ndarray, machine: np.ndarray, uncertainty: np.nd
         uncertainty: Standard uncertainty of each coordinate found [mm], shape (n, 2).
     """
     a, b = sensor - sensor.mean(axis=0), machine - machine.mean(axis=0)
+    # In two dimensions the best rotation is the angle of the vector (dot, cross).
     dot = float((a * b).sum())
     cross = float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
     yaw = np.arctan2(cross, dot)
@@ -91,6 +92,7 @@ def fit_rigid_motion(sensor: np.ndarray, machine: np.ndarray, uncertainty: np.nd
     degrees = max(2 * len(sensor) - 3, 1)
     spread = max(float(np.sqrt((uncertainty**2).mean())), float(np.sqrt((residual**2).sum() / degrees)))
     turning = spread / np.sqrt(lever)
+    # The origin is off the taxels' mean, so an error of the yaw moves it by that distance.
     arm = float(np.linalg.norm(sensor.mean(axis=0)))
     position = float(np.sqrt(spread**2 / len(sensor) + (turning * arm) ** 2))
     scale = float(np.hypot(dot, cross)) / lever

@@ -55,6 +55,7 @@ def symmetric_center(place: np.ndarray, answer: np.ndarray, noise: float) -> Cen
         return (base + top * bell - answer / height) * (abs(height) / noise)
 
     lower, upper = [place.min(), 0.1, 0.5, 0.3, -0.5], [place.max(), 3 * span, 20.0, 3.0, 0.7]
+    # The search starts from Boussinesq's exponent, 5/2.
     start = [float(np.clip(place[peak], lower[0] + 1e-3, upper[0] - 1e-3)), 0.5 * span, 2.5, 1.0, 0.0]
     fit = least_squares(residual, start, bounds=(lower, upper), loss="soft_l1", x_scale=[0.1, 1.0, 1.0, 0.3, 0.1])
     center = float(fit.x[0])

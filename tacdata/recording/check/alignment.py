@@ -33,6 +33,7 @@ def reading_lag(figures: RecordingFigures) -> float | None:
     felt, episode = _felt(figures, 0.5), figures.recording.episode
     if felt is None:
         return None
+    # Above the skin nothing answers, so heights above it are not compared.
     depth = np.maximum(episode.tip_at(episode.taxels.sample_ns)[:, 2], 0.0)
     gone = _crossings(depth, float(depth.max()), 0.5, episode.taxels.sample_ns)
     return None if gone is None else float(np.mean(felt - gone) / 1e6)
@@ -56,6 +57,7 @@ def _felt(figures: RecordingFigures, share: float) -> np.ndarray | None:
     change = episode.taxels.counts - np.median(episode.taxels.counts[idle], axis=0)
     if not np.isfinite(change).all():
         return None
+    # A quantised channel may rest on one count; half a count is then its noise.
     noise = np.maximum(change[idle].std(axis=0), 0.5)
     # The middle of the ten greatest: one spike is no answer.
     greatest = np.sort(np.abs(change), axis=0)[-FEW:].mean(axis=0)
@@ -74,6 +76,7 @@ def loading(figures: RecordingFigures) -> float:
 def _crossings(values: np.ndarray, greatest: float, share: float, time_ns: np.ndarray) -> np.ndarray | None:
     """Return when a share of the greatest value is first passed upwards and last downwards [ns], shape (2,)."""
     above = np.flatnonzero(values > share * greatest)
+    # A crossing needs a reading on either side of it.
     if not len(above) or above[0] == 0 or above[-1] == len(values) - 1:
         return None
     times = []
@@ -129,6 +132,7 @@ def stood_still(figures: RecordingFigures, rate: float) -> float:
     if len(arrival) < 2:
         return 0.0
     usual = float(np.median(np.diff(arrival))) + UNKNOWN_MS * 1e6 * rate
+    # An interrupted recording ends within its last move, which did not run to its end.
     moves = recording.moves if recording.episode.complete else recording.moves[:-1]
     for move, following in zip(moves, [*recording.moves[1:], None], strict=False):
         later = _ended_by(recording, move, following) - move.end_ns
@@ -149,6 +153,7 @@ def _ended_by(recording: Recording, move: AnchoredMove, following: AnchoredMove 
     ends = [float(shown[0])] if len(shown) else []
     hold = next((phase for phase in episode.phases if phase.name == "hold"), None)
     if hold is not None and move.command.phase == "press":
+        # The end of the hold is an acknowledgement, and its length is known: the press ended before it began.
         ends.append(hold.end_ns - episode.press.hold * 1e9)
     if following is not None:
         ends.append(following.command.sent_ns)

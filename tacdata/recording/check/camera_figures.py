@@ -69,6 +69,7 @@ def _longest_gap(arrival_ns: np.ndarray, within: tuple[int, int]) -> float | Non
     """Return the longest time without an image [ms], from the recording's beginning to its end."""
     if not len(arrival_ns):
         return None
+    # The board's readings mark the span: a camera that is silent at either end has a gap there.
     moments = np.concatenate([[min(within[0], arrival_ns[0])], arrival_ns, [max(within[1], arrival_ns[-1])]])
     return _rounded(np.diff(moments).max() / 1e6)
 

@@ -143,6 +143,7 @@ def jumps(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jum
         response: Change of each channel from rest to hold [counts], shape (taxels,).
     """
     usual, size_of = _usual(noise), np.abs(np.nan_to_num(response))
+    # A difference of two readings has sqrt(2) times the noise of one.
     least = JUMP * np.sqrt(2) * usual
     clear = np.flatnonzero(size_of > ANSWERING * usual)  # none where a reading is no number
     found: dict[int, Jump] = {}
@@ -228,6 +229,7 @@ def held_frames(counts: np.ndarray, noise: np.ndarray) -> int:
     if len(counts) < 2 or np.isnan(noise).all() or np.nanmedian(noise) <= LIVE or (counts == counts[:1]).all():
         return 0
     same = np.concatenate([[False], (counts[1:] == counts[:-1]).all(axis=1), [False]])
+    # k equal neighbours in a row are k + 1 equal frames.
     edges = np.flatnonzero(np.diff(same.astype(int)))
     return int((edges[1::2] - edges[::2]).max(initial=0)) + 1 if len(edges) else 0
 
@@ -251,12 +253,15 @@ def held_by_chance(counts: np.ndarray, idle: np.ndarray, frames: int) -> float:
     resolution = np.abs(change[change != 0]).min()
     # Two Gaussian readings are equal with this probability; their difference has twice the variance of one.
     equal = np.minimum(resolution / (np.sqrt(2 * np.pi) * change.std(axis=0)), 1.0)
+    # Effective number of independent channels: (sum of eigenvalues)^2 / sum of their squares, of the correlation
+    # matrix.
     independent = change.shape[1] ** 2 / (np.corrcoef(change.T) ** 2).sum()
     return len(counts) * float(np.exp(independent * np.log(equal).mean() * (frames - 1)))
 
 
 def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, float]]:
     change = np.diff(counts, axis=0)
+    # Relaxation changes all neighbouring differences alike: their running median is subtracted.
     padded = np.pad(change, ((2, 2), (0, 0)), mode="edge")
     trend = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
     sudden = np.argwhere(np.abs(change - trend) > threshold)

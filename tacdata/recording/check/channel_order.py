@@ -114,6 +114,7 @@ def fit_answers(found: Answers, place: np.ndarray | None = None) -> AnswerFit:
         expected = pattern[:, place]
         weight = _trust(response - expected * gain, found.noise)
         raw = (weight * response * expected).sum(axis=0) / np.maximum((weight * expected**2).sum(axis=0), 1e-12)
+        # Gains and amplitudes share one free factor: the median gain is set to 1.
         gain = np.clip(raw / max(float(np.median(raw)), 1e-12), 0.2, 5.0)
     return AnswerFit(gain, pattern, amplitude)
 
@@ -124,6 +125,7 @@ def _amplitudes(response: np.ndarray, shape: np.ndarray, weight: np.ndarray) -> 
 
 
 def _trust(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    # 1.5 median |r| estimates the standard deviation of a Gaussian; Cauchy weights reduce outliers beyond three of it.
     scale = np.maximum(1.5 * np.median(np.abs(residual), axis=1, keepdims=True), noise)
     return 1 / (1 + (residual / (3 * scale)) ** 2)
 
@@ -148,6 +150,7 @@ def exchanged(score: np.ndarray) -> dict[int, int]:
     own = np.diag(score)
     _, place = linear_sum_assignment(-score)
     gain = score[np.arange(len(own)), place] - own
+    # Channels exchange places in cycles, so each channel of the cycle has to fit better.
     return {
         k: int(j) for k, j in enumerate(place) if j != k and gain[k] > CLEAR and _cycle_gain(place, gain, k) > CLEAR
     }
@@ -178,6 +181,7 @@ def likelihood(found: Answers, pattern: np.ndarray) -> np.ndarray:
     a, b = response / scale, pattern / scale
     floor = count * (np.median(found.noise / np.median(scale)) ** 2 + 0.02**2)
     power = (a**2).sum(axis=0)[:, None]
+    # A gain is positive: answers of the opposite sign explain nothing.
     shared = np.maximum(a.T @ b, 0.0) ** 2 / np.maximum((b**2).sum(axis=0), 1e-12)
     return -0.5 * count * np.log((power - shared + floor) / (power + floor))
 
@@ -189,6 +193,7 @@ def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
     pattern = fit_answers(found).pattern
     near = _near(found, pattern)
     ratio = np.full(pattern.shape, np.nan)
+    # A gain is a factor; in logarithms its step is additive.
     ratio[near] = np.log(np.clip(found.response[near] / pattern[near], 0.05, 20.0))
     ratio -= _common(found, ratio)
     centers = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in ratio.T])

@@ -35,7 +35,9 @@ def clock_figures(
     if clock is None:
         return None
     within = (int(arrival_ns[0]), int(arrival_ns[-1])) if len(arrival_ns) else (0, 0)
+    # Sample times have the constant latency subtracted; the delay is what exceeds it.
     beyond = arrival_ns - sample_ns - (clock.latency.latency_ns if clock.latency else 0)
+    # Each step begins a line, except for the first line.
     lines = (*clock.earlier, clock)[1:]
     steps = [s for s, line in zip(clock.steps_ns, lines, strict=True) if within[0] < line.first_arrival_ns <= within[1]]
     known = nominal_period_ns > 0 or clock.axis == "device_ns"

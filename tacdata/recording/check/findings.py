@@ -226,6 +226,7 @@ def _cnc(figures: RecordingFigures) -> list[Judgement]:
     values, found = figures.document["cnc"], []
     if not values["reports"]:
         return [(UNUSABLE, "cnc", "no status report")]
+    # GRBL may append a code to a state, as in Door:1.
     alarms = [state for state in values["states"] if state.split(":")[0] in ("Alarm", "Door")]
     if alarms:
         found.append((UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"))

@@ -115,6 +115,7 @@ def _repeats(counts: np.ndarray) -> list[Doubt]:
     for place, factor in enumerate(factors):
         keys += kind[place : place + windows] * factor
     _, first, group = np.unique(keys, return_index=True, return_inverse=True)
+    # Windows that overlap do not count: a resting signal equals itself one row later.
     for later in np.flatnonzero(first[group] <= np.arange(windows) - REPEATED).tolist():
         earlier = int(first[group[later]])
         if len(np.unique(kind[later : later + REPEATED])) < VARIED:
@@ -133,6 +134,7 @@ def _motion(recording: Recording) -> list[Doubt]:
     """Judge speeds: between reports where there are commands, along the path where there are none."""
     episode, stream = recording.episode, recording.episode.cnc
     if recording.moves and len(stream.sample_ns) > 1:
+        # Sample times are the middle of query and answer, so two positions are at most this far apart in time.
         half = stream.arrival_ns - stream.sample_ns
         longest = (stream.arrival_ns[1:] - (stream.sample_ns[:-1] - half[:-1])) * 1e-9
         way = np.linalg.norm(np.diff(stream.position, axis=0), axis=1)

@@ -63,6 +63,7 @@ def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
         return [*apart, Finding(UNUSABLE, "taxels", "", text)]
     moved = misplaced(found)
     texts = [(UNUSABLE, text) for text in _places(found, moved)]
+    # A channel that answers at another taxel's place is not silent.
     if quiet := [channel for channel in silent(found) if channel not in moved]:
         texts.append((UNUSABLE, f"channel {', '.join(map(str, quiet))} did not answer to presses close by"))
     names = [f.recording.episode.path.name for f in entries if counts_as_press(f)]
@@ -191,6 +192,7 @@ def _steps(entries: list[RecordingFigures], found: Answers, names: list[str]) ->
         words = "the tool or the skin slipped, or the registration changed"
         return [(UNUSABLE, f"answers lie x {x:+.1f}, y {y:+.1f} mm elsewhere from {names[slipped.row]} on: {words}")]
     if step := height_step(entries).step:
+        # For an answer linear in depth, a surface lower by h moves the depth at a share s by (1 - s) h.
         height = float(step.size[0]) / (1 - FELT)
         way = "deeper" if height > 0 else "higher"
         words = f"the skin is felt about {abs(height):.2f} mm {way} from {names[step.row]} on"

@@ -65,6 +65,7 @@ def find_step(explained: np.ndarray, values: np.ndarray, least: float) -> StepSe
     count, best, middle = len(values), None, np.inf
     for at in range(FEWEST, count - FEWEST + 1):
         step = (np.arange(count) >= at).astype(float)
+        # Only the part of the step that no other column explains determines its size (Frisch, Waugh and Lovell).
         own = step - explained @ np.linalg.lstsq(explained, step, rcond=None)[0]
         design = np.column_stack([explained, step])
         freedom = count - int(np.linalg.matrix_rank(design))

@@ -56,6 +56,7 @@ def append_to_hull(hull: list[Point], point: Point) -> None:
     """Add a (counter, arrival) point right of all others to a lower convex hull, in exact integers."""
     while len(hull) >= 2:
         (x1, y1), (x2, y2) = hull[-2:]
+        # Slopes rise along a lower hull; a middle point that breaks this is above the chord.
         if (x2 - x1) * (point[1] - y1) > (y2 - y1) * (point[0] - x1):
             break
         hull.pop()
@@ -108,6 +109,7 @@ class _Stretch:
         if len(self.blocks) > BLOCKS:
             gone = self.blocks.pop(0)
             self._count, self._total = self._count - gone.sums[0], self._total - gone.sums[1]
+            # The hull of all arrivals is the hull of the blocks' hulls.
             self.hull = []
             for kept in (p for block in self.blocks for p in block.hull):
                 append_to_hull(self.hull, kept)
@@ -169,6 +171,7 @@ class _Stretch:
         x0, y0, slope = line
         delay, jitter, uncertainty = self._spread(line)
         free = line == self._free_line()
+        # Either end of the line may be off by the uncertainty.
         drift = 2 * uncertainty / self.span_ns
         return ClockModel(
             x0,
@@ -187,9 +190,11 @@ class _Stretch:
         """Return mean and standard deviation of the latencies above a line, and its uncertainty [ns]."""
         x0, y0, slope = line
         n, sx, sy, sxx, sxy, syy = (sum(parts) for parts in zip(*self._usual_sums(line), strict=True))
+        # The sums are exact integers: in floating point these differences would cancel.
         variance = ((n * syy - sy * sy) - 2 * slope * (n * sxy - sx * sy) + slope**2 * (n * sxx - sx * sx)) / n**2
         jitter = math.sqrt(max(variance, 0.0))
         delay = sy / n + self.origin[1] - y0 - slope * (sx / n + self.origin[0] - x0)
+        # The last block is still being filled.
         whole = self.blocks[:-1] or self.blocks
         least = [min(y - y0 - slope * (x - x0) for x, y in block.hull) for block in whole]
         usual = np.median([y - y0 - slope * (x - x0) for block in self.blocks for x, y in block.first])
@@ -244,6 +249,7 @@ class EnvelopeFit:
             return
         error = arrival_ns - line[1] - line[2] * (counter - line[0])
         period = now.frame_ns()
+        # A line is less certain beyond the arrivals that it was fitted to.
         doubt = now.uncertainty_ns() * (1 + 2 * (arrival_ns - now.last[1]) / now.span_ns)
         if error < -max(EARLY_NS * self._rate, 2.5 * period) - DRIFT * (arrival_ns - now.last[1]) - doubt:
             self._begin([(counter, arrival_ns)])
@@ -275,6 +281,7 @@ class EnvelopeFit:
         for kept in (*late, point):
             before.add(kept)
         self._stretch, self._before = before, None
+        # `_begin` stored this line as ended.
         self._earlier.pop()
         return True
 

@@ -181,6 +181,7 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
         usual: Median interval [ns].
         nominal: Nominal period [ns], or None.
     """
+    # A fixed seed: one recording always has the same period.
     rng = np.random.default_rng(0)
     first = rng.integers(0, len(begun), PAIRS)
     second = np.clip(first + rng.integers(4, max(len(begun) // NEAR, 6), PAIRS), 0, len(begun) - 1)
@@ -195,6 +196,7 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
         tried = guess * (1 + np.linspace(-width, width, 201))
         shares = agreeing(tried)
         best = tried[int(shares.argmax())]
+        # The right-hand side is the mean of the kernel over a whole turn: the agreement of arrivals without a period.
         if shares.max() < CLEAR * KERNEL * np.sqrt(2 * np.pi):
             continue
         for usual_period in [] if nominal is None else [nominal, nominal * NTSC]:
@@ -207,6 +209,7 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
 def _unsure(arrival: np.ndarray, late: np.ndarray) -> float:
     """Return the standard uncertainty of the smallest latency [ns]: how well blocks of images agree on it."""
     block = (arrival - arrival[0]) // BLOCK_NS
+    # The smallest is usually 0 by construction, so the second block is the first that can disagree.
     least = np.sort([late[block == k].min() for k in np.unique(block)])
     usual = float(np.median(late))
     return max(TYPICAL * float(least[min(1, len(least) - 1)]), HIDDEN * min(usual, float(np.quantile(late, 0.3))))

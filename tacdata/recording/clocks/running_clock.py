@@ -46,6 +46,7 @@ class StreamClock:
         if counter < 0 or self._line is None or not self._steady:
             return arrival_ns - constant
         origin, host_ns, period = self._line
+        # No reading is taken after its arrival, even where the line is still too high.
         return min(host_ns + round(period * (counter - origin)), arrival_ns) - constant
 
     def set_latency(self, latency: StreamLatency | None) -> None:

@@ -49,6 +49,7 @@ def stream_pairs(latencies: dict[str, StreamLatency | None], motion: bool = True
         motion: Whether the recording holds a motion, too; latencies are measured against it.
     """
     beside = {MOTION: StreamLatency(0, 0)} if motion else {}
+    # Motion comes last, so that offsets are those of a stream against the motion.
     ordered = {**dict(sorted(latencies.items())), **beside}
     return tuple(_pair(first, second, ordered[first], ordered[second]) for first, second in combinations(ordered, 2))
 

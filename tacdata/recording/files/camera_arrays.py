@@ -42,6 +42,7 @@ def image_stamps(records: Records, camera: str) -> tuple[np.ndarray, np.ndarray,
 def device_times(records: Records, camera: str) -> dict[int, int]:
     """Return the camera's own time [ns] of each image, by the image's number modulo 2^32."""
     times = map(pb.ImageTime.FromString, records.columns_of(topics.image_time(camera)).data)
+    # MCAP keeps 32 bits of a sequence number.
     return {time.sequence & 0xFFFFFFFF: time.device_ns for time in times}
 
 

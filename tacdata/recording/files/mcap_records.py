@@ -208,6 +208,7 @@ def _blocks(path: Path, damage: list[str]) -> Iterator[Any]:
         if ended and head[:1] == bytes([Opcode.FOOTER]):
             end = stream.tell() + len(MAGIC)
             closing = stream.read(2 * len(MAGIC))
+            # The closing magic of one file, followed by the opening magic of the next.
             if closing == 2 * MAGIC:
                 raise FormatError(
                     f"{path} is several recordings joined: another one begins at byte {end} of {size}",
@@ -219,6 +220,7 @@ def _blocks(path: Path, damage: list[str]) -> Iterator[Any]:
 
 
 def _plausible(opcode: int, length: int) -> bool:
+    # A footer always has 20 bytes: two offsets and a checksum (MCAP specification, "Footer").
     return opcode >= PRIVATE or (opcode in KNOWN and (opcode != Opcode.FOOTER or length == 20))
 
 
@@ -282,6 +284,7 @@ def _parsed(opcode: int, body: bytes) -> Schema | Channel | Message | None:
 
 def _intact_attachment(body: bytes) -> bool:
     written = int.from_bytes(body[-4:], "little")
+    # A checksum of 0 means that none was computed (MCAP specification, "Attachment").
     return written in (0, crc32(body[:-4]))
 
 
@@ -306,10 +309,12 @@ def _candidates(stream: IO[bytes], begin: int, size: int) -> Iterator[int]:
     """Yield positions at which a chunk that fits into the file could begin."""
     for block in range(begin, size, SEARCH):
         stream.seek(block)
+        # Blocks overlap by a head, which may otherwise be cut in two.
         data = stream.read(SEARCH + HEAD)
         place = data.find(Opcode.CHUNK)
         while 0 <= place < min(SEARCH, len(data) - HEAD):
             length = int.from_bytes(data[place + 1 : place + HEAD], "little")
+            # 40 bytes are the fields of a chunk without content.
             if 40 <= length <= size - block - place - HEAD:
                 yield block + place
             place = data.find(Opcode.CHUNK, place + 1)

@@ -109,6 +109,7 @@ class MessageTable:
     @property
     def heads(self) -> np.ndarray:
         """Their heads (`HEAD`), shape (n,)."""
+        # Parts are joined once, at the first request after the last part.
         if len(self._heads) != 1:
             self._heads = [np.concatenate([np.zeros(0, HEAD), *self._heads])]
         return self._heads[0]

@@ -96,6 +96,7 @@ class _Copy:
 
     def run(self, path: Path) -> None:
         for record in walk(path, self.found.damage):
+            # At the first readable record, so that a file whose header is lost is copied too.
             if not self.begun:
                 profile = record.profile if isinstance(record, Header) else ""
                 self.writer.start(profile=profile, library=f"tacdata {code_version()}")
@@ -119,6 +120,7 @@ class _Copy:
                 number = self.writer.register_schema(record.name, record.encoding, record.data)
                 self.schemas[record.id] = number
             case Channel() if record.id not in self.channels:
+                # The writer assigns numbers of its own to schemas and channels.
                 schema = self.schemas.get(record.schema_id, 0)
                 self.channels[record.id] = self.writer.register_channel(
                     record.topic, record.message_encoding, schema, record.metadata

@@ -41,6 +41,7 @@ def taxel_frames(data: list[bytes]) -> TaxelFrames:
     found: dict[str, np.ndarray] = {}
     lengths = np.fromiter(map(len, data), np.int64, len(data))
     left = np.ones(len(data), dtype=bool)
+    # Messages of one length mostly share a layout, so that they can be decoded as columns.
     for length in np.unique(lengths).tolist():
         rows = np.flatnonzero(lengths == length)
         flat = np.frombuffer(b"".join([data[k] for k in rows.tolist()]), np.uint8).reshape(len(rows), -1)
@@ -95,6 +96,7 @@ def _varints(octets: np.ndarray, alike: np.ndarray) -> np.ndarray:
     """Return varints of equal length, shape (n, bytes), as int64; clears ``alike`` where a length differs."""
     more = octets >= 0x80
     alike &= (more[:, :-1].all(axis=1)) & ~more[:, -1] if octets.shape[1] else False
+    # Seven bits an octet, the lowest first; the eighth bit marks continuation (protobuf encoding).
     values = np.zeros(len(octets), np.uint64)
     for k in range(octets.shape[1]):
         values |= (octets[:, k] & np.uint8(0x7F)).astype(np.uint64) << np.uint64(7 * k)

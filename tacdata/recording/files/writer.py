@@ -166,6 +166,7 @@ class EpisodeWriter:
             if item is None:
                 return
             try:
+                # Without messages, too, the chunk has to be closed at its age.
                 if self._failure is None:
                     self._file.add(*item) if item else self._file.tick()
             except Exception as error:  # any error of writing stops the motion

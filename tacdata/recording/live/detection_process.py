@@ -28,6 +28,7 @@ def in_background(detect: Callable[..., Any]) -> Iterator[Detect]:
     Args:
         detect: A function at a module's top level, as `tacdata.tags.look`.
     """
+    # Not a fork: it would copy locks that the recorder's threads may hold.
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_give_way)
     try:
         yield lambda *arguments: pool.submit(detect, *arguments)

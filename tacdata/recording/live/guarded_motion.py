@@ -179,6 +179,7 @@ class GuardedMotion:
                     done = self._cnc.dwell(step.seconds)
                     self._allowed.rested(done.acknowledged_ns)
                 else:
+                    # Entered before it is sent, as another thread may read a report of it at once.
                     self._allowed.move(step.target, step.speed, self._clock.now_ns())
                     done, position = self._cnc.move(step.target, step.speed), step.target
                     self._allowed.taken(done.acknowledged_ns)
@@ -193,6 +194,7 @@ class GuardedMotion:
 
     def lift(self, height: float, speed: float) -> str:
         """After a stop: go straight up to machine height [mm] at ``speed`` [mm/s]; return the result as a sentence."""
+        # This text stays if the lift itself is interrupted.
         self._lifted = f"the indenter was not lifted (interrupted){self._advice}"
         self._lifted = self._lift(height, speed)
         if self.lifted or self._still:

@@ -53,6 +53,7 @@ class MachineState:
         """Prepare; nothing is read before the controller is open."""
         self._directory, self._cnc = state_directory(rig), cnc
         port = str(rig.cnc.get("port", ""))
+        # Two names of one port, such as a link in /dev/serial/by-id, must find one record.
         self._port = os.path.realpath(port) if os.path.exists(port) else port
         self._driver = rig.cnc["driver"]
         self._document: dict[str, Any] | None = None
@@ -129,6 +130,7 @@ class MachineState:
         if self._document is None:
             self._identity = self._identify()
             records = [record for record in map(_record, self._directory.glob("*.json")) if self._is_ours(record)]
+            # A change of port leaves several records of one machine; the latest counts.
             self._document = max(records, key=lambda record: record["number"], default={})
         return self._document
 

@@ -168,6 +168,7 @@ def _report_bounds(
     progress = profile.progress(statuses.stream.position[chosen])
     direction = np.abs(profile.target - profile.start) / profile.length
     off = float(direction @ resolution) + profile.acceleration * min(SEGMENT**2 / 8, profile.ramp**2 / 2)
+    # A report at rest before the move bounds no latest start, and one at its end no earliest start.
     moved, unfinished = progress > off, progress < profile.length - off
     late = arrival - _nanoseconds(profile.time(progress - off))
     early = sent - _nanoseconds(profile.time(progress + off))
@@ -196,6 +197,7 @@ def machine_path(moves: list[AnchoredMove], statuses: CncStream, complete: bool)
         times.append(statuses.sample_ns[after])
         positions.append(statuses.position[after])
     time, position = np.concatenate(times), np.concatenate(positions)
+    # Neighbouring estimates may overlap by their errors, and times must increase.
     order = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]]) if len(time) else np.empty(0, bool)
     return time[order], position[order]
 

@@ -92,6 +92,7 @@ def with_safe_travel(motion: MotionSettings, limits: AxisLimits, report_rate: fl
         report_rate: Status reports per second [Hz].
     """
     seconds, braking = 1.0 / report_rate + REPORT_LAG, float(limits.acceleration.min())
+    # The largest v with v t + v^2 / (2 a) = clearance: the way until the report is read, and while braking.
     fastest = braking * (np.sqrt(seconds**2 + 2.0 * motion.clearance / braking) - seconds)
     return replace(motion, travel_speed=min(motion.travel_speed, float(fastest)))
 

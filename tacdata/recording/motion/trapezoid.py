@@ -76,6 +76,7 @@ class Trapezoid:
 
     def knots(self) -> tuple[np.ndarray, np.ndarray]:
         """Return a polyline: times since the start [s], shape (k,), and positions [mm], shape (k, 3)."""
+        # Only the ramps are curved; the stretch between them is linear and needs no knots.
         ramp = np.linspace(0.0, self.ramp, KNOTS_PER_RAMP + 1)
         time = np.unique(np.concatenate([ramp, self.duration - ramp]))
         share = self.distance(time) / self.length if self.length else np.zeros_like(time)

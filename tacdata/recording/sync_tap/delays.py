@@ -113,11 +113,13 @@ def taxel_latency(recording: Recording) -> StreamLatency | str:
     moves = [m for m in recording.moves if m.command.phase == "press" and m.profile.length]
     if len(moves) < LEAST_TOUCHES + 1:
         return f"{len(moves)} touches, {LEAST_TOUCHES + 1} or more are needed"
+    # The target is the touch's depth below the skin, which gives the skin's machine height.
     origin = float(moves[0].command.target[2]) + episode.press.depth
     signal, answer = _signal(episode.taxels.sample_ns, episode.taxels.counts, moves)
     if answer < LEAST_ANSWER:
         return f"the touches are answered by {answer:.0f} times the noise only; touch deeper or nearer to a taxel"
     touches = [_cut(move, episode.taxels.sample_ns, signal) for move in moves]
+    # Quick touches are ten times as fast: the geometric mean separates the two kinds.
     middle = np.sqrt(min(t.speed for t in touches) * max(t.speed for t in touches))
     slow, quick = [t for t in touches if t.speed < middle], [t for t in touches if t.speed >= middle]
     if not slow or len(quick) < LEAST_TOUCHES:
@@ -125,6 +127,7 @@ def taxel_latency(recording: Recording) -> StreamLatency | str:
     delay = _match(slow, quick, origin, _coarse(quick, origin))
     others = [_match(slow, quick[:k] + quick[k + 1 :], origin, delay) for k in range(len(quick))]
     n = len(quick)
+    # Jackknife over the quick touches.
     spread = float(np.sqrt((n - 1) / n * np.sum((np.array(others) - np.mean(others)) ** 2)))
     clock = recording.clocks.get("taxels")
     line = clock.uncertainty_ns if clock else 0.0
@@ -204,6 +207,7 @@ def _curve(slow: list[_Touch], origin: float, delay: float) -> Callable[[np.ndar
     chosen = depth >= low
     table = BSpline.design_matrix(depth[chosen], knots, 2).toarray()
     rough = SMOOTH * np.diff(np.eye(table.shape[1]), 3, axis=0)
+    # The first coefficients are held near 0, as nothing answers above the skin.
     still = 10.0 * np.eye(table.shape[1])[:2]
     system = np.vstack([table, rough, still])
     values = np.concatenate([signal[chosen], np.zeros(len(rough) + len(still))])
@@ -232,9 +236,11 @@ def camera_latency(recording: Recording, tags: TagStream) -> StreamLatency | str
 
     def misfit(delay: float, chosen: np.ndarray) -> float:
         path = episode.tip_at(time[chosen] - round(delay * 1e9))
+        # An affine map from guide to camera, so that the camera's pose need not be known.
         table = np.column_stack([path, np.ones(len(path))])
         fitted, *_ = np.linalg.lstsq(table, place[chosen], rcond=None)
         off = np.linalg.norm(table @ fitted - place[chosen], axis=1)
+        # An outlier counts as three median residuals at most.
         return float(np.minimum(off**2, 9 * np.median(off) ** 2 + 1e-12).sum())
 
     def best(chosen: np.ndarray) -> float:
@@ -248,9 +254,11 @@ def camera_latency(recording: Recording, tags: TagStream) -> StreamLatency | str
     if np.ptp(episode.tip_at(time), axis=0).max() < LEAST_WAY:
         return f"the guide moved less than {LEAST_WAY:g} mm while the tag was seen"
     whole = best(np.ones(len(time), bool))
+    # Jackknife over consecutive eighths: neighbouring images share their errors.
     parts = np.arange(len(time)) * 8 // len(time)
     others = np.array([best(parts != part) for part in range(8)])
     spread = float(np.sqrt(7 / 8 * np.sum((others - others.mean()) ** 2)))
+    # A minimum at the edge of the search is no estimate.
     if spread > LEAST_SURE or not RANGE[0] + 0.006 < whole < RANGE[1] - 0.006:
         return "the tag's motion does not show the delay; let the tag be larger in the image, or the host less busy"
     return StreamLatency(round(whole * 1e9), round(spread * 1e9))
