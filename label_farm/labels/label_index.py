@@ -95,6 +95,7 @@ class LabelIndex:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with closing(sqlite3.connect(self.path, timeout=5.0)) as db, db:
+                # The index can be made again, so it is not worth a sync.
                 db.execute("PRAGMA synchronous = OFF")
                 for statement in TABLES.split(";"):
                     db.execute(statement)
@@ -104,6 +105,7 @@ class LabelIndex:
         except (OSError, sqlite3.OperationalError):
             return
         except sqlite3.DatabaseError:
+            # Any other error than a lock or a full disk means that the file is damaged.
             self.path.unlink(missing_ok=True)
 
 

@@ -107,6 +107,7 @@ class Ledger:
                 if time.monotonic() > deadline:
                     raise
                 time.sleep(0.05)
+        # In WAL mode a power cut then costs the last commits at most, and results are in the store.
         self._db.execute("PRAGMA synchronous = NORMAL")
         if not self._layout():
             with self._transaction():
@@ -122,6 +123,7 @@ class Ledger:
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
+        # The write lock at once: a transaction that reads first can fail when it comes to write.
         self._db.execute("BEGIN IMMEDIATE")
         try:
             yield

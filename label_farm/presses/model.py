@@ -112,6 +112,7 @@ def version(factory: str, sensor: Sensor) -> Version:
             capture_output=True,
             text=True,
         )
+        # A negative code is a signal, as of the kernel where memory is short: that may pass.
         if finished.returncode >= 0:
             break
     try:

@@ -64,6 +64,7 @@ class Crew:
 
     def _start(self, number: int) -> subprocess.Popen[str]:
         device = self._devices[number % len(self._devices)]
+        # A process group of its own: Ctrl-C reaches the crew alone, which stops the workers.
         process = subprocess.Popen(
             environment.python("tacdata.label_farm.remote.worker"),
             env=environment.variables(device),

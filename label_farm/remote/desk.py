@@ -87,6 +87,7 @@ class RemoteDesk:
 
     def fail(self, job: Job, failure: Failure, seconds: float = 0.0) -> None:
         """Say why a job has no result."""
+        # Cut, as the service limits the size of a request (`service.guard`, `service.work`).
         why = {**asdict(failure), "reason": failure.reason[:10_000], "log": failure.log[-40_000:], "seconds": seconds}
         self._client.post(f"/api/work/failures/{job.key}", self._me(**why))
 

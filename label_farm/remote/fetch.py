@@ -93,6 +93,7 @@ class Fetch:
             self.fetched.current.append(number)
             return
         path.parent.mkdir(exist_ok=True)
+        # Read before it gets its name: a damaged label never replaces a good one.
         unread = path.with_name(f".{path.name}.fetched")
         try:
             with replacement(unread, settled=False) as stream:

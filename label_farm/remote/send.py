@@ -63,6 +63,7 @@ def _send_file(client: Client, path: Path, name: str) -> int:
     """Send the missing part of a file; return its number of bytes."""
     size = path.stat().st_size
     request: dict[str, object] = {"folder": name, "name": path.name, "size": size, "sha256": provenance.file_hash(path)}
+    # An empty piece asks how much of the file the service has already.
     answer = _piece(client, request, 0, b"")
     sent = 0
     with path.open("rb") as stream:

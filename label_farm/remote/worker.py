@@ -58,6 +58,7 @@ def _enter(desk: RemoteDesk) -> float:
 
 def _end_with_parent() -> None:
     sys.stdin.read()
+    # Not sys.exit, which would end this thread alone.
     os._exit(0)
 
 

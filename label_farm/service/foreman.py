@@ -229,6 +229,7 @@ class Foreman:
             if not waiting:
                 time.sleep(ROUND_SECONDS)
                 continue
+            # Fewest attempts first: a submission whose planning fails must not hold up the others.
             run = min(waiting, key=lambda r: (r.attempts, -r.submission.priority, r.submission.id))
             try:
                 run.plan()

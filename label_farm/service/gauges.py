@@ -55,8 +55,10 @@ class Gauges:
         """Take the ledger's totals; the increase since the last call belongs to this minute."""
         with self._lock:
             number = int(self._now() // 60)
+            # Presses settled before this service belong to none of its minutes.
             previous = self._totals or (solved, failed)
             self._totals = solved, failed
+            # Minutes without a press are listed as 0, so that the series has no gaps.
             while not self._minutes or self._minutes[-1].number < number:
                 self._minutes.append(Minute(self._minutes[-1].number + 1 if self._minutes else number))
             # A cancelled submission takes jobs out of the ledger: totals may fall.

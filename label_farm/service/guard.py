@@ -52,6 +52,7 @@ class Guard:
     def _refusal(self, scope: Message, headers: dict[str, str]) -> tuple[int, str, str, str] | None:
         if self._token:
             token = headers.get("authorization", "").removeprefix("Bearer ").strip()
+            # In constant time: its duration must not show how much of a guessed token is right.
             if scope["path"] in OPEN_PATHS or hmac.compare_digest(token.encode(), self._token.encode()):
                 return None
             what = "a wrong token" if token else "no token"

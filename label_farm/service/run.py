@@ -86,6 +86,7 @@ class Run:
             if isinstance(error, ProcessDied) and self.attempts < MOST_ATTEMPTS and not self.cancelled:
                 return  # it is planned again later
             self.refusal = str(error)
+        # Jobs that were enqueued after the cancellation are withdrawn too.
         if self.cancelled:
             self.close()
         self.planned.set()
@@ -124,6 +125,7 @@ class Run:
         self._since = self.labelling.plan(recordings, sensor, paths)
 
     def _progress(self, stage: str, done: int, total: int) -> None:
+        # Called for each recording: an error here ends the planning of a cancelled submission.
         if self.cancelled:
             raise UsageError("cancelled while it was planned", "a submission that goes on", "submit again")
         self.stage = (stage, done, total)

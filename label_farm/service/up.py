@@ -73,6 +73,7 @@ def up(asked: UpSettings) -> None:
             log_level="warning",
             timeout_graceful_shutdown=3,
             server_header=False,
+            # Limits the head of a request; `guard` limits its body.
             h11_max_incomplete_event_size=64 * 1024,
             lifespan="off",
         )

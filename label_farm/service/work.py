@@ -92,6 +92,7 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
                 ledger.heartbeat(remote(asked.owner))
             open_ones = []
             for lease in leases:
+                # A job whose result is in the store is settled here, and not handed out.
                 if foreman.store.intact(lease.job):
                     ledger.finish(lease.job.key, remote(asked.owner), 0.0)
                 else:

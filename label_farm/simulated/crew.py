@@ -64,6 +64,7 @@ class _Hand:
         self, folder: Path, presses: int, index: int, of: int, device: str, settled: Callable[[int, str], None]
     ) -> None:
         self._errors: IO[bytes] = tempfile.TemporaryFile()
+        # A process group of its own: Ctrl-C reaches this process alone, which stops the others.
         self._process = subprocess.Popen(
             [*environment.python("tacdata.label_farm.simulated.worker"), str(folder), *map(str, (presses, index, of))],
             env=environment.variables(device),

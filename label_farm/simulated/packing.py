@@ -90,6 +90,7 @@ def write_dataset(
     writer = begun(out, simulation.sensor, extra, simulated=True)
     where = {n: path for path in shard_files(simulation.folder) for n in read_about(path).numbers if n < presses}
     _refuse_others(simulation, writer, where, out)
+    # Successive presses are of different specimens, each in a file of its own.
     read = lru_cache(maxsize=len(simulation.specimens) + 1)(read_shard)
     for number in sorted(where):
         reason = ""

@@ -192,6 +192,7 @@ class SolvedPressResponse(Response):
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return the readings of loads [counts], shape (n, channels)."""
         closure, area = np.zeros_like(load), np.zeros_like(load)
+        # The idle readings are asked for with loads of 0, which have neither closure nor area.
         if len(load) == len(self._load) and load.any():
             closure, area = (np.asarray(v, float) for v in (self._label.taxel_closure, self._label.taxel_area))
         return self._transducer.read(Loads(load, closure, area)).counts

@@ -19,6 +19,7 @@ def board_counts(
         full_scale: Largest reading [counts]; None for no limit.
         rng: Random generator.
     """
+    # The steps of a random walk grow with the square root of time.
     seconds = np.sqrt(np.diff(time_ns, prepend=time_ns[:1]) / 1e9)[:, None]
     drift = noise.drift * np.cumsum(seconds * rng.standard_normal(counts.shape), axis=0)
     readings = counts + drift + noise.readings * rng.standard_normal(counts.shape)

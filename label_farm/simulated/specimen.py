@@ -56,6 +56,7 @@ def draw_specimen(sensor: Sensor, spread: SpecimenSpread, seed: int, number: int
     ]
     stated["offset"] = [round(v, 2) for v in (transducer.offset + spread.offset * _normal(rng, count)).tolist()]
     values = {**vars(transducer.principle), **stated.get("parameters", {})}
+    # Sorted, so that draws do not depend on the order of a file's entries.
     for name, share in sorted(spread.parameters.items()):
         if name not in values:
             raise FormatError(

@@ -51,6 +51,7 @@ def timeline(press: Press, sensor: Sensor, rng: np.random.Generator) -> Episode:
         if name:
             phases.append(Phase(name, round(clock if name != "rest" else 0.0), round(clock + time[-1])))
         clock, at = clock + time[-1], depth
+    # Neighbouring moves share a knot, and times of a path must increase.
     tip_ns, first = np.unique(np.concatenate(times).round().astype(np.int64), return_index=True)
     depth = np.concatenate(depths)[first]
     tip = np.column_stack([np.full(len(depth), press.x), np.full(len(depth), press.y), depth])
@@ -76,6 +77,7 @@ def timeline(press: Press, sensor: Sensor, rng: np.random.Generator) -> Episode:
 def _motion(start: float, end: float, pause: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Return times since its start [ns] and depths [mm] of a move from rest to rest, or of a pause."""
     if not speed:
+        # From 1 ns on, as the move before has a knot at 0; at least 2 ns, so that times increase.
         return np.array([1.0, max(1e9 * pause, 2.0)]), np.array([end, end])
     move = Trapezoid(np.array([0.0, 0.0, start]), np.array([0.0, 0.0, end]), speed, ACCELERATION)
     time, place = move.knots()

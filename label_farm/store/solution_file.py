@@ -55,6 +55,7 @@ def encode(job: Job, solution: PathSolution) -> bytes:
             # Digits of maps hardly shrink, and trying cost more than all other steps here. A pressure is 0 outside
             # the contact: it shrinks to a tenth.
             kind = zipfile.ZIP_DEFLATED if name in PACKED else zipfile.ZIP_STORED
+            # A fixed date, the earliest of the ZIP format: equal content gives equal bytes.
             archive.writestr(zipfile.ZipInfo(name, EPOCH), content, kind, compresslevel=1)
     return stream.getvalue()
 

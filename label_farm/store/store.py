@@ -49,6 +49,7 @@ class Store:
 
     def _holds_something(self) -> bool:
         """Return whether the folder is missing, or has content that is no part of a store."""
+        # Temporary names of the mark: another process may be making this store right now.
         begun = f".{MARK}."
         try:
             return any(p.name != WRITING and not p.name.startswith(begun) for p in self.folder.iterdir())

@@ -247,6 +247,7 @@ class DaskPool(Engine):
     def _submit(self, client: Client, address: str, leases: list[Lease]) -> Future:
         version = leases[0].job.model
         documents = [lease.job.document for lease in leases]
+        # Not pure: Dask would answer an equal task by the earlier result, and a job may be solved again.
         return client.submit(
             solve_there,
             self._factory,

@@ -61,6 +61,7 @@ class Engine(ABC):
             DeviceError: If the workers' cluster cannot be reached.
         """
         pending, settled, growing = set(keys), False, True
+        # Claims of processes that have ended would otherwise wait for the end of their leases.
         self._ledger.release_dead()
         try:
             while pending or growing:

@@ -21,10 +21,12 @@ class Usage:
 def usage_of(process: int) -> Usage | None:
     """Return the use of a process of this computer; None if it has ended or the system has no /proc."""
     try:
+        # After the last parenthesis: the name before it may contain blanks and parentheses.
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
         pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
     except (OSError, IndexError, ValueError):
         return None
+    # Fields 14 and 15 of proc(5): time in user mode and in the kernel.
     ticks = int(fields[11]) + int(fields[12])
     return Usage(ticks / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE"))
 

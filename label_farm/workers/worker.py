@@ -202,6 +202,7 @@ def is_disk(error: Exception) -> bool:
 
 def _end_with_parent() -> None:
     sys.stdin.read()
+    # Not sys.exit, which would end this thread alone.
     os._exit(0)
 
 

@@ -171,6 +171,7 @@ class Course:
         gap = np.maximum(time[2:] - time[:-2], 1e-12)
         share = ((time[1:-1] - time[:-2]) / gap)[:, None]
         deviation = tip[1:-1] - (1 - share) * tip[:-2] - share * tip[2:]
+        # Three rows with equal noise contribute; this scales their sum to the noise of one.
         deviation = deviation / np.sqrt(1 + share**2 + (1 - share) ** 2)
         inner = self.episode[2:] == self.episode[:-2]
         limit = CORNERS * max(int(inner.sum()), 1)

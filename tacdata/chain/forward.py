@@ -128,6 +128,7 @@ def _after(run: _Run, step: Acting | str) -> _Run:
         tool = state.course.tool
         load, force = state.response.load(state.pose, tool), state.response.force(state.pose, tool)
         return replace(run, state=replace(state, load=load, force=force))
+    # The force is taken here: the stages after it change readings alone.
     return replace(run, state=replace(state, signal=state.response.signal(state.load)), force=state.force)
 
 

@@ -39,6 +39,7 @@ def low_passes(values: np.ndarray, step: np.ndarray, taus: np.ndarray, shares: n
 
     ratio = step[:, None] / taus
     decay = np.exp(-np.minimum(ratio, 700.0))
+    # The limit of (1 - exp(-x)) / x at 0 is 1; first rows have no time step.
     weight = np.where(ratio > 1e-8, -np.expm1(-ratio) / np.maximum(ratio, 1e-12), 1.0)
     return filtered(_wide(values), decay, weight, np.asarray(shares, dtype=float)).reshape(values.shape)
 
@@ -73,6 +74,7 @@ def second_order(values: np.ndarray, step: np.ndarray, tau: float, damping: floa
     discriminant = damping**2 - 1
     discriminant = discriminant if abs(discriminant) > DOUBLE else -DOUBLE
     if discriminant > 0:
+        # Two real poles: by partial fractions, the difference of two first-order filters.
         taus = 0.5 * tau * (1 + np.array([1.0, -1.0]) * np.sqrt(discriminant) / damping)
         return low_passes(values, step, taus, taus * [1.0, -1.0] / (taus[0] - taus[1]))
     pole = 0.5 * tau * (1 + 1j * np.sqrt(-discriminant) / damping)
@@ -93,6 +95,7 @@ def _recursion(forcing: np.ndarray, decay: np.ndarray) -> np.ndarray:
     """Return y_i = E_i y_{i-1} + b_i, y_0 = 0, for ``forcing`` b, shape (n, k), and ``decay`` E, shape (n,)."""
     from tacdata.chain.memory_kernels import filtered
 
+    # With w = E the filter adds (1 - E) u, so the forcing is divided by 1 - E.
     fresh = np.maximum(1 - decay, 1e-300)[:, None]
     return filtered(np.ascontiguousarray(forcing / fresh), decay[:, None], decay[:, None], np.ones(1))
 
@@ -178,6 +181,7 @@ def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:
     change = np.where(first, 0.0, np.diff(values, prepend=values[:1]))
     keep = np.where(first, 0.0, np.exp(-np.abs(change) / width))
     toward = np.where(first, -1.0, np.sign(change))
+    # Shifted by 1, as the filter starts at 0 and z at -1.
     return filtered(_wide(toward + 1.0), keep[:, None], keep[:, None], np.ones(1)).reshape(values.shape) - 1.0
 
 
@@ -219,8 +223,10 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
     share = np.clip((instants - time[right - 1]) / gap, 0.0, 1.0)
     result = between(_wide(values), right, share)
     step = np.diff(time, prepend=time[0])
+    # No curvature across episodes: an infinite step counts as too uneven.
     step[starts] = np.inf
     curved = bends(_wide(values), step).take(right, axis=0)
+    # The distance of a parabola from its chord.
     curved *= (0.5 * share * (1 - share) * np.square(gap))[:, None]
     result -= curved
     return result

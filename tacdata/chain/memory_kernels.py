@@ -90,6 +90,7 @@ def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray, share: n
     if len(values):
         result[0] = 0.0
         arguments = [in_lanes(wide), _shared(decay), _shared(weight), _shared(share), in_lanes(state), in_lanes(result)]
+        # One thread: each row needs the one before it, and columns are taken in lanes.
         wp.launch(_filter, 1, arguments, device="cpu")
     return np.ascontiguousarray(result[:, :columns])
 

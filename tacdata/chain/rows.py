@@ -131,6 +131,7 @@ def _corners(time: np.ndarray, path_time: np.ndarray, path: np.ndarray, toleranc
     bent = np.diff(path, 2, axis=0)
     # Fewer points than readings are the corners of a command.
     measured = len(path) > len(time)
+    # A second difference of white noise has six times its variance: 1 + 4 + 1.
     noise = MIDDLE * np.median(np.abs(bent), axis=0) / np.sqrt(6) if measured and len(bent) else np.zeros(3)
     within = (path_time > time[0]) & (path_time < time[-1])
     when, corners = path_time[within], path[within]
@@ -139,6 +140,7 @@ def _corners(time: np.ndarray, path_time: np.ndarray, path: np.ndarray, toleranc
         straight = np.stack([np.interp(rows, path_time, path[:, axis]) for axis in range(3)], axis=-1)
         deviation = np.stack([np.interp(when, rows, straight[:, axis]) for axis in range(3)], axis=-1) - corners
         deviation = (np.abs(deviation) - NOISE * noise).max(axis=1, initial=-np.inf)
+        # One row per gap and pass, at the farthest corner: the next pass sees the path with it.
         gap = np.searchsorted(time, when)
         order = np.lexsort((-deviation, gap))
         first = order[np.flatnonzero(np.diff(gap[order], prepend=-1))]

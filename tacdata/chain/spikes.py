@@ -30,8 +30,10 @@ def without_spikes(values: np.ndarray) -> np.ndarray:
     count = np.maximum(finite.sum(axis=0), 1)
     # A mean that single jumps do not move much; a median is 0 where readings are mostly the same.
     bounded = np.where(finite, np.minimum(inner, np.where(finite, inner, 0.0).sum(axis=0) / count * 4), 0.0)
+    # sqrt(pi / 2) times the mean absolute deviation is a Gaussian's standard deviation.
     usual = 1.2533 * bounded.sum(axis=0) / count
     jump = (deviation > FAR * usual) & (deviation > WIDE * (near.max(axis=0) - near.min(axis=0)))
+    # `roll` wraps around: the outermost rows have neighbours from the other end.
     jump[:2] = jump[-2:] = False
     return np.where(jump, middle, values)
 

@@ -136,6 +136,7 @@ class TableResponse(Response):
 
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return readings, shape (n, channels); the curve is continued straight beyond its ends."""
+        # By identity, which is enough: nobody can write into a load that this table returned (`_locked`).
         cached = next((answer for answer in self._kept.values() if answer.load is load), None)
         if cached is not None and cached.signal is not None:
             return cached.signal
@@ -220,10 +221,12 @@ def _coefficients(values: np.ndarray) -> np.ndarray:
     matrix = np.zeros((count + 2, count + 2))
     for k in range(count):
         matrix[k, k : k + 3] = 1 / 6, 4 / 6, 1 / 6
+    # Even about depth 0: the coefficients around it are equal. Not-a-knot: the fourth difference vanishes.
     matrix[count, [0, 2]] = 1.0, -1.0
     matrix[count + 1, -5:] = 1.0, -4.0, 6.0, -4.0, 1.0
     inverse = np.linalg.inv(matrix)[:, :count]
     inner = np.einsum("kd,abdc->abkc", inverse, filtered, optimize=True)
+    # The last coefficient has weight 0 at the deepest place; it is there so that four nodes always exist.
     return np.concatenate([inner, inner[:, :, -1:]], axis=2)
 
 
@@ -232,6 +235,7 @@ def _continued(values: np.ndarray) -> np.ndarray:
     beyond = []
     last = values[:, :, -4:]
     for _ in range(2):
+        # The next value of the cubic through the last four.
         following = -last[:, :, :1] + 4 * last[:, :, 1:2] - 6 * last[:, :, 2:3] + 4 * last[:, :, 3:4]
         beyond.append(following)
         last = np.concatenate([last[:, :, 1:], following], axis=2)

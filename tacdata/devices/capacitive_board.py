@@ -124,6 +124,7 @@ class CapacitiveBoard(TaxelBoard):
             try:
                 data = read_available(line)
             except (serial.SerialException, OSError, TypeError) as error:
+                # pyserial raises a TypeError where another thread has closed the port.
                 if not self._stopped.is_set():
                     self._break(error)
                 return

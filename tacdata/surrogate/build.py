@@ -169,6 +169,7 @@ class Work:
             true = table.reading.load(answer.loads, transducer)
             wrong = response.load(pose, tool) - true
             squares += np.sum(np.square(wrong)), np.sum(np.square(true))
+            # Without the first state, whose depth and load are 0.
             loads.append(wrong[1:] / np.abs(true).max())
             normals.append((response.force(pose, tool) - answer.normal)[1:] / answer.normal.max())
         if not loads:
@@ -195,6 +196,7 @@ def work(sensor: Sensor, reaches: dict[str, Reach], settings: TableSettings | No
         SolveError: If the sensor cannot be modelled.
     """
     resolved = settings or TableSettings()
+    # First with the fine settings: where all those presses exist already, the better table costs nothing.
     estimate = _work(sensor, reaches, resolved, resolved.mesh or MeshSettings(), resolved.spacing or FINE)
     presses = [press for _, _, press in estimate.requests]
     if (resolved.mesh and resolved.spacing) or not estimate.store.missing(presses):

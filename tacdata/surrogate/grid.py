@@ -87,6 +87,7 @@ def covering(reaches: list[Reach], sensor: Sensor, spacing: float) -> Grid:
     depth = UNIT * np.arange(states + EDGE) ** 2
     sides = [(float(a), float(b)) for a, b in zip(low - MARGIN, high + MARGIN, strict=True)]
     x, y = (_axis(a, b, spacing) for a, b in sides)
+    # A folded grid is symmetric about the middle and may need more presses than its symmetry saves.
     grids = [Grid(x, y, depth, False)]
     if all(r.tilt == (0.0, 0.0) and foldable(sensor, r.indenter, r.yaw) for r in reaches):
         x, y = (_axis(-max(abs(a), abs(b)), max(abs(a), abs(b)), spacing) for a, b in sides)
@@ -113,6 +114,7 @@ def _axis(low: float, high: float, spacing: float) -> np.ndarray:
 def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor) -> PressRequest | None:
     """Return the press at one position, as deep as possible there; None if none is possible."""
     for count in range(len(depths), 1, -1):
+        # Rounded, as stored and shipped presses are found by these very numbers.
         press = PressRequest(
             reach.indenter,
             round(float(x), 6),

@@ -54,6 +54,7 @@ class PressStore:
             "y": request.y,
             "yaw": request.yaw,
             **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(request, name))},
+            # Three depths fix the spacing. The end is no part of the name: a deeper press serves shallower requests.
             "depths": list(request.depths[:3]),
             "model": self.model.content_hash,
         }

@@ -54,6 +54,7 @@ def reading_of(sensor: Sensor, loads: Loads) -> ReadingCurve:
     }
     largest = max(weight.values())
     dominant = [name for name, value in weight.items() if value > _NOTHING * largest]
+    # A parameter that differs from taxel to taxel leaves no common curve.
     numbers = [np.ptp(np.atleast_1d(v)) for v in vars(transducer.principle).values()]
     by = (
         dominant[0]

@@ -152,6 +152,7 @@ def _place(
         values, count = reading.load(press.loads, transducer), len(press.normal)
         sides = [(a, b) for a in (False, True) for b in (False, True)] if grid.folded else [(False, False)]
         for over_x, over_y in sides:
+            # Presses on an axis of symmetry meet their own mirror images: `times` makes them a mean.
             at = (len(grid.x) - 1 - i if over_x else i, len(grid.y) - 1 - j if over_y else j)
             load[*at, :count] += mirrored(values, sensor, over_x, over_y)
             normal[*at, :count] += press.normal
