@@ -10,6 +10,7 @@ from tacdata.skin.adhesions.adhesion_law import AdhesionLaw
 class Exponential(AdhesionLaw):
     """Initially rigid, as Camacho and Ortiz (Int. J. Solids Struct. 33 (1996) 2899) ask of a cohesive law."""
 
+    # exp(-12) = 6e-6 of the work lies beyond.
     reach = 12.0
 
     @staticmethod

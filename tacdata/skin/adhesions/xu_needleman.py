@@ -10,6 +10,7 @@ from tacdata.skin.adhesions.adhesion_law import AdhesionLaw
 class XuNeedleman(AdhesionLaw):
     """The normal part of Xu and Needleman's law (Modelling Simul. Mater. Sci. Eng. 1 (1993) 111)."""
 
+    # (1 + 15) exp(-15) = 5e-6 of the work lies beyond.
     reach = 15.0
 
     @staticmethod

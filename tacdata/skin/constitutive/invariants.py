@@ -24,6 +24,7 @@ def excesses(real: type) -> SimpleNamespace:
         one = real(1.0)
         E = H + wp.transpose(H) + wp.transpose(H) * H
         mean = third * wp.trace(E)
+        # c = 1 + mean carries the swelling, so that D vanishes with the distortion.
         D = shifted(E, -mean) / (one + mean)
         r = half * wp.ddot(D, D)
         return vec2(r, r - wp.determinant(D))

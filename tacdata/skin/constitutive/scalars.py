@@ -33,6 +33,7 @@ def expm1_ratio(real: type) -> wp.Function:
         one = real(1.0)
         if wp.abs(y) >= real(0.5):
             return (wp.exp(y) - one) / y
+        # Taylor's series by Horner's rule: its next term is below the rounding of double precision for |y| < 1/2.
         total = one
         for k in range(13):
             total = one + total * y / real(14 - k)
@@ -50,6 +51,7 @@ def exp_excess(real: type) -> wp.Function:
         one = real(1.0)
         if wp.abs(y) >= real(0.5):
             return wp.exp(y) - one - y
+        # The same series, begun at y^2 / 2.
         total = one
         for k in range(12):
             total = one + total * y / real(14 - k)

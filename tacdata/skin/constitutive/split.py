@@ -24,6 +24,7 @@ def with_volumetric(
     @wp.func
     def whole_energy(H: mat33, m: numbers):
         j = volume_change(H, cofactor_change(H))
+        # The isochoric energy is blind to the sign of J; the NaN of this term makes the whole law refuse J <= 0.
         return energy(H, m) + real(0.5) * m[1] * j * j
 
     @wp.func

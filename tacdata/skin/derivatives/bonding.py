@@ -20,12 +20,14 @@ from tacdata.skin.mesh.skin_mesh import SkinMesh
 
 def held_faces(mesh: SkinMesh, fixed: np.ndarray) -> np.ndarray:
     """Return the boundary triangles with all nodes held, shape (f, 6); ``fixed``: shape (n,), bool."""
+    # A tetrahedron has its mid-edge nodes after the four corners.
     pairs = {frozenset(pair): 4 + number for number, pair in enumerate(elements.EDGES)}
     found = []
     for corners in elements.FACES:
         sides = [pairs[frozenset((corners[a], corners[b]))] for a, b in elements.FACE_EDGES]
         found.append(mesh.tets[:, [*corners, *sides]])
     faces = np.concatenate(found)
+    # A face inside the body belongs to two tetrahedra and appears twice.
     _, first, count = np.unique(np.sort(faces[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
     boundary = faces[first[count == 1]]
     return boundary[fixed[boundary].all(axis=1)]
@@ -58,6 +60,7 @@ class Bonding:
         if self._solve:
             b = reaction.shape[2]
             load = reaction.cpu().numpy()[self._nodes].reshape(len(self._nodes), 3 * b)
+            # The bond gives way against the traction that it exerts, u = -c t.
             displacement = -self._solve(np.ascontiguousarray(load)).reshape(len(self._nodes), 3, b)
             result[torch.as_tensor(self._nodes, device=result.device)] = torch.as_tensor(
                 displacement, device=result.device

@@ -33,6 +33,7 @@ def point_change(displacement: wp.array3d(dtype=wp.float64), surface: SurfaceDat
 def share_change(gap: wp.float64, d_gap: wp.float64, approach: wp.float64, d_approach: wp.float64):
     """Return the change of `share_in_contact` [1]."""
     change = wp.float64(0.0)
+    # Derivative of 1 - gap/approach; the share of a node that was closed (1) or is not reached (0) is constant.
     if gap > wp.float64(0.0):
         if approach > gap:
             change = (gap * d_approach / approach - d_gap) / approach
@@ -46,6 +47,7 @@ def return_mapping_change(trial: wp.vec3d, d_trial: wp.vec3d, limit: wp.float64,
     size = wp.length(trial)
     if size > limit:
         direction = trial / size
+        # Only the part of the change across the direction turns it; the disc cuts off the part along it.
         transverse = d_trial - direction * wp.dot(direction, d_trial)
         shear = limit * direction
         change = d_limit * direction + (limit / size) * transverse
@@ -81,6 +83,7 @@ def gap_change_function(distance: wp.Function) -> wp.Function:
 
     @wp.func
     def gap_change(p: wp.vec3d, dp: wp.vec3d, n: wp.vec3d, q: Parameters, dq: Parameters):
+        # The gradient of a distance is its unit normal.
         change = wp.dot(n, dp)
         size = wp.length(dq)
         if size > wp.float64(1.0e-30):
@@ -139,6 +142,7 @@ def normal_change_kernel(distance: wp.Function) -> wp.Kernel:
             w = surface.weights[f, k]
             x = deformed_point(u, surface, f, k, b, members.thickness[b]) - tip
             local = wp.transpose(R) * x
+            # local = R^T x: when the shape turns, a point at rest moves in its frame.
             moves = wp.transpose(R) * (point_change(displacement, surface, f, k, b) - d_tip) + wp.transpose(dR) * x
             n = normal(local, q)
             dg = gap_change(local, moves, n, q, dq)
@@ -199,6 +203,7 @@ def friction_change(
     R, dR = rotation_of(members.turn, b), rotation_of(d_members.turn, b)
     tip, d_tip = of_member(members.place, b), of_member(d_members.place, b)
     place = at_node(local, j, b)
+    # `place` is in the shape's frame; R place is the lever in the sensor's, on which the change of R acts.
     moves = wp.transpose(R) * (at_node(d_place, j, b) - d_tip) + wp.transpose(dR) * (R * place)
     for i in range(3):
         d_local[j, i, b] = moves[i]
@@ -208,6 +213,7 @@ def friction_change(
     mean_normal, turns = at_node(mean, j, b), at_node(d_mean, j, b)
     length = wp.length(mean_normal)
     n = mean_normal / length
+    # A unit vector changes only across itself.
     dn = (turns - n * wp.dot(n, turns)) / length
     step = tip - of_member(history.place, b)
     slip = wp.transpose(R) * step

@@ -167,8 +167,11 @@ class PathDerivatives:
             SolveError: If a linear solve does not converge.
         """
         newton, count = self._newton, along.pose.place.shape[1]
+        # The preconditioner takes friction's stiffness from here: its tangent, which the solver may blend with the
+        # secant.
         full_tangent = replace(reached, friction_tangent=torch.ones_like(reached.friction_tangent))
         contacts = newton.residual(full_tangent).contacts
+        # The first contact is the indenter's; the board stays where it is.
         still = replace(along, pose=along.pose.zeros())
         directions = (along, *[still] * (len(newton.surfaces) - 1))
         forces = tuple(contact.repeat(count) for contact in contacts)
@@ -204,6 +207,7 @@ class PathDerivatives:
         body, unfixed, at = self._newton.body, self._free, point.at
         points: dict[tuple[int, torch.dtype], tuple[torch.Tensor, Conditions, torch.Tensor | None]] = {}
         if self._prepared:
+            # All columns are directions at one state, so that the stiffness of one member serves them.
             first = torch.zeros(1, dtype=torch.long)
             self._prepared.update_one(at.u[:, :, :1].to(_WORK), at.conditions.take(first).to(_WORK), at.u.shape[2])
 
@@ -227,11 +231,14 @@ class PathDerivatives:
             z, normal = preconditioner.apply(force, gaps / point.modulus)
             return torch.cat([z, normal / point.modulus])[:, None]
 
+        # The right-hand side: -(F_p + F_h dh/dp), at unchanged displacements and pressures.
         none = [torch.zeros_like(contact.pressure) for contact in point.now]
         still = point.changes(torch.zeros_like(at.u), none, self._history, full=False)
         rhs = -point.residual((self._internal(point) - _force(still)) * unfixed, still)
+        # Moves of held nodes are prescribed, hence part of the right-hand side.
         if self._slack:
             rhs -= product(point.joined(slack, none))
+        # The derivatives at the previous equilibrium; nodes that have opened since have no pressure left to change.
         guesses = [
             torch.where(forces.tangent.active, change.pressure, 0.0)
             for forces, change in zip(point.now, self.changes, strict=True)
@@ -252,8 +259,10 @@ class PathDerivatives:
     def _internal(self, point: _Point) -> torch.Tensor:
         """Return the change of internal forces [N] with law and thickness at fixed displacements, shape (n, 3, p)."""
         conditions, directions = point.at.conditions, point.along[0].conditions
+        # A number that is 0 has no relative change; its step is measured against 1.
         share = (directions.law / torch.where(conditions.law != 0, conditions.law, 1.0)).abs().amax(dim=0)
         share = share.maximum((directions.thickness / conditions.thickness).abs())
+        # Most parameters leave law and thickness alone, and cost no assembly.
         change, moves = torch.zeros_like(point.at.u), (share > 0).nonzero()[:, 0]
         if not len(moves):
             return change

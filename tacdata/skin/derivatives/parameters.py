@@ -122,6 +122,7 @@ def _turning(name: str, turn: torch.Tensor) -> torch.Tensor:
     """Return the change of a turn Rx Ry Rz per degree, shape (3, 3)."""
     axis = torch.zeros(3, dtype=torch.float64)
     axis["xyz".index("z" if name == "yaw" else name[-1])] = np.radians(1.0)
+    # Rz is the last factor, so that its change multiplies from the right; those of Rx and Ry, from the left.
     if name == "yaw":
         return turn @ _cross(axis.to(turn))
     if name == "tilt_y":
@@ -148,6 +149,7 @@ def _by_material(sensor: Sensor, name: str) -> np.ndarray:
     law = load_law(material.law)
     if name in ("youngs_modulus", "poisson_ratio"):
         value = getattr(material, name)
+        # The bulk modulus grows as 1 / (0.5 - nu): a step must be small against that distance.
         room = value if name == "youngs_modulus" else 0.5 - value
         return _difference(lambda v: law.parameters(replace(material, **{name: v})), value, _STEP * room)
     field, _, entry = name.partition("/")
@@ -160,6 +162,7 @@ def _by_material(sensor: Sensor, name: str) -> np.ndarray:
             new = [changed if k == int(entry) else old for k, old in enumerate(whole)]
         return law.parameters(replace(material, parameters={**material.parameters, field: new}))
 
+    # Many parameters are 0 by default and still need a step.
     return _difference(numbers, value, _STEP * max(abs(value), 0.1))
 
 
@@ -176,6 +179,7 @@ def _difference(numbers: Callable[[float], tuple[float, ...]], value: float, ste
         except FormatError:
             ends.append((0.0, np.array(numbers(value))))
     (high, upper), (low, lower) = ends
+    # Neither way is allowed: the law's error is raised again, as it says why.
     if high == low:
         numbers(value + step)
     return (upper - lower) / ((high - low) * step)

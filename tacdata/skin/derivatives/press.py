@@ -150,6 +150,7 @@ class _Reader:
             tuple(self._names),
             self._units,
             self._map(state, derivatives.du, changes.conditions.thickness),
+            # Derivatives hold the force on the skin; the indenter feels the opposite.
             -derivatives.changes[0].force.sum(dim=0).T.cpu().numpy(),
             taxel_force,
             self._model.skin.reader.closure(derivatives.du).T.cpu().numpy(),
@@ -159,6 +160,7 @@ class _Reader:
 
     def _map(self, state: Equilibrium, du: torch.Tensor, thickness: torch.Tensor) -> np.ndarray:
         """Return the derivative of the map: the skin moves under the pixels; a thicker slab has a higher face."""
+        # Thickness scales heights of the slab alone, not the protrusions below z = 0.
         rise = self._nodes[:, 2].clamp_min(0.0)
         moves = du.clone()
         moves[:, 2] += rise[:, None] * thickness
@@ -167,6 +169,7 @@ class _Reader:
         maps = self._raster.depth(torch.cat([base + step * moves, base - step * moves], dim=2))
         upper, lower = maps.cpu().numpy().reshape(2, -1, *maps.shape[1:])
         slope = (upper - lower) / (2 * step.cpu().numpy()[:, None, None])
+        # The map counts from the undeformed face, which a thicker slab raises; pixels beside the skin have none.
         covered = self._raster.measure(base)[1][0].cpu().numpy() > 0
         return slope + covered * self._height * thickness.cpu().numpy()[:, None, None]
 
@@ -178,6 +181,7 @@ class _Reader:
     def _area(self, state: Equilibrium, taxel_force: np.ndarray) -> np.ndarray:
         """Return the derivative of the contact areas by Hertz's law, shape (p, taxels)."""
         material = self._model.sensor.material
+        # Relative changes: of 1/E it is -dE/E, of 1 - nu^2 it is -2 nu dnu / (1 - nu^2).
         factors = {"youngs_modulus": 1 / material.youngs_modulus}
         factors["poisson_ratio"] = 2 * material.poisson_ratio / (1 - material.poisson_ratio**2)
         softer = np.array([factors.get(name, 0.0) for name in self._names])[:, None]

@@ -80,7 +80,10 @@ class StatePreconditioner:
         used = torch.zeros(self._count, dtype=torch.bool, device=self._rows.device)
         used[self._rows] = True
         compliance = self._rest.table(used)[self._rows[:, None], self._rows].to(torch.float64)
+        # Q^T C Q; C is symmetric, so that the sparse factor can stay on the left.
         projected = self._along @ (self._along @ compliance).T
+        # Normals' rows would be compliances beside the pure numbers of the tangents' rows; their own compliance scales
+        # them.
         self._give[self._normal, self._normal] = 1 / projected.diagonal()[self._normal]
         diagonal = torch.zeros_like(projected)
         for normal, stiffness, grows in blocks:
@@ -130,10 +133,12 @@ def _friction(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Return friction's stiffness [N/mm], shape (a, 2, 2), and its growth with the normal force [1], shape (a, 2)."""
     tangents = frame[:, :, 1:]
+    # Stored are xx, yy, zz, xy, yz and xz.
     stiffness = contact.tangent.friction[nodes, :, 0][:, [0, 3, 5, 3, 1, 4, 5, 4, 2]].unflatten(1, (3, 3))
     shear, limit = contact.shear[nodes, :, 0] @ turn.T, coefficient * contact.pressure[nodes, 0]
     size = torch.linalg.vector_norm(shear, dim=1)
     slips = (limit > 0) & (size >= _SLIPS * limit)
+    # A slipping node carries friction times its normal force along its shear.
     slip_stiffness = torch.where(slips, coefficient / size.clamp_min(1e-30), 0.0)[:, None] * shear
     return (
         torch.einsum("aip,aij,ajq->apq", tangents, stiffness, tangents),

@@ -36,9 +36,12 @@ class ArrudaBoyce(Law):
         """Return mu, kappa [MPa] and the coefficients of x^k, k = 1 to 5, of w(x) [1], x = I1bar - 3."""
         weights = [c * self.inverse_links**i for i, c in enumerate(SERIES)]
         powers = [0.0] * 6
+        # With I1bar = x + 3 the binomial theorem turns I1bar^i - 3^i into powers of x, and the sum starts near 0 at
+        # rest.
         for i, weight in enumerate(weights, start=1):
             for k in range(1, i + 1):
                 powers[k] += weight * comb(i, k) * 3.0 ** (i - k)
+        # The stated shear modulus is that at rest, which asks for w'(0) = 1/2.
         return shear_modulus, bulk_modulus, *(0.5 * p / powers[1] for p in powers[1:])
 
     @staticmethod

@@ -56,6 +56,8 @@ class Gent(Law):
             y = wp.min(m[2] * x, end)
             room = real(1.0) - y
             if y < end:
+                # Through ln(1 - y) / -y there is no division by m[2] = 1/Jm, and a stiffening of 0 gives the
+                # Neo-Hookean x/2.
                 return half * x * log1p_ratio(-y)
             excess = m[2] * x - y
             return half * (-wp.log(room) + excess / room + half * excess * excess / (room * room)) / m[2]

@@ -51,6 +51,7 @@ class NeoHookeanLog(Law):
             # (I1 - 3)/2 - ln J = tr H + H:H/2 - ln J by terms of second order: tr H = j - tr cof H - det H
             t, sym = wp.trace(H), half * (H + wp.transpose(H))
             minors = wp.ddot(sym, sym) - half * t * t - wp.determinant(H)
+            # The rest is j - ln J = exp(L) - 1 - L, of second order as well.
             return m[0] * (minors + exp_excess(L)) + half * m[1] * L * L
 
         @wp.func
@@ -66,6 +67,7 @@ class NeoHookeanLog(Law):
             K = cofactor_change(H)
             j = volume_change(H, K)
             J = real(1.0) + j
+            # G = F^-T, g = d ln J, dG = the change of F^-T along dF.
             G = shifted(K, real(1.0)) / J
             g = wp.ddot(G, dF)
             dG = cross(shifted(H, real(1.0)), dF) / J - g * G

@@ -88,6 +88,7 @@ class Ogden(Law):
         def stress(H: mat33, m: numbers):
             found = axes(H)
             tau = kirchhoff(log_stretches(found.strains), m)
+            # From tau = F S F^T the second Piola-Kirchhoff stress has the principal values tau_i / c_i.
             S = along_axes(found.axes, wp.diag(wp.cw_div(tau, found.strains + vec3(real(1.0)))))
             return (wp.identity(n=3, dtype=real) + H) * S
 
@@ -99,6 +100,7 @@ class Ogden(Law):
             tau = kirchhoff(logs, m)
             dC = wp.transpose(found.axes) * (wp.transpose(dF) * F + wp.transpose(F) * dF) * found.axes
             dS = mat33()
+            # Change of S_i = tau_i / c_i by its denominator; that by tau_i follows.
             for i in range(3):
                 dS[i, i] = -tau[i] / (c[i] * c[i]) * dC[i, i]
             for p in range(3):
@@ -107,9 +109,12 @@ class Ogden(Law):
                 mean = third * (x[0] + x[1] + x[2])
                 for i in range(3):
                     dtau = x[i] * dC[i, i] / c[i]
+                    # The isochoric stretches contain all three c_k through J, so that each dtau_i does.
                     for k in range(3):
                         dtau += third * (mean - x[i] - x[k]) * dC[k, k] / c[k]
                     dS[i, i] += real(0.5) * factor * dtau / c[i]
+                    # The axes turn: dS_ik = (S_i - S_k) / (c_i - c_k) dC_ik, where only the part in tau_i - tau_k
+                    # needs the divided difference. The other part, tau_k / (c_i c_k), follows in the last loop.
                     for k in range(3):
                         if k != i:
                             slope = factor / a * divided(a, logs[k], c[i], c[k])

@@ -49,6 +49,7 @@ def _adhesion_remark(edge: float, sensor: Sensor) -> str:
         return ""
     # Length over which traction falls at the contact's edge (Hillerborg, Cem. Concr. Res. 6 (1976) 773): E' w / t^2.
     plane = material.youngs_modulus / (1 - material.poisson_ratio**2)
+    # Work is in J/m^2, which is 1e-3 N/mm.
     width = plane * adhesion.range**2 / (adhesion.work * 1e-3)
     if width >= _SPACING * edge:
         return ""

@@ -50,6 +50,8 @@ def stable_ranges(material: Material, stretch: float = 2.0) -> list[StableRange]
         for sign in (-1.0, 1.0):
             stable = _least_stiffness(law, numbers, sign * steps[:, None] * np.array(path)) > 0
             unstable = np.flatnonzero(~stable)
+            # A stable stretch behind an unstable one does not count: loading would have to pass through the unstable
+            # one.
             last = unstable[0] - 1 if len(unstable) else STEPS
             ends.append(float(np.exp(sign * steps[last])) if last >= 0 else 1.0)
         result.append(StableRange(name, *ends))
@@ -84,20 +86,24 @@ def unstable(material: Material, strains: np.ndarray) -> np.ndarray:
         FormatError: If a parameter of the law is unknown or out of its range.
     """
     law = load_law(material.law)
+    # Written as "not above 0", so that a NaN counts as unstable.
     return ~(_least_stiffness(law, law.parameters(material), strains) > 0)
 
 
 def _least_stiffness(law, numbers: tuple[float, ...], strains: np.ndarray) -> np.ndarray:
     """Return the least d tau : d eps / |d eps|^2 over isochoric changes [MPa], shape (n,), at log strains (n, 3)."""
     stretches = np.exp(strains)
+    # Two orthonormal changes span all isochoric ones, so that the 2 x 2 stiffness below covers every direction.
     basis = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
     F = stretches[:, :, None] * np.eye(3)
     responses = []
     for change in basis:
+        # Strains are logarithmic: d l_i = l_i d eps_i.
         rate = stretches * change
         values = evaluate(law, numbers, F, rate[:, :, None] * np.eye(3))
         stress, tangent = (np.einsum("nii->ni", a) for a in (values.stress, values.tangent))
         # Kirchhoff stress tau_i = l_i P_i
         responses.append(rate * stress + stretches * tangent)
     stiffness = np.einsum("bi,cni->nbc", basis, np.stack(responses))
+    # The sign of d tau : d eps depends on the symmetric part alone.
     return np.linalg.eigvalsh((stiffness + stiffness.transpose(0, 2, 1)) / 2)[:, 0]

@@ -106,7 +106,9 @@ def estimate(
         doubt = np.broadcast_to(depths[:, None, None], fine.surface.shape).copy()
         return NumericalError(doubt, force, np.abs(fine.taxel_force), remark)
     growth = ratio**ORDER
+    # From the mean square of the difference, e^2 (r^2p + 1 - 2 rho r^p), solved for e.
     factor = 1 / np.sqrt(growth**2 + 1 - 2 * CORRELATION * growth)
+    # The force follows Richardson's estimate, so that it has no correlation in it.
     factor_of_force = 1 / (ratio**FORCE_ORDER - 1)
     pixels = np.stack(np.meshgrid(sensor.map.x, sensor.map.y, indexing="ij"), axis=-1).reshape(-1, 2)
     taxels = sensor.taxels.centers

@@ -32,6 +32,7 @@ class StableStrain:
             displacement: Of the nodes [mm], shape (nodes, 3).
         """
         gradient = np.einsum("eai,eqaj->eqij", displacement[self._mesh.tets], self._slopes) + np.eye(3)
+        # The eigenvalues of C = F^T F are the squares of the stretches.
         square = np.linalg.eigvalsh(np.einsum("eqki,eqkj->eqij", gradient, gradient))
         strain = 0.5 * np.log(square)
         return strain - strain.mean(axis=-1, keepdims=True)
@@ -53,7 +54,9 @@ class StableStrain:
         if not len(bad):
             return
         worst = bad[np.abs(strains[bad]).max(axis=1).argmax()]
+        # There are four quadrature points an element.
         place = self._mesh.nodes[self._mesh.tets[worst // 4, :4]].mean(axis=0).round(2).tolist()
+        # The eigenvalues, hence the strains, are in ascending order.
         low, high = np.exp(strains[worst][[0, 2]])
         raise SolveError(
             f"at {depth:g} mm depth, material law {self._material.law} is unstable in {len(bad)} of {len(strains)} "
