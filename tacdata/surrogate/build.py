@@ -105,6 +105,7 @@ class Work:
         rng, presses, count = np.random.default_rng(0), [], self.settings.left_out
         if count is None:
             count = 0 if self._ships else LEFT_OUT
+        # Fifty attempts each: where few positions are possible, fewer presses are left out.
         for k in range(50 * count):
             if len(presses) >= count:
                 break

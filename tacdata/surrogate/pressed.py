@@ -75,6 +75,7 @@ def pressed(paths: list[Path]) -> Pressed:
 def _reach(name: str, episodes: list[tuple[Episode, np.ndarray]]) -> Reach:
     first = episodes[0][0].press
     round_one = round_about_axis(first.indenter)
+    # The yaw of a round tool changes nothing, so that its recordings may differ in it.
     ways = {
         (0.0 if round_one else round(p.yaw, 3), p.tilt_x, p.tilt_y): p.turned for p in (e.press for e, _ in episodes)
     }

@@ -49,6 +49,7 @@ def reading_of(sensor: Sensor, loads: Loads) -> ReadingCurve:
     """
     transducer = Transducer.of(sensor)
     slopes = transducer.derivatives(loads)
+    # Derivative times load is a change of capacitance, so that the three kinds compare.
     weight = {
         name: float(np.abs(getattr(slopes, name) * getattr(loads, name)).max()) for name in ("force", "closure", "area")
     }
@@ -64,9 +65,11 @@ def reading_of(sensor: Sensor, loads: Loads) -> ReadingCurve:
     if by == "capacitance":
         top = float(np.abs(transducer.principle.capacitance(loads) - transducer.rest).max())
         at = np.array([0.0, max(top, 1e-9)])
+        # The identity: this load already is the change of capacitance.
         return ReadingCurve(by, at, at, transducer.gain, transducer.offset)
     at = np.linspace(0.0, 1.5 * float(getattr(loads, by).max()), POINTS)
     none = np.zeros((POINTS, transducer.taxels))
     arrays = {"force": none, "closure": none, "area": none, by: np.repeat(at[:, None], transducer.taxels, axis=1)}
     change = transducer.principle.capacitance(Loads(**arrays)) - transducer.rest
+    # All taxels have the same curve here, so that the first stands for them.
     return ReadingCurve(by, at, change[:, 0], transducer.gain, transducer.offset)

@@ -24,6 +24,7 @@ FOLDER = Path(__file__).parent / "presses"
 
 def shelf(sensor: Sensor, mesh: MeshSettings) -> str:
     """Return the folder name of such presses: a hash of sensor (without its readings) and mesh."""
+    # Transduction turns loads into readings and is no part of a solved press.
     document = sensor.document
     physical = {name: document[name] for name in ("taxels", "skin", "material", "contact")}
     return provenance.content_hash({"sensor": physical, "mesh": asdict(mesh)})[:16]

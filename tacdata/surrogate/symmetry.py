@@ -49,5 +49,6 @@ def _turned(indenter: Indenter, x: np.ndarray, y: np.ndarray, yaw: float) -> np.
 
 
 def _same(a: np.ndarray, b: np.ndarray) -> bool:
+    # Beyond the indenter heights are infinite, and infinities have no difference.
     finite = np.isfinite(a) & np.isfinite(b)
     return bool((np.isfinite(a) == np.isfinite(b)).all() and np.allclose(a[finite], b[finite], atol=_CLOSE))

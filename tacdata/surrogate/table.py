@@ -95,6 +95,7 @@ class LoadTable:
         at = [np.searchsorted(axis, v - 1e-9) for axis, v in zip((self.grid.x, self.grid.y), place, strict=True)]
         if not all(0 < k < len(axis) for k, axis in zip(at, (self.grid.x, self.grid.y), strict=True)):
             return False
+        # One level suffices: a press is solved from depth 0 on, so that all above it are solved as well.
         level = int(np.searchsorted(self.grid.depth, deepest - 1e-9))
         if level >= len(self.grid.depth):
             return False
@@ -172,6 +173,7 @@ def _continue(grid: Grid, load: np.ndarray, normal: np.ndarray, solved: np.ndarr
     for k in range(len(nodes)):
         i, j = nodes[k].tolist()
         _deepen(grid.depth, load[i, j], normal[i, j], int(levels[i, j]))
+    # The order matters: copied columns are complete by now, and the ends continue what is filled here.
     for i in range(EDGE, len(grid.x) - EDGE):
         for j in range(EDGE, len(grid.y) - EDGE):
             if not pressed[i, j]:
@@ -191,6 +193,7 @@ def _deepen(depth: np.ndarray, load: np.ndarray, normal: np.ndarray, count: int)
         for values in (load, normal):
             values[count] = 4 * values[count - 1] - 6 * values[count - 2] + 4 * values[count - 3] - values[count - 4]
         count += 1
+    # The state at depth 0 has no logarithm.
     last, previous = count - 1, max(count - 2, 1)
     power = 1.5
     if last > previous and normal[last] > normal[previous] > 0:
