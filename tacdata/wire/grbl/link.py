@@ -22,9 +22,7 @@ from tacdata.wire.patience import Patience
 from tacdata.wire.serial_port import read_available, why_broken, write_all
 
 SILENCE = 3.0
-"""Time without an answer after which the controller counts as gone [s of the clock, and of real time, since an emulator
-on a fast clock stalls with its host].
-"""
+"""Time without an answer after which the controller counts as gone [s of the clock, and of real time]."""
 LINE_BYTES = 79
 """Longest line that Grbl 1.1 takes [bytes without its end] (``LINE_BUFFER_SIZE`` 80; grblHAL takes 256)."""
 RX_BYTES = 128
@@ -115,10 +113,8 @@ class GrblLink:
         self._fail(f"the controller on {self.port.port} was closed", "an open one", "open it again")
         for thread in self._threads:
             thread.join(timeout=2.0)
-        try:
+        with suppress(serial.SerialException, OSError):
             self.port.close()
-        except (serial.SerialException, OSError):
-            pass
 
     def realtime(self, byte: bytes) -> None:
         """Send a real-time byte at once, before all waiting lines; safe in any thread and signal handler."""
@@ -141,8 +137,8 @@ class GrblLink:
     def ask(self) -> None:
         """Query the status, unless an answer is pending."""
         with self._changed:
-            wanted = self.statuses.ask()
-        if wanted:
+            due = self.statuses.ask()
+        if due:
             self._write(b"?")
 
     def command(self, line: str, limit: float, motion: float = 0.0) -> tuple[list[str], int, int]:
