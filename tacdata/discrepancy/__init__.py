@@ -1,1 +1,1 @@
-"""Where simulation and measurement disagree, which effect is missing, and what to record next."""
+"""Disagreement of simulation and measurement: its place, the missing effect, and the next presses to record."""

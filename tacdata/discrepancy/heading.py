@@ -1,4 +1,4 @@
-"""The head of a verdict: sentence, sizes, what was judged and when. Text, page and picture begin with it."""
+"""The head of a verdict: sentence, effect sizes, recordings and date. Text, page and picture begin with it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ YEAR_2000 = 946684800
 
 @dataclass(frozen=True)
 class Heading:
-    """What was judged."""
+    """Recordings of a verdict, its folder, and the unit of its readings."""
 
     recordings: tuple[str, ...]
     """Recordings or folders of sessions, as they were given."""
@@ -137,7 +137,7 @@ def _interval(value: float, error: float, unit: str, percent: bool) -> str:
 
 
 def origin(verdict: dict[str, Any]) -> str:
-    """Return what was judged, when, and by which version; what is not known is left out."""
+    """Return session, dates and version of a verdict in a line; unknown parts are left out."""
     heading, stamp = verdict.get("heading", {}), verdict.get("provenance", {})
     names = [Path(path).name for path in heading.get("recordings", ())]
     parts = [f"session {', '.join(names)}"] if names else []

@@ -29,7 +29,7 @@ class DataChecks:
     wiring: tuple[str, ...] = ()
     """Channels that are not those of the model: no verdict."""
     shortcomings: tuple[str, ...] = ()
-    """What is amiss with the recordings, each with its remedy."""
+    """Faults of the recordings, each with its remedy."""
     base: tuple[str, ...] = ()
     """Open questions of the model that they are compared with."""
     watched: tuple[str, ...] = ()
@@ -41,7 +41,7 @@ class DataChecks:
     early: tuple[str, ...] = ()
     """By how much they come early. A loop explains it."""
     limitations: tuple[str, ...] = ()
-    """What recordings of such a protocol leave open, each with its remedy."""
+    """Questions that such a protocol cannot answer, each with its remedy."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
@@ -73,7 +73,7 @@ def check(setting: Setting) -> DataChecks:
 
 
 def _touched(course: Course) -> tuple[str, ...]:
-    """Return that no side is without contact, where readings show it: estimates of touch would be of half the way."""
+    """Return a sentence if readings show contact on both sides of zero depth: half the path would be misjudged."""
     low = always_touched(course)
     if not low:
         return ()
@@ -84,7 +84,7 @@ def _touched(course: Course) -> tuple[str, ...]:
 
 
 def _base(setting: Setting) -> tuple[str, ...]:
-    """Return the open questions of the base, and the nearest contact law; nothing of one that was not fitted."""
+    """Return the open questions of a fitted response, and the nearest contact law; empty for a model of the sensor."""
     if not setting.response.fitted:
         return ()
     curve = response_curve(setting.course)

@@ -8,13 +8,13 @@ from tacdata.chain import Course
 from tacdata.discrepancy.data.tip_motion import HOLD, longest_hold, speeds
 
 FEWEST_EPISODES = 8
-"""Fewer episodes carry no name: a standard error over them is not known."""
+"""Fewest episodes for a name: with fewer, the standard error over them is too uncertain."""
 RATE_RATIO, ALIKE = 2.5, 1.3
-"""Rates: least ratio that tells lags from play, and largest one of a single rate [1]."""
+"""Rates: least ratio that distinguishes lags from play, and largest ratio that counts as a single rate [1]."""
 
 
 def shortcomings(course: Course) -> list[str]:
-    """Return in words what is amiss with recordings, each with its remedy."""
+    """Return the faults of recordings as sentences, each with its remedy."""
     remarks = list(course.notes)
     if course.episodes < FEWEST_EPISODES:
         remarks.append(
@@ -33,7 +33,7 @@ def shortcomings(course: Course) -> list[str]:
 
 
 def limitations(course: Course) -> list[str]:
-    """Return in words what recordings of such a protocol leave open, each with its remedy."""
+    """Return the questions that such a protocol cannot answer as sentences, each with its remedy."""
     remarks = []
     if longest_hold(course) < HOLD:
         remarks.append("no hold of a second or more: relaxation and baseline tracking show in holds; hold for 60 s")

@@ -18,8 +18,8 @@ SHARE_LEFT_ALONE = 0.15
 def stands_in(found: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     """Return whether an effect may be model error of another, or part of the common remainder.
 
-    It explains little compared with that, beyond the others. A form that is off by a tenth leaves a hundredth. What a
-    family without a name surely explains is left, too. `adequate` compares a single effect with the residual.
+    Its own part is small compared with these. (A form that is wrong by a tenth leaves a hundredth of its explained
+    part.) The part that an unnamed family explains counts as remainder. For a single effect, see `adequate`.
     """
     if len(found.effects) < 2 or finding.corrected_p is None:
         return False

@@ -17,10 +17,9 @@ from tacdata.discrepancy.model.contexts import contexts
 EVEN_INTERVALS = 8
 """With so few intervals, knots stay evenly spaced."""
 INTERVALS = 50
-"""Most intervals of the splines in depth. They know nothing of direction, rate or time, so history stays out however
-many they are; too few cannot follow how a skin is first touched, and half of that looks like a skin that sticks. (The
-best predictor of left-out episodes is no guide: that bias is far below one reading's noise, and far above what a test
-of all of them sees.)"""
+"""Most intervals of the splines in depth. The splines have no direction, rate or time, so they absorb no history,
+however many they are. Too few cannot follow the first touch, and half of that error resembles adhesion. (Prediction of
+left-out episodes is no criterion: the bias is far below the noise of a reading, but significant over all of them.)"""
 BENT = 0.65
 """Share of the knots that follow the response's curvature [1]."""
 LITTLE = 0.02

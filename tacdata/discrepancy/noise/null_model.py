@@ -42,7 +42,7 @@ class NullModel:
     context: np.ndarray
     """Group of rows that share features, of the rows read, shape (m,), int64."""
     features: np.ndarray | None
-    """What the response may take up [1], shape (m, k)."""
+    """Features that the response absorbs [1], shape (m, k); None if it was not fitted."""
     errors: np.ndarray
     """Effect of an episode's own errors of pose [each stream's unit], shape (m, streams, kinds)."""
     ridge: np.ndarray

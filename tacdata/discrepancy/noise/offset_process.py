@@ -1,17 +1,17 @@
-"""How offsets drift from episode to episode: an Ornstein-Uhlenbeck process, estimated by REML.
+"""Drift of offsets from episode to episode: an Ornstein-Uhlenbeck process, estimated by REML.
 
-A stream's offset in an episode is the sum of three parts: a level of its place and session, an Ornstein-Uhlenbeck
-process in time, and the episode's own error. Their variances are those of restricted maximum likelihood (REML:
-Patterson & Thompson, Biometrika 58, 1971, 545) with a straight line. REML leaves slow processes undecided: of the
-time constants that are likely, the one counts by which a drift is least certain. A common change of all channels, as a
-warm-up causes, or a dependence on a measured temperature, is no evidence of the process either: it is tested against
-it.
+The offset of a stream in an episode is the sum of a level (of its place and session), an Ornstein-Uhlenbeck process in
+time, and an independent error. Their variances are estimated by restricted maximum likelihood (REML: Patterson &
+Thompson, Biometrika 58, 1971, 545). A straight line in time is a covariate: a drift at a constant rate is an effect to
+be tested, and must not enlarge the process. For the same reason measured temperature is a covariate, and the common
+part of all channels, such as a warm-up, is left out. REML hardly distinguishes long time constants. Of the likely
+ones, the one is taken that gives the rate of a drift the largest variance.
 
-An offset is read as a mean over the rows without contact, and a mean moves less than the process does: its covariance
-is that of means. An episode's own offset is the mean over all of it.
+An offset is measured as the mean over the rows without contact. A mean varies less than the process, so covariances
+are those of means. The offset to be predicted is the mean over the whole episode.
 
-Episodes are made independent by their innovations (the Cholesky factor of the offsets' covariance): the part that the
-earlier offsets, read without contact, predict is taken off. An effect that follows the clock must then exceed this
+The innovations of the offsets (by the Cholesky factor of their covariance) are independent over episodes: the part
+predicted by earlier offsets is subtracted. So an effect that follows the clock is only significant if it exceeds this
 drift.
 """
 
@@ -35,23 +35,23 @@ FREE_LEVEL = 1e3
 FEWEST_OFFSETS = 6
 """REML: with fewer episodes no process is estimated, and every offset is free."""
 MANY_CHANNELS = 8
-"""REML: from so many channels on, their common part is left out."""
+"""REML: from this number of channels on, their common part is left out."""
 SETTLING = (0.7, 1.5, 3.0, 6.0, 12.0)
-"""Common wander: rates of settling [over the time of all episodes]."""
+"""Common drift: rates of exponential settling that are projected out [1 / duration of all episodes]."""
 TOGETHER_Z = 1.64
-"""Common wander: it is larger from so many standard errors of its variance on (5 %, one-sided) [1]."""
+"""Common drift: its variance is larger if it is so many standard errors above that of REML (5 %, one-sided) [1]."""
 POINTS = 40
-"""Covariance of means: most points of an episode that its mean is taken over."""
+"""Covariance of means: points of time that represent an episode."""
 QUIET_ROWS = 3
-"""Rows without contact from which an episode's offset is read, at least."""
+"""Fewest rows without contact from which the offset of an episode is measured."""
 LEAST_OWN = 0.05
-"""REML: least standard deviation of an episode's own offset [noise scales]."""
+"""REML: least standard deviation of the independent error of an offset [noise scales]."""
 MOST_OFFSETS = 160
 """REML: most successive episodes that enter; its cost grows with their cube."""
 TIME_CONSTANTS = (0.5, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 200.0)
-"""REML: time constants of the Ornstein-Uhlenbeck process on a grid [median times between episodes]."""
+"""REML: grid of time constants of the Ornstein-Uhlenbeck process [median times between episodes]."""
 LIKELY = 1.0
-"""REML: a time constant is likely within this log-likelihood of the best, 84 % one-sided [1]."""
+"""REML: a time constant is likely if its log-likelihood is within this of the best, 84 % one-sided [1]."""
 
 
 @dataclass(frozen=True)
@@ -59,36 +59,36 @@ class OffsetProcess:
     """Prior of episodes' offsets."""
 
     covariance: np.ndarray
-    """Of the means where nothing presses [noise scales squared], shape (episodes, episodes)."""
+    """Covariance of the means without contact [noise scales squared], shape (episodes, episodes)."""
     cross: np.ndarray
-    """Of each episode's offset, the mean over all of it, with those means [the same], shape (episodes, episodes)."""
+    """Covariance of offsets (means over whole episodes) with these means [the same], shape (episodes, episodes)."""
     variance: np.ndarray
-    """Of each episode's offset [the same], shape (episodes,)."""
+    """Variance of each offset [the same], shape (episodes,)."""
     error: np.ndarray
-    """Variance with which each mean is read [the same], shape (episodes,); inf where none was read."""
+    """Error variance of each mean by noise [the same], shape (episodes,); inf for episodes without such rows."""
     quiet: np.ndarray
-    """Readings behind each row read where nothing presses, 0 where something does [1], shape (m,)."""
+    """Number of readings averaged in each row read without contact, 0 in contact [1], shape (m,)."""
     episode: np.ndarray
     """Episode of each row read, shape (m,), int64."""
 
     @property
     def weights(self) -> np.ndarray:
-        """Expected offset of an episode is this times those read, shape (episodes, episodes), lower triangular."""
+        """Weights of earlier means in the prediction of each offset, shape (episodes, episodes), lower triangular."""
         return self._innovations[0]
 
     @property
     def spread(self) -> np.ndarray:
-        """Standard deviation of each offset around that [noise scales], shape (episodes,)."""
+        """Standard deviation of each offset around its prediction [noise scales], shape (episodes,)."""
         return self._innovations[1]
 
     @cached_property
     def _innovations(self) -> tuple[np.ndarray, np.ndarray]:
         count, blind = len(self.error), ~np.isfinite(self.error)
         read = self.covariance + np.diag(np.where(blind, 0.0, self.error))
-        # An episode whose offset cannot be read has no part in the others' prediction.
+        # An episode without a measured offset has no part in the prediction of the others.
         read[blind] = read[:, blind] = 0.0
         read[blind, blind] = 1.0
-        # Its inverse's rows up to e whiten the means before e: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e.
+        # The first e rows of the inverse factor whiten the means before e: E[o_e | q_<e] = C_e,<e (Q_<e,<e)^-1 q_<e.
         inverse = solve_triangular(cholesky(read, lower=True), np.eye(count), lower=True)
         weights, spread = np.zeros((count, count)), np.zeros(count)
         for e in range(count):
@@ -98,11 +98,11 @@ class OffsetProcess:
         return weights, spread
 
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> OffsetProcess:
-        """Return the prior if only some rows were read.
+        """Return the prior for a part of the rows.
 
         Args:
             rows: Whether each row is kept, shape (m,), bool.
-            episodes: Those that are left, renumbered; all, unless given.
+            episodes: Episodes that are kept, to be renumbered; None keeps all of them.
         """
         number = self.episode[rows]
         if episodes is None:
@@ -119,11 +119,11 @@ class OffsetProcess:
         )
 
     def beside(self, course: Course) -> OffsetProcess:
-        """Return it for a course with readings of more episodes: their offsets let no others be expected."""
+        """Return the prior for a course with readings of more episodes, whose offsets predict no others."""
         return replace(self, quiet=_quiet(course), episode=course.episode)
 
     def expected(self, values: np.ndarray, missing: np.ndarray | None = None) -> np.ndarray:
-        """Return the offsets that those of the episodes before let one expect, shape (episodes, streams, columns).
+        """Return the offsets predicted by those of earlier episodes, shape (episodes, streams, columns).
 
         Args:
             values: Shape (m, streams, columns).
@@ -136,14 +136,14 @@ class OffsetProcess:
 def offset_process(
     residual: np.ndarray, course: Course, scale: np.ndarray, memory: float, levels: Sequence[np.ndarray]
 ) -> OffsetProcess | None:
-    """Return how offsets drift; None if there are too few episodes to estimate it.
+    """Return the process of the offsets; None if there are too few episodes to estimate it.
 
     Args:
-        residual: Residual of an over-rich fit, shape (m, streams); NaN where nothing was read.
-        course: With the rows read alone.
+        residual: Residual of an over-rich fit, shape (m, streams); NaN for missing readings.
+        course: Course of the rows read.
         scale: Standard deviation of the innovations of rows, shape (streams,).
         memory: Correlation of successive rows [1].
-        levels: Kinds of unknown levels, each as the number of the one that an episode has, shape (episodes,).
+        levels: For each kind of level (place, session), its number in each episode, shape (episodes,).
     """
     quiet = quiet_rows(course)
     streams = residual[:, : course.channels] / scale[: course.channels]
@@ -155,7 +155,7 @@ def offset_process(
         return None
     weight = np.where(there, course.averaged, 0.0)
     offsets = _means(streams[:, :, None], weight, course.episode, course.episodes, None)[:, :, 0]
-    # The mean of n readings with memory m and innovations of variance 1.
+    # Variance of the mean of n readings of an AR(1) process with correlation m and innovations of variance 1.
     error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
     spans = _Spans.of(course, weight)
     kinds, near, warmth = [level[known] for level in levels], spans.among(known), _warmth(course)[known]
@@ -179,18 +179,18 @@ def offset_process(
 
 @dataclass(frozen=True)
 class _Spans:
-    """Times over which an episode's means are taken: where nothing presses, and over all of it."""
+    """Times of the two means of each episode: over the rows without contact, and over the whole episode."""
 
     time: np.ndarray
-    """Of each episode [s], shape (episodes,)."""
+    """Mean time of each episode [s], shape (episodes,)."""
     quiet: list[np.ndarray]
-    """Times without contact, from that [s]; empty where there are none."""
+    """Times without contact, relative to the mean time [s]; empty where there are none."""
     whole: list[np.ndarray]
-    """Times of all of it, from that [s]."""
+    """Times of the whole episode, relative to the mean time [s]."""
 
     @classmethod
     def of(cls, course: Course, weight: np.ndarray) -> _Spans:
-        """Return those of a course of which rows determine the offset, each by its weight, shape (m,)."""
+        """Return the times of a course; ``weight``: of each row in the mean without contact, shape (m,)."""
         time = _times(course)
         quiet, whole, share = [], [], (np.arange(POINTS) + 0.5) / POINTS
         edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
@@ -204,14 +204,14 @@ class _Spans:
         return cls(time, quiet, whole)
 
     def among(self, known: np.ndarray) -> _Spans:
-        """Return those of some episodes, shape (episodes,), bool, at most of `MOST_OFFSETS`."""
+        """Return the times of the first `MOST_OFFSETS` of some episodes; ``known``: shape (episodes,), bool."""
         few = np.flatnonzero(known)[:MOST_OFFSETS]
         return _Spans(self.time[few], [self.quiet[k] for k in few], [self.whole[k] for k in few])
 
     def covariances(self, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return covariances of a process of variance 1: of means, of offsets with means, and offsets' variances.
+        """Return covariances of a process of variance 1: of means, of offsets with means, and variances of offsets.
 
-        That of two episodes is a product: exp(-|t - s| / length) of any two of their times.
+        exp(-|t - s| / length) of times in two episodes is a product of two factors, so no pairs of times are formed.
 
         Args:
             length: Time constant [s].
@@ -230,21 +230,21 @@ class _Spans:
 
 
 def _mean_alike(first: np.ndarray, second: np.ndarray, length: float) -> float:
-    """Return the covariance of the means over two sets of times of one episode, for a process of variance 1."""
+    """Return the covariance of means over two sets of times of one episode, for a process of variance 1."""
     if not (len(first) and len(second)):
         return 1.0
     return float(np.mean(np.exp(-np.abs(np.subtract.outer(first, second)) / length)))
 
 
 def _shared(offsets: np.ndarray, course: Course, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return offsets in the directions that all channels share, and in all others, shapes (episodes, k).
+    """Return offsets in the common directions of all channels, and in all others, shapes (episodes, k).
 
-    A common settling or drift of all channels, or one proportional to their readings at rest, is systematic: it would
-    hide in the process.
+    A common drift of all channels, or one proportional to their readings at rest, is a systematic effect. Left in, it
+    would enlarge the process and then be hidden by it.
 
     Args:
-        offsets: In noise scales, shape (episodes, channels).
-        course: With the rows read alone.
+        offsets: Offsets [noise scales], shape (episodes, channels).
+        course: Course of the rows read.
         scale: Standard deviation of the innovations of rows, shape (streams,).
     """
     channels = offsets.shape[1]
@@ -267,16 +267,16 @@ def _variance_ratio(
     levels: Sequence[np.ndarray],
     warmth: np.ndarray,
 ) -> float:
-    """Return how much larger variances are where channels wander together [1]: 1 where they surely do not.
+    """Return the variance of the common directions over that of the others [1]; 1 unless it is significantly larger.
 
-    Common noise of all channels is quick, too; settling and warm-up are slow, and have no part in this.
+    Only common noise counts, which is quick. Slow settling and warm-up are projected out.
 
     Args:
-        shared: Offsets in directions that channels share [noise scales], shape (episodes, k).
-        process: REML estimate from the other directions.
-        error: Variance of each that is known [1].
-        spans: Their times.
-        levels: Of each.
+        shared: Offsets in the common directions [noise scales], shape (episodes, k).
+        process: Variance, time constant and error variance by REML from the other directions.
+        error: Error variance of each offset [1].
+        spans: Times of the episodes.
+        levels: Numbers of the levels of each episode.
         warmth: Further covariates of a drift, shape (episodes, k).
     """
     walk, length, own = process
@@ -298,7 +298,7 @@ def _variance_ratio(
 
 
 def _warmth(course: Course) -> np.ndarray:
-    """Return the measured temperature of each episode, less its mean [degC], shape (episodes, 1), or (episodes, 0)."""
+    """Return the temperature of each episode less its mean [degC], shape (episodes, 1), or (episodes, 0) if unknown."""
     if course.temperature is None:
         return np.zeros((course.episodes, 0))
     count = np.maximum(np.bincount(course.episode, minlength=course.episodes), 1)
@@ -307,7 +307,7 @@ def _warmth(course: Course) -> np.ndarray:
 
 
 def _quiet(course: Course) -> np.ndarray:
-    """Return the readings behind each row where nothing presses, 0 elsewhere, shape (m,)."""
+    """Return the number of readings averaged in each row without contact, 0 in contact, shape (m,)."""
     return np.where(quiet_rows(course), course.averaged, 0.0)
 
 
@@ -320,7 +320,7 @@ def _times(course: Course) -> np.ndarray:
 def _means(
     values: np.ndarray, weight: np.ndarray, episode: np.ndarray, episodes: int, missing: np.ndarray | None
 ) -> np.ndarray:
-    """Return the weighted means of each episode's rows, shape (episodes, ...), 0 where there are none."""
+    """Return the weighted mean over the rows of each episode, shape (episodes, ...); 0 for episodes without rows."""
     chosen = np.flatnonzero(weight > 0)
     gone = ~np.isfinite(values[..., 0]) if missing is None else missing
     if gone[chosen].any():
@@ -334,13 +334,13 @@ def _means(
 def _reml(
     offsets: np.ndarray, error: np.ndarray, spans: _Spans, levels: Sequence[np.ndarray], warmth: np.ndarray
 ) -> tuple[float, float, float]:
-    """Return the REML variance and time constant [s] of the process, and the variance of episodes' own offsets.
+    """Return the variance and time constant [s] of the process by REML, and the variance of the independent error.
 
     Args:
-        offsets: In noise scales, shape (episodes, channels).
-        error: Variance of each that is known [1].
-        spans: Their times.
-        levels: Of each.
+        offsets: Offsets [noise scales], shape (episodes, channels).
+        error: Error variance of each offset [1].
+        spans: Times of the episodes.
+        levels: Numbers of the levels of each episode.
         warmth: Further covariates of a drift, shape (episodes, k).
     """
     offsets, error, time = offsets[:MOST_OFFSETS], error[:MOST_OFFSETS], spans.time
@@ -375,18 +375,18 @@ def _reml(
 
 
 def _slow(time: np.ndarray, levels: Sequence[np.ndarray], warmth: np.ndarray) -> np.ndarray:
-    """Return columns that are no evidence of the process: unknown levels, covariates, and last a straight line."""
+    """Return the covariates of the process: unknown levels, temperature, and last a straight line in time."""
     known = [level[:MOST_OFFSETS, None] == np.unique(level[:MOST_OFFSETS]) for level in levels]
     clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
     return np.column_stack([*known, warmth[:MOST_OFFSETS] / max(float(np.abs(warmth).max(initial=0.0)), 1e-9), clock])
 
 
 def _complement(basis: np.ndarray) -> np.ndarray:
-    """Return orthonormal columns that are orthogonal to those of a basis, shape (n, k)."""
+    """Return an orthonormal basis of the orthogonal complement of a basis, shape (n, k)."""
     values, vectors = np.linalg.eigh(basis @ basis.T)
     return vectors[:, values < 1e-9 * values[-1]]
 
 
 def _doubt(covariance: np.ndarray, basis: np.ndarray) -> float:
-    """Return the variance of the last column's weight given the others, for offsets of a covariance [1]."""
+    """Return the variance of the last column's coefficient (a drift) by generalized least squares [1]."""
     return float(np.linalg.pinv(basis.T @ np.linalg.solve(covariance, basis), hermitian=True)[-1, -1])

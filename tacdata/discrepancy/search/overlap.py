@@ -1,4 +1,4 @@
-"""Overlap: share of one effect that those in the model might explain in other forms."""
+"""Overlap: share of an effect that the effects in the model could explain, were their forms slightly different."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from tacdata.discrepancy.regressors.candidates import Candidate
 from tacdata.discrepancy.search.problem import Problem
 
 RIDGE = 1e-6
-"""Ridge of unexcited directions, over the mean of the excited ones [1]."""
+"""Ridge for unexcited directions, over the mean of the diagonal [1]."""
 
 
 def overlap(problem: Problem, candidates: Sequence[Candidate]) -> float:
     """Return the largest share of a candidate's columns that the placed effects could explain press by press [1].
 
-    Every press has amounts of its own of the placed effects' model error, and of their tangent space:
-    the remainder then resembles no form of them, however large they are.
+    The columns are regressed on the tangent space and the model error of the placed effects, with free coefficients
+    in each press. So the unexplained part of a candidate resembles no form of the placed effects, of any size.
 
     Args:
-        problem: With columns for the placed effects.
-        candidates: Shapes of an effect; 0 without any.
+        problem: Problem with columns for the placed effects.
+        candidates: Shapes of one effect. Without any, the result is 0.
     """
     beside = np.concatenate([problem.tangent.columns, problem.model_errors]).astype(int) + 1
     gram = problem.grams.gram

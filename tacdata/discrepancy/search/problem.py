@@ -1,4 +1,4 @@
-"""The regression problem: columns of everything that may be missing, reduced to a Gram matrix an episode."""
+"""The regression problem: columns of all candidates and nuisances, reduced to one Gram matrix per episode."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tacdata.effects import Placed
 
 @dataclass(frozen=True)
 class Problem:
-    """One state of the model with all candidates."""
+    """A model with its placed effects, and the Gram matrices of all columns that may be added to it."""
 
     setting: Setting
     null: NullModel
@@ -29,39 +29,39 @@ class Problem:
     board: CandidateColumns
     grams: EpisodeGrams
     tangent: Tangent
-    """Columns by which the placed effects may still move."""
+    """Derivatives of the predictions with respect to the parameters of the placed effects."""
     model_errors: np.ndarray
     """Columns of the model error of the placed effects, from 0, shape (k,), int64."""
     nuisances: np.ndarray
     """Columns of nuisances, from 0, shape (k,), int64."""
     generic: np.ndarray
-    """Columns that belong to no effect, from 0, shape (k,), int64."""
+    """Columns of smooth histories of the path, of no particular effect, from 0, shape (k,), int64."""
     rise: float
     """Rise of all readings under presses, root of the sum of squares in noise scales [1]."""
     parts: np.ndarray
-    """Columns of each placed effect's contribution to the others, from 0, shape (placed,), int64."""
+    """Column of each placed effect's contribution in the presence of the others, from 0, shape (placed,), int64."""
     of_errors: np.ndarray
-    """Which placed effect each of the model errors is of, shape (k,), int64."""
+    """Number of the placed effect that each column of model error belongs to, shape (k,), int64."""
     numerics: int | None = None
-    """Column of the response's own error, from 0; None if it has no numerics."""
+    """Column of the interpolation error of the response, from 0; None if it has no numerics."""
 
     @property
     def candidates(self) -> list[Candidate]:
-        """Everything that may be missing."""
+        """All effects and shapes that may be missing."""
         return self.board.candidates
 
     @property
     def ridge(self) -> np.ndarray:
-        """Weight of each nuisance's prior, shape (k,)."""
+        """Weight of the prior of each nuisance, shape (k,)."""
         return self.null.ridge
 
     @property
     def fixed(self) -> np.ndarray:
-        """Columns fitted with every candidate: nuisances, placed effects, their model error."""
+        """Columns fitted together with every candidate: nuisances, tangent space and model error of placed effects."""
         return np.concatenate([self.nuisances, self.tangent.columns, self.model_errors]).astype(int)
 
     def fixed_ridge(self, moving: float) -> np.ndarray:
-        """Return the weights of their priors; ``moving``: of the placed effects [1]."""
+        """Return the weights of the priors of `fixed`; ``moving``: weight for the placed effects [1]."""
         return np.concatenate([self.ridge, np.full(len(self.tangent.columns), moving), np.ones(len(self.model_errors))])
 
     @property
@@ -70,7 +70,7 @@ class Problem:
         return self.null.folds
 
     def without(self, at: int) -> Problem:
-        """Return the same without one placed effect, to first order: candidates keep their columns."""
+        """Return the problem without one placed effect, to first order: the candidates' columns stay the same."""
         gram, own = self.grams.gram.copy(), int(self.parts[at]) + 1
         gram[:, 0] += gram[:, own]
         gram[:, :, 0] += gram[:, :, own]
@@ -99,14 +99,14 @@ def prepare(
     tested: bool = True,
     among: Collection[Form] | None = None,
 ) -> Problem:
-    """Build columns given the placed effects and reduce them.
+    """Compute all columns for a model with placed effects, and reduce them to Gram matrices.
 
     Args:
         setting: Input of the judgement.
-        null: Its nuisances and noise.
-        placed: Effects that the model has.
-        tested: Whether it will be tested: columns of no effect and the response's own error are for tests alone.
-        among: Effects and shapes that are tried; all, unless given.
+        null: Nuisances and noise of the setting.
+        placed: Effects in the model.
+        tested: Whether score tests will follow. Only these need the generic columns and the interpolation error.
+        among: Effects and shapes to be tried; None tries all.
     """
     course, response = setting.course, setting.response
     board = build(course, response, [*setting.given, *placed], setting.effects, setting.absorbed, among)
@@ -143,7 +143,7 @@ def prepare(
 
 
 def _numerics(setting: Setting, placed: Sequence[Placed]) -> np.ndarray | None:
-    """Return the error of a response, shape (m, streams, 1); None where it has no numerics."""
+    """Return the interpolation error of a response, shape (m, streams, 1); None if it has no numerics."""
     rough = setting.response.rougher()
     if rough is None:
         return None

@@ -225,7 +225,7 @@ def _only_unphysical(current: Refined, best: dict[str, Candidate], models: dict[
 
 
 def _bound(model: Refined) -> bool:
-    """Return whether an amplitude is at its bound. A shape at its own says that the form is another one."""
+    """Return whether an amplitude is at its bound; a shape at its bound only means that the form is another one."""
     return any(set(model.bounds(k)) - {p.name for p in placed.effect.shapes} for k, placed in enumerate(model.placed))
 
 

@@ -1,4 +1,4 @@
-"""Readings beside the predictions of a verdict's model, without and with its effects."""
+"""Readings, and predictions of a verdict's model without and with its effects."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MOST_VALUES = 2_000_000
 
 
 def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int = MOST_VALUES) -> Residuals:
-    """Lay the readings beside the model before and after.
+    """Return the readings with the predictions of the model before and after.
 
     Args:
         course: All recordings, the sealed ones with their readings.
-        found: What was found without those.
+        found: Findings without those.
         sealed: Which episodes were sealed.
         most: Values of each kind that are kept at most.
     """

@@ -1,4 +1,4 @@
-"""Calibration: what it leaves open of gains and scales, what is beyond that, and what known specimens calibrate."""
+"""Calibration: gains and scales beyond its tolerance, and the compliance that known specimens determine."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.effects import Effect, GainKind, Placed, Scale, library
 
 BEYOND = 3.0
-"""Calibration: a gain or a scale is wrong beyond so many of its prior's standard deviations [1]."""
+"""Calibration: a gain or a scale is wrong beyond so many standard deviations of its prior [1]."""
 OUTLYING = 4.0
-"""Calibration: ... or, where all gains scatter little, beyond so many of theirs (robust) [1]."""
+"""Calibration: ... or, where the gains scatter little, beyond so many of their robust standard deviations [1]."""
 WIDE = 2.0
-"""Calibration: gains scatter more than it leaves open beyond so many of its standard deviations [1]."""
+"""Calibration: scatter of the gains from which on the prior is too narrow [its standard deviations]."""
 STEADY = 0.5
-"""Calibration: a gain is one only if the halves of the session differ by less than this share of it [1]."""
+"""Calibration: largest difference between the halves of a session at which a gain is a constant [its size]."""
 OBSERVER_SCALE = 0.005
 """Calibration: standard deviation of the scale of a camera or a gauge [1]."""
 
 
 def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
-    """Return gains that are beyond what calibration leaves open: common to all channels, or of some."""
+    """Return gains beyond the tolerance of calibration: one common to all channels, or those of some."""
     setting, known = found.problem.setting, found.gains[np.isfinite(found.gains)]
     per_channel = setting.channel_gain
     if per_channel is None or not np.any(known):
@@ -36,10 +36,11 @@ def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
         made.append(_finding(effect, np.array(common), error, rivals, abs(common) / max(error, 1e-9)))
     own = np.nan_to_num(found.gains - common)
     spread = float(np.sqrt(np.mean(np.square(known - common))))
-    # Gains may all be worse than calibration was thought to be; else a channel must stand out against its kind.
+    # If all gains scatter more than the prior, the prior is the measure: the sensor was calibrated worse than assumed.
+    # Otherwise a channel must be an outlier among the others.
     usual = prior if spread > WIDE * prior else max(prior, 1.4826 * float(np.median(np.abs(known - common))))
     far = np.abs(own) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
-    # What changes over the session is no constant: channels that changed places half way, a contact that got loose.
+    # A gain that changes over the session is no calibration error, but swapped channels or a loose contact.
     far &= _steady(found.halves - np.nanmedian(found.halves, axis=1, keepdims=True), own)
     if far.any():
         made.append(_finding(per_channel, np.where(far, own, 0.0), prior, (), float(np.abs(own).max() / prior)))
@@ -47,9 +48,9 @@ def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
 
 
 def compliance_of_specimens(found: Findings) -> list[FoundEffect]:
-    """Return the compliance in series that specimens of other stiffness share; empty where they show none.
+    """Return the series compliance common to specimens of different stiffness; empty where they show none.
 
-    Each may have a law of its own, by chance in the order of their stiffness: that stays beside it.
+    Its rivals remain: laws of the specimens could differ in the order of their stiffness by chance.
     """
     shown = series_compliance(found.problem.setting.course) if found.problem.setting.response.fitted else None
     if shown is None:
@@ -61,21 +62,21 @@ def compliance_of_specimens(found: Findings) -> list[FoundEffect]:
 
 
 def _steady(halves: np.ndarray, whole: np.ndarray | float) -> np.ndarray:
-    """Return whether a gain is the same in both halves of the session; those that one half does not show pass."""
+    """Return whether a gain is the same in both halves of the session; True where one half does not determine it."""
     apart = np.abs(np.nan_to_num(halves[1] - halves[0]))
     return apart < STEADY * np.abs(whole)
 
 
 def _finding(effect: Effect, value: np.ndarray, error: float, rivals: tuple[str, ...], necessity: float) -> FoundEffect:
-    """Return an effect of a size as a finding; it did not race."""
+    """Return an effect of a size as a finding, without the statistics of the search."""
     name = effect.amplitudes[0].name
     return FoundEffect(Placed(effect, {name: value}), {name: error}, (), rivals, {}, necessity, needed=BEYOND)
 
 
 def calibration_error(finding: FoundEffect) -> bool:
-    """Return whether a drive and its observer disagree by no more than calibrating the observer leaves open.
+    """Return whether a drive and its observer disagree by no more than the tolerance of the observer's calibration.
 
-    One of the two must be its observer's scale, in its own place or in its rival's.
+    The effect or one of its rivals must be the scale of the observer.
     """
     placed = finding.placed
     if placed.effect.scale is None:

@@ -1,4 +1,4 @@
-"""How sure a name is: a probability, by a map fitted to worlds of which the truth was known."""
+"""Confidence in a name: a probability, by a map fitted to simulated worlds with a known truth."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from tacdata.discrepancy.search.findings import Findings, FoundEffect
 FILE = "confidence.json"
 """The map: weights, and the worlds and the command that they come from."""
 LARGEST_Z = 12.0
-"""Margins beyond are all the same [standard errors]."""
+"""Larger margins are clipped to this [standard errors]."""
 
 
 def features(found: Findings, finding: FoundEffect, count: int) -> dict[str, float]:
-    """Return what the confidence in an effect rests on, each about 0 to 1.
+    """Return the features of an effect's confidence, each about 0 to 1.
 
     Args:
-        found: What was found.
+        found: Findings of the search.
         finding: One effect of the answer.
-        count: How many there are.
+        count: Number of effects in the answer.
     """
     p = finding.corrected_p
     margin = min((float(v) for v in finding.margins.values()), default=LARGEST_Z)
@@ -57,7 +57,7 @@ def known() -> dict[str, Any] | None:
 
 
 def fit(rows: list[dict[str, float]], right: list[bool], weight: float = 1.0) -> dict[str, Any]:
-    """Return a map fitted to names of which it is known whether they were right.
+    """Return a map fitted to names whose truth is known.
 
     A logistic regression with a ridge of ``weight`` on every weight. Its probabilities stay between 1 / (n + 2) and
     1 - 1 / (n + 2), as n names prove no more (rule of succession).

@@ -1,4 +1,4 @@
-"""The decision: one of five statuses. Every status is given here, and nowhere else."""
+"""The decision: one of five statuses. No other module gives a status."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from tacdata.discrepancy.verdict.sealed import Gap, borne_out, refuted
 from tacdata.effects import AtRest, Family, load
 
 GAP_T = 3.0
-"""Leftovers: without any effect that helps, they are a gap from so many standard errors on [1]."""
+"""Leftovers: if no effect helps, they are a gap from so many standard errors on [1]."""
 SAME_SIZE = 0.1
-"""Constancy: an effect whose size spreads by so little over all conditions is a mechanism, whatever is left [1]..."""
+"""Constancy: largest spread of size over conditions at which a mechanism is named despite a remainder [1]..."""
 ALIKE_SIZE = 0.2
-"""...and by so little it is surely of its family. Stand-ins spread by more, but for those that look the same [1]."""
+"""...and largest spread for a family. Wrong effects spread by more, except collinear ones [1]."""
 FAR_SIZE = 0.25
-"""Constancy: ... or by so little, where no rival is within `SETTLED_Z` and the sealed gap surely closes [1]."""
+"""...or this spread, if no rival is within `SETTLED_Z` and the sealed gap surely closes [1]."""
 SURELY_CLOSED = 0.5
 """Sealed episodes: the gap surely closes if the 90 % interval of the share that is closed begins above this [1]."""
 SETTLED_Z = 5.0
-"""J test: a rival beaten by so many standard errors is out, whatever the answer leaves [1]."""
+"""J test: margin from which a rival is excluded, however much the answer leaves unexplained [standard errors]."""
 LOUD = 2.0
-"""Residual: a mean square of so many noise floors is unknown, not none, even if no test rejects [1]."""
+"""Residual: mean square from which the status is unknown, not none, even if no test rejects [noise floor]."""
 RARE_P = 0.003
-"""Score test: with so small a corrected p-value `NEEDED_Z` standard errors of necessity are enough [1]."""
+"""Score test: with so small a corrected p-value, a necessity of `NEEDED_Z` suffices for a name [1]."""
 INCOMPLETE = "named, incomplete"
-"""Status: some of what is missing has a name, the rest has not."""
+"""Status: part of the gap is named, another part is unexplained."""
 
 
 class Reason(Enum):
@@ -53,23 +53,23 @@ class Reason(Enum):
     STOPPED = auto()
     """Stopped before the last step."""
     QUIET = auto()
-    """Nothing is missing that these recordings would show."""
+    """No effect is missing within the detection limits of these recordings."""
     NAMED = auto()
-    """Nothing else explains the episodes as well."""
+    """No rival explains the episodes as well."""
     RIVALS = auto()
-    """Others explain the episodes as well, or the effect is not surely needed."""
+    """Rivals explain the episodes as well, or the necessity of the effect is not certain."""
     INCOMPLETE = auto()
-    """Some of it has a name, at some level, beside a remainder that has none."""
+    """Part of the gap is named, at some level; a remainder is unexplained."""
     LEFTOVERS = auto()
-    """The best answer leaves too much."""
+    """The best answer leaves too much unexplained."""
     ODD = auto()
     """Some episodes are unlike all others, and no effect explains them."""
     ALARM = auto()
-    """No effect shows, but the residual is not noise: it has no form of the library."""
+    """No effect is significant, but an alarm shows structure in the residual outside the library."""
     LOUD = auto()
     """The residual is far above the noise, but no effect is supported by several episodes."""
     SEALED = auto()
-    """The sealed episodes, which should show it, do not bear the answer out."""
+    """The sealed episodes refute the answer, though they have the power to show it."""
     UNEXPLAINED = auto()
     """A gap that no modelled effect explains."""
 
@@ -79,37 +79,37 @@ class Decided:
     """One effect of the verdict with its status."""
 
     finding: FoundEffect
-    """Its rivals include those that the recordings cannot tell from it."""
+    """The effect; its rivals include those that the recordings cannot distinguish from it."""
     status: str
     """named, ambiguous, or suspected where the verdict does not name it."""
     features: dict[str, float]
-    """What the confidence rests on."""
+    """Input of the confidence, by name [1]."""
     confidence: float | None
     """Probability that the name is right [1]; None where nothing is named."""
     level: Level | None = None
     """The finest level at which it is named; None where it is not."""
     beside: BesideRemainder | None = None
-    """Its evidence beside a remainder, where something is left."""
+    """Its evidence given a remainder; None where there is no remainder."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What may be said."""
+    """Status of a verdict, its reason, and the status of each effect."""
 
     status: str
     """named, "named, incomplete", ambiguous, unknown or none."""
     reason: Reason
     effects: tuple[Decided, ...] = field(default=())
     lone: LonePress | None = None
-    """What one press alone shows, where nothing else has a name."""
+    """An effect that only one press shows, where none is named."""
     lacking: Mapping[Family, Lack] = field(default_factory=dict)
-    """What each family's saturated model still explains."""
+    """Lack of fit: the part of the residual that each family's saturated model explains."""
     alarms: tuple[Alarm, ...] = ()
-    """What the residual shows without a form."""
+    """Structure of the residual outside the library."""
 
     @property
     def surest_first(self) -> list[Decided]:
-        """The effects in the order in which a reader meets them: named, ambiguous, suspected."""
+        """The effects in reading order: named, ambiguous, suspected."""
         return sorted(self.effects, key=lambda e: ("named", "ambiguous", "suspected").index(e.status))
 
 
@@ -121,15 +121,15 @@ def decide(
     lacking: Mapping[Family, Lack] | None = None,
     seen: tuple[Alarm, ...] = (),
 ) -> Decision:
-    """Decide what may be said of findings.
+    """Decide the status of findings.
 
     Args:
-        found: What the search found.
-        checks: What the recordings can carry.
-        beside: The evidence of each effect that was found beside a remainder, where something is left.
-        shown: The gap on sealed episodes: it can take a name away, and never gives one.
-        lacking: What each family's saturated model explains beside the answer.
-        seen: What the residual shows without a form: where no effect shows, it is no reassurance.
+        found: Findings of the search.
+        checks: Limits and contradictions of the recordings.
+        beside: Evidence of each effect found, given a remainder; empty where there is no remainder.
+        shown: Gap on sealed episodes. It can withdraw a name, never give one.
+        lacking: Lack of fit: the part of the answer's residual that each family's saturated model explains.
+        seen: Alarms. They turn the status none into unknown.
     """
     lacking = lacking or {}
     answer = answer_of(found)
@@ -147,7 +147,8 @@ def decide(
         if first is None or levels[first] is None:
             levels = [None for _ in answer]
         if not any(levels) and first is not None and fills(found, answer[first], lacking):
-            # What is left is another law of its family: at that level nothing is, and no rival hides in it.
+            # The remainder is another law of the same family. At the level of families nothing is left unexplained,
+            # so the rivals that only the remainder admits are dropped.
             answer[first] = answer_of(replace(found, left=Leftovers(0.0, 0.0)))[first]
             levels[first] = finest(answer[first]) and Level.FAMILY
         if any(levels):
@@ -165,11 +166,11 @@ def decide(
     parts = [ask and stands_in(found, f, lacking) for ask, f in zip(asked, answer, strict=True)]
     open_ones = [e or part for e, part in zip(early, parts, strict=True)]
     if status in ("named", INCOMPLETE) and any(open_ones):
-        # One of several names may stand in for a part of what has none: only the others are sure.
+        # One of several names may be a form of the unexplained part: only the other names are certain.
         levels = [None if doubt else level for doubt, level in zip(open_ones, levels, strict=True)]
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
     rough = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
-    # Another law of the family is there, too, or in its place: the family alone is sure.
+    # Another law of the family is present, too, or is the true one: only the family is certain.
     levels = [Level.FAMILY if own else level for own, level in zip(rough, levels, strict=True)]
     if status in ("named", INCOMPLETE) and (any(rough) or elsewhere(found, lacking)):
         status, reason = INCOMPLETE, Reason.INCOMPLETE
@@ -203,17 +204,20 @@ def decide(
 
 
 def _of_one_family(finding: FoundEffect) -> bool:
-    """Return whether all that would do as well is of its family."""
+    """Return whether all rivals of an effect are of its family."""
     return all(load(name).family is finding.placed.effect.family for name in finding.rivals)
 
 
 def _within_bounds(finding: FoundEffect) -> FoundEffect:
-    """Return an effect without the rivals that need an unphysical size: a remainder lends them what they explain."""
+    """Return an effect without rivals that need an unphysical size: these only fit part of the remainder."""
     return replace(finding, rivals=tuple(name for name in finding.rivals if name not in finding.unphysical))
 
 
 def lends_form(found: Findings, answer: list[FoundEffect]) -> bool:
-    """Return whether what a single lag leaves may lend it its form: only the edge's tells a filter from a delay."""
+    """Return whether the residual is large enough to make a delay and a filter indistinguishable.
+
+    The two differ only at the edges of a press, where a residual of this size hides the difference.
+    """
     if len(answer) != 1 or found.left.t < LEFT_T or found.share_left < SHARE_LEFT:
         return False
     effect = answer[0].placed.effect
@@ -221,9 +225,10 @@ def lends_form(found: Findings, answer: list[FoundEffect]) -> bool:
 
 
 def seems_early(finding: FoundEffect, answer: list[FoundEffect]) -> bool:
-    """Return whether readings come early beside a skin with memory: a sensor cannot, but what relaxes seems to.
+    """Return whether a negative delay is found together with memory of the skin.
 
-    It is another form of the memory before it is an error of clocks.
+    No sensor reads ahead, but a relaxing skin seems to. The delay is then more likely another form of the memory
+    than an error of clocks.
     """
     memory = any(f.placed.effect.family is Family.SKIN_MEMORY for f in answer)
     return memory and finding.placed.effect.delay(finding.placed.values) < 0
@@ -232,7 +237,7 @@ def seems_early(finding: FoundEffect, answer: list[FoundEffect]) -> bool:
 def finest(finding: FoundEffect) -> Level | None:
     """Return the finest level at which an effect may be named; None if none holds.
 
-    A shape at its bound leaves the family: the form is another one.
+    With a shape at its bound only the family is named: the form is another one.
     """
     if not _needed(finding) or _unphysical(finding) or not _of_one_family(finding):
         return None
@@ -242,16 +247,19 @@ def finest(finding: FoundEffect) -> Level | None:
 
 
 def leading(answer: list[FoundEffect]) -> int | None:
-    """Return which effect explains most beyond the others; what does not race has no such figure."""
+    """Return the index of the effect that explains most beyond the others, of those from the search; None without any.
+
+    Effects from calibration have no such figure.
+    """
     raced = [k for k, f in enumerate(answer) if f.corrected_p is not None]
     return max(raced, key=lambda k: answer[k].bought, default=None)
 
 
 def stands(found: Findings, finding: FoundEffect, beside: BesideRemainder | None, shown: Gap | None = None) -> bool:
-    """Return whether an effect, or one that looks the same, is there beside much that has no name.
+    """Return whether an effect, or one collinear with it, is present although much is unexplained.
 
-    It is needed and explains more than is left, or surely most of the sealed gap. Its size is the same in all
-    conditions: what it stands beside has no reason to follow it there.
+    It is needed, and explains more than the remainder or certainly most of the sealed gap. Its size is the same in
+    all conditions: a remainder has no reason to follow it into each of them.
     """
     if beside is None or not beside.spreads or not _needed(finding) or _unphysical(finding):
         return False
@@ -264,9 +272,9 @@ def stands(found: Findings, finding: FoundEffect, beside: BesideRemainder | None
 def beside_much(
     found: Findings, finding: FoundEffect, beside: BesideRemainder | None, shown: Gap | None = None
 ) -> Level | None:
-    """Return the finest level of an effect beside much that has no name; None if none holds.
+    """Return the finest level of an effect although much is unexplained; None if none holds.
 
-    How exactly its size is the same in all conditions says how fine the name may be.
+    The more exactly its size is the same in all conditions, the finer is the level.
     """
     bare = _within_bounds(finding)
     level = finest(bare)
@@ -280,15 +288,15 @@ def beside_much(
 
 
 def _unphysical(finding: FoundEffect) -> bool:
-    """Return whether an amplitude is at its bound. A shape at its own says that the form is another one."""
+    """Return whether an amplitude is at its bound; a shape at its bound only means that the form is another one."""
     shapes = {p.name for p in finding.placed.effect.shapes}
     return bool(set(finding.at_bound) - shapes)
 
 
 def _untried_kin(found: Findings, finding: FoundEffect) -> set[str]:
-    """Return mechanisms of its group that do the same at rest, and were not held against it.
+    """Return mechanisms of its group with the same behaviour at rest that were no rivals in the J test.
 
-    They look alike but for their exact form, and what is left may lend it.
+    They differ only in their exact form, and a remainder can hide that difference.
     """
     mine, tried = finding.placed.effect, {load(name).called for name in finding.margins}
     every = {c.effect.called: c.effect for c in found.given.candidates}
@@ -301,7 +309,7 @@ def _untried_kin(found: Findings, finding: FoundEffect) -> set[str]:
 
 
 def _needed(finding: FoundEffect) -> bool:
-    """Return whether an effect is surely there."""
+    """Return whether an effect is significant: necessity, and the corrected p-value where the search gave one."""
     needed = finding.necessity >= finding.needed
     if finding.corrected_p is not None:
         needed = finding.corrected_p <= (LARGEST_P if needed else RARE_P)
@@ -309,7 +317,7 @@ def _needed(finding: FoundEffect) -> bool:
 
 
 def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
-    """Return what the statistics allow."""
+    """Return status and reason by the tests of the search alone."""
     if found.until != "decide":
         return ("unknown" if found.gap else "none"), Reason.STOPPED
     # One test in a hundred rejects by chance: without an effect, leftovers must confirm the gap.
@@ -330,25 +338,25 @@ def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
 
 
 def answer_of(found: Findings) -> list[FoundEffect]:
-    """Return the effects of the answer, with all their rivals, and those that calibration shows."""
+    """Return the effects of the answer with all their rivals, and the gains beyond calibration."""
     course, own = found.problem.setting.course, []
     for f in found.effects:
         effect = f.placed.effect
         alike = lookalikes(course, effect, f.placed.values)
         rivals = [name for name in dict.fromkeys([*f.rivals, *alike, *_hidden(found, f)]) if name != effect.called]
-        # A size says nothing against what these presses cannot split.
+        # An unphysical size is no argument against a rival that these presses cannot distinguish.
         unphysical = tuple(name for name in f.unphysical if name in rivals and name not in alike)
         own.append(replace(f, rivals=tuple(rivals), unphysical=unphysical))
-    # What is within another's form, and only where its own equation ends, is no sign of more.
+    # An effect at its bound that explains no more than the model error of another is no evidence of a second effect.
     own = [f for f in own if not (f.at_bound and lent(found, f))]
     return [*(f for f in own if not calibration_error(f)), *gains_beyond_calibration(found)]
 
 
 def adequate(found: Findings, answer: list[FoundEffect]) -> bool:
-    """Return whether nothing much is left to explain.
+    """Return whether the answer leaves little to explain.
 
-    Real effects have other forms than any library. What a single effect leaves is its own form where every rival would
-    leave twice as much, or more.
+    Real effects differ in form from any library. The residual of a single effect is its model error if every rival
+    would leave at least twice as much.
     """
     if found.left.t < LEFT_T or found.share_left < SHARE_LEFT:
         return True
@@ -363,7 +371,7 @@ def settled(finding: FoundEffect) -> str:
 
 
 def _hidden(found: Findings, finding: FoundEffect) -> list[str]:
-    """Return rivals that are worse by less than what the answer itself leaves: another form may turn them around."""
+    """Return rivals that lose less than the answer leaves: in another form they might win."""
     if found.left.t < LEFT_T:
         return []
     near = [name for name, loss in finding.losses.items() if loss < found.left.gain]
@@ -379,7 +387,7 @@ def _decided(
     beside: BesideRemainder | None,
     shown: Gap | None,
 ) -> Decided:
-    """Return an effect with its status; whoever reads it alone must not take it for a name that the verdict refuses."""
+    """Return an effect with its status: never named where the verdict gives no name, so it can be read alone."""
     values = features(found, finding, count)
     if level is not None and not _of_one_family(finding):
         finding = _within_bounds(finding)

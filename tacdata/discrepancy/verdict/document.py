@@ -1,4 +1,4 @@
-"""The verdict as a document; everything in it was decided before."""
+"""The verdict as a document. It decides nothing: its content comes from `decide.py`."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def document(
     """Return the verdict (`schemas/verdict.schema.json`).
 
     Args:
-        decision: What may be said.
-        found: What was found.
-        checks: What the recordings can carry.
-        sliced: Where the residual lives, before and after; nothing where that was not asked for.
-        parents: Name to content hash of what was judged.
-        shown: The gap on episodes that were sealed before.
+        decision: Status, reason and effects.
+        found: Findings of the search.
+        checks: Limits and contradictions of the recordings.
+        sliced: Slices of the residual before and after; empty if they were not computed.
+        parents: Name of each input to its content hash.
+        shown: Gap on the sealed episodes.
     """
     course, placed = found.problem.setting.course, [e.finding.placed for e in decision.effects]
     told = [p.effect.remark(p.values) for p in placed]
@@ -97,7 +97,7 @@ def document(
 
 
 def _families(decision: Decision) -> dict[str, dict[str, float]]:
-    """Return what each family's saturated model still explains."""
+    """Return the lack of fit of each family."""
     return {
         family.value: {
             "size": round(own.size, 2),
@@ -109,7 +109,7 @@ def _families(decision: Decision) -> dict[str, dict[str, float]]:
 
 
 def _path(found: Findings) -> list[dict[str, Any]]:
-    """Return the effects in the order in which they were added, each with what its absence would cost."""
+    """Return the effects in the order in which they were added, each with its share of the explained evidence."""
     bought = {f.placed.effect.name: max(f.bought, 0.0) for f in found.effects if np.isfinite(f.bought)}
     whole = max(sum(bought.values()) + found.left.gain, 1e-12)
     return [
@@ -119,7 +119,7 @@ def _path(found: Findings) -> list[dict[str, Any]]:
 
 
 def located(before: list[Slice], found: Findings) -> list[str]:
-    """Return in words where the residual lives: single episodes, then parts of all."""
+    """Return sentences on where the residual is large: single episodes, then slices of all."""
     alone = outstanding(found.problem.setting.course.names, found.energy[1], found.values)
     whole = 2 * float(found.energy[0].sum()) / max(float(found.values.sum()), 1.0)
     return in_words(before, alone, whole)
@@ -170,12 +170,12 @@ def _effect(decided: Decided) -> dict[str, Any]:
 
 
 def _bounded(margins: dict[str, float]) -> dict[str, float]:
-    """Return margins that stand in a file [standard errors]."""
+    """Return margins clipped to the range of the schema [standard errors]."""
     return {name: float(np.clip(by, -99, 99)) for name, by in margins.items()}
 
 
 def untested(answer: list[FoundEffect]) -> list[str]:
-    """Return effects that are known and not modelled, of the answer's ambiguity groups; all, without an answer."""
+    """Return known effects without a model in the answer's ambiguity groups; all of them without an answer."""
     groups = {m.placed.effect.group for m in answer}
     groups |= {load(name).group for m in answer for name in m.margins}
     listed = yaml.safe_load(resources.files("tacdata.effects").joinpath("not_modelled.yaml").read_text())
@@ -183,13 +183,13 @@ def untested(answer: list[FoundEffect]) -> list[str]:
 
 
 def following(decision: Decision, course: Course, watched: bool = False, fitted: bool = False) -> list[str]:
-    """Return what to do next, the most useful first.
+    """Return the next steps, the most useful first.
 
     Args:
-        decision: What may be said.
+        decision: Status, reason and effects.
         course: The recordings.
-        watched: Whether single channels show what no effect does.
-        fitted: Whether the base was fitted to the recordings.
+        watched: Whether single channels show faults.
+        fitted: Whether the response was fitted to the recordings.
     """
     if decision.reason is Reason.TOO_FEW:
         return [DIAGNOSTIC]
@@ -222,7 +222,7 @@ def following(decision: Decision, course: Course, watched: bool = False, fitted:
 
 
 def data(course: Course) -> dict[str, Any]:
-    """Return what was judged, in numbers."""
+    """Return the size of the recordings, as in the verdict."""
     return {
         "episodes": course.episodes,
         "rows": len(course.read),

@@ -1,11 +1,12 @@
-"""The likelihood ratio of sealed episodes with and without an answer, and what chance makes of it.
+"""The likelihood ratio of sealed episodes with and without an answer, and its standard error.
 
-The density of sealed episodes given the open ones is what counts. Its logarithm is that of all less that of the open.
-The covariance is the null model's: noise, offsets, each press's own pose and gains. Open episodes tell what calibration
-leaves open.
+The ratio is that of the density of sealed episodes given the open ones: log density of all less that of the open. The
+covariance is the null model's: noise, offsets, pose and gain errors of each press. The open episodes determine the
+gains and scales that calibration leaves open.
 
-d is what the answer changes, r the residual without it. The log-likelihood ratio is d'r - d'd / 2. The share of the
-answer that is found, d'r / d'd, says the same. It is 1 on average with the answer, 0 without.
+Let d be the change of the predictions by the answer and r the residual without it. The log-likelihood ratio is
+d'r - d'd / 2. The share of the answer found in the data, d'r / d'd, is equivalent. Its expectation is 1 with the
+answer and 0 without.
 """
 
 from __future__ import annotations
@@ -24,23 +25,23 @@ from tacdata.discrepancy.verdict.calibration import gains_beyond_calibration
 from tacdata.effects import Placed
 
 REFUTED_Z = 2.33
-"""A name is taken away at a one-sided level of 1 % [standard errors]: it has passed every other test."""
+"""One-sided level of 1 % at which a name is withdrawn, since it has passed every other test [standard errors]."""
 SHOWN_Z = 1.645
-"""What no other test bears out is shown at a one-sided level of 5 % [standard errors]."""
+"""One-sided level of 5 % at which sealed episodes alone support an answer [standard errors]."""
 HALF = 0.5
 """Share of an answer at which sealed episodes are as likely with it as without [1]."""
 
 
 @dataclass(frozen=True)
 class LikelihoodRatio:
-    """How likely sealed episodes are with an answer, over without."""
+    """Likelihood ratio of sealed episodes: with an answer over without."""
 
     power: float
     """d'd: twice the log-likelihood ratio that is expected with the answer [1]."""
     share: float
     """Share of the answer that the sealed episodes show [1]."""
     scatter: float = 1.0
-    """Variance of open episodes' scores over what the covariance says, 1 at least [1]."""
+    """Variance of open episodes' scores over that of the covariance, at least 1 [1]."""
     known: float = float("inf")
     """d'd of the open episodes, which gave the answer its size [1]."""
 
@@ -51,27 +52,27 @@ class LikelihoodRatio:
 
     @property
     def expected(self) -> float:
-        """What it is on average with the answer [1]; the negative of it without."""
+        """Expectation of the log-likelihood ratio with the answer [1]; without, it is the negative of this."""
         return HALF * self.power
 
     @property
     def error(self) -> float:
-        """Standard error of the share with the answer [1]: chance in the sealed episodes, and in its size."""
+        """Standard error of the share with the answer [1]: by sealed episodes, and by the answer's size."""
         return float(np.sqrt(self.scatter * (1 / self.power + 1 / self.known))) if self.power > 0 else float("inf")
 
     @property
     def refutes(self) -> bool:
-        """Whether sealed episodes take the answer away.
+        """Whether sealed episodes refute the answer.
 
-        They are likelier without it. Their ratio is below what it is with the answer, by more than chance: one-sided,
-        1 %. So a model is tested by its likelihood ratio against another (Cox, Proc. 4th Berkeley Symposium 1, 1961,
-        105). The answer's size has an error of its own (Chow, Econometrica 28, 1960, 591).
+        They are likelier without it, and their ratio is significantly below its expectation with the answer (one-sided,
+        1 %). This is the test of a model by its likelihood ratio against another (Cox, Proc. 4th Berkeley Symposium 1,
+        1961, 105). The error of the answer's size enters as in Chow (Econometrica 28, 1960, 591).
         """
         return self.share < HALF and self.share + REFUTED_Z * self.error < 1
 
     @property
     def bears_out(self) -> bool:
-        """Whether sealed episodes show the answer: their ratio is above chance without it, at 5 %."""
+        """Whether sealed episodes support the answer: their ratio is significant against no answer, at 5 %."""
         return self.power > 0 and self.share > SHOWN_Z * float(np.sqrt(self.scatter / self.power))
 
     def document(self) -> dict[str, float | None]:
@@ -85,7 +86,7 @@ def likelihood_ratio(course: Course, found: Findings) -> LikelihoodRatio | None:
 
     Args:
         course: All recordings, with the readings that the search did not have.
-        found: What was found without them.
+        found: Findings without them.
     """
     model, beyond = found.final, [f.placed for f in gains_beyond_calibration(found)]
     fewer, given = found.problem.setting.course, list(model.setting.given)
@@ -113,7 +114,7 @@ def likelihood_ratio(course: Course, found: Findings) -> LikelihoodRatio | None:
 
 
 def _beside(nuisances: np.ndarray, beyond: list[Placed], channels: int) -> np.ndarray:
-    """Return nuisances that cannot do what found gains do; channels' gains stand first."""
+    """Return nuisance columns with the gains that were found projected out of the channels' gains, which come first."""
     if not beyond:
         return nuisances
     sizes = [np.broadcast_to(next(iter(p.values.values())), channels) for p in beyond]
@@ -124,6 +125,6 @@ def _beside(nuisances: np.ndarray, beyond: list[Placed], channels: int) -> np.nd
 
 
 def _marginal(gram: np.ndarray, ridge: np.ndarray) -> np.ndarray:
-    """Return products of the first two columns, the others integrated out, shape (2, 2)."""
+    """Return the Gram matrix of the first two columns with the others integrated out, shape (2, 2)."""
     beside = gram[2:, 2:] + np.diag(ridge)
     return gram[:2, :2] - gram[:2, 2:] @ np.linalg.solve(beside, gram[2:, :2])

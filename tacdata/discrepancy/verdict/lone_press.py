@@ -1,7 +1,7 @@
-"""What a single press shows: an effect that only one press excites has no scatter over presses, and so no name.
+"""Effects that only one press excites: without scatter over presses there is no standard error, and so no name.
 
 A sandwich over few clusters of high leverage rejects too often or never (MacKinnon & Webb, J. Appl. Econometrics 32,
-2017, 233). Such an effect is not tested, and told as what to repeat.
+2017, 233). Such an effect is not tested; the verdict recommends to repeat the press.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from tacdata.discrepancy.statistics.gram_fit import eliminated
 from tacdata.effects import Effect
 
 MOST_OF_IT = 0.5
-"""An effect is told if it explains so much of what exceeds the noise [1]."""
+"""Least share of the residual above the noise that a reported effect explains [1]."""
 
 
 @dataclass(frozen=True)
 class LonePress:
-    """One press that holds nearly all that recordings show of an effect."""
+    """One press with nearly all information of the recordings on an effect."""
 
     effect: Effect
-    """What would explain most, if one press were enough."""
+    """The candidate that explains most."""
     share: float
-    """Of what exceeds the noise, explained by it [1]."""
+    """Part of the residual above the noise that it explains [1]."""
     episode: int
     """The press."""
     leverage: float
@@ -35,7 +35,7 @@ class LonePress:
 
 
 def lone_press(problem: Problem) -> LonePress | None:
-    """Return the effect that explains most, where one press alone shows it; None where there is no such effect."""
+    """Return the effect that explains most if one press has nearly all information on it; else None."""
     bare = float(gained(problem, [], np.arange(len(problem.folds))).sum())
     excess = 0.5 * (float(problem.grams.gram[:, 0, 0].sum()) - float(problem.grams.rows.sum())) - bare
     if excess <= 0 or not problem.candidates:

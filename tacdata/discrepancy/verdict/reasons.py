@@ -1,4 +1,4 @@
-"""The verdict in a sentence: words for a reason that was decided before."""
+"""The verdict in a sentence. It decides nothing: status and reason come from `decide.py`."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tacdata.discrepancy.verdict.text import LEAST_CLOSED, worsened
 from tacdata.effects import Family, load
 
 SPEAKS_FROM = 0.005
-"""Share of what could be explained from which on a form is worth a word [1]."""
+"""Least unexplained share that the sentence mentions [1]."""
 SMALL = 0.01
-"""Change of the residual of sealed presses below which effects are said to be small [1]."""
+"""Change of the residual of sealed presses below which effects are called small [1]."""
 ALL_CLOSED = 0.995
-"""Share of the gap from which on all of it is closed [1]."""
+"""Closed share of the gap that counts as all of it: it would be printed as 100 % [1]."""
 SIGNS = {
     Family.DRIFT: "gains that each part of the sensor changes by itself",
     Family.KINEMATICS: "depths and places that go with place, side, order or direction",
@@ -33,11 +33,11 @@ SIGNS = {
     Family.RESPONSE_CURVE: "how readings grow with depth",
     Family.CROSSTALK: "what other channels read",
 }
-"""Where another law of a family shows."""
+"""Where the residual shows another law of a family."""
 MOST_LISTED = 6
-"""Episodes that are listed by name."""
+"""Most episodes that are listed by name."""
 MOST_STAND_INS = 3
-"""What may stand in for an effect is listed by name up to so many; of more, their families are."""
+"""Most rivals that are listed by name; of more, the families are listed."""
 
 
 def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, shown: Gap | None = None) -> str:
@@ -45,9 +45,9 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
 
     Args:
         decision: Status and reason.
-        found: What was found.
-        checks: What the recordings can carry.
-        shown: The gap on episodes that were sealed before.
+        found: Findings of the search.
+        checks: Limits and contradictions of the recordings.
+        shown: Gap on the sealed episodes.
     """
     answer = [e.finding for e in decision.effects]
     names = _listed([f.placed.effect.spoken for f in answer], "and") if answer else ""
@@ -100,12 +100,12 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
 
 
 def _seen(decision: Decision) -> str:
-    """Return what was seen without a form."""
+    """Return the findings of all alarms."""
     return "; ".join(alarm.seen for alarm in decision.alarms)
 
 
 def _against(shown: Gap | None) -> str:
-    """Return how sealed episodes speak against an answer."""
+    """Return the evidence of sealed episodes against an answer as a clause."""
     if shown is None or shown.ratio is None:
         return "the sealed ones do not bear it out"
     share, error = 100 * shown.ratio.share, 100 * shown.ratio.error
@@ -113,7 +113,7 @@ def _against(shown: Gap | None) -> str:
 
 
 def _lone(decision: Decision, found: Findings, before: str) -> str:
-    """Return what a single press shows; empty where there is none."""
+    """Return a clause on an effect that only one press shows; empty where there is none."""
     if (lone := decision.lone) is None:
         return ""
     press = found.problem.setting.course.names[lone.episode]
@@ -124,7 +124,7 @@ def _lone(decision: Decision, found: Findings, before: str) -> str:
 
 
 def _incomplete(decision: Decision, shown: Gap | None) -> str:
-    """Return what has a name, how fine it is, and what it closes."""
+    """Return the named effects with their level and the share of the gap that they close, then the suspected ones."""
     sure = [e for e in decision.effects if e.level is not None]
     words = _all_called(sure)
     open_ones = list(dict.fromkeys(e.finding.placed.effect.spoken for e in decision.effects if e.level is None))
@@ -133,13 +133,13 @@ def _incomplete(decision: Decision, shown: Gap | None) -> str:
 
 
 def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str:
-    """Return that so many effects are there, and what they close on sealed presses."""
+    """Return a clause on the presence of effects, with the share of the sealed gap that they close."""
     said, closed = f"{names} {'is' if count == 1 else 'are'} there", _closed(decision, shown)
     return f"{said} and {'closes' if count == 1 else 'close'} {closed}" if closed else said
 
 
 def _small(count: int, shown: Gap | None) -> str:
-    """Return that effects hardly matter, where sealed presses fit as well without them; empty where they do matter."""
+    """Return a remark on small effects, without which sealed presses fit as well; empty for larger ones."""
     sealed = shown.document() if shown is not None and len(shown.before) else {}
     if not sealed or abs(sealed["after"] - sealed["before"]) > SMALL * sealed["before"]:
         return ""
@@ -147,18 +147,18 @@ def _small(count: int, shown: Gap | None) -> str:
 
 
 def _other_laws(decision: Decision, found: Findings) -> str:
-    """Return where other laws show: of a family that has a name, then of one that has none."""
+    """Return clauses on the evidence for other laws: of a named family, then of an unnamed one."""
     return _own_laws(decision) + _elsewhere(decision, found)
 
 
 def _elsewhere(decision: Decision, found: Findings) -> str:
-    """Return where another family shows, that which explains most."""
+    """Return a clause on the unnamed family that explains most; empty without one."""
     others = elsewhere(found, decision.lacking)[:1]
     return "".join(f"; something of {family.value} shows, too, in {SIGNS[family]}" for family in others)
 
 
 def _own_laws(decision: Decision) -> str:
-    """Return where another law of a family shows that has a name."""
+    """Return clauses on the evidence for another law of a named family."""
     shares: dict[Family, float] = {}
     for e in decision.effects:
         family, own = e.finding.placed.effect.family, of_family(e.finding, decision.lacking)
@@ -171,13 +171,13 @@ def _own_laws(decision: Decision) -> str:
 
 
 def _called(decided: Decided) -> str:
-    """Return an effect by the level at which it is named; a family with what fits best."""
+    """Return the name of an effect at its level; a family with the law that fits best."""
     effect = decided.finding.placed.effect
     return f"{effect.family.value} ({effect.spoken} fits best)" if decided.level is Level.FAMILY else effect.spoken
 
 
 def _all_called(effects: Sequence[Decided]) -> list[str]:
-    """Return effects by the level at which they are named, a family once with all that fit best."""
+    """Return the names of effects at their levels; a family once, with all its laws that fit best."""
     words: list[str] = []
     for e in effects:
         family = e.finding.placed.effect.family
@@ -189,7 +189,7 @@ def _all_called(effects: Sequence[Decided]) -> list[str]:
 
 
 def _closed(decision: Decision, shown: Gap | None) -> str:
-    """Return what is closed of the gap on sealed episodes, by effects with a name if there are any; empty if unsure."""
+    """Return the closed share of the sealed gap, by the named effects if there are any; empty if it is uncertain."""
     sealed = shown.document() if shown is not None and len(shown.before) else {}
     if not sealed.get("certain"):
         return ""
@@ -200,7 +200,7 @@ def _closed(decision: Decision, shown: Gap | None) -> str:
 
 
 def _nameless(found: Findings, least: float) -> str:
-    """Return how much has no name, from a least share on [1]."""
+    """Return a clause on the unexplained share; empty below ``least`` [1]."""
     if found.left.t < LEFT_T or found.share_left < least:
         return ""
     much = f"{100 * found.share_left:.0f} %" if found.share_left >= SPEAKS_FROM else "less than 1 %"
@@ -208,7 +208,7 @@ def _nameless(found: Findings, least: float) -> str:
 
 
 def _undecided(decision: Decision, shown: Gap | None) -> str:
-    """Return what is open: rivals, bounds, episodes that are too few; and what is not: a family that all share."""
+    """Return the open questions (rivals, bounds, too few episodes), and the family if all rivals share it."""
     answer = [e.finding for e in decision.effects]
     shapes = [{p.name for p in f.placed.effect.shapes} & set(f.at_bound) for f in answer]
     bounds = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if set(f.at_bound) - own]
@@ -227,7 +227,7 @@ def _undecided(decision: Decision, shown: Gap | None) -> str:
 
 
 def _needed(effects: Sequence[Decided]) -> str:
-    """Return what is there and what only fits best, where nothing may stand in for either."""
+    """Return the certain effects and those that only fit best, of an answer without rivals."""
     sure = _all_called([e for e in effects if e.status == "named"])
     fits = list(dict.fromkeys(e.finding.placed.effect.spoken for e in effects if e.status != "named"))
     words = [f"{_listed(sure, 'and')} {'is' if len(sure) == 1 else 'are'} there"] if sure else []
@@ -237,7 +237,7 @@ def _needed(effects: Sequence[Decided]) -> str:
 
 
 def _odd(names: list[str]) -> str:
-    """Return which presses are unlike all others."""
+    """Return a sentence on presses unlike all others."""
     listed = ", ".join(names[:MOST_LISTED])
     more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
     return (
@@ -248,7 +248,7 @@ def _odd(names: list[str]) -> str:
 
 
 def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
-    """Return what comes closest without being the name: what it leaves, and how it fails on sealed episodes if so."""
+    """Return a clause on the best answer that is no name: the share it leaves, and its failure on sealed episodes."""
     names = list(dict.fromkeys(m.placed.effect.spoken for m in answer))
     alone, words = len(names) == 1, _listed(names, "and")
     words += " comes closest and leaves" if alone else " together come closest and leave"
@@ -269,7 +269,7 @@ def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
 
 
 def _best(effects: Sequence[Decided]) -> str:
-    """Return what is found, and where that is open what fits best and what may stand in for it."""
+    """Return the effects without rivals, then those that fit best with their rivals."""
     alone = [e for e in effects if not e.finding.rivals]
     told = [_called(e) if e.status == "named" else e.finding.placed.effect.spoken for e in alone]
     clear = list(dict.fromkeys(told))
@@ -286,7 +286,7 @@ def _best(effects: Sequence[Decided]) -> str:
 
 
 def _open(own: list[FoundEffect]) -> str:
-    """Return effects of the answer with the same rivals, and those."""
+    """Return a clause on effects with the same rivals, and those rivals."""
     called = {m.placed.effect.called for m in own}
     names = list(dict.fromkeys(m.placed.effect.spoken for m in own))
     others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in called]

@@ -1,4 +1,4 @@
-"""Where a residual lives, in words and as a table for pictures."""
+"""Mean squares of a residual by slices of the recordings, as sentences and as a table for pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.statistics.gram_fit import t_value
 
 NOTABLE = 1.3
-"""A slice stands out from this mean square on [noise floor]..."""
+"""A slice is notable from this mean square on [noise floor]..."""
 NOTABLE_T = 3.0
 """...and from so many standard errors over episodes on [1]."""
 NOWHERE = "nowhere does the residual stand out from the noise"
@@ -38,11 +38,11 @@ def whitened_residual(problem: Problem) -> np.ndarray:
 
 
 PHASES = ("without contact", "loading", "hold", "unloading")
-"""What a tip may be doing."""
+"""Phases of a press."""
 
 
 def phases(course: Course) -> np.ndarray:
-    """Return what the tip does at each row, as an index into `PHASES`, shape (rows,), int64."""
+    """Return the phase of each row, as an index into `PHASES`, shape (rows,), int64."""
     speed, depth = course.speed, course.tip[:, 2]
     inside = depth > 0 if depth.max() > 0 else depth > depth.min() + 0.1 * course.stroke
     still = np.abs(speed) < 1e-3 * max(float(np.abs(speed).max()), 1e-9)
@@ -103,13 +103,13 @@ def beside(before: list[Slice], after: list[Slice]) -> list[dict[str, Any]]:
 
 
 ALONE = 9.0
-"""An episode stands out by itself when its mean square is so many times the median of the others [1]."""
+"""An episode is an outlier when its mean square is so many times the median of all [1]."""
 FEW_ALONE = 0.2
-"""Largest share of the episodes that can stand out by themselves [1]."""
+"""Largest share of the episodes that can be outliers [1]."""
 
 
 def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) -> list[str]:
-    """Return in words which few episodes hold most of the residual: no statistic over episodes sees them.
+    """Return the outlying episodes as a sentence: no statistic over episodes detects these few.
 
     Args:
         names: Of the episodes.
@@ -133,7 +133,7 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
 
 
 def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 1.0) -> list[str]:
-    """Return sentences on what stands out, ``alone`` first, then each kind of slice, with mean squares [noise floor].
+    """Return sentences on the notable slices, ``alone`` first, then each kind, with mean squares [noise floor].
 
     Args:
         found: The slices.

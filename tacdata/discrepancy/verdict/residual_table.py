@@ -1,4 +1,4 @@
-"""Readings beside a model's predictions before and after, and their file (`schemas/residuals.schema.json`)."""
+"""Readings and a model's predictions before and after, and their file (`schemas/residuals.schema.json`)."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ REMEDY = "run `tacdata discrepancy` again: residuals can always be made anew"
 
 @dataclass(frozen=True)
 class Residuals:
-    """What was measured and what a model predicts; predictions are moved by a constant an episode."""
+    """Readings and predictions of a model; predictions are shifted by a constant an episode, which is a nuisance."""
 
     episode: np.ndarray
     """Number of the episode, shape (n,), int32."""
     time: np.ndarray
     """Since the first reading of all, sessions laid end to end [s], shape (n,)."""
     phase: np.ndarray
-    """What the tip does, as an index into ``phases``, shape (n,), int8."""
+    """Phase of the press, as an index into ``phases``, shape (n,), int8."""
     depth: np.ndarray
     """Commanded depth [mm], shape (n,), float32."""
     rate: np.ndarray
@@ -46,11 +46,11 @@ class Residuals:
     streams: tuple[str, ...]
     """Name of each stream."""
     phases: tuple[str, ...]
-    """What a tip may be doing."""
+    """Phases of a press."""
     names: tuple[str, ...]
     """Name of each episode."""
     sealed: tuple[int, ...] = ()
-    """Episodes that were sealed before anything was looked at."""
+    """Episodes that the search did not use."""
     every: int = 1
     """One reading in so many is kept."""
 
@@ -64,7 +64,7 @@ def write(path: Path, residuals: Residuals, verdict: str) -> None:
 
     Args:
         path: File to write.
-        residuals: What to write.
+        residuals: Content of the file.
         verdict: Content hash of the verdict that they belong to.
     """
     header: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""Episodes that are put aside before anything is looked at, and the gap on them before and after."""
+"""Sealed episodes: excluded from the search, to measure the gap before and after the effects without bias."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tacdata.discrepancy.verdict.likelihood_ratio import LikelihoodRatio, likeli
 SEALED_SHARE = 0.1
 """Share of the episodes that is sealed [1]..."""
 LEAST_SEALED = 4
-"""...and no fewer: a handful shows the gap, all the others are needed to say what it is [episodes]."""
+"""...but at least this number. A few are enough to measure the gap; the search needs all the others [episodes]."""
 FEWEST_TO_SEAL = 20
 """With fewer episodes none is sealed: all are needed for the verdict."""
 OPEN_EACH = 2
@@ -28,7 +28,7 @@ DEEPER = 0.02
 FLOOR = 1.0
 """Mean square of noise alone [1]."""
 LEAST_GAP = 1e-2
-"""A gap that is smaller, over the floor, has no share that is closed [1]."""
+"""Smallest gap above the floor of which a closed share is stated [1]."""
 WIDEST = 0.5
 """A share is stated where its 90 % interval is narrower [1]."""
 BOOTSTRAPS = 2000
@@ -38,7 +38,7 @@ RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 
 
 def chosen(course: Course) -> np.ndarray:
-    """Return which episodes are sealed, by the hash of session and name, shape (k,), int64.
+    """Return the sealed episodes, in the order of a hash of session and name, shape (k,), int64.
 
     An episode deeper than all that stay open at its place is left open: a response fitted to the others is
     not known at such depths.
@@ -63,29 +63,29 @@ def chosen(course: Course) -> np.ndarray:
 
 
 def without_readings(course: Course, episodes: np.ndarray) -> Course:
-    """Return the course with the path of some episodes alone: what they did to the skin is known, not what was read."""
+    """Return the course without the readings of some episodes; their path stays, since it changes the skin's state."""
     return replace(course, averaged=np.where(course.of(episodes), 0.0, course.averaged))
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Mean squares of what a model leaves of sealed episodes, over the noise [1]; an offset an episode is taken off."""
+    """Mean squares of the residual of sealed episodes, over the noise [1]; the offset of each episode is removed."""
 
     before: np.ndarray
     """Of each sealed episode [1], shape (k,)."""
     after: np.ndarray
     """The same with the effects in place [1], shape (k,)."""
     ceiling: np.ndarray
-    """The same with what histories of the path predict of the residual, whatever its name [1], shape (k,)."""
+    """The same after a regression of the residual on histories of the path, of no particular effect [1], shape (k,)."""
     names: tuple[str, ...]
     without: dict[str, np.ndarray] = field(default_factory=dict)
     """Effect -> the same with all effects but that one [1], shape (k,)."""
     ratio: LikelihoodRatio | None = None
-    """How likely the sealed episodes are with the effects, over without; None where there are none."""
+    """Likelihood ratio of the sealed episodes, with the effects over without; None where there are none."""
 
     @property
     def interval(self) -> tuple[float, float]:
-        """90 % interval of the share that is closed [1], by bootstrap over sealed episodes; of nothing, -inf to inf."""
+        """90 % interval of the closed share [1], by bootstrap over sealed episodes; -inf to inf if there are none."""
         if not len(self.before):
             return -np.inf, np.inf
         low, high = _between(_closed(*self._drawn()))
@@ -123,7 +123,7 @@ class Gap:
         }
 
     def _shares(self, closed: float) -> dict[str, float]:
-        """Return each effect's part of the share that is closed: in proportion to what its absence costs."""
+        """Return each effect's part of the closed share, in proportion to the rise of the mean square without it."""
         cost = {name: max(float((own - self.after).mean()), 0.0) for name, own in self.without.items()}
         whole = sum(cost.values())
         return {name: closed * by / whole if whole > 0 else 0.0 for name, by in cost.items()}
@@ -145,7 +145,7 @@ def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
 
     Args:
         course: All recordings, the sealed ones with their readings.
-        found: What was found without the sealed episodes.
+        found: Findings without the sealed episodes.
         episodes: The sealed ones.
     """
     if not len(episodes):
@@ -182,7 +182,7 @@ def _squares(residual: np.ndarray, number: np.ndarray, episodes: np.ndarray) -> 
 
 
 def _predicted(course: Course, residual: np.ndarray, episodes: np.ndarray) -> np.ndarray:
-    """Return what a ridge regression on histories of the path, fitted to the open episodes, predicts of a residual."""
+    """Return the prediction of a residual by a ridge regression on histories of the path, fitted to open episodes."""
     own = histories(course)[course.read]
     share = np.clip(course.tip[course.read, 2] / course.span, 0.0, None)[:, None]
     columns = np.column_stack([own * np.minimum(share * 10, 1), own * share, own])
@@ -206,10 +206,10 @@ def _ridge(columns: np.ndarray, target: np.ndarray, strength: float) -> np.ndarr
 
 
 def refuted(shown: Gap | None) -> bool:
-    """Return whether sealed episodes take an answer away (`LikelihoodRatio.refutes`)."""
+    """Return whether sealed episodes refute an answer (`LikelihoodRatio.refutes`)."""
     return shown is not None and shown.ratio is not None and shown.ratio.refutes
 
 
 def borne_out(shown: Gap | None) -> bool:
-    """Return whether sealed episodes show an answer by themselves (`LikelihoodRatio.bears_out`)."""
+    """Return whether sealed episodes alone support an answer (`LikelihoodRatio.bears_out`)."""
     return shown is not None and shown.ratio is not None and shown.ratio.bears_out

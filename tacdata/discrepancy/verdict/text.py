@@ -16,15 +16,15 @@ MOST_WORDS = 200
 """Words of an unknown verdict, at most."""
 MEAN_SQUARE = "as a mean square over the noise (1 is noise alone)"
 WITHIN_NOISE = 2.0
-"""What is left is noise below so many standard errors [1]."""
+"""An unexplained part within so many standard errors of zero counts as noise [1]."""
 EVEN = 0.05
-"""A rival by which an effect is behind by less fits as well [standard errors]."""
+"""A rival that leads by less fits as well [standard errors]."""
 LOW = 0.7
-"""A residual below this [noise] is said to be so."""
+"""Mean square below which the text explains why it is less than 1 [noise floor]."""
 BEST = 0.9
-"""A regression on the path's history is worth a word below this share of the residual [1]."""
+"""A regression on the path's history is mentioned below this share of the residual [1]."""
 LEAST_CLOSED = 0.01
-"""Share of the gap on sealed presses from which on it is worth a word [1]."""
+"""Least closed share of the sealed gap that is mentioned [1]."""
 WEAK_LIMIT = 3.0
 """Effects with a larger detection limit are listed [typical sizes]."""
 
@@ -71,7 +71,7 @@ def _short(lines: list[str]) -> list[str]:
 
 
 def _folded(verdict: dict[str, Any]) -> list[str]:
-    """Return in a line how much verdict.html has folded away."""
+    """Return the number of entries in each folded part of verdict.html, as a line."""
     judged = answered(verdict)
     weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in judged]
     counts = [
@@ -85,12 +85,12 @@ def _folded(verdict: dict[str, Any]) -> list[str]:
 
 
 def unsaid(verdict: dict[str, Any]) -> list[str]:
-    """Return the remarks on the recordings that the sentence above all has not said."""
+    """Return the remarks on the recordings that the first sentence does not contain."""
     return [words for words in verdict["remarks"] if words not in verdict["why"]]
 
 
 def _gate(verdict: dict[str, Any]) -> str:
-    """Return whether there is a gap, and how probable such recordings are without one."""
+    """Return a line on the gate: whether there is a gap, and its p-values."""
     gate, there = verdict["gate"], "yes, beyond chance"
     if not gate["gap"]:
         there = "not within a specimen, only between specimens" if between_specimens(verdict) else "none beyond chance"
@@ -101,17 +101,17 @@ def _gate(verdict: dict[str, Any]) -> str:
 
 
 def between_specimens(verdict: dict[str, Any]) -> bool:
-    """Return whether only specimens together tell the effect.
+    """Return whether only the comparison of specimens shows the effect.
 
-    Each has a curve of its own, so the effect is in no residual.
+    Each specimen has its own response curve, which absorbs the effect, so the residual does not contain it.
     """
     return not verdict["gate"]["gap"] and any(load(e["effect"]).in_series for e in verdict["effects"])
 
 
 def answered(verdict: dict[str, Any]) -> set[str]:
-    """Return the effects of which the verdict speaks already: all forms of its answer and of what may stand in for it.
+    """Return all forms of the answer and its rivals.
 
-    Beside the answer they explain nothing more: that is no limit of seeing them.
+    In addition to the answer they explain nothing, so their detection limits are meaningless.
     """
     spoken = {name for e in verdict["effects"] for name in (e["mechanism"], *e["alternatives"])}
     return {e["effect"] for e in verdict["effects"]} | {e.name for e in library() if e.called in spoken}
@@ -167,7 +167,7 @@ def _is_vague(parameter: dict[str, Any]) -> bool:
 
 
 def _standing(entry: dict[str, Any]) -> str:
-    """Return how sure an effect is, and of what: where only its family is, that it is the one that fits best."""
+    """Return the status of an effect in words: with its confidence, or with the family if only that is named."""
     status, sure = entry["status"], entry["confidence"]
     if entry.get("level") == "family":
         family = entry["family"]
@@ -180,7 +180,7 @@ def _by(rivals: list[tuple[str, float]]) -> str:
 
 
 def _sizes(verdict: dict[str, Any]) -> list[str]:
-    """Return how large the residual is, with what each number is; before and after only where something was added."""
+    """Return lines on the mean squares of the residual; before and after only if the answer has effects."""
     left, sealed, none = verdict["left"], verdict["sealed"], not verdict["effects"]
     lines = [f"residual, {MEAN_SQUARE}:"]
     own = "their own pose and gain"
@@ -204,7 +204,7 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
 
 
 def _borne_out(ratio: dict[str, Any] | None) -> list[str]:
-    """Return how much of the answer sealed episodes show, where each press's own pose and gain are accounted for."""
+    """Return a line on the share of the answer in sealed episodes, given the pose and gain errors of each press."""
     if ratio is None or ratio["error"] is None:
         return []
     return [
@@ -214,11 +214,11 @@ def _borne_out(ratio: dict[str, Any] | None) -> list[str]:
 
 
 def _closed(sealed: dict[str, Any], named: bool) -> str:
-    """Return how far the gap on sealed episodes is closed, in words that follow its numbers.
+    """Return the closed share of the sealed gap, as the end of a line.
 
     Args:
-        sealed: Of the verdict.
-        named: Whether the effects have names. What is worse beyond chance has none.
+        sealed: Entry ``sealed`` of the verdict.
+        named: Whether the effects are named. If the fit is significantly worse, none is.
     """
     after, ratio = f" before, {figure(sealed['after'])} after", sealed.get("ratio")
     if (ratio is None or ratio["observed"] < 0) and (worse := worsened(sealed["before"], sealed["after"])):
