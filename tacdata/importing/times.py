@@ -76,6 +76,7 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
             "seconds since 1970 in the unit that is given",
             "correct unit, or give zero: shared or zero: own",
         )
+    # Integers stay exact: Unix nanoseconds need 61 bits, a float64 has 53.
     if values.dtype.kind in "iu" and "drift" not in clock and scale < 1:
         nanoseconds = values.astype(np.int64) * round(scale * 1e9)
         return nanoseconds + round(clock.get("offset", 0.0) * 1e9), zero or ("unix" if looks_unix else "shared")
@@ -211,6 +212,7 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
         if text is not None:
             *hours, minutes, rest = str(text).strip().replace(",", ".").split(":")
             seconds[row] = 3600 * int(hours[0] if hours else 0) + 60 * int(minutes) + float(rest)
+    # A fall by more than half a turn is midnight (or the hour); a smaller one is a row out of order.
     back = np.diff(seconds, prepend=seconds[0]) < -turn / 2
     return seconds + turn * np.cumsum(back)
 
@@ -264,6 +266,8 @@ def _datetimes(values: np.ndarray, layout: str | None, where: str) -> np.ndarray
     result = np.full(len(values), NEVER, dtype=np.int64)
     for row, moment in enumerate(moments):
         if moment is not None:
+            # A time without a zone counts as UTC: the zone of this computer would make an import depend on where it
+            # runs.
             moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
             since = moment - datetime(1970, 1, 1, tzinfo=UTC)
             result[row] = (since.days * 86_400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
@@ -298,6 +302,7 @@ def _parsed(text: str, layout: str, where: str) -> datetime | None:
 
 def layouts_of(known: list[str]) -> dict[str, list[datetime]]:
     """Return every layout of dates that fits texts, with a sample of the times that it makes of them."""
+    # Spread over the file and up to its end: only a day above 12 distinguishes days from months.
     sample = [_pointed(text).replace("T", " ") for text in known[:: max(len(known) // 200, 1)] + known[-1:]]
     fitting = {}
     for layout in (f"{date} {clock}" for date in DATES for clock in CLOCKS):

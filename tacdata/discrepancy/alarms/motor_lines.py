@@ -113,6 +113,7 @@ def _periodogram(cleaned: Cleaned, rows: np.ndarray, every: float) -> tuple[np.n
         at = np.round((course.time[own] - course.time[own[0]]) * FINER / every).astype(int)
         grid = np.zeros((values.shape[1], bins), dtype=np.float32)
         grid[:, np.minimum(at, bins - 1)] = values.T
+        # Up to half the rate of readings: the finer grid only keeps the phase of uneven times, beyond are aliases.
         spectrum = np.fft.rfft(grid, axis=1)[:, : bins // (2 * FINER)]
         squares = np.maximum(np.square(values).sum(axis=0), 1e-9)
         power = power + np.square(np.abs(spectrum)) / squares[:, None]
@@ -144,5 +145,6 @@ def _chance(frequency: np.ndarray, power: np.ndarray) -> np.ndarray:
     ratio = total / np.maximum(np.interp(frequency / BESIDE, np.arange(len(level)) + 0.5, level), 1e-12)
     counted = frequency > LOWEST
     low, high = np.quantile(ratio[counted], [0.25, 0.75])
+    # The quartiles are 1.349 standard deviations apart, and the shape of a gamma variable is (mean / deviation)^2.
     shape = (1.349 / max(float(high - low), 1e-6)) ** 2
     return np.where(counted, gamma.sf(ratio * gamma.median(shape), shape) * counted.sum(), 1.0)

@@ -112,6 +112,7 @@ def stretch(depth: np.ndarray, place: np.ndarray, seed: int = 0) -> tuple[int, i
     inside = ((order >= begin) & (order < end)).astype(float)
     inside -= basis @ (basis.T @ inside)
     power = np.square(inside).sum(axis=0)
+    # A stretch that coincides with the visits of a place is explained by its level: no contrast remains.
     kept = power > 1.5
     freedom = count - levels.shape[1] - 1
     if not kept.any() or freedom < LEAST_STRETCH:

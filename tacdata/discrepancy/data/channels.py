@@ -118,6 +118,7 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
     values, depth = values[known], depth[known]
     if len(values) < FEWEST_STOPPED:
         return []
+    # A second difference of white noise has 6 times its variance, and a press hardly contributes to it.
     noise = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], values == limit, [False]]).astype(int)))
     words = []

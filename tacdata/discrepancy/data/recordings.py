@@ -178,6 +178,7 @@ def _strokes_of(
     if tag:
         columns.append(np.full((len(time_ns), 3), np.nan) if views is None else views.at(time_ns))
     values = np.column_stack(columns)
+    # Of two readings at one time the second is dropped: rates and interpolation need times that increase.
     good = np.isfinite(columns[0]).all(axis=1) & np.concatenate([[True], np.diff(time_ns) > 0])
     time_ns, values = time_ns[good], values[good]
     if len(time_ns) < FEW_ROWS or len(episode.tip_ns) < 2:
@@ -194,6 +195,7 @@ def _strokes_of(
         origin = time_ns[0]
         path_time = (episode.tip_ns - origin) * 1e-9
         laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, tip, len(kept))
+        # The place of a press is where it is deepest: a path may come from aside.
         deepest = laid.tip[np.argmax(laid.tip[:, 2])]
         name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
         made.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2], specimen))
@@ -230,6 +232,8 @@ def _joined(
     clock, last = [], None
     for part in parts:
         begin = part.begin + part.rows.time[0]
+        # Clocks of imported sessions may begin at zero. A session that seems to begin in an earlier one is laid behind
+        # it.
         if last is not None and not 0 <= begin - last[0] < LONG_PAUSE:
             begin = last[0] + (LONG_PAUSE if begin - last[0] >= LONG_PAUSE else 1.0)
         shift = begin - part.rows.time[0] if last is None else last[1] + (begin - last[0]) - part.rows.time[0]

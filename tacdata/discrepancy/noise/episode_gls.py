@@ -167,6 +167,8 @@ class _Offsets:
         """Take a constant (streams, m, 1), its standard deviation, and modes of a random walk (streams, m, k)."""
         modes = offset[:, :, :0] if random_walk is None else random_walk
         if np.isinf(prior):
+            # A free offset is projected out. The modes are made orthogonal to it, else each would free a part of
+            # itself, too.
             constant = offset / np.sqrt(np.maximum(np.square(offset).sum(axis=1, keepdims=True), 1e-12))
             modes = modes - constant @ (constant.transpose(0, 2, 1) @ modes)
         else:
@@ -211,6 +213,7 @@ class _Errors:
             gains = gain_error * (np.eye(streams) - self._mean)[:, None, :].astype(np.float32)
             every = np.concatenate([every, gains], axis=2)
         self.gram = self.inner(every)
+        # The Gram matrix is symmetric only up to rounding, and `eigh` reads one triangle of it.
         self.root = _root(0.5 * (self.gram + self.gram.T))
 
     def inner(self, block: np.ndarray) -> np.ndarray:
@@ -269,6 +272,7 @@ class _Free:
         """Invert the part common to all columns."""
         streams, width = self._streams, self._blocks.shape[1]
         mean = np.einsum("spp->s", self._blocks) / width
+        # A spline that no row of the place reaches would leave its block singular.
         floor = RIDGE * np.maximum(mean, 1e-12)[:, None, None] * np.eye(width)
         inverse = np.linalg.inv(self._blocks + floor)
         self.freedom = float(np.einsum("sij,sji->", inverse, self._blocks)) * streams / len(inverse)

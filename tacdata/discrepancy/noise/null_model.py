@@ -85,6 +85,7 @@ class NullModel:
         spread: float = 0.0,
     ) -> NullModel:
         """Return the null model of the rows read, with its derived quantities."""
+        # A fixed seed: the same recordings must give the same verdict.
         white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), NOISE_DRAWS))
         nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
         return cls(
@@ -118,6 +119,7 @@ class NullModel:
         """
         course, before = setting.course, self.whitener.features
         features = taken_up(course, setting.response, placed)
+        # Most effects leave the pose unchanged, and factoring the covariance is the dearest step of a comparison.
         if features is before or (features is not None and before is not None and np.array_equal(features, before)):
             return self.whitener
         errors, noise = self.errors, self.noise

@@ -42,6 +42,8 @@ def modes(rate: float, course: Course, memory: float) -> np.ndarray | None:
     length = np.where(there, end - begin, 1.0)
     number = np.arange(1, MOST_MODES + 1)
     variance = 2 * rate * length[:, None] / (np.pi * number) ** 2
+    # Information on a cosine, whose mean square is 1/2. Slow AR(1) noise is larger than its innovations by 1 / (1 -
+    # m)^2.
     known = 0.5 * count[:, None] * (1 - memory) ** 2
     shown = np.median((variance * known)[there], axis=0) > SHOWS
     most = int(np.argmin(shown)) if not shown.all() else MOST_MODES

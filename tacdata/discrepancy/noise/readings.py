@@ -83,6 +83,7 @@ def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | Non
     known = np.isfinite(second).sum(axis=0) > 10
     scale = whole.copy()
     if known.any():
+        # A reading less the mean of its neighbours has 1.5 times the variance of white noise.
         scale[known] = 1.4826 * np.nanmedian(np.abs(second[:, known]), axis=0) / np.sqrt(1.5)
     missing = ~np.isfinite(residual)
     tag = np.inf if course.tag is not None else None
@@ -107,6 +108,7 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
         scale = before.scale.copy()
         scale[seen] = estimate.scale
         return replace(before, scale=scale, memory=estimate.memory)
+    # Rows on both sides of a gap in time would make the correlation of successive rows too small.
     pairs = ~course.first & (course.step < 1.5 * before.step)
     later, earlier = leftover[pairs], leftover[np.flatnonzero(pairs) - 1]
     weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-24)
@@ -178,6 +180,7 @@ def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
     low, high = 0.0, float(np.max(square)) + 1e-30
     if not beyond(0.0):
         return 0.0
+    # Bisection: `beyond` changes once from true to false, and 60 halvings exhaust double precision.
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if beyond(middle) else (low, middle)

@@ -136,6 +136,7 @@ def _unlikely(
     """Return the negative logarithm of how likely sizes are, given as logarithms."""
     cost = 0.5 * float(np.sum(np.square(log / SURE)))
     for run, mean, counts in zip(told, shared, weights, strict=True):
+        # det(1 + L'IL) instead of det(I): the information I is zero along directions that the response absorbs.
         root = cholesky(_covariance(mean, counts, log)[1], lower=True, check_finite=False)
         factor = cholesky(np.eye(len(root)) + root.T @ run.information @ root, lower=True, check_finite=False)
         seen = solve_triangular(factor, root.T @ run.score.ravel(), lower=True, check_finite=False)

@@ -73,6 +73,7 @@ def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) 
         spare = [k for k in need if need[k] < NEEDED_Z]
         if not spare:
             break
+        # Only one is dropped at a time: of two collinear effects, each is needless only while the other is there.
         model = without[min(spare, key=lambda k: without[k].half_bic)]
         placed = list(model.placed)
     if len(placed) == 1:
@@ -124,6 +125,7 @@ def two_lags(
     behind = _lag(mine)
     kin = [e for e in setting.effects if _is_lag(e)]
     pairs = [pair for pair in combinations(kin, 2) if len({e.called for e in pair}) == 2]
+    # To first order two lags of half the size equal the single one, so both start where the model is.
     both = [refine(begin, [*others, *(_behind(e, 0.5 * behind) for e in pair)], null) for pair in pairs]
     best = min(both, key=lambda two: two.half_bic, default=model)
     if best.half_bic >= model.half_bic or necessity(begin, best, model, null, pooled) < NEEDED_Z:

@@ -129,10 +129,12 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
     for _ in range(steps):
         state, best = _state(*begin, null), None
         for share in (1.0, 0.3):
+            # A part s of a Newton step makes a quadratic fall by s (2 - s) of the fall of the full step.
             if state.fall * share * (2 - share) < HOPELESS:
                 continue
             there = now
             for knob, by in zip(state.knobs, share * state.move, strict=True):
+                # A shape moves by its logarithm. Beyond a factor of e^1.5 its derivative is no guide.
                 there = knob.moved(there, float(np.clip(by, -1.5, 1.5) if knob.shape else by))
             fresh = _own(response)
             if isinstance(fresh, FittedResponse):
@@ -292,6 +294,7 @@ def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, kno
     good = size > 1e-12 * max(float(size[-1]), 1e-300)
     root = (vectors[:, good] / np.sqrt(size[good])) @ vectors[:, good].T
     heavy, axes = np.linalg.eigh(root @ each @ root)
+    # A press with all the information on a parameter has leverage 1: the jackknife without it would divide by zero.
     left = np.einsum("eji,ej->ei", axes, scores @ root) / (1 - np.minimum(heavy, LARGEST_LEVERAGE))
     left = np.einsum("eij,ej->ei", axes, left)
     count, inverse = len(scores), root @ root

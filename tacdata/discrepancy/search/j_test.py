@@ -76,6 +76,7 @@ class ModelError:
         scores = np.stack([total[index, 0], total[index, 0] - total[index, 1]])
         bare = total[np.ix_(index, index)]
         bare = bare + 1e-9 * np.eye(len(index)) * max(float(np.trace(bare)) / len(index), 1e-12)
+        # A larger coefficient is an effect, not a model error: it must remain as evidence, so the prior is tightened.
         while np.abs(np.linalg.solve(bare + np.diag(ridge), scores[0])[:own]).max(initial=0.0) > MOST_ERROR:
             ridge[:own] *= 2
         matrix = bare + np.diag(ridge)

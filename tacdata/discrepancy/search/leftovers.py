@@ -37,6 +37,7 @@ def leftovers(problem: Problem) -> Leftovers:
             each = _ridge_gains(problem, gram, columns, strength * scale)
             if each.sum() > best.gain:
                 best = Leftovers(float(each.sum()), t_value(each))
+    # The columns so far are patterns common to all streams. Each stream may still follow the path in its own way.
     residual, remembered = _stream_residual(problem), own_histories(problem)
     for strength in (1e-3, 1e-2, 1e-1, 1.0):
         each = _stream_gains(problem, residual, remembered, strength)

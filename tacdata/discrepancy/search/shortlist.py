@@ -43,6 +43,7 @@ def shortlist(problem: Problem, tested: ScoreTests) -> list[list[Candidate]]:
         better = pair and clipped_t(held_out(problem, pair) - alone) > RIVAL_Z
         return [[c] for c in _tried(order)] + ([pair] if better else [])
     if tested.p_generic <= ALPHA and pair and clipped_t(held_out(problem, pair)) > PAIR_Z:
+        # The first part is tried alone, too: `without_minor` in the race compares the pair with it.
         return [pair[:1], pair]
     return []
 
@@ -57,6 +58,7 @@ def _tried(order: list[Candidate]) -> list[Candidate]:
 
 def _gain(problem: Problem, chosen: list[Candidate]) -> float:
     everything = np.arange(len(problem.folds))
+    # Half the BIC penalty. The sample is the episodes, not the readings: readings of one press are correlated.
     fee = 0.5 * sum(len(c.columns) for c in chosen) * float(np.log(max(len(problem.folds), 2)))
     return float(gained(problem, chosen, everything).sum()) - fee
 

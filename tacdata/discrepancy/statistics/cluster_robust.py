@@ -182,6 +182,8 @@ def clustered_score(gram: np.ndarray, columns: np.ndarray) -> ClusteredScore:
     inside = np.einsum("ji,eik,lk->ejl", turned, information, turned, optimize=True)
     bare = white - inside @ whole
     leverage = np.einsum("ejj->ej", inside)
+    # A drift makes successive presses dependent. They are joined into larger clusters until their scores no longer
+    # correlate: the sandwich assumes independent clusters.
     for size in CLUSTER_SIZES:
         count = max(len(gram) // size, min(FEWEST_CLUSTERS, len(gram)))
         if size == CLUSTER_SIZES[-1]:
@@ -195,6 +197,7 @@ def clustered_score(gram: np.ndarray, columns: np.ndarray) -> ClusteredScore:
     tested = heavy.max(axis=0) <= LARGEST_LEVERAGE
     if not tested.any():
         return _nothing(len(gram))
+    # HC3: the division undoes the pull of a cluster on the fit that it is compared with (decision 0008).
     residuals = together[:, tested] / (1 - heavy[:, tested])
     expected = float(np.sum(heavy[:, tested] / (1 - heavy[:, tested])))
     drawn, freedom = _freedom(residuals, heavy[:, tested])

@@ -97,6 +97,7 @@ class Beside:
         """Return the coefficients of some columns as `solve` does, and those of the free ones."""
         index = columns + 1
         matrix = self._rest[np.ix_(index, index)] + np.diag(ridge)
+        # The mean over all columns, the free ones included: `solve` adds the same jitter to all of them at once.
         mean = (float(np.trace(matrix)) + self._trace) / max(len(index) + len(self._index), 1)
         matrix = matrix + JITTER * np.eye(len(index)) * max(mean, 1e-12)
         values = bounded(matrix, self._rest[index, 0], low, np.maximum(high, low + 1e-12))
@@ -136,6 +137,7 @@ def fold_of(episodes: int, seed: int = 0) -> np.ndarray:
 def flips(episodes: int, count: int, seed: int = 0) -> np.ndarray:
     """Return signs for a randomization test, shape (count, episodes), the first row all +1."""
     signs = np.random.default_rng([seed, 7]).choice([-1.0, 1.0], size=(count, episodes))
+    # The recordings as they are belong to the null distribution: a p-value is never 0.
     signs[0] = 1.0
     return signs
 

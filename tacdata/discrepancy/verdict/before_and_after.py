@@ -41,6 +41,7 @@ def beside_model(course: Course, found: Findings, sealed: np.ndarray, most: int 
         measured=measured[kept].astype(np.float32),
         before=_level(measured, before, reduced.episode)[kept].astype(np.float32),
         after=_level(measured, after, reduced.episode)[kept].astype(np.float32),
+        # From the innovations of an AR(1) process to the standard deviation of readings.
         noise=scale.scale / np.sqrt(max(1 - scale.memory**2, 0.02)),
         streams=streams.names(course),
         phases=PHASES,

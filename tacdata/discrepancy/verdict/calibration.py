@@ -29,6 +29,7 @@ def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
     prior, made = setting.nuisance[per_channel.name], []
     common = float(np.median(known))
     if abs(common) > BEYOND * prior / np.sqrt(len(known)) * 2 and _steady(np.nanmedian(found.halves, axis=1), common):
+        # Normal gains: the standard error of a median is sqrt(pi / 2) = 1.25 times that of a mean.
         error = float(1.25 * np.std(known) / np.sqrt(len(known)))
         alike = sorted({e.called for e in library() if e.like_gain is not None})
         rivals = tuple(alike) if setting.course.force is None else ()

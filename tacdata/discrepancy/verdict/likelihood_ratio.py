@@ -109,6 +109,7 @@ def likelihood_ratio(course: Course, found: Findings) -> LikelihoodRatio | None:
         return LikelihoodRatio(0.0, 0.0)
     each = eliminated(shown, np.arange(1, shown.shape[1] - 1), ridge)
     score = each[:, 0, 1] - each[:, 1, 1]
+    # At least 1: where open episodes scatter less by chance, sealed ones must not refute an answer more easily.
     scatter = max(float(np.sum(np.square(score))) / max(float(each[:, 1, 1].sum()), 1e-12), 1.0)
     return LikelihoodRatio(power, float(after[0, 1] - before[0, 1]) / power, scatter, max(float(before[1, 1]), 1e-12))
 

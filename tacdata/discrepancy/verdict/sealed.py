@@ -45,6 +45,8 @@ def chosen(course: Course) -> np.ndarray:
     """
     if course.episodes < FEWEST_TO_SEAL:
         return np.zeros(0, dtype=np.int64)
+    # Names decide, not readings: the choice cannot depend on the result, and a repeated judgement seals the same
+    # presses.
     keys = [f"{course.session[k]}/{course.names[k]}" for k in range(course.episodes)]
     order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(keys[k].encode()).digest())
     tool = np.array([course.tool[course.episode == k][0] for k in range(course.episodes)])
@@ -93,6 +95,7 @@ class Gap:
 
     def _drawn(self) -> tuple[np.ndarray, np.ndarray]:
         """Return bootstrap draws of both means [1], shape (draws,) each."""
+        # A fixed seed: the same recordings must give the same interval.
         pick = np.random.default_rng(0).integers(len(self.before), size=(BOOTSTRAPS, len(self.before)))
         return self.before[pick].mean(axis=1), self.after[pick].mean(axis=1)
 
@@ -160,6 +163,7 @@ def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
     last = measured - predict(course, model.setting.response, placed).signal[rows]
     rest = first - _predicted(course, np.nan_to_num(first), episodes)
     noise = found.problem.null.noise
+    # ``scale`` is that of the innovations of an AR(1) process. Readings scatter by more, by 1 / sqrt(1 - memory^2).
     scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
     number = course.episode[rows]
     before, after, ceiling = (_squares(r / scale, number, episodes) for r in (first, last, rest))
@@ -189,6 +193,7 @@ def _predicted(course: Course, residual: np.ndarray, episodes: np.ndarray) -> np
     columns = columns / np.maximum(columns.std(axis=0), 1e-9)
     number = course.episode[course.read]
     sealed = np.isin(number, episodes)
+    # The ridge is chosen on whole presses: readings of one press are correlated, so a split by reading would overfit.
     validation = ~sealed & (number % 4 == 0)
     best, chosen_weight = np.inf, RIDGES[-1]
     for strength in RIDGES:
