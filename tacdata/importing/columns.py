@@ -40,6 +40,7 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
         selector = composed(selector)
     names = list(table.columns)
     if len(names) == 1 and table.inner(names[0]):
+        # In a file of one array, numbers in the mapping mean its columns.
         names = [f"{names[0]}[{k}]" for k in range(table.inner(names[0]))]
         if isinstance(selector, str) and selector in table.columns:
             return [selector]
@@ -139,6 +140,7 @@ def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
     whole = inner[1] if (inner := INNER.fullmatch(name)) and table.inner(inner[1]) else name
     inside = split_unit(whole)[1]
     stated = table.units.get(whole) or ("" if inside.isdigit() else inside)
+    # The unit belongs to the file's type (a duration), so no mapping can contradict it.
     if whole in table.typed:
         return stated
     given = entry.get("unit", "")

@@ -115,6 +115,7 @@ def source_hash(path: Path) -> str:
     """Return the SHA-256 of a file, or of the names and contents of the files of a folder (hex)."""
     if path.is_file():
         return provenance.file_hash(path)
+    # Paths are relative to the folder: a copy elsewhere has the same hash.
     inside = sorted(p for p in path.rglob("*") if p.is_file())
     return provenance.content_hash({p.relative_to(path).as_posix(): provenance.file_hash(p) for p in inside})
 
@@ -161,6 +162,7 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
     sets = []
     led = [parts for parts, _ in matches[leading]]
     if files[leading].get("join"):
+        # Files that are joined repeat the parts of their trial: each trial counts once.
         led = [parts for number, parts in enumerate(led) if parts not in led[:number]]
     for parts in led:
         paths, more, titles, fault = {}, {}, {}, None
@@ -270,6 +272,7 @@ def _check_clocks(parts: list[SourceTable], time: str) -> None:
                 equal = bool((first == other).all())
             else:
                 usual = float(np.median(np.abs(np.diff(first.astype(float))))) if len(first) > 1 else 0.0
+                # Two loggers round one clock differently. Half an interval apart, the rows still belong together.
                 equal = bool(np.nanmax(np.abs(first.astype(float) - other.astype(float)), initial=0.0) <= 0.5 * usual)
             if equal:
                 continue
@@ -299,6 +302,7 @@ def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
             raise FormatError(f"{name} is no number in all parts", "a clock of numbers", "write join: rows")
         whole = [np.asarray(columns[name][0], float)]
         for values in columns[name][1:]:
+            # The pause between parts is unknown: the clock goes on by one usual interval.
             step = float(np.nanmedian(np.diff(whole[-1])))
             whole.append(np.asarray(values, float) + whole[-1][-1] + step - float(values[0]))
         columns[name] = whole
@@ -329,6 +333,7 @@ def _in_tables(found: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) 
 
 
 def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
+    # Names are compared in composed form: macOS stores an accent as a character of its own.
     regex, found = _regex(pattern), []
     for path in files_below(source):
         if match := re.fullmatch(regex, composed(path.relative_to(source).as_posix())):

@@ -100,6 +100,7 @@ def read_streams(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> lis
         path, further = position[number] if position else None, tuple(streams[number] for streams in measured)
         streams = ImportedStreams(readings, path, further, counted, depth_given)
         _check_zeros(streams)
+        # Of several stretches a faulty one is refused alone, and the others are imported (`presses_of`).
         if len(taxels) == 1:
             _check_overlap(streams)
         notes = tuple(note for stream in streams.all for note in stream.notes)
@@ -159,6 +160,7 @@ def _timed(
 ) -> list[Stream]:
     """Return a stream for each stretch of a file in which time never goes back."""
     clock = _clock(mapping, entry)
+    # Wraps and restarts are recognized by the clock's own numbers: the offset follows after they are undone.
     bare = {key: value for key, value in clock.items() if key != "offset"}
     time_ns, zero = times(table, bare, f"{name}: time")
     tick_ns = 0.0 if zero == "unix" else _tick(table, bare, time_ns, name)
@@ -218,6 +220,7 @@ def _apart(time_ns: np.ndarray) -> tuple[np.ndarray, int]:
         return time_ns, 0
     begins = np.flatnonzero(np.concatenate([[True], steps > 0]))
     counts = np.diff(np.append(begins, len(time_ns)))
+    # Nothing follows the last group: it lasts as long as the median group.
     widths = np.append(np.diff(time_ns[begins]), int(np.median(np.diff(time_ns[begins]))))
     inside = np.arange(len(time_ns)) - np.repeat(begins, counts)
     return time_ns + np.rint(inside * np.repeat(widths / counts, counts)).astype(np.int64), shared
@@ -261,6 +264,7 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
     clock = _clock(mapping, entry)
     time = single(table, clock["column"], "taxels: time") if "column" in clock else None
     if time is None:
+        # A rate would count rows, and here a row is one channel and not one moment.
         raise FormatError("taxels: long without a time column", "time: {column: NAME}", "add it to the mapping")
     channel = table.column(single(table, entry["long"]["channel"], "taxels: long: channel"))
     value = numbers(table, [single(table, entry["long"]["value"], "taxels: long: value")], [], "taxels: long")[:, 0]
@@ -361,6 +365,7 @@ def _measured(
         values, unit = values * factor(given, ours, f"measured: {name}"), ours
     else:
         unit = given
+    # An array column expands to several, and then names and columns differ in number.
     labels = tuple(split_unit(n)[0] for n in names) if len(names) == values.shape[1] else None
     labels = labels or tuple(str(k) for k in range(values.shape[1]))
     stretches = _timed(mapping, entry, table, name, values, labels, unit, doubts)

@@ -187,6 +187,7 @@ def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
             raw = raw.decode(encoding).encode()
             advice = " by guess; if names look wrong, give encoding under the file" if doubtful else ""
             notes.append(f"{path.name}: not UTF-8, read as {ENCODINGS.get(encoding, encoding)}{advice}")
+    # Windows ends lines with \r\n, and an old Macintosh with \r: from here on every line ends with \n.
     raw = raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return _whole_cells(raw[:HEAD]) + raw[HEAD:], notes
 
@@ -203,6 +204,7 @@ def _whole_cells(head: bytes) -> bytes:
     """Return a file's first lines without breaks inside quotes: a name and its unit, as a rule."""
     lines = head.split(b"\n")
     odd = [line.count(b'"') % 2 == 1 for line in lines]
+    # An odd number of quotes in a line means that a quoted cell goes on in the next one.
     for number in range(len(lines) - 1):
         ends = next((k for k in range(number + 1, min(number + 4, len(lines))) if odd[k]), None)
         if odd[number] and ends:
@@ -274,6 +276,7 @@ def _parsed(
     try:
         table, skipped = _arrow(body, layout, missing, types)
     except pa.ArrowInvalid:
+        # A single cell without a number makes Arrow refuse the file. As text, the cell can be named or left out.
         table, skipped = _arrow(body, layout, missing, dict.fromkeys(layout.names, pa.string()))
     columns, doubts = {}, []
     for name, kind in zip(layout.names, layout.kinds, strict=True):

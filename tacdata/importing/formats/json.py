@@ -77,6 +77,7 @@ def _flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
 
 def _array(values: list[Any]) -> np.ndarray:
     """Return a list as numbers, NaN for null, or as text; lists of one length inside it as a table."""
+    # A null in place of a list is a row without readings, not a table of another shape.
     widths = {len(row) if isinstance(row, list) else -1 for row in values if row is not None}
     if len(widths) == 1 and (width := widths.pop()) > 0:
         values = [[None] * width if row is None else row for row in values]

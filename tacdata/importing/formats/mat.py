@@ -74,6 +74,7 @@ def _loaded(path: Path) -> dict[str, Any]:
     """
     from scipy.io import loadmat, whosmat
 
+    # `whosmat` reads the directory alone, so a file that would fill the memory is refused before it is loaded.
     refuse_growth(path, sum(8.0 * math.prod(shape) for _, shape, _ in whosmat(path)))
     return loadmat(path, simplify_cells=True)
 

@@ -60,6 +60,7 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
     if not columns:
         return SourceTable(path, {})
     lengths = [len(values) for values in columns.values()]
+    # Most arrays of a recording have a value a row. Settings and labels are of other lengths.
     rows = max(set(lengths), key=lambda length: (lengths.count(length), length))
     notes = [*turned, *_shapes(path, arrays, options)]
     for name, values in columns.items():
@@ -164,5 +165,6 @@ def _column(array: np.ndarray) -> np.ndarray:
     if values.dtype.kind in "bui" and values.dtype.itemsize < 8:
         return values.astype(float)
     if values.dtype.kind in "iu":
+        # Only integers beyond 2^53 stay so, as Unix nanoseconds: a float64 would round them.
         return values.astype(np.int64) if np.abs(values).max() > 2**53 else values.astype(float)
     return values.astype(float) if values.dtype.kind == "f" else values.astype(str).astype(object)

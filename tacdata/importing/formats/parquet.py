@@ -27,6 +27,7 @@ class Parquet(SourceFormat):
             file = parquet.ParquetFile(path)
             refuse_growth(path, 8.0 * file.metadata.num_rows * file.metadata.num_columns)
             table = file.read()
+        # `flatten` opens one level of nesting.
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
         names = [str(name) for name in table.column_names]
@@ -70,6 +71,7 @@ def _column(column: Any, where: str, notes: list[str]) -> np.ndarray:
         column, kind = column.cast(pa.float64()), pa.float64()
     if pa.types.is_integer(kind) and kind.bit_width == 64 and not column.null_count:
         values = column.to_numpy()
+        # Integers beyond 2^53, as Unix nanoseconds, would be rounded as float64.
         return values if len(values) and np.abs(values).max() > 2**53 else values.astype(float)
     if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
         return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=float)

@@ -104,6 +104,7 @@ def _parts(path: Path) -> list[str]:
         names = [Path(name).name for name in listed]
     except (yaml.YAMLError, KeyError, TypeError, ValueError):
         return [path.name]
+    # A metadata.yaml of another bag in the same folder must not hide this file.
     return names if path.name in names else [path.name]
 
 
@@ -141,6 +142,7 @@ def _flat(message: Any, longer: Counter[str], prefix: str = "") -> Iterator[tupl
     for field in fields(message):
         value, name = getattr(message, field.name), f"{prefix}{field.name}"
         if is_dataclass(value):
+            # builtin_interfaces/Time: seconds and nanoseconds are joined as integers, which a float64 would round.
             if hasattr(value, "nanosec"):
                 yield name, int(value.sec) * 1_000_000_000 + int(value.nanosec)
             else:

@@ -69,6 +69,7 @@ def _far(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
         if steps[-policy.few :].any():
             place = len(rest) - 1 - int(np.argmax(steps[::-1]))
             usual = int((size[np.isfinite(column)] <= rest[place - 1]).sum())
+            # Of two groups of numbers the larger group is the signal.
             if 2 * usual > len(column):
                 codes |= size >= rest[place]
     return codes
@@ -91,4 +92,5 @@ def _at_rail(values: np.ndarray, policy: CodePolicy) -> np.ndarray:
             share = here.mean(axis=0)
             clipped |= here & (share <= policy.inside) & (here.sum(axis=0) >= policy.run)
     levels = [len(np.unique(column[np.isfinite(column)])) for column in values.T]
+    # A flag of a few levels may reach 255, too, and is not clipped.
     return clipped & (np.array(levels) > 2 * policy.bits[0])

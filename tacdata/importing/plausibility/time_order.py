@@ -97,6 +97,7 @@ def time_order(time_ns: np.ndarray, where: str, *, tick_ns: float = 0.0, policy:
     ordered = np.array(time_ns)
     ordered[rows] = known
     edges = [0, *cuts.tolist(), len(rows)]
+    # Stable: rows of one time stay in the order of the file.
     stretches = tuple(rows[a:b][np.argsort(known[a:b], kind="stable")] for a, b in pairwise(edges))
     back_words = tuple(_step_back(rows, known, cut) for cut in cuts.tolist())
     if back_words:
@@ -134,6 +135,7 @@ def _unwrapped(time_ns: np.ndarray, usual: float, tick_ns: float, policy: OrderP
         return time_ns, ""
     near = policy.wrap * usual
     for span, name in _spans(tick_ns).items():
+        # Counters are unsigned or signed, so they wrap to 0 or to minus half of the span.
         for low in (0.0, -span / 2):
             inside = time_ns.min() >= low and time_ns.max() < low + span
             ends = (time_ns[back] >= low + span - near) & (time_ns[back + 1] <= low + near)

@@ -101,6 +101,7 @@ def _dropouts(position: Stream, taxels: Stream, policy: PathPolicy) -> np.ndarra
     rest = steps[~dropped[1:] & ~dropped[:-1]]
     for rows in range(1, policy.longest + 1):
         for edge, outer in ((rows - 1, slice(0, rows)), (len(steps) - rows, slice(len(path) - rows, len(path)))):
+            # The fastest steps are left out: the dropout at the edge is among them and must not excuse itself.
             others = np.sort(rest)[: -policy.longest]
             fastest = float(others[-1]) if len(others) else 0.0
             if steps[edge] > max(policy.share * span, policy.faster * fastest) and fastest > 0:
@@ -135,6 +136,7 @@ def _in_ramps(steps: np.ndarray, dropped: np.ndarray, policy: PathPolicy) -> boo
 def _followed(position: Stream, taxels: Stream, begin: int, end: int, policy: PathPolicy) -> bool:
     """Return whether the readings follow the path away and back again."""
     times = position.time_ns
+    # Without readings there, only a long stay away is taken for a motion.
     if end >= len(times) or times[begin - 1] < taxels.time_ns[0] or times[end] > taxels.time_ns[-1]:
         return end - begin > policy.longest
     before, *inside, behind = _readings_at(taxels, times[begin - 1 : end + 1])

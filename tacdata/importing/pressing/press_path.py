@@ -63,6 +63,7 @@ def press_path(time_ns: np.ndarray, tip: np.ndarray) -> PressPath:
     rates = np.diff(depth[loading])[moving] / seconds[moving]
     speed = float(np.median(rates[rates > 0])) if (rates > 0).any() else None
     hold = float(time_ns[last] - time_ns[first]) / 1e9
+    # At the turning point of a parabola the time near the top grows with the root of the distance: fourfold gives two.
     near = _run(depth >= deepest - 4 * STILL * stroke, peak)
     if hold < SHORTEST_HOLD or (time_ns[near[1]] - time_ns[near[0]]) / 1e9 > ROUNDED * hold:
         hold = 0.0

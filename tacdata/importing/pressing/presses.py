@@ -93,6 +93,7 @@ def presses_of(
             "one clock for the presses of a schedule",
             "import the parts before and behind the step as files of their own",
         )
+    # Recordings hold no negative times. All streams and stretches move by the same shift, so they stay aligned.
     shift = max(-min(int(s.time_ns.min(initial=0)) for streams in stretches for s in streams.all), 0)
     for number, streams in enumerate(stretches):
         label = f"{record['trial']} stretch {number}".strip() if len(stretches) > 1 else record["trial"]
@@ -308,6 +309,7 @@ def _cuts(
     begin, end = int(streams.taxels.time_ns[0]), int(streams.taxels.time_ns[-1]) + 1
     if scheduled:
         knots = [press.knots[0] for press in scheduled]
+        # Cut half way between two presses: both keep idle readings.
         middles = [int(a[-1] + b[0]) // 2 for a, b in pairwise(knots)]
         edges = [min(begin, int(knots[0][0])), *middles, max(end, int(knots[-1][-1]) + 1)]
         return list(zip(edges[:-1], edges[1:], scheduled, strict=True))
@@ -319,6 +321,7 @@ def _cuts(
 def _commanded(planned: ScheduledPress, begin_ns: int, end_ns: int) -> Stream:
     time_ns, position = planned.knots
     time_ns = np.concatenate([[min(begin_ns, time_ns[0] - 1)], time_ns, [max(end_ns, time_ns[-1] + 1)]])
+    # At rest before and after the press, up to the ends of the readings: a position must exist for each of them.
     return Stream("position", time_ns, position[[0, 0, 1, 2, 3, 3]], ("x", "y", "z"), "mm", "aligned")
 
 

@@ -87,6 +87,7 @@ def _listed(entry: dict[str, Any], taxels: Stream) -> list[ScheduledPress]:
     from tacdata.importing.times import YEAR_2000
 
     zero = round(entry.get("time", {}).get("offset", 0.0) * 1e9)
+    # Nobody writes a schedule in Unix time by hand: small numbers count from the first row.
     if taxels.zero == "unix" and entry["presses"][0]["start"] < YEAR_2000:
         zero += int(taxels.time_ns[0])
     return [

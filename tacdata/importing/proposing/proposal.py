@@ -56,6 +56,7 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
     for kind in kinds:
         path, _, inside = kind.partition(INSIDE)
         alias = re.sub(r"\W+", "_", (inside or Path(path).stem).lower()).strip("_") or "data"
+        # Aliases are keys of the mapping: two folders may hold files of one name.
         while alias in aliases:
             alias += "_"
         aliases[alias] = kind
@@ -376,6 +377,7 @@ def _axis(table: SourceTable, name: str) -> dict[str, Any]:
 
 def _length(table: SourceTable, entry: dict[str, Any], pressing: str) -> str:
     """Set the unit of lengths without one: m where no press would be so short in mm; return it."""
+    # A stroke below 0.02 is no press in mm, but 2 mm written in m is.
     unit = "m" if float(np.nanmax(table.column(pressing)) - np.nanmin(table.column(pressing))) < SHORTEST else "mm"
     for given in entry.values():
         if "unit" in given:

@@ -143,6 +143,7 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     unit = quantity_of(given)
     if given.lower() in DEGREES:
         return "temperature"
+    # "t" with the unit of another quantity, as V, is no time.
     if role == "time" and values.dtype != object and unit != "s" and given.lower() in OTHERS:
         role = None
     role = {"N": "force", "s": "time"}.get(unit or "", role)

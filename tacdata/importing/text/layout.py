@@ -210,6 +210,7 @@ def is_number(field: str, decimal: str) -> bool:
         float(field.replace(",", ".") if decimal == "," else field)
     except ValueError:
         return False
+    # Python reads 1_000 as a number; in a measured file it is a name.
     return "_" not in field
 
 
@@ -223,6 +224,7 @@ def _delimiter(lines: list[str]) -> str:
     for delimiter in DELIMITERS:
         widths = Counter(len(split(line, delimiter)) for line in tail)
         width, count = widths.most_common(1)[0] if widths else (1, 0)
+        # Not all lines: the last one may be cut off, and a text may contain the delimiter.
         if width > 1 and count >= 0.8 * len(tail):
             return delimiter
     return ","
@@ -283,6 +285,7 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         name = composed(title) or str(k)
         if titles.count(title) > 1 and title:
             name = " ".join([*_groups(groups, k, title), name])
+        # Columns are keyed by name: a second one of the same name must not replace the first.
         while name in names:
             name += "'"
         names.append(name)
@@ -326,6 +329,7 @@ def _kind(fields: list[str], decimal: str) -> str:
     known = [field for field in fields if field not in MISSING]
     numbers = [is_number(field, decimal) for field in known]
     if not known or (2 * sum(numbers) >= len(known) and any(numbers)):
+        # From 16 digits on, as in Unix nanoseconds, a float64 would round.
         long = known and all(re.fullmatch(r"[-+]?\d{16,}", field) for field in known)
         return "int" if long else "float"
     return "text"
