@@ -90,6 +90,7 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
     # Of shapes (presses, channels, waves), (presses, waves), (presses,).
     parts, power, episodes = (np.array(each) for each in zip(*there, strict=True))
     alone = np.square(np.abs(parts)).sum(axis=1)
+    # A press counts by the root of its energy: a single strong one must not decide.
     weight = 1 / np.sqrt(np.where(alone > 0, alone, np.inf))
     energy = np.zeros((DRAWS + 1, parts.shape[2]))
     rng = np.random.default_rng([seed, 29])
@@ -103,6 +104,7 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
     for own, by, at in zip(parts, weight, together.tolist(), strict=True):
         if at not in signs:
             signs[at] = rng.integers(0, 2, (DRAWS + 1, len(own))) * 2.0 - 1.0
+            # Row 0 is the data as it is.
             signs[at][0] = 1.0
         energy += by * (np.square(signs[at] @ own.real) + np.square(signs[at] @ own.imag))
     energy[1:] *= 1 + _shared_in_air(cleaned)

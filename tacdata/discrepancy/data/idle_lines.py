@@ -40,6 +40,7 @@ def idle_lines(course: Course) -> list[str]:
     first = 3  # the trend and the window's own width lie below
     reduced = course.reduced
     rise = float(np.nanmax(np.nanquantile(reduced.readings, 0.999, axis=0) - np.nanmedian(windows, axis=(0, 1))))
+    # The mean of n periodograms of noise is a chi square variable with 2 n degrees of freedom.
     most = chi2.isf(CHANCE, 2 * len(windows)) / chi2.median(2 * len(windows))
     found: dict[float, list[tuple[int, float]]] = {}
     for channel in range(power.shape[1]):

@@ -86,6 +86,7 @@ def _groups(parts: Sequence[Rows], channels: int) -> np.ndarray:
         ]
         group[k] = int(np.argmin(near))
     first = [int(np.flatnonzero(group == n)[0]) for n in range(int(group.max()) + 1)]
+    # Numbered in the order of their first press: the group of the first one keeps the number of the place.
     return np.argsort(np.argsort(first))[group]
 
 

@@ -35,6 +35,7 @@ def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
     for first, second in pairwise(tops):
         between = depth[first:second]
         lowest = np.flatnonzero(between <= between.min() + 1e-9)
+        # In the middle of the time at rest: idle readings before and after a stroke then belong to it.
         middle = first + int(lowest[len(lowest) // 2])
         cuts.append(int(time_ns[middle]))
     edges = [whole[0], *cuts, whole[1]]

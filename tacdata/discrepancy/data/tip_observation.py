@@ -77,11 +77,13 @@ def _seen(episode: Episode) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     order = np.argsort(best[0], kind="stable")
     time, place = best[0][order], best[1][order]
+    # `Views.at` interpolates and needs times that increase: a camera may report one frame twice.
     new = np.concatenate([[True], np.diff(time) > 0])
     return time[new], place[new]
 
 
 def _right_handed(tip: np.ndarray) -> np.ndarray:
+    # x, y and depth are left-handed, as depth counts downwards. A rotation can only map right-handed frames.
     return tip * np.array([1.0, 1.0, -1.0])
 
 
@@ -102,6 +104,7 @@ def _laid_on(seen: np.ndarray, commanded: np.ndarray) -> tuple[np.ndarray, np.nd
             turn = np.stack([np.zeros(3), np.zeros(3), line])
         else:
             left, _, right = np.linalg.svd(cross)
+            # Without the sign, noise in a nearly flat path would give a reflection.
             sign = np.sign(np.linalg.det(right.T @ left.T))
             turn = right.T @ np.diag([1.0, 1.0, sign]) @ left.T
         offset = b - turn @ a

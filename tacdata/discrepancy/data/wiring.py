@@ -44,6 +44,7 @@ def miswired(course: Course, response: Response) -> list[str]:
     turned = [int(k) for k in np.flatnonzero(moved & (own < INVERTED))]
     words = [f"{course.channel_names[k]} reads the other way round: turn its sign" for k in turned]
     likeness[turned] = np.abs(likeness[turned])
+    # One-to-one, not the best for each channel: two channels of similar readings would both claim the same prediction.
     _, best = linear_sum_assignment(-likeness)
     own = np.diag(likeness)
     mismatched = [

@@ -174,6 +174,7 @@ def _size(whole: np.ndarray) -> float:
     root = np.sqrt(np.diag(whole)[1:])
     information, score = whole[1:, 1:] / np.outer(root, root), whole[1:, 0] / root
     power, axes = np.linalg.eigh(information)
+    # Columns of a saturated model are nearly collinear: round-off along weak axes would count as explained.
     good = power > 1e-3 * power[-1]
     explained = np.square(axes[:, good].T @ score) / power[good]
     return max(0.5 * float(np.sum(explained) - np.count_nonzero(good)), 0.0)

@@ -86,6 +86,7 @@ def series_compliance(course: Course) -> SeriesCompliance | None:
         own[of == s] = made[of == s][:, int(np.argmin(made[of == s, :, 0].sum(axis=0))), 0]
     count = len(presses)
     each = np.array([_best(np.delete(made, k, axis=0))[1] for k in range(count)])
+    # The jackknife over presses, as readings of one press are correlated.
     error = float(np.sqrt((count - 1) / count * np.square(each - each.mean()).sum()))
     better, worse, chance = without - with_it, with_it - own, sum(len(p.load) - 2 for p in presses)
     shown = 0 < with_it.sum() - chance <= (1 - CLOSES) * (without.sum() - chance) or with_it.sum() <= chance
@@ -94,6 +95,7 @@ def series_compliance(course: Course) -> SeriesCompliance | None:
     most = max(kept, key=lambda s: float(better[of == s].sum()))
     # Noise in the load bends all curves a little: one specimen at least must show it plainly.
     plain = with_it[of == most].sum() <= (1 - CLOSES) * without[of == most].sum()
+    # A power at the end of the grid is a bound, not an optimum: the law is then another one.
     if not (shown and plain) or differ or c < SURE * error or not 0 < at < len(POWERS) - 1:
         return None
     much = noise[kept.index(most)] / sum(p.change for p in presses if p.specimen == most)
@@ -174,6 +176,7 @@ def _presses(course: Course) -> list[_Press]:
         idle = depth <= depth.min() + IDLE * np.ptp(depth)
         air = load[own][idle]
         rise = load[own] - np.median(air)
+        # Test machines count compression as positive or as negative.
         rise = rise * np.sign(rise[np.argmax(np.abs(rise))])
         down = np.arange(len(own)) <= int(np.argmax(depth))
         loaded = down & (rise >= max(BEGINS * rise.max(), NOISE * float(air.std())))

@@ -119,7 +119,7 @@ class NullModel:
         """
         course, before = setting.course, self.whitener.features
         features = taken_up(course, setting.response, placed)
-        # Most effects leave the pose unchanged, and factoring the covariance is the dearest step of a comparison.
+        # Most effects leave the pose unchanged: the factors of the covariance are then reused.
         if features is before or (features is not None and before is not None and np.array_equal(features, before)):
             return self.whitener
         errors, noise = self.errors, self.noise

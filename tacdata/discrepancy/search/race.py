@@ -100,8 +100,8 @@ def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None
             first.append(candidate.placed(own, problem.setting.course.channels))
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.null))
-    # To first order a long delay is not seen: its derivative at zero resembles other effects. So delays and filters are
-    # also started from the lag that readings and path show by themselves.
+    # To first order a long delay is not seen. So delays and filters are also started from the lag that readings and
+    # path show by themselves.
     if not problem.placed and sets:
         best = [p for p in min(tried, key=lambda model: model.half_bic).placed if p.effect.called not in _called(late)]
         starts = [[p] for p in late] + [[p, *best[:1]] for p in late if best]

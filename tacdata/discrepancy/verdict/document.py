@@ -52,7 +52,7 @@ def document(
     if any(p.effect.in_series for p in placed) and (shared := series_compliance(course)) is not None:
         told.append(str(shared))
     families = {p.effect.family for p in placed}
-    # A named effect that explains the lag of readings makes the remark on clocks needless.
+    # An effect of the verdict that explains the lag of readings makes the remark on clocks needless.
     clocks = () if Family.DELAY_AND_FILTER in families else checks.clocks
     leads = {Family.DELAY_AND_FILTER, Family.SKIN_MEMORY, Family.FRICTION_AND_PLAY}
     clocks += () if families & leads else checks.early
