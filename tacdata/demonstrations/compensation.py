@@ -117,4 +117,5 @@ def compensate(position: np.ndarray, normal: np.ndarray, depth: np.ndarray, gain
             "the same number of each, normals of length 1",
             "give fingertip poses with their depths",
         )
+    # Without a predicted depth a target stays where it was seen.
     return position + gain * np.nan_to_num(np.asarray(depth, float))[:, None] * normal

@@ -130,6 +130,7 @@ def _search(
         search.aim(place, turn)
         start, cost = search.settle(start, STEPS if row else 10 * STEPS)
         if not _reached(search, start) and missed % AGAIN == 0:
+            # Seeded by the row: the same targets give the same path, whatever part of them is solved.
             rng = np.random.default_rng(row)
             for begin in (good, model.home, *(search.drawn(rng) for _ in range(OTHERS))):
                 other, left = search.settle(begin)

@@ -50,6 +50,7 @@ class Kinematics:
         self.robot, self.fingers = robot, fingers
         try:
             spec = engine.MjSpec.from_string(robot.urdf)
+            # Links on fixed joints would be merged and lose their names, and a fingertip may hang on one.
             spec.compiler.fusestatic = False
             # Kinematics needs no masses, MuJoCo does.
             spec.compiler.boundmass, spec.compiler.boundinertia = 1e-3, 1e-6
@@ -74,6 +75,7 @@ class Kinematics:
         link, pose = self.robot.tips[name]
         body = spec.body(link) or spec.worldbody  # MuJoCo makes the root link the world
         x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat()
+        # MuJoCo writes the real part of a quaternion first.
         body.add_site(name=f"tip {name}", pos=pose[:3, 3], quat=[w, x, y, z])
 
     def _joint(self, k: int) -> Joint:

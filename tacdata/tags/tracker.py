@@ -60,6 +60,7 @@ class FingerTracker:
         if not tags or wanted:
             tags, self._since = detect_tags(grey, whole=False), 0
         view = view_of(grey, tags, self.camera, self.fingers, self._hints)
+        # Of two consecutive images alone: a finger that was out of sight may well come back at another's place.
         recent = {name: pose for name, pose in self._hints.items() if self._ages[name] == 0}
         view = replace(view, remarks=view.remarks + exchanged(recent, view.cubes))
         self._remember(view)

@@ -61,6 +61,7 @@ def board_poses(
         # A pixel in metres at the board's distance.
         metre = float(shift[2, 0]) / camera.matrix[0, 0]
         squares.append(float((deviation**2).sum(axis=1).mean()) * metre**2)
+        # Six numbers of the pose were fitted to these deviations.
         variance = float((deviation**2).sum()) / max(2 * len(deviation) - 6, 1)
         spreads.append(_camera_spread(places, pose, camera, variance))
     if not poses:

@@ -40,6 +40,7 @@ def acquire(sightings: Sightings, times_ns: np.ndarray, wander: ProcessNoise) ->
     taken: list[int] = []
     wrong: list[int] = []
     wander = unseen_noise(sightings, wander)
+    # Candidates are compared by their likelihood, which the forward pass alone gives.
     best = smooth(sightings, nothing, wander, back=False)
     refused: set[int] = set()
     while len(taken) + len(wrong) < MOST:

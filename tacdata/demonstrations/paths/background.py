@@ -124,6 +124,7 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
         if image.shape != first.shape:
             continue
         there, there_too, _ = cv2.calcOpticalFlowPyrLK(first, image, corners, None, **lk)  # ty: ignore[no-matching-overload]
+        # Followed there and back: a corner that a hand covers meanwhile does not return to its place.
         back, back_too, _ = cv2.calcOpticalFlowPyrLK(image, first, there, None, **lk)  # ty: ignore[no-matching-overload]
         kept = (there_too.ravel() > 0) & (back_too.ravel() > 0)
         kept &= np.linalg.norm((back - corners)[:, 0], axis=1) < RETURNED
@@ -132,8 +133,10 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
 
 
 def _corners(image: np.ndarray) -> np.ndarray:
-    """Return corners spread over an image, clearer than its noise [px], shape (n, 1, 2), float32; "
-    "none if they are not."""
+    """Return corners spread over an image and clearer than its noise [px], shape (n, 1, 2), float32.
+
+    None are returned if they do not spread.
+    """
     import cv2
 
     clear = cv2.cornerMinEigenVal(image, BLOCK)
@@ -152,6 +155,7 @@ def _corners(image: np.ndarray) -> np.ndarray:
             if highest < least:
                 continue
             own = np.ascontiguousarray(image[top : rows[-1] + 1, left : columns[-1] + 1])
+            # OpenCV takes the threshold as a share of the cell's clearest corner.
             corners = cv2.goodFeaturesToTrack(own, A_CELL, min(max(least / highest, 0.02), 1.0), 8, blockSize=BLOCK)
             if corners is not None:
                 found.append(corners + np.array([left, top], np.float32))

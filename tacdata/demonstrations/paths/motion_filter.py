@@ -133,6 +133,7 @@ def smooth(
     inside = (times_ns >= sightings.time_ns[first]) & (times_ns <= sightings.time_ns[-1])
     moments = np.concatenate([sightings.time_ns[first:], times_ns[inside]])
     which = np.concatenate([np.arange(first, len(sightings)), np.full(int(inside.sum()), -1)])
+    # Of one time, sightings come before the pose that is asked for, which then contains them.
     order = np.lexsort((which < 0, moments))
     accepted, distance, likelihood, nodes = np.zeros(len(sightings), bool), np.full(len(sightings), np.nan), 0.0, []
     state, known, now = _first(sightings, first)
@@ -209,6 +210,7 @@ def _predicted(
 ) -> tuple[_State, np.ndarray, np.ndarray]:
     turn = exponential(state.turning * dt)
     step = np.eye(len(known))
+    # An error of rotation is a vector in the world: it turns along with the finger.
     step[:3, :3] = turn
     step[:3, 6:9] = step[3:6, 9:MOTION] = dt * _EYE
     of_rates, mixed, of_places = _noise_parts(len(known), wander.turning, wander.velocity)
@@ -245,11 +247,13 @@ def _updated(
         total = across[:6] + sightings.covariance[n]
     inverse = np.linalg.inv(total)
     distance = float(surprise @ inverse @ surprise)
+    # An outlier counts as one at the gate. Without that, every rejection would make a track likelier.
     gained = -0.5 * ((GATE if wrong else min(distance, GATE)) + np.linalg.slogdet(total)[1])
     if wrong or distance >= GATE:
         return expected, spread, distance, gained
     gain = across @ inverse
     known = spread - gain @ across.T
+    # Rounding would make the covariance unsymmetric over thousands of steps.
     return expected.plus(gain @ surprise), (known + known.T) / 2, distance, gained
 
 
@@ -297,4 +301,5 @@ def logarithm(matrix: np.ndarray) -> np.ndarray:
         return axis / 2
     from scipy.spatial.transform import Rotation
 
+    # Near half a turn the sine vanishes, and the axis cannot be taken from it.
     return Rotation.from_matrix(matrix).as_rotvec()

@@ -96,6 +96,8 @@ def sampled(recording: DemoRecording, count: int) -> dict[str, list[tuple[int, n
         if passed[name] % stride[name] == 0:
             kept[name][passed[name]] = bytes(message)
         passed[name] += 1
+        # The number of images is known only at the end, so every other one is dropped whenever there are twice too
+        # many.
         if len(kept[name]) > 2 * count:
             stride[name] *= 2
             kept[name] = {k: own for k, own in kept[name].items() if k % stride[name] == 0}

@@ -147,6 +147,7 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     chosen, turn = np.flatnonzero(sightings), pose[:3, :3]
     count = len(chosen)
     covariance = np.full((count, 6, 6), np.nan) if view.covariance is None else view.covariance[sightings].copy()
+    # Rotation error and position both turn from the camera's frame into the world's.
     both = np.kron(np.eye(2), turn)
     covariance = both @ np.where(np.isfinite(covariance), covariance, np.nan) @ both.T
     lost = ~np.isfinite(covariance).all(axis=(1, 2))

@@ -103,6 +103,7 @@ def in_step(
     words = []
     for one, other in combinations(cameras, 2):
         lag = _lag(sightings, one, other)
+        # Of three cameras, a pair with one that is moved already would move it twice.
         if lag is None or one in moved or other in moved:
             continue
         late, early = (other, one) if lag > 0 else (one, other)
@@ -305,6 +306,7 @@ def _difference(pairs: list[list[tuple[np.ndarray, np.ndarray]]], lag: float, fe
             continue
         there = np.stack([np.interp(at[inside], times, path[:, k]) for k in range(3)], axis=1)
         deviation = other_path[inside] - there
+        # A constant distance of the paths is an error of a camera's place and not of its time.
         squares.append(((deviation - np.median(deviation, axis=0)) ** 2).sum(axis=1))
     if count < max(fewest, OVERLAP * total):
         return np.inf

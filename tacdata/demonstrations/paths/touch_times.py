@@ -91,6 +91,7 @@ def _residuals(
     away = np.minimum(
         abs(seconds - changing[nearest - 1]), abs(seconds - changing[np.minimum(nearest, len(changing) - 1)])
     )
+    # The same rows at every lag: else residuals of different rows would be compared.
     inside = (seconds > seconds[0] + LAGS[-1]) & (seconds < seconds[-1] - LAGS[-1])
     rows = (away < AROUND) & visible & np.isfinite(distance) & inside
     if rows.sum() < FEWEST:

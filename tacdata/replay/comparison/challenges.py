@@ -39,6 +39,7 @@ def _shifted(by: float) -> Callable[[ReplayScene, np.random.Generator], ReplaySc
 
 def _cameras(spread: float) -> Callable[[ReplayScene, np.random.Generator], ReplayScene]:
     def change(scene: ReplayScene, rng: np.random.Generator) -> ReplayScene:
+        # Per axis: the root mean square length of the error in space is then ``spread``.
         deviation = rng.normal(0, spread / np.sqrt(3), (len(scene.bias), 3)) + np.array(scene.bias)
         return replace(scene, bias=tuple((a, b, c) for a, b, c in deviation.tolist()))
 
@@ -61,4 +62,5 @@ CHALLENGES = {
 
 def changed(name: str, scene: ReplayScene, seed: int) -> ReplayScene:
     """Return the scene of a challenge and a seed, from the one that the seed drew."""
+    # Random numbers of its own: a challenge must not change the scene that the seed drew.
     return CHALLENGES[name].change(scene, np.random.default_rng([seed, 41]))

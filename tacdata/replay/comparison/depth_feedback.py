@@ -42,6 +42,7 @@ class DepthFeedback:
 
     def __post_init__(self) -> None:
         """Draw the errors of the estimate."""
+        # Random numbers of its own: the same seed draws the same scene with and without feedback.
         self._rng = np.random.default_rng([self.seed, 31])
         count = self.goal.shape[1]
         self._shallow = self._rng.uniform(0, SHALLOW, count) / 1000

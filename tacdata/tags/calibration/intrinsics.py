@@ -255,6 +255,7 @@ def _held_out(views: list[BoardView], board: Board, size: tuple[int, int], model
 
     squares: list[np.ndarray] = []
     for part in (0, 1):
+        # Every other view, so that both halves cover all attitudes of the board.
         fit = _fit(views[part::2], board, size, model)
         for view in views[1 - part :: 2]:
             points = board.corners[view.ids]

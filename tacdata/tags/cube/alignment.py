@@ -143,6 +143,7 @@ def _step(
         if patch.contrast <= 1.0:
             continue
         weighted, rest = patch.columns, patch.rest
+        # In the first step the residual is not known, and no pixel can be suspected.
         if left is not None:
             # Cauchy weights: pixels that cover a part of the face count little.
             weight = 1 / (1 + np.square(rest / (patch.contrast * np.clip(3 * left, *COVERED))))
@@ -158,6 +159,7 @@ def _step(
         right += patch.contrast * (towards[:7] - inner @ towards[7:])
     if not count:
         return None
+    # Radians, metres and square pixels differ by many orders: scaled to a unit diagonal the matrix is well conditioned.
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
     scales = np.outer(scale, scale)
     try:

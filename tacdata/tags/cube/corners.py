@@ -117,6 +117,7 @@ def _settle(
         if not group:
             return None
         try:
+            # OpenCV writes into the arrays that it is given.
             rotation, translation = cv2.solvePnPRefineVVS(
                 *_pairs(group, cube), camera.matrix, None, rotation.copy(), translation.copy()
             )

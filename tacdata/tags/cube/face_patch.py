@@ -117,6 +117,7 @@ def draw_face(
     places = np.stack([across.ravel()[inside], down.ravel()[inside]])
     arm = half * axes[:, :2] @ places + (centre - translation)[:, None]
     slopes_of(slope_x, slope_y, arm, translation, matrix, columns)
+    # The heat equation: the derivative of a Gaussian blur by its variance is half the Laplacian.
     columns[6] = (cv2.Laplacian(model, cv2.CV_32F, ksize=1)[2:-2, 2:-2]).ravel()[inside] / 2
     columns[7] = 1.0
     columns[8] = core.ravel()[inside]
@@ -173,6 +174,7 @@ def _drawn(tag: int, to_plane: np.ndarray, size: tuple[int, int], blur: float, f
     texels = len(texture)
     # Half tags to texels (the pattern is 8 cells and 2 cells of paper on each side), rows downwards.
     to_texel = np.array([[4 * CELL, 0, texels / 2 - 0.5], [0, -4 * CELL, texels / 2 - 0.5], [0, 0, 1]])
+    # Whole numbers are pixel centres, so pixels of two sizes share their edges and not their centres.
     offset = 0.5 / fine - 0.5
     to_coarse = np.array([[1 / fine, 0, offset], [0, 1 / fine, offset], [0, 0, 1]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP

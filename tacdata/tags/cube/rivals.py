@@ -101,6 +101,7 @@ def best_rival(
         best, other = _choose(rivals, before)
         if not best.false:
             return best, other
+        # A tag that was read where the image shows none spoils all candidates: they are solved again without it.
         tags = [tag for tag in tags if not any(tag is false for false in best.false)]
     return None
 
