@@ -54,6 +54,7 @@ def evaluated(table: SourceTable, text: str, where: str) -> tuple[np.ndarray, st
         return f"_column_{len(quoted) - 1}"
 
     try:
+        # Cut before it is parsed: a long expression can exhaust the parser itself.
         tree = ast.parse(re.sub(r"`([^`]+)`", placeholder, text[: LONGEST + 1]).strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise _refusal(text, where) from None

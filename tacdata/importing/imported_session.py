@@ -69,6 +69,7 @@ def import_session(
         raise UsageError(f"{out} exists", "a new session folder", "choose another --out")
     sets = file_sets(source, document["files"])
     out.parent.mkdir(parents=True, exist_ok=True)
+    # On the same drive, so that the rename at the end is atomic.
     work = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}."))
     try:
         run = _Import(document, mapping.parent, source, work, progress)
@@ -177,6 +178,7 @@ class _Import:
         depth = imported.registration["origin"][2] - imported.position.values[:, 2]
         at = np.interp(imported.taxels.time_ns, imported.position.time_ns, depth)
         self.sides.append(zero_side(at, imported.taxels.values))
+        # At the end only the press is needed, and the rows of all recordings would fill the memory.
         self.presses.append(replace(imported, taxels=None, position=None, measured=()))
         rows = len(imported.taxels.time_ns)
         self.progress(f"  {path.name}  {trial or self.mapping['name']}: {rows} rows, {press.depth:.2f} mm deep")

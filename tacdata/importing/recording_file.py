@@ -67,6 +67,7 @@ class ImportedPress:
                 "unit": self.taxels.unit,
                 "rate": {"nominal": self.taxels.stated_rate or self.sensor.taxels.rate, "unit": "Hz"},
             },
+            # No controller is known: limits that bind nothing.
             "controller.json": {"settings": {}, "acceleration": [1e6] * 3, "max_rate": [1e6] * 3},
             "import.json": self.record,
         }

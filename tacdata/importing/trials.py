@@ -70,6 +70,7 @@ def _by_column(
     for alias, table in tables.items():
         try:
             labels = _labels(table, column)
+            # Mostly empty cells behind a first label repeat it. A few empty ones are gaps between trials.
             named[alias] = _held(labels) if labels[0] and 2 * (labels == "").sum() > len(labels) else labels
             if counted:
                 runs = np.cumsum(np.concatenate([[0], labels[1:] != labels[:-1]]))
