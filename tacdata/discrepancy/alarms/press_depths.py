@@ -146,6 +146,7 @@ def two_groups(depth: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, float]
     known = np.square(error)
     least = (0.1 * spread) ** 2
     made = []
+    # Expectation-maximization ends at the nearest optimum, so it starts from three divisions.
     for cut in (len(depth) // 3, len(depth) // 2, 2 * len(depth) // 3):
         share, low, high, own = 0.5, float(order[:cut].mean()), float(order[cut:].mean()), (0.5 * spread) ** 2
         for _ in range(ROUNDS):
@@ -183,6 +184,7 @@ def reasoned(course: Course, episodes: np.ndarray, lower: np.ndarray) -> bool:
     tool = np.array([course.tool[r[0]] for r in rows])
     for known in (course.site[episodes], tool, deep, fast, course.session[episodes]):
         kinds = np.unique(known)
+        # Kinds of one press each would determine any group.
         if not 1 < len(kinds) <= len(episodes) // 2:
             continue
         table = np.array([[np.sum((known == k) & lower), np.sum((known == k) & ~lower)] for k in kinds])

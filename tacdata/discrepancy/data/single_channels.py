@@ -101,6 +101,7 @@ def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, 
             continue
         own, called = gains[known, channel], course.channel_names[channel]
         others = _others(gains, channel)[known]
+        # The difference of two presses has twice the variance of one.
         scatter = float(1.4826 * np.median(np.abs(np.diff(own) - np.median(np.diff(own)))) / np.sqrt(2))
         begin, end = _longest(np.abs(own - 1) > max(LEAST_JUMP, JUMP_Z * scatter))
         change = float(np.median(own[begin:end])) - 1 if end > begin else 0.0
@@ -119,6 +120,7 @@ def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, 
             )
             continue
         spread = float(np.ptp(_smooth(own)))
+        # `_smooth` takes five presses together, so chance is smaller by the root of five.
         if spread > max(LEAST_WANDER, WANDER_Z * scatter / np.sqrt(5)) and np.ptp(_smooth(others)) < SHARED * spread:
             words.append(
                 (

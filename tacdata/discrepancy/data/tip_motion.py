@@ -48,6 +48,7 @@ def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
             continue
         top = int(np.argmax(depth))
         loading.append(_speed(time[: top + 1], depth[: top + 1], TOUCHING * course.span, least))
+        # Backwards in time the way out is a way in.
         unloading.append(_speed(-time[top:][::-1], depth[top:][::-1], TOUCHING * course.span, least))
     return np.array(loading), np.array(unloading)
 

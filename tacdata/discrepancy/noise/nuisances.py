@@ -46,6 +46,7 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
     idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * largest
     off = table_error.common(response.error, rise, course.reduced)
     weights = [
+        # A column is the change by a typical size: a standard deviation s has the weight (typical / s)^2.
         (p.typical / setting.nuisance[c.effect.name]) ** 2
         for c in board.candidates
         for p in c.effect.amplitudes

@@ -61,6 +61,7 @@ def model_errors(
             change = streams.predicted(chain.again([*rest, other])) - bare
             large = float(np.linalg.norm(change))
             if large > NEGLIGIBLE * size:
+                # Scaled to the effect itself, as `form_error` is a share of it.
                 columns.append(OTHER_FORMS * one.effect.form_error * size / large * change)
         parts.append(own)
         of += [at] * (len(columns) - len(of))

@@ -103,6 +103,7 @@ def tangents(
         steps, there = {}, list(placed)
         for k in group:
             low, high = knobs[k].room(placed)
+            # At its upper bound a parameter is moved downwards.
             step = STEP if high > STEP else -STEP
             if low < step < high:
                 steps[k], there = step, knobs[k].moved(there, step)
