@@ -185,6 +185,7 @@ def train(
             _keep(run, line, out)
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
         best = checkpoint.load(out, place)
+        # Cross-conformal intervals leave each press out once (decision 0012).
         if len(split.validation) > 1:
             conformal_intervals.write(out, _calibrated(best, windows, frames, split))
         known = novelty.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
@@ -231,6 +232,8 @@ def _started(
     if pretrained:
         pretrained.check_sensor(frames.sensor, frames.origin)
         pretrained.check_unseen(frames.dataset_hash, frames.origin)
+        # The calibration stays the unit's own. The normalization comes with the weights, which learned on signals of
+        # that scale.
         network.load_state_dict(pretrained.network.state_dict())
         known = pretrained.document["normalization"]
         mean, sd = (np.asarray(known[name], dtype=np.float32) for name in ("mean", "sd"))
@@ -336,6 +339,7 @@ def _epoch(
         chosen = chosen[taken | (torch.rand(len(chosen)) < settings.idle_share)]
     order = chosen[torch.randperm(len(chosen))].to(place)
     batches = order.split(settings.batch_size)
+    # Summed on the device: reading the loss of each step would wait for the GPU.
     total = torch.zeros((), device=place)
     for step, batch in enumerate(batches, start=1):
         label = normalized(depth[batch.to(depth.device)].to(place), frames.sensor.map.depth_max)
@@ -345,6 +349,7 @@ def _epoch(
             signals, label = torch.cat([signals, more]), torch.cat([label, known])
         with torch.autocast(place.type, torch.bfloat16, enabled=settings.precision == "bfloat16"):
             prediction = run.forward(signals)
+        # In float32: bfloat16 has three digits, and the mean is over a thousand pixels.
         loss = run.loss(prediction.float(), label, settings)
         run.optimizer.zero_grad(set_to_none=True)
         loss.backward()

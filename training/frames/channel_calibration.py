@@ -209,6 +209,7 @@ def _spread(presses: list[tuple[np.ndarray, np.ndarray]], taxels: Taxels, expone
     Gains are fitted to forces without spreading, the variance to the residual of the spread forces. The exponent
     stays that without spreading: a joint fit would trade a steeper law for a wider skin.
     """
+    # `spreading` is the exponential of variance / 2 times the Laplacian: this is its derivative by the variance.
     change, variance, previous = laplacian(taxels) / 2, 0.0, 0.0
     product, square = np.zeros(len(presses)), np.zeros(len(presses))
     if len(presses) == 1:  # its place errs as much as a skin differs
@@ -251,6 +252,7 @@ def _sums(presses: list[tuple[np.ndarray, np.ndarray]], exponents: np.ndarray = 
     square = np.empty((len(exponents), len(presses), presses[0][0].shape[1]))
     product, total = np.empty_like(square), np.empty(square.shape[1:])
     for k, (counts, force) in enumerate(presses):
+        # Each press counts the same, however many frames it has: those are correlated.
         weight = 1 / len(counts)
         total[k] = weight * (force * force).sum(axis=0)
         for j, exponent in enumerate(exponents):

@@ -21,6 +21,7 @@ class Variation:
         self.mean, self.sd = network.get_buffer("mean"), network.get_buffer("sd")
         self.calibrated = network.is_calibrated
         self.spread = settings.spread_jitter
+        # In these modes spreading is a factor each, so every frame can have a variance of its own.
         values, modes = np.linalg.eigh(laplacian(sensor.taxels) / 2)
         to = {"dtype": torch.float32, "device": self.mean.device}
         self.values, self.modes = torch.as_tensor(values, **to), torch.as_tensor(modes, **to)
@@ -38,8 +39,10 @@ class Variation:
         if self.exponent:
             change = self.exponent * torch.randn(len(signals), 1, 1, device=signals.device)
             unit = self.sd.square().mean().sqrt()
+            # A negative change of the exponent would make a reading of zero infinite.
             signals = signals * (signals.abs() / unit).clamp(min=1e-6).pow(change)
         if self.scale:
+            # Log-normal: the gain of a unit is never negative.
             signals = signals * (self.scale * torch.randn(len(signals), 1, 1, device=signals.device)).exp()
         if self.jitter:
             factor = 1.0 + self.jitter * torch.randn(len(signals), 1, signals.shape[2], device=signals.device)

@@ -106,7 +106,9 @@ def save(path: Path, network: Network, optimizer: torch.optim.Optimizer | None, 
     os.close(handle)
     save_file(tensors, temporary, {KEY: json.dumps(document)})
     with open(temporary, "rb") as stream:
+        # On the disk before the name changes: else a crash could leave the name with an empty file.
         os.fsync(stream.fileno())
+    # `mkstemp` makes a file that only its owner may read.
     os.chmod(temporary, 0o644)
     os.replace(temporary, path)
 

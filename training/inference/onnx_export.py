@@ -76,6 +76,7 @@ def export(trained: Checkpoint, path: Path, windows: np.ndarray | None = None) -
         with torch.inference_mode():
             reference = DepthNetwork(trained).eval()(torch.from_numpy(inputs)).numpy()
         batch_output = session.run(None, {"windows": inputs})[0]
+        # Singly, too: a batch size that the tracer took for a constant shows only at another one.
         single = np.concatenate([session.run(None, {"windows": window[None]})[0] for window in inputs[:16]])
         difference = float(max(np.abs(batch_output - reference).max(), np.abs(single - reference[:16]).max()))
         if not difference <= TOLERANCE:

@@ -45,4 +45,5 @@ def milliseconds_per_frame(network: Network, windows: Windows, repeats: int = 20
             began = time.perf_counter()
             network(windows.batch(frame))
             times.append(time.perf_counter() - began)
+    # The first calls allocate memory.
     return 1e3 * float(np.median(times[20:]))

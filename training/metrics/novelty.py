@@ -84,6 +84,7 @@ def gathered(
     readings = frames.taxels[learned[:: -(-len(learned) // LOOKED_AT)]].astype(np.float64)
     if mirror:
         readings = np.concatenate(_mirrored(readings, frames.sensor.taxels.rows, frames.sensor.taxels.columns))
+    # Rounded as in the file: a checkpoint that is read again must judge readings the same way.
     representatives = np.round(readings[_covering(_root(readings))], 1)
     far = float(np.quantile(_nearest(_root(frames.taxels[pressed]), _root(representatives)), SHARE))
     return TrainingReadings(representatives, max(far, 1e-6), checkpoint)
@@ -120,6 +121,7 @@ def _nearest(points: np.ndarray, readings: np.ndarray) -> np.ndarray:
     for start in range(0, len(points), BLOCK):
         block = points[start : start + BLOCK]
         square = (block**2).sum(axis=1)[:, None] + squares - 2 * block @ readings.T
+        # By rounding the square of a distance near zero may be negative.
         distances[start : start + BLOCK] = np.sqrt(np.maximum(square.min(axis=1), 0.0))
     return distances
 

@@ -70,6 +70,7 @@ def bilinear(depth: np.ndarray, x: float, y: float, grid: DepthMap) -> float | N
     j = float(y) / grid.pixel_pitch + (grid.pixels_y - 1) / 2
     if not (0 <= i <= grid.pixels_x - 1 and 0 <= j <= grid.pixels_y - 1):
         return None
+    # A point on the last pixel centre belongs to the cell before it.
     i0, j0 = min(int(i), grid.pixels_x - 2), min(int(j), grid.pixels_y - 2)
     u, v = i - i0, j - j0
     corner = depth[i0 : i0 + 2, j0 : j0 + 2].astype(np.float64)

@@ -33,6 +33,7 @@ class Paper(Network):
             channels: Channels of the coarse feature map.
         """
         super().__init__(taxels, map_shape, {"hidden": hidden, "channels": channels})
+        # Both transposed convolutions double the size. Rounded up, as `_crop` can only cut.
         self.coarse = (channels, -(-map_shape[0] // 4), -(-map_shape[1] // 4))
         self.encoder = nn.LSTM(taxels, hidden, batch_first=True)
         self.projection = nn.Linear(hidden, channels * self.coarse[1] * self.coarse[2])

@@ -116,6 +116,7 @@ def learning_curve(
     parents |= {"simulated": simulated.dataset_hash} if simulated else {}
     held_out = divide(frames, split, seeds[0])
     pool = tuple(sorted({*held_out.train, *held_out.validation}))
+    # A single press cannot be trained on and choose the epoch as well.
     possible = [count for count in presses if count <= len(pool) and count != 1 and (count or pretrained)]
     if not possible:
         raise UsageError(
@@ -193,6 +194,7 @@ def _scored(network: Any, frames: Frames, test: tuple[int, ...], start: str, pre
         start,
         presses,
         seed,
+        # A network that detects no contact gets the diagonal of the map, which is worse than any place.
         centroid_error=float(
             np.median(scores.centroid_error[detected]) if detected.any() else np.hypot(*network.map_shape)
         ),

@@ -104,6 +104,7 @@ def evaluate(
     own = frames.dataset_hash == trained.document["dataset"]["hash"]
     numbers = trained.split.test if own else tuple(e.number for e in frames.episodes)
     spans = frames.spans(numbers)
+    # Raises if no frame of these episodes is valid, before the network runs.
     frames.indices(numbers)
     place = choose_device(device)
     windows = Windows(frames, trained.network.offsets, place)

@@ -145,6 +145,7 @@ def _wearing(found: tuple[PressTrial, ...], of: MapOf) -> dict[str, Any]:
     return {
         "threshold_mm": REGION_THRESHOLD,
         "participants": rows,
+        # As in the paper each participant counts once, however many trials there are.
         "overall": _summary(np.array([row["mean"] for row in rows])),
     }
 

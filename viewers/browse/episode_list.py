@@ -59,6 +59,7 @@ class Entry:
 UNITS = {"x": "mm", "y": "mm", "depth": "mm", "rate": "mm/s", "error": "mm", "centroid": "px"}
 SHOWN = tuple(f.name for f in fields(Entry) if f.name != "recording")
 """Columns for listing, filtering and sorting."""
+# The first that is found counts, so the signs of two characters come first.
 OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
     "!=": lambda a, b: a != b,
     "<=": lambda a, b: a <= b,

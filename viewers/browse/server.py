@@ -120,6 +120,7 @@ class Pages:
 
         self.listed.numbered(number)
         file = self._folder / f"{number}.rrd"
+        # Requests run in threads of their own, and two of them must not draw one file.
         with self._drawing:
             if not file.is_file():
                 scene = scene_at(self.listed.root, self._labels, self._predictions, number)
@@ -143,6 +144,7 @@ class Pages:
         """Add a note on an interval of an episode; return a confirmation."""
         with self._drawing:
             said = note_stretch(self.listed, asked.number, asked.begin, asked.end, asked.text)
+            # Drawn again, with the note, when it is asked for next.
             (self._folder / f"{asked.number}.rrd").unlink(missing_ok=True)
         return f"noted: {said}"
 
@@ -179,6 +181,8 @@ def application(pages: Pages) -> FastAPI:
     async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
         """Answer only whoever knows the address and comes under this machine's own name."""
         token = request.url.path.strip("/").split("/")[0]
+        # By DNS rebinding a foreign page can reach this port under its own name. The token is compared in constant
+        # time, as the time of an answer must not reveal a part of it.
         if request.url.hostname not in (LOOPBACK, "localhost") or not secrets.compare_digest(
             token.encode(), pages.token.encode()
         ):

@@ -44,6 +44,7 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
         UsageError: If there is no display for a window, the file exists, or Rerun does not start.
     """
     _refuse(where)
+    # A fork would copy the locks of the recorder's threads as they are at that moment.
     context = get_context("spawn")
     values, started, ending = context.Queue(WAITING), context.Queue(), context.Event()
     process = context.Process(target=_show, args=(where, columns, rows, values, started, ending), daemon=False)
@@ -71,6 +72,7 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
             if process.is_alive():
                 end()
                 process.join(PATIENCE)
+        # Otherwise this process would wait at its end for values that nobody takes.
         values.cancel_join_thread()
         values.close()
 

@@ -38,6 +38,7 @@ class ImageSampler:
         if number % step:
             return
         kept.append(bytes(message))
+        # The number of images is known only at the end, so every other one is dropped whenever there are too many.
         if len(kept) > 2 * self._most or len(kept) * len(message) > 2 * IMAGE_BYTES:
             del kept[1::2]
             self._step[topic] = 2 * step

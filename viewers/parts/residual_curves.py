@@ -44,6 +44,7 @@ def _curves(
     rows = extremes(values, ROWS)
     cut = np.unique(np.searchsorted(rows, breaks))
     cut = cut[(cut > 0) & (cut < len(rows))]
+    # A row of NaN breaks the line between the last row of an episode and the first of the next.
     between = (time_ns[rows[cut - 1]] + 1).astype(np.int64)
     return Curves(
         name, unit, labels, np.insert(time_ns[rows], cut, between), np.insert(values[rows], cut, np.nan, axis=0)

@@ -71,6 +71,7 @@ class RerunParts:
         for maps in scene.maps:
             self._maps(maps)
         if scene.maps and scene.footprint is not None:
+            # Maps of one grid share their marks: the first of them wins, as it is written into the dictionary last.
             for maps in {marks_of(own.name): own for own in reversed(scene.maps)}.values():
                 self._map_marks(maps)
         for surface in scene.surfaces:

@@ -79,6 +79,7 @@ def _fetched(address: str):
     while True:
         try:
             return urlopen(address, timeout=PATIENCE)
+        # An OSError, too, but an answer: the server listens, so there is nothing to wait for.
         except HTTPError:
             raise
         except OSError:

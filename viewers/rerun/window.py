@@ -70,6 +70,7 @@ def any_port() -> int:
 def quiet_environment() -> Iterator[dict[str, str]]:
     """Yield an environment in which Rerun's usage statistics are off, leaving the user's own choice alone."""
     with tempfile.TemporaryDirectory(prefix="tacdata-rerun-") as folder:
+        # Rerun stores the choice in its configuration folder, which is a temporary one here.
         environment = {**os.environ, "XDG_CONFIG_HOME": folder}
         subprocess.run([executable(), "analytics", "disable"], env=environment, capture_output=True, timeout=60)
         yield environment

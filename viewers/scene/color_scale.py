@@ -65,6 +65,7 @@ def scale_of(values: np.ndarray, unit: str, signed: bool = False, floor: float =
 def round_up(value: float) -> float:
     """Return a positive value rounded up to two significant digits, so that a scale ends where its data end."""
     unit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    # A value that has two digits already must not be pushed one step up by rounding.
     return float(f"{np.ceil(value / unit * (1 - 1e-9)) * unit:.12g}")
 
 

@@ -17,6 +17,7 @@ def moments(scene: Scene) -> tuple[tuple[str, int], ...]:
     time = shown.time_ns if shown else scene.taxels.time_ns
     values = shown.values if shown else np.nan_to_num(np.abs(scene.taxels.values))
     strength = values.reshape(len(values), -1).max(axis=1)
+    # A hold has many frames of nearly the same depth: its middle is shown, and not its noisiest frame.
     top = np.flatnonzero(strength >= 0.98 * strength.max())
     deepest = int(top[len(top) // 2])
     half = 0.5 * strength.max()

@@ -252,6 +252,7 @@ class Scene:
 
     def device_at(self, time_ns: np.ndarray) -> np.ndarray:
         """Return times [ns] on the board's own clock, shape (n,), int64, interpolated between taxel frames."""
+        # Relative to the first frame: as float64, Unix nanoseconds would be rounded to 240 ns.
         return np.interp(time_ns - self.frame_ns[0], self.frame_ns - self.frame_ns[0], self.device_ns).astype(np.int64)
 
     def map_named(self, name: str) -> DepthMaps | None:
