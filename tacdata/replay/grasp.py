@@ -32,6 +32,7 @@ def first_grasp(targets: FingertipTargets) -> tuple[int, int, int]:
         UsageError: If there is none.
     """
     touch = touching(targets)
+    # Padded with no touch on both sides, so that edges come in pairs.
     edges = np.flatnonzero(np.diff(touch.astype(int), prepend=0, append=0))
     lead, tail = round(BEFORE * targets.rate), round(AFTER * targets.rate)
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -87,6 +87,7 @@ def _tracks(
     jumps: np.ndarray,
 ) -> Iterator[np.ndarray]:
     """Yield the postures found, each continued as far as it goes, shape (n, joints), NaN elsewhere."""
+    # A fixed seed: the same targets must give the same path.
     joints, rng = search.model.joints, np.random.default_rng(0)
     rows = np.flatnonzero(np.isfinite(found).all(axis=1))
     known = [found]

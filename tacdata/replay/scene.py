@@ -124,6 +124,7 @@ def drawn(scene: ReplayScene, fingers: int, seed: int) -> ReplayScene:
     def off(name: str) -> float:
         return float(rng.uniform(-SPREADS[name]["half_width"], SPREADS[name]["half_width"]))
 
+    # The order of the draws decides the scene of a seed: a further spread is drawn last.
     place, bias = (off("place"), off("place"), 0.0), rng.normal(0, SPREADS["bias"]["sd"], (fingers, 3))
     return replace(
         scene,

@@ -163,6 +163,7 @@ def _spread(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.
     for k in range(12):
         x = step * np.eye(12)[k]
         jacobian[:, k] = (_residuals(_nudged(base, x[:6]), _nudged(held, x[6:]), grippers, cubes) - start) / step
+    # Two poses of six numbers each were fitted.
     variance = float(start @ start) / max(len(start) - 12, 1)
     covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
     return float(np.sqrt(np.trace(covariance[3:6, 3:6]))), float(np.sqrt(np.trace(covariance[:3, :3])))

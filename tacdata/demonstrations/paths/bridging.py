@@ -80,6 +80,7 @@ def _begins(hidden: np.ndarray, rows: int) -> np.ndarray:
 def _errors(path: Smoothed, begins: np.ndarray, rows: int) -> tuple[float, float]:
     """Return the largest error of a bridge in its middle, of an axis: position [m], rotation [rad]."""
     ends, middles = begins + rows, begins + rows // 2
+    # The middle of the cubic with these places and velocities at its ends.
     bent = rows * STEP / 8 * (path.velocity[begins] - path.velocity[ends])
     middle = (path.position[begins] + path.position[ends]) / 2 + bent
     deviation = np.abs(path.position[middles] - middle).max()

@@ -253,6 +253,7 @@ def _bounded(joint: ET.Element, limit: ET.Element, ends: dict[str, float], path:
         remarks.append(f"cannot move, as both limits are {low:g} {unit}")
         low, high = low - HAIR, high + HAIR  # MuJoCo takes equal limits for none
     low, high = (float(np.clip(value, -WIDEST[unit], WIDEST[unit])) for value in (low, high))
+    # `repr` writes all digits of a float.
     limit.set("lower", repr(low))
     limit.set("upper", repr(high))
     return remarks

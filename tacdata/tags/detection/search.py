@@ -91,6 +91,7 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
             quads.append(np.add(_grown(quad), (left, top)))
     if not quads:
         return []
+    # A pixel of the half-size image covers two by two, whose centre is half a pixel further.
     framed = _framed(grey, 2 * np.array(quads) + 0.5)
     return [Suspect(low, high, bool(good)) for (low, high), good in zip(places, framed, strict=True)]
 
@@ -102,6 +103,7 @@ def noise(grey: np.ndarray) -> float:
     sqrt(6) times its standard deviation. Their median is robust against edges.
     """
     rows = grey[::20].astype(np.int16)
+    # The median size of a normal variable is 0.6745 standard deviations.
     return float(np.median(np.abs(rows[:, 2:] - 2 * rows[:, 1:-1] + rows[:, :-2]))) / 0.6745 / np.sqrt(6)
 
 
