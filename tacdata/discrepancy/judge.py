@@ -52,11 +52,11 @@ def judge(
 ) -> Verdict:
     """Judge recordings: which effect does the model lack?
 
-    1. Seal some episodes: their readings are not looked at.
+    1. Seal some episodes: the search does not use their readings.
     2. Check the data: wiring, units, gaps.
     3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
-    4. Hold the answer against the saturated model of each family: is its law borne out?
-    5. Look for patterns without a form of the library: alarms.
+    4. Compare the answer with the saturated model of each family: does another law explain more?
+    5. Test the residual for patterns outside the library: alarms.
     6. Open the sealed episodes: how much smaller is their gap?
     7. Decide: named (all of it, or some with a remainder left), ambiguous, unknown or none. Sealed episodes can take a
        name away; they never give one.

@@ -24,7 +24,7 @@ class VerdictFolder(Displayed):
     document: dict[str, Any]
     """The verdict (`schemas/verdict.schema.json`)."""
     _kept: Any = field(default=None, compare=False)
-    """A temporary folder that goes with this object; None if the folder stays."""
+    """A temporary folder that is deleted with this object; None if the folder is permanent."""
 
     @property
     def status(self) -> str:

@@ -30,7 +30,7 @@ LEAST_RATIO = 13.0
 LEAST_GROUP = 0.2
 """Share of the smaller group, at least [1]."""
 REASON = 0.01
-"""P-value by which groups go with place, tool, depth, rate or session: a reason [1]."""
+"""P-value below which groups depend on place, tool, depth, rate or session, and raise no alarm [1]."""
 ROUNDS = 60
 """Steps of the expectation-maximization."""
 LEAST_MM = 0.002

@@ -55,7 +55,7 @@ class DataChecks:
 
 
 def check(setting: Setting) -> DataChecks:
-    """Check recordings against the model that they are to be held against."""
+    """Check recordings, and whether they are of the model's sensor."""
     course, response = setting.course, setting.response
     wiring = () if setting.given else tuple(miswired(course, response))
     late, words = shifted(course)

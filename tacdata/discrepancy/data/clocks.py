@@ -23,7 +23,7 @@ KNOTS = 10
 CREEPS = (1.0, 8.0)
 """Edges: time constants of a skin that creeps or relaxes meanwhile: without them its recovery looks late [s]."""
 MOST_ROWS = 6000
-"""Edges: rows that are looked at, at most."""
+"""Edges: most rows that are used."""
 CLEARER = 0.3
 """Largest share of the unexplained variance that may be left at the best delay [1]."""
 

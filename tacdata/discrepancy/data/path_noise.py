@@ -30,7 +30,7 @@ REGULAR = 0.9
 def without_noise(time_ns: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a path smoothed, and the noise that it was measured with.
 
-    A position that dithers where the tool rests looks like play, which the readings do not follow. Every position is
+    A position that dithers while the tool rests resembles play, which the readings do not follow. Every position is
     estimated by a straight line through its neighbours. The window is the widest that agrees with all narrower ones:
     intersection of confidence intervals (Goldenshluger & Nemirovski, Math. Methods Stat. 6, 1997, 135). Commands have
     no noise and stay, and so does a path that is given by its corners.

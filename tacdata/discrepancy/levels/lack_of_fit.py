@@ -1,10 +1,11 @@
 """Lack of fit: does another law of a family explain part of an answer's residual?
 
-A mechanism is held against the saturated model of its family (`tacdata.discrepancy.regressors.saturated`), which
-contains it but for its form: the nested test of goodness of fit. The answer's residual is regressed on those columns.
+A mechanism is compared with the saturated model of its family (`tacdata.discrepancy.regressors.saturated`), which
+contains it up to its form. This is the nested test of goodness of fit. The answer's residual is regressed on the
+columns of that model.
 
-- Held-out gain (folds of presses, ridge) tests whether there is any.
-- Its size is the part that the columns explain, less half a unit of the sum of squares for each, the part of noise.
+- The held-out gain (folds of presses, ridge) is the test.
+- The size is the explained part of half the sum of squares, less one half for each column: noise explains as much.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def of_family(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> Lack | No
 
 
 def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
-    """Return whether an effect's family explains clearly more than its law does: the mechanism is not borne out."""
+    """Return whether the saturated model of an effect's family explains significantly more than its law."""
     own = of_family(finding, lacking)
     if own is None or own.size < ANOTHER_FORM * max(finding.bought, 0.0):
         return False

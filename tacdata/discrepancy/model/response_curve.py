@@ -16,7 +16,7 @@ from tacdata.discrepancy.statistics.gram_fit import FOLDS, fold_of
 TOUCHES = np.linspace(-0.05, 0.1, 7)
 """Where the skin may begin, below the recorded depth [stroke]."""
 INTERVALS = (6, 12, 25, 50)
-"""Of the splines that laws are held against."""
+"""Intervals of the splines that laws are compared with."""
 RIDGE = 1e-9
 """Share of the mean diagonal added to it."""
 FEWEST = 2 * FOLDS

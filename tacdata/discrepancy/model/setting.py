@@ -36,7 +36,7 @@ class Setting:
 
     @property
     def absorbed(self) -> frozenset[str]:
-        """Effects that calibration takes up: nuisances, and the common factor of all channels' gains."""
+        """Effects that calibration absorbs: nuisances, and the common factor of all channels' gains."""
         if self.response.fitted:
             return frozenset()
         force = self.course.force is not None

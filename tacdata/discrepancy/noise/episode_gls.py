@@ -308,11 +308,11 @@ class _Free:
         return (self._shared[episode].transpose(0, 2, 1) @ own).astype(np.float64) - self._joints[episode] @ turned
 
     def taken_of_all(self, right: np.ndarray) -> np.ndarray:
-        """Return how much of columns features take up, shape (k, k); their products with features (streams, p, k)."""
+        """Return the information that features absorb, shape (k, k); ``right``: products with them (streams, p, k)."""
         return np.einsum("spk,spl->kl", right, self._solved(right), optimize=True)
 
     def taken(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
-        """Return how much of columns in one stream of an episode features take up, shape (streams,).
+        """Return the information of columns in one stream of an episode that features absorb, shape (streams,).
 
         Args:
             episode: Its number.

@@ -1,4 +1,4 @@
-"""Delays and filters to begin with: to first order a long one looks like anything but itself."""
+"""Initial delays and filters for the search: to first order a long one resembles other effects more than itself."""
 
 from __future__ import annotations
 

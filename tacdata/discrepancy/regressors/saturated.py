@@ -25,7 +25,7 @@ GAIN_WAVES = 4
 STEPS = (1 / 3, 1 / 2, 2 / 3)
 """Shares of a session after which something may have jumped [1]."""
 LAGS = (0.2, 0.6, 2.0)
-"""Times by which a tip that is pushed aside may come late [s]."""
+"""Time constants with which a tip may yield sideways [s]."""
 WIDTHS = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Widths of play [largest depth, or rise]."""
 LATE = (0.01, 0.03, 0.1)
@@ -33,9 +33,9 @@ LATE = (0.01, 0.03, 0.1)
 SIDE = 3.0
 """Steepness of a change from one side of the bed to the other [half widths]."""
 LATERAL = 0.05
-"""A tip that is aside by so much does not surprise [mm]."""
+"""Lateral displacement of the finite difference, a plausible error of place [mm]."""
 FEW, MANY = 0.5, 2.0
-"""Earlier presses of a place after which it is as it stays [1]."""
+"""Numbers of earlier presses over which softening of a place decays [1]."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ def _friction(ways: _Ways) -> list[np.ndarray]:
 
 
 def _late(ways: _Ways) -> list[np.ndarray]:
-    """Readings that go with the rate, and filters."""
+    """Readings that depend on the rate, and filters."""
     speed = ways.course.speed / max(float(np.abs(ways.course.speed).max()), 1e-9)
     columns: list[np.ndarray] = []
     for history in (speed, speed * ways.share, np.abs(speed), np.abs(speed) * speed):

@@ -60,7 +60,7 @@ def eliminate(setting: Setting, selection: Selection) -> Answer:
 
 
 def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) -> Answer:
-    """Drop the effects that the others can stand in for, then find those that would do as well in each one's place."""
+    """Remove redundant effects, then list the rivals of each remaining one."""
     null, pooled = selection.null, selection.tests.pooled
     model, maybe_two = two_lags(setting, parsimonious(setting, model, null, pooled), selection.nothing, null, pooled)
     placed = list(model.placed)

@@ -64,7 +64,7 @@ class FoundEffect:
 
 @dataclass(frozen=True)
 class RivalModels:
-    """The models by which one effect of the answer was held against others in its place."""
+    """The models by which one effect of the answer was compared with its rivals."""
 
     begin: Setting
     """With the response of the model without it."""

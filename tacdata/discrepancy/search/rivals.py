@@ -154,10 +154,10 @@ def try_rivals(
 
 @dataclass
 class Spectra:
-    """Laws of linear memory that are held against each other by all mixtures of times, instead of by their own.
+    """Comparison of laws of linear memory by all mixtures of time constants, instead of their own.
 
-    A law with the right mechanism and the wrong mixture may be behind one with the wrong mechanism. Of two spectra with
-    as many numbers only the variable of their times is left: the tool's radius, or nothing.
+    A law of the right mechanism with a wrong mixture may fit worse than one of a wrong mechanism. Two spectra have the
+    same number of parameters and differ only in whether the time constants depend on the tool's radius.
     """
 
     begin: Setting
@@ -169,7 +169,7 @@ class Spectra:
 
     @staticmethod
     def both(mine: Effect, rival: Effect) -> bool:
-        """Return whether both are such laws, of times that go with different powers of the radius."""
+        """Return whether both are such laws, with time constants that depend on different powers of the radius."""
         powers = mine.times_by_radius, rival.times_by_radius
         return None not in powers and powers[0] != powers[1]
 
@@ -188,10 +188,10 @@ class Spectra:
 
 
 def stands_in(margin: float, level: float, behind: float, kin: bool = True) -> bool:
-    """Return whether a rival may stand in for an effect.
+    """Return whether a rival explains the episodes about as well as an effect.
 
-    More numbers put one out that explains the episodes about as well. One that they prefer stays in: kin that hold a
-    law as a special case always do a little better, others have no reason to.
+    A rival with more parameters that fits about as well is excluded, unless the episodes prefer it significantly. The
+    limit is higher within a family: a law that contains another one always fits a little better.
 
     Args:
         margin: By how many standard errors over episodes the effect is better (J test).
