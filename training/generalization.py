@@ -72,6 +72,7 @@ def generalize(
                 outcomes.append(SplitOutcome(settings, folder, None, error.given))
                 continue
             except UsageError as error:
+                # Only a split that leaves a part without episodes is passed over; other errors are the user's to mend.
                 if "leaves no" not in error.given:
                     raise
                 outcomes.append(SplitOutcome(settings, folder, None, error.given))

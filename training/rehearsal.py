@@ -51,6 +51,8 @@ class Rehearsal:
         self._depth_max, self._place = frames.sensor.map.depth_max, place
         source = create(network.name, frames.sensor, network.arguments).to(place)
         source.set_normalization(network.get_buffer("mean").cpu().numpy(), network.get_buffer("sd").cpu().numpy())
+        # The unit's own calibration would be wrong for simulated frames: they have the gains that the pretrained
+        # network saw.
         if network.is_calibrated:
             calibration = pretrained.calibration if pretrained else None
             calibration = calibration or calibrate(frames, tuple(span.number for span in frames.episodes))

@@ -155,6 +155,7 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
         mixing = spreading(frames.sensor.taxels, variance)
         gain, error = _gains(_gathered(presses, frames.sensor.taxels, variance), exponent)
     groups = min(len(presses), _GROUPS)
+    # From a single press the jackknife knows no scatter: the largest plausible error.
     exponent_error = 1.0
     if groups > 1:
         group = np.arange(len(presses)) % groups

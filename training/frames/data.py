@@ -56,6 +56,7 @@ def _valid(dataset: Dataset) -> np.ndarray:
     """Return which frames may be learned from and scored: none of an episode that a person has set aside."""
     valid, flagged = dataset[key.VALID], flagged_episodes(dataset)
     if flagged:
+        # A copy: the dataset's own column must not change.
         valid = np.array(valid)
         for episode in dataset.episodes:
             if episode.index in flagged:

@@ -97,6 +97,7 @@ class Checkpoint:
 def save(path: Path, network: Network, optimizer: torch.optim.Optimizer | None, document: dict[str, Any]) -> None:
     """Write a checkpoint; a crash leaves the old file or the new one."""
     documents.check(document, "checkpoint", str(path))
+    # safetensors takes contiguous tensors only.
     tensors = {f"network.{k}": v.detach().cpu().contiguous() for k, v in network.state_dict().items()}
     if optimizer is not None:
         for index, values in optimizer.state_dict()["state"].items():
@@ -156,6 +157,7 @@ def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
 
 def restore(optimizer: torch.optim.Optimizer, state: dict[str, torch.Tensor]) -> None:
     """Put a saved state back into an optimizer of the same network."""
+    # safetensors has flat names, an optimizer's state is nested.
     nested: dict[int, dict[str, torch.Tensor]] = {}
     for name, value in state.items():
         index, quantity = name.split(".", 1)

@@ -154,6 +154,7 @@ def learning_curve(
                 with reproducible(threads):
                     point = _scored(network, frames, held_out.test, start, count, seed)
                 document["points"].append(asdict(point))
+                # Written after each point, so that an interrupted curve goes on from there.
                 documents.write(out / FILE, document, "learning_curve")
                 told(point)
     return document

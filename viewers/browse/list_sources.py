@@ -142,6 +142,7 @@ def _record_keys(root: Path, rows: list[folder.EpisodeRow]) -> dict[int, int]:
                 "a data file",
                 "take it from a copy, or pack the session again",
             ) from None
+        # Row numbers count over all files, and each file begins with the first of its episodes.
         values, first = table.column(0), min(row.start for row in own)
         keys |= {row.index: int(values[row.start - first].as_py()) for row in own}
     return keys

@@ -243,6 +243,7 @@ def serving(pages: Pages, port: int) -> Iterator[None]:
     """Answer requests on a port of the loopback while the context lasts; 0 takes any that is free."""
     with socket.create_server((LOOPBACK, port)) as listener:  # before the address is printed: early requests wait
         pages.address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/{pages.token}"
+        # An open page keeps its connection: without a limit the server would wait for the browser to close.
         config = uvicorn.Config(application(pages), log_config=None, lifespan="off", timeout_graceful_shutdown=1)
         server = uvicorn.Server(config)
         thread = Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)

@@ -41,6 +41,7 @@ def fed_viewer(web: bool) -> Iterator[FedViewer]:
     """
     with quiet_environment() as environment:
         port, inner = free_port(GRPC_PORT), any_port()
+        # The viewer keeps all that was logged: without a limit a long session would fill the memory.
         command = ["--bind", LOOPBACK, "--port", str(port), "--memory-limit", "500MB"]
         if web:
             command += ["--serve-web", "--web-viewer-port", str(inner), "--server-memory-limit", "200MB"]

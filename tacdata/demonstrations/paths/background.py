@@ -135,7 +135,7 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
 def _corners(image: np.ndarray) -> np.ndarray:
     """Return corners spread over an image and clearer than its noise [px], shape (n, 1, 2), float32.
 
-    None are returned if they do not spread.
+    The array is empty if they do not spread.
     """
     import cv2
 

@@ -65,6 +65,7 @@ class Trials:
         path = self.paths[DEPTH]
         goal = np.clip(np.nan_to_num(path.depth), 0, None) / 1000
         seconds = (path.time_ns - path.time_ns[0]) * 1e-9
+        # Of the undisturbed scene: the controller does not know the drawn one.
         softness = 1 + self._scene.skin / self._scene.stiffness
         controller = DepthFeedback(goal, seconds, normals(path), softness, seed)
         return replay_targets(path, scene, self._centre, controller.shift)
@@ -83,6 +84,7 @@ class Trials:
         found: dict[str, list[bool]] = {kind: [] for kind in kinds}
         felt = self.paths[DIRECT].depth
         stands = CHALLENGES[challenge].force if challenge else None
+        # The force of the demonstration is the felt depth times the stiffness of the skin.
         limit = np.inf if stands is None else stands * scene.skin * float(np.nanmax(felt)) / 1000
         for seed in range(seeds):
             world = drawn(scene, len(self.paths[DIRECT].fingers), seed)

@@ -169,6 +169,7 @@ def _fitting(
                 f"less than {BAD:g} px; a good calibration has 0.1 to 0.4 px",
                 "check columns, rows and legacy in the board file, and that the board is flat",
             )
+        # One at a time: a wrong view pulls the fit, which makes the errors of good views larger.
         worst = int(np.argmax(rms))
         if rms[worst] <= max(OUTLIER * float(np.median(rms)), LEAST_OUTLIER):
             return kept, dropped
