@@ -106,6 +106,7 @@ def check_worlds(worlds: dict[str, CameraWorld], origin: str) -> None:
             )
     for (name, world), (rest, other) in combinations(worlds.items(), 2):
         alike = np.allclose(world.matrix, other.matrix, rtol=0, atol=1e-9)
+        # A file with a name passed the check above for one camera only; an unnamed one passes for any.
         if UNNAMED in (world.camera, other.camera) and alike:
             given = f"{origin}: cameras {name} and {rest} stand in the same place: is one file named twice?"
             raise FormatError(given, "a place of its own for each camera", "name each camera's own file")

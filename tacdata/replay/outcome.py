@@ -88,6 +88,7 @@ def object_centre(targets: FingertipTargets, touch: int, reach: float) -> np.nda
 def normals(targets: FingertipTargets) -> np.ndarray:
     """Return the normals out of the pads [1], shape (n, f, 3)."""
     x, y, z, w = np.moveaxis(targets.quaternion, -1, 0)
+    # Third column of the rotation matrix: z points out of the pad.
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
 
 
@@ -175,6 +176,7 @@ def _behind(fingers: np.ndarray, centre: np.ndarray, first: int, wiping: np.ndar
         behind = -distance[:, 2]
     else:
         moved = fingers[wiping] - fingers[wiping].mean(axis=0)
+        # Strokes go both ways, so that a lag has either sign.
         behind = np.abs(distance @ np.linalg.svd(moved, full_matrices=False)[2][0])
     behind[:first] = 0.0
     return behind

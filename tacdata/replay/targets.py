@@ -213,6 +213,7 @@ def _bridged(targets: FingertipTargets) -> list[tuple[str, np.ndarray, np.ndarra
     found = []
     for k, name in enumerate(targets.fingers):
         covariance = targets.source.tracks[name].covariance[targets.rows]
+        # The position comes after the rotation in the covariance.
         spread = np.sqrt(np.max(np.diagonal(covariance[:, 3:, 3:], axis1=1, axis2=2), axis=1))
         found.append((name, targets.gap[:, k], spread))
     return found

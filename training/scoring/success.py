@@ -101,6 +101,7 @@ def read_attempts(path: StrPath) -> list[Attempt]:
     path = Path(path)
     if not path.is_file():
         raise UsageError(f"no file {path}", "a CSV file of trials", "check the path")
+    # Excel begins a UTF-8 file with a byte order mark, which would become part of the first column's name.
     with path.open(newline="", encoding="utf-8-sig") as stream:
         table = csv.DictReader(stream)
         lacking = {"condition", "success"} - set(table.fieldnames or ())

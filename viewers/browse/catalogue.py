@@ -52,6 +52,7 @@ class Catalogue:
         """Page that shows one episode at its deepest moment; "" where the dataset's address is not known."""
         if not self.dataset:
             return ""
+        # A datetime holds microseconds, the moment is in nanoseconds.
         second, rest = divmod(self.deepest[number], _SECOND)
         moment = f"{datetime.fromtimestamp(second, UTC):%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
         return self._page_of(f"{self.dataset}?segment_id={_name(number)}#when={HOST}@{moment}")

@@ -156,6 +156,7 @@ def _taxels(records: Records, name: str, board: dict[str, Any], rate: float, cou
     axis = device if board.get("clock") == "device_ns" else counter
     stored = records.metadata.get(f"clock_model/taxels {name}")
     kind = "device_ns" if board.get("clock") == "device_ns" else "counter"
+    # Clock models are written at the end: a file that was cut off has none.
     model = ClockModel.from_document(stored) if stored else fit(arrival, axis, kind, rate, nominal_period_ns(board))
     sample = arrival if model is None else model.sample_times(arrival, axis)
     counts = np.array([list(frame.counts) for frame in frames], float).reshape(-1, count)

@@ -134,6 +134,7 @@ class DemoRecorder:
                 time.sleep(WATCH)
             reason = ""
         finally:
+            # Data that arrived before the end may still be on the way to the writer.
             self._streams.catch_up()
             counts = self._streams.counts
             self._streams.record_into(None)

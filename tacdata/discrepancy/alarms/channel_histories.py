@@ -69,6 +69,7 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
         white = cleaned.whitened(column)
         score, known = cleaned.sums(white * cleaned.residual), cleaned.sums(white * white)
         if signs is None:
+            # All histories share the flips: the distribution of the largest statistic keeps their correlation.
             signs = flips(len(score), DRAWS + 1, seed)[1:]
         total = known.sum(axis=0)
         leverage = known / np.maximum(total, 1e-30)

@@ -61,6 +61,7 @@ def spread(gram: np.ndarray, parts: int) -> float:
     inverse = np.linalg.inv(scaled) / np.outer(root, root)
     off = inverse @ total[index, 0]
     scores = gram[:, index, 0] - np.einsum("eij,j->ei", gram[:, index][:, :, index], off)
+    # Sandwich variance with episodes as clusters: it does not rely on the noise model.
     chance = np.diag(inverse @ (scores.T @ scores) @ inverse)
     told = np.sqrt(chance) <= UNSURE
     if np.count_nonzero(told) < 2:
@@ -105,6 +106,7 @@ def _conditions(course: Course) -> dict[str, np.ndarray]:
     for e in range(course.episodes):
         rows = (course.episode == e) & touching & ~course.first
         moved = float(way[rows].sum())
+        # Weighted by the way, so that a hold does not count as a slow press.
         fast[e] = float((way[rows] * np.abs(course.speed[rows])).sum()) / moved if moved > 0 else np.nan
     deep = np.array([course.tip[course.episode == e, 2].max() for e in range(course.episodes)])
     found = {"rate": _parts(fast), "depth": _parts(deep), TIME: np.arange(course.episodes) * 2 // course.episodes}

@@ -112,6 +112,7 @@ def _places(course: Course) -> Iterator[_Place]:
         depth, deepest = reduced.tip[rows, 2] / course.stroke, np.full(count, -np.inf)
         np.maximum.at(deepest, episode, depth)
         folds = fold_of(count)
+        # In a press deeper than all those fitted to, extrapolation would be compared, not the law.
         others = np.array([deepest[folds != fold].max() for fold in folds])
         folds = np.where(deepest <= others + DEEPER * np.abs(others), folds, -1)
         yield _Place(depth, _centred(reduced.readings[rows], episode), episode, folds[episode])
@@ -168,6 +169,7 @@ def _splines(place: _Place, intervals: int) -> np.ndarray:
         basis = BSpline.design_matrix(np.clip(place.depth, low, high), knots, 3).toarray()
         columns = _centred(basis, place.episode)
         gram = columns[~out].T @ columns[~out]
+        # B-splines sum to 1, centred ones to 0: without a ridge the matrix is singular.
         gram = gram + RIDGE * max(float(np.trace(gram)) / len(gram), 1e-300) * np.eye(len(gram))
         missed = place.change[out] - columns[out] @ np.linalg.solve(gram, columns[~out].T @ place.change[~out])
         left += np.bincount(place.episode[out], np.square(missed).sum(axis=1), minlength=len(left))

@@ -138,6 +138,8 @@ def _as_text(sheet: Any, marks: _Marks, notes: list[str], most: int | None = Non
     rows = [[*row, *[""] * (width - len(row))] for row in rows]
     for top, bottom, left, right in marks.merged:
         for row in rows[top : bottom + 1]:
+            # The file holds a merged range's value in its top left cell only. That cell may be in a hidden row, so
+            # ranges are filled before those are left out.
             row[left : right + 1] = [rows[top][left]] * len(row[left : right + 1])
     shown = [row for number, row in enumerate(rows) if number not in marks.hidden]
     if len(shown) < len(rows):
@@ -150,6 +152,7 @@ def _never_computed(path: Path, sheet: str) -> list[str]:
     """Return a note on formulas without a value: a program wrote them, and no spreadsheet ever computed them."""
     from openpyxl import load_workbook
 
+    # Without data_only the cells are the formulas themselves.
     book = load_workbook(path, read_only=True)
     try:
         book[sheet].reset_dimensions()

@@ -114,11 +114,13 @@ def solve_cube(
     own = [Tag(tag.id, camera.straighten(tag.corners), tag.margin, tag.hamming) for tag in tags if tag.id in cube.faces]
     before = None
     if hint is not None:
+        # No residual is clearly below 0: after an ambiguous pose all candidates are compared again.
         before = Before(hint.matrix[:3, :3], 0.0 if hint.ambiguous else hint.residual)
     found = best_rival(own, grey, cube, camera, before)
     if found is None:
         return None
     best, other = found
+    # By identity: two tags of one image may have the same number.
     used, aligned = {id(tag) for tag in best.tags}, best.alignment
     others = [tag for tag in own if id(tag) not in used]
     away = contradicting(others, aligned.rotation, aligned.translation, cube, camera)
@@ -131,6 +133,7 @@ def surroundings(pose: CubePose, cube: Cube, camera: PinholeCamera) -> tuple[int
     if pose.position[2] <= cube.side / 1000:
         return None
     centre = camera.bend(camera.project(pose.position[None]))[0]
+    # Half the diagonal of a cube is 0.87 of its side.
     reach = (0.9 + AROUND) * cube.side / 1000 * camera.matrix[0, 0] / pose.position[2]
     low, high = np.floor(centre - reach).astype(int), np.ceil(centre + reach).astype(int)
     left, top = np.maximum(low, 0)
