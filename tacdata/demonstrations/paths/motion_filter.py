@@ -285,6 +285,7 @@ def exponential(vector: np.ndarray) -> np.ndarray:
     angle = math.sqrt(x * x + y * y + z * z)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     if angle < 1e-8:
+        # Series to second order: the quotients below become 0 over 0.
         return _EYE + cross + cross @ cross / 2
     return _EYE + math.sin(angle) / angle * cross + (1 - math.cos(angle)) / angle**2 * cross @ cross
 
@@ -297,6 +298,7 @@ def logarithm(matrix: np.ndarray) -> np.ndarray:
     angle = math.atan2(sine, cosine)
     if sine > 1e-4:
         return axis * (angle / (2 * sine))
+    # At so small an angle its quotient with the sine is 1 to within 2e-9.
     if cosine > 0:
         return axis / 2
     from scipy.spatial.transform import Rotation

@@ -158,6 +158,7 @@ def _projected(cleaned: Cleaned, rows: np.ndarray) -> tuple[np.ndarray, np.ndarr
     every = max(float(np.median(np.diff(time))), 1e-9)
     apart = WAVES * float(np.median(rate[rows][moving])) * every / stroke
     along = (WAVES * way[-1] >= FEWEST_WAVES) & ((apart < 0.5) | (np.abs(apart - np.round(apart)) >= ALIAS))
+    # Near the Nyquist frequency, half a wave a row, a frequency has its alias next to it.
     in_time = (HERTZ * time[-1] >= FEWEST_WAVES) & (HERTZ * every <= 0.45)
     waves = np.exp(2j * np.pi * np.concatenate([way[:, None] * WAVES, time[:, None] * HERTZ], axis=1))
     waves[:, : len(WAVES)] *= moving[:, None]

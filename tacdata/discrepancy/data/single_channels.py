@@ -61,6 +61,7 @@ def _turned(course: Course, episodes: np.ndarray, rows: list[np.ndarray], measur
     ways = [depth[r] - depth[r].mean() for r in rows]
     peak = np.array([m.T @ way / max(float(np.linalg.norm(way)), 1e-9) for m, way in zip(known, ways, strict=True)])
     place, steps = course.site[episodes], np.concatenate([np.abs(np.diff(m, axis=0)) for m in known])
+    # A step between two readings has twice the variance of a reading's noise.
     noise = 1.4826 * np.median(steps, axis=0) / np.sqrt(2)
     words = {}
     for channel, heights in enumerate(peak.T):

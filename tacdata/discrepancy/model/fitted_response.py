@@ -344,6 +344,7 @@ def _roughness(basis: BSpline) -> np.ndarray:
     Plain ones take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit
     is that of plain differences between evenly spaced knots.
     """
+    # Greville abscissae of a cubic spline: weights on a straight line there give that line.
     apart = np.diff((basis.t[1:-3] + basis.t[2:-2] + basis.t[3:-1]) / 3)
     bend = np.zeros((len(apart) - 1, len(apart) + 1))
     usual = float(np.median(apart))
@@ -383,6 +384,7 @@ def _shaken(left: np.ndarray, course: Course) -> np.ndarray:
         if whole >= 3:
             means = left[rows[: whole * BLOCK]].reshape(whole, BLOCK, -1).mean(axis=1)
             found = np.concatenate([found, means[2:] - 2 * means[1:-1] + means[:-2]])
+    # A second difference has 6 times the variance of a mean of BLOCK rows.
     return 1.4826 * np.median(np.abs(found), axis=0) * np.sqrt(BLOCK / 6) if len(found) else np.zeros(left.shape[1])
 
 

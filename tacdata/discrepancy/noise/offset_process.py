@@ -362,6 +362,7 @@ def _reml(
             covariance = walk * pattern + read_error + own * np.eye(len(read_error))
             factor = cho_factor(covariance, lower=True, check_finite=False)
             power = float(np.sum(seen * cho_solve(factor, seen, check_finite=False)))
+            # Half the log of a determinant is the sum of logs of its Cholesky factor's diagonal.
             return seen.shape[1] * float(np.log(np.diag(factor[0])).sum()) + 0.5 * power
 
         found = minimize(

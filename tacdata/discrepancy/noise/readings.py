@@ -117,6 +117,7 @@ def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
     memory = float(np.clip(products / max(squares, 1e-12), 0.0, 0.98))
     spread = 1.4826 * np.nanmedian(np.abs(leftover - np.nanmedian(leftover, axis=0)), axis=0)
     mixed = np.maximum(0.5 * (spread + np.nanstd(leftover, axis=0)), before.scale * 0.3)
+    # The scale is that of the innovations: in an AR(1) process their variance is 1 - memory^2 of the readings'.
     return replace(before, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
 
 

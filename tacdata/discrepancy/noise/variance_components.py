@@ -171,6 +171,7 @@ def _alone(
     kinds = errors.shape[1]
     inverse = np.linalg.inv(0.5 * (spread + np.swapaxes(spread, 1, 2)))
     prior = counts[:, None, None] * np.diag(np.exp(-2 * log))
+    # Precisions of independent sources add: without that of the prior, that of the readings is left.
     unsure = np.linalg.inv(_positive(inverse - prior) + UNINFORMED * np.eye(kinds))
     return np.einsum("ekl,elm,em->ek", unsure, inverse, errors), unsure
 
@@ -184,6 +185,7 @@ def _positive(matrices: np.ndarray) -> np.ndarray:
 @cache
 def _consistent(kinds: int) -> float:
     """Return the factor of the t distribution's scale that is consistent for normal numbers [1]."""
+    # A mean over equally probable quantiles is the expectation over the distribution.
     at = chi2.ppf((np.arange(4000) + 0.5) / 4000, kinds)
 
     def bias(scale: float) -> float:

@@ -126,6 +126,8 @@ def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | No
         return None
     half = 0.5 * np.array([np.median([s.freedom[1] for s in shapes]) for shapes in excited])
     excess = [np.median([s.variance / max(s.expected_variance, 1e-12) for s in shapes]) for shapes in excited]
+    # The log of a chi-squared variable over its freedom has mean digamma(half) - log(half), variance trigamma(half)
+    # (Smyth 2004).
     log = np.log(excess) - digamma(half) + np.log(half)
     middle = float(np.median(log))
     chance, independent = float(np.mean(polygamma(1, half))), INDEPENDENT * len(excited)
@@ -134,6 +136,7 @@ def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | No
     most = PRIOR_FREEDOM * len(excited)
     freedom = min(2 * _trigamma_inverse(spread), most) if spread > 0 else most
     ratio = float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2)))
+    # A median's standard error is sqrt(pi / 2) = 1.2533 times a mean's.
     return PooledExcess(max(ratio, LEAST_EXCESS), freedom, 1.2533 * float(np.sqrt(chance / independent)))
 
 

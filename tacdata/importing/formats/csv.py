@@ -225,6 +225,7 @@ def _without_zeros(path: Path, raw: bytes, notes: list[str]) -> bytes:
     if body and b"\0" not in body:
         notes.append(f"{path.name}: {len(raw) - len(body)} zero bytes at its end are left out")
         return body
+    # In UTF-16 digits and Latin letters have a zero byte each: in little endian the second.
     for start, name in ((1, "utf-16-le"), (0, "utf-16-be")):
         if raw[start:4096:2].count(0) > 0.9 * len(raw[start:4096:2]):
             raise FormatError(

@@ -78,6 +78,7 @@ def _span(values: np.ndarray) -> float:
     """Return the range of a path or of readings over all of its columns, without its outermost hundredths."""
     if not len(values):
         return 0.0
+    # Dropouts must not set the range by which they are found.
     low, high = np.nanquantile(values, [0.01, 0.99], axis=0)
     return float(np.linalg.norm(np.nan_to_num(high - low)))
 
