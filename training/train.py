@@ -185,7 +185,6 @@ def train(
             _keep(run, line, out)
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
         best = checkpoint.load(out, place)
-        # Cross-conformal intervals leave each press out once (decision 0012).
         if len(split.validation) > 1:
             conformal_intervals.write(out, _calibrated(best, windows, frames, split))
         known = novelty.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
@@ -232,8 +231,7 @@ def _started(
     if pretrained:
         pretrained.check_sensor(frames.sensor, frames.origin)
         pretrained.check_unseen(frames.dataset_hash, frames.origin)
-        # The calibration stays the unit's own. The normalization comes with the weights, which learned on signals of
-        # that scale.
+        # The normalization comes with the weights: they learned on signals of that scale.
         network.load_state_dict(pretrained.network.state_dict())
         known = pretrained.document["normalization"]
         mean, sd = (np.asarray(known[name], dtype=np.float32) for name in ("mean", "sd"))

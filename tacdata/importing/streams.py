@@ -220,7 +220,6 @@ def _apart(time_ns: np.ndarray) -> tuple[np.ndarray, int]:
         return time_ns, 0
     begins = np.flatnonzero(np.concatenate([[True], steps > 0]))
     counts = np.diff(np.append(begins, len(time_ns)))
-    # Nothing follows the last group: it lasts as long as the median group.
     widths = np.append(np.diff(time_ns[begins]), int(np.median(np.diff(time_ns[begins]))))
     inside = np.arange(len(time_ns)) - np.repeat(begins, counts)
     return time_ns + np.rint(inside * np.repeat(widths / counts, counts)).astype(np.int64), shared

@@ -344,7 +344,6 @@ def _roughness(basis: BSpline) -> np.ndarray:
     Plain ones take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit
     is that of plain differences between evenly spaced knots.
     """
-    # Greville abscissae of a cubic spline: weights on a straight line there give that line.
     apart = np.diff((basis.t[1:-3] + basis.t[2:-2] + basis.t[3:-1]) / 3)
     bend = np.zeros((len(apart) - 1, len(apart) + 1))
     usual = float(np.median(apart))
