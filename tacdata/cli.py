@@ -15,16 +15,17 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
 
+from tacdata.errors import Exit, TacdataError, UsageError, refused_by_system
+
 try:
     import typer
 
     from tacdata import progress, registry, stages
     from tacdata.commands.command import Result, members
-    from tacdata.errors import Exit, TacdataError, UsageError, refused_by_system
     from tacdata.extras import missing_package
 except KeyboardInterrupt:  # these imports take most of the first half second
     print("interrupted", file=sys.stderr)
-    raise SystemExit(130) from None
+    raise SystemExit(int(Exit.INTERRUPTED)) from None
 
 ROOM, BASE = "tacdata.commands", "command"
 QUIET, JSON = "quiet", "as_json"

@@ -19,7 +19,7 @@ LISTED = 4
 
 
 @dataclass(frozen=True)
-class Heading:
+class Machines:
     """Names of the compared machines."""
 
     measured: tuple[str, ...]
@@ -134,7 +134,7 @@ def remarks(found: Difference) -> list[str]:
     return lines
 
 
-def text(found: Difference, heading: Heading) -> str:
+def text(found: Difference, heading: Machines) -> str:
     """Return everything for reading in a terminal."""
     lines = [f"{found.status.upper()}: {sentence(found, heading.unit)}", ""]
     lines.append(
@@ -157,7 +157,7 @@ def text(found: Difference, heading: Heading) -> str:
     return "\n".join([*lines, *(f"- {line}" for line in remarks(found))]) + "\n"
 
 
-def document(found: Difference, heading: Heading, parents: dict[str, str]) -> dict[str, Any]:
+def document(found: Difference, heading: Machines, parents: dict[str, str]) -> dict[str, Any]:
     """Return the difference (`schemas/difference.schema.json`).
 
     Args:

@@ -12,7 +12,7 @@ from tacdata.discrepancy.run import recording_hash
 from tacdata.errors import UsageError
 from tacdata.reference import picture
 from tacdata.reference.difference import Difference, difference
-from tacdata.reference.report import Heading, document, text
+from tacdata.reference.report import Machines, document, text
 from tacdata.reference.sessions import read_sessions
 
 DOCUMENT, TEXT, PICTURE = "difference.json", "difference.txt", "difference.png"
@@ -24,7 +24,7 @@ class Compared:
     """A difference with its heading and its document."""
 
     found: Difference
-    heading: Heading
+    heading: Machines
     document: dict[str, Any]
     """As in the file (`schemas/difference.schema.json`)."""
 
@@ -47,7 +47,7 @@ def compare(measured: list[Path], healthy: list[Path]) -> Compared:
     """
     sessions = read_sessions(healthy, measured)
     unit, recorded = unit_of(measured[0])
-    heading = Heading(tuple(map(str, measured)), tuple(map(str, healthy)), recorded, unit)
+    heading = Machines(tuple(map(str, measured)), tuple(map(str, healthy)), recorded, unit)
     found = difference(sessions.course, sessions.names, sessions.measured)
     sides = (("recording", measured), ("reference", healthy))
     parents = {f"{side} {path}": recording_hash(path) for side, paths in sides for path in paths}

@@ -11,7 +11,7 @@ from tacdata.errors import UsageError
 
 def test_every_folder_of_members_is_found():
     found = catalogue.registries()
-    assert {"commands", "devices", "indenters"} <= set(found)
+    assert {"verbs", "devices", "indenters"} <= set(found)
     assert found["indenters"].room == "tacdata.indenters"
     assert found["indenters"].base == "indenter"
     assert all(r.meaning for r in found.values())

@@ -210,10 +210,16 @@ def test_a_rare_mechanism_is_out_sooner_and_takes_more_to_be_named():
 
 @pytest.mark.parametrize(
     ("power", "share", "status"),
-    [(40.0, 0.7, "named"), (40.0, 0.3, "unknown"), (3.0, 0.3, "named"), (3.0, -0.5, "unknown"), (0.5, -0.5, "named")],
+    [
+        (40.0, 0.7, "named"),
+        (40.0, 0.3, "unknown"),
+        (3.0, 0.3, "ambiguous"),
+        (3.0, -0.5, "unknown"),
+        (0.5, -0.5, "ambiguous"),
+    ],
 )
 def test_sealed_episodes_take_a_name_away_where_chance_is_no_reason(power, share, status):
-    """Of an answer that they should hardly show, they may show nothing."""
+    """An answer that they should hardly show is not refuted by them, and not named while their gain may be zero."""
     one = FoundEffect(Placed(load("latency"), {"L": np.array(0.05)}), {}, (), (), {}, 9.0, corrected_p=0.001)
     setting = SimpleNamespace(
         course=course(episodes=8), channel_gain=None, response=FittedResponse(course(episodes=8)), nuisance={}

@@ -9,12 +9,12 @@ from tacdata import documents
 from tacdata.chain import Course, Tool
 from tacdata.errors import FormatError
 from tacdata.reference.difference import difference
-from tacdata.reference.report import Heading, document, sentence, text
+from tacdata.reference.report import Machines, document, sentence, text
 
 TIME = np.linspace(0.0, 10.0, 251)
 DEPTH = np.interp(TIME, [0, 0.5, 4.0, 6.0, 9.5, 10.0], [0.0, 0.0, 70.0, 70.0, 0.0, 0.0])
 WAY = np.sign(np.gradient(DEPTH, TIME)) * (np.abs(np.gradient(DEPTH, TIME)) > 2)
-HEADING = Heading(("after",), ("before",), "", "A")
+HEADING = Machines(("after",), ("before",), "", "A")
 
 
 def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01):
