@@ -149,8 +149,9 @@ class _Place:
     def viewing(self) -> tuple[str, list[str]]:
         number = _telling_episode(self.dataset, self.network / "predictions")
         view = ["view", str(self.session), "--episode", str(number), "--predictions", str(self.network)]
-        save = ["--save", str(self.scene), "--picture", str(self.picture)]
-        return "draw the deepest press that the network had not seen", [*view, *save]
+        # A run that stopped between the two files leaves the scene, and nothing is overwritten.
+        save = [] if self.scene.exists() else ["--save", str(self.scene)]
+        return "draw the deepest press that the network had not seen", [*view, *save, "--picture", str(self.picture)]
 
     @property
     def products(self) -> dict[str, Path]:
