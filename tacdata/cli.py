@@ -196,7 +196,7 @@ def missing_path(error: TacdataError, arguments: Sequence[str]) -> str:
         with suppress(OSError):
             neighbours = [entry.name for entry in folder.iterdir()] if folder else []
             if close := difflib.get_close_matches(first, neighbours, n=1):
-                return f"did you mean {folder / close[0]}?" if folder else ""
+                return f"did you mean {folder / close[0]}? " if folder else ""
     return ""
 
 
@@ -253,9 +253,7 @@ def main() -> None:
         print("interrupted", file=sys.stderr)
         raise SystemExit(int(Exit.INTERRUPTED)) from None
     except TacdataError as error:
-        suggestion = missing_path(error, sys.argv[1:])
-        if suggestion:
-            error.args = (str(error).replace("  next:    ", f"  next:    {suggestion} ", 1),)
+        error.remedy = missing_path(error, sys.argv[1:]) + error.remedy
         print("\n".join([f"error: {error}", *last_words(error)]), file=sys.stderr)
         raise SystemExit(int(error.exit_code)) from None
     except KeyboardInterrupt as error:

@@ -42,7 +42,11 @@ class TacdataError(Exception):
 
     def __init__(self, given: str, allowed: str, remedy: str) -> None:
         self.given, self.allowed, self.remedy = given, allowed, remedy
-        super().__init__(f"{given}\n  allowed: {allowed}\n  next:    {remedy}")
+        super().__init__(given, allowed, remedy)
+
+    def __str__(self) -> str:
+        """Return the three parts, a line each."""
+        return f"{self.given}\n  allowed: {self.allowed}\n  next:    {self.remedy}"
 
 
 class UsageError(TacdataError):

@@ -1,6 +1,7 @@
 """What a verb found comes as JSON, hints and progress can be left out, and exit codes stand in one table."""
 
 import json
+import pickle
 import re
 from pathlib import Path
 
@@ -130,6 +131,20 @@ def test_arrays_paths_and_what_is_not_finite_become_json():
     given = {"a": np.array([1.0, np.nan]), "b": Path("x/y"), "c": np.float64(2.5), "d": (Exit.DONE,), 3: {1}}
     assert json.loads(Result(given).text) == {"a": [1.0, None], "b": "x/y", "c": 2.5, "d": [0], "3": [1]}
     assert plain(float("inf")) is None
+
+
+def test_an_error_survives_the_way_between_processes():
+    error = pickle.loads(pickle.dumps(SolveError("1 N", "2 N", "press less")))
+    assert (error.given, error.allowed, error.remedy) == ("1 N", "2 N", "press less")
+    assert str(error) == "1 N\n  allowed: 2 N\n  next:    press less"
+
+
+def test_the_neighbour_of_a_mistyped_path_is_offered(tmp_path, monkeypatch, capsys):
+    (tmp_path / "session").mkdir()
+    monkeypatch.setattr("sys.argv", ["tacdata", "check", str(tmp_path / "sesion")])
+    with pytest.raises(SystemExit):
+        cli.main()
+    assert f"next:    did you mean {tmp_path / 'session'}? " in capsys.readouterr().err
 
 
 def test_every_error_ends_with_a_code_of_the_table():
