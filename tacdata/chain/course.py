@@ -79,6 +79,9 @@ class Course:
     """Name of each episode's specimen, by the source; empty: it names none."""
     apart: bool = False
     """Whether episodes are so far apart that no memory lasts from one to the next, regardless of the clock."""
+    restarts: np.ndarray | None = None
+    """Whether a clock of its own begins with an episode: the rest before it is not known and taken as long, shape
+    (episodes,), bool; None: one clock."""
 
     @property
     def rows(self) -> int:
@@ -133,7 +136,9 @@ class Course:
     def step(self) -> np.ndarray:
         """Time since the row before [s], shape (n,); the first is 0, unless episodes are `apart`."""
         step = np.diff(self.time, prepend=self.time[:1])
-        return np.where(self.first, FORGOTTEN, step) if self.apart else step
+        if self.apart:
+            return np.where(self.first, FORGOTTEN, step)
+        return step if self.restarts is None else np.where(self.first & self.restarts[self.episode], FORGOTTEN, step)
 
     @cached_property
     def first(self) -> np.ndarray:

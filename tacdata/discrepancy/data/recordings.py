@@ -230,12 +230,13 @@ def _joined(
     (kept, (least, most)), (force, temperature, tag) = usable, extra
     tools = tuple(dict.fromkeys(p.tool for p in parts))
     clock, last = [], None
-    for part in parts:
+    restarts = np.zeros(len(parts), dtype=bool)
+    for k, part in enumerate(parts):
         begin = part.begin + part.rows.time[0]
-        # Clocks of imported sessions may begin at zero. A session that seems to begin in an earlier one is laid behind
-        # it.
+        # Clocks of imported recordings may begin at zero. One that seems to begin in an earlier one is laid behind it.
+        restarts[k] = last is not None and begin < last[0]
         if last is not None and not 0 <= begin - last[0] < LONG_PAUSE:
-            begin = last[0] + (LONG_PAUSE if begin - last[0] >= LONG_PAUSE else 1.0)
+            begin = last[0] + (1.0 if restarts[k] else LONG_PAUSE)
         shift = begin - part.rows.time[0] if last is None else last[1] + (begin - last[0]) - part.rows.time[0]
         clock.append(part.rows.time + shift)
         last = part.begin + part.rows.time[-1], float(clock[-1][-1])
@@ -263,13 +264,21 @@ def _joined(
         centers=centers[kept] if len(centers) > int(kept.max()) else None,
         force=values[:, channels] if force else None,
         temperature=_filled(values[:, channels + force]) if temperature else None,
-        notes=(*notes, *told),
+        notes=(*notes, *told, *_restarted(restarts)),
         tag=values[:, channels + force + temperature :] if tag else None,
         recording=recording if recording.max() + 1 < len(parts) else None,
         numbers=tuple(int(k) for k in kept),
         clipped=clipped if clipped.any() else None,
         specimens=tuple(p.specimen for p in parts) if any(p.specimen for p in parts) else (),
+        restarts=restarts if restarts.any() else None,
     )
+
+
+def _restarted(restarts: np.ndarray) -> list[str]:
+    """Return in words how many presses begin on a clock of their own."""
+    if not restarts.any():
+        return []
+    return [f"{restarts.sum()} presses begin clocks of their own: the rest before each is not known and taken as long"]
 
 
 def _sites(parts: list[_Stroke], channels: int) -> tuple[np.ndarray, list[str]]:

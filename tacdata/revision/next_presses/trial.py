@@ -175,6 +175,7 @@ def laid_out(course: Course, trial: CandidatePress, machine: MachineLimits) -> C
         site=np.array([trial.site]),
         names=("trial",),
         recording=None,
+        restarts=None,
         force=None,
         tag=None,
         temperature=None if course.temperature is None else np.full(rows, float(np.median(course.temperature))),
