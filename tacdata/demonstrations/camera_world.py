@@ -46,7 +46,7 @@ class CameraWorld:
 
     def document(self, date: str) -> dict[str, Any]:
         """Return the document for a file; ``date`` is ISO 8601."""
-        made: dict[str, Any] = {
+        content: dict[str, Any] = {
             "version": schemas.version("camera_world"),
             "camera": self.camera,
             "frame": self.frame,
@@ -56,12 +56,12 @@ class CameraWorld:
             "residual": _errors(self.residual),
         }
         if self.spread is not None:
-            made["spread"] = _errors(self.spread)
+            content["spread"] = _errors(self.spread)
         if self.cube is not None:
-            made["cube"] = _flat(self.cube)
+            content["cube"] = _flat(self.cube)
         if self.board is not None:
-            made["board"] = self.board
-        return {**made, "remarks": list(self.remarks), "date": date, "code_version": provenance.code_version()}
+            content["board"] = self.board
+        return {**content, "remarks": list(self.remarks), "date": date, "code_version": provenance.code_version()}
 
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str) -> CameraWorld:
@@ -104,25 +104,25 @@ def check_worlds(worlds: dict[str, CameraWorld], origin: str) -> None:
                 f"one that was made for camera {name}",
                 f"name its own file, or calibrate it by tacdata calibrate-world --camera {name}",
             )
-    for (name, world), (rest, other) in combinations(worlds.items(), 2):
-        alike = np.allclose(world.matrix, other.matrix, rtol=0, atol=1e-9)
+    for (name, world), (rival_name, rival) in combinations(worlds.items(), 2):
+        alike = np.allclose(world.matrix, rival.matrix, rtol=0, atol=1e-9)
         # A file with a name passed the check above for one camera only; an unnamed one passes for any.
-        if UNNAMED in (world.camera, other.camera) and alike:
-            given = f"{origin}: cameras {name} and {rest} stand in the same place: is one file named twice?"
-            raise FormatError(given, "a place of its own for each camera", "name each camera's own file")
-        if world.board and other.board and not _same_board(world.board, other.board):
+        if UNNAMED in (world.camera, rival.camera) and alike:
+            fault = f"{origin}: cameras {name} and {rival_name} stand in the same place: is one file named twice?"
+            raise FormatError(fault, "a place of its own for each camera", "name each camera's own file")
+        if world.board and rival.board and not _same_board(world.board, rival.board):
             raise FormatError(
-                f"{origin}: cameras {name} and {rest} were calibrated on different boards, of "
-                f"{_squares(world.board)} and {_squares(other.board)}",
+                f"{origin}: cameras {name} and {rival_name} were calibrated on different boards, of "
+                f"{_squares(world.board)} and {_squares(rival.board)}",
                 "one board for all cameras, which lies still meanwhile",
                 "calibrate both again, with the board in one place",
             )
 
 
-def _same_board(one: dict[str, Any], other: dict[str, Any]) -> bool:
+def _same_board(board: dict[str, Any], reference: dict[str, Any]) -> bool:
     """Return whether two files describe one board; its squares may have been measured twice."""
-    same = all(one.get(name) == other.get(name) for name in ("columns", "rows", "dictionary", "legacy"))
-    return same and abs(one["square"] - other["square"]) < REMEASURED * one["square"]
+    same = all(board.get(name) == reference.get(name) for name in ("columns", "rows", "dictionary", "legacy"))
+    return same and abs(board["square"] - reference["square"]) < REMEASURED * board["square"]
 
 
 def _squares(board: dict[str, Any]) -> str:
@@ -139,11 +139,11 @@ def pose_matrix(entry: dict[str, Any], origin: str) -> np.ndarray:
 
     turn = np.array(entry["quaternion"], float)
     if not 0.99 < np.linalg.norm(turn) < 1.01:
-        given = f"{origin}: quaternion {turn.tolist()} of length {np.linalg.norm(turn):.3f}"
-        raise FormatError(given, "xyzw of length 1", "correct it; no rotation is [0, 0, 0, 1]")
+        fault = f"{origin}: quaternion {turn.tolist()} of length {np.linalg.norm(turn):.3f}"
+        raise FormatError(fault, "xyzw of length 1", "correct it; no rotation is [0, 0, 0, 1]")
     if not (away := float(np.linalg.norm(entry["position"]))) <= FARTHEST:
-        given = f"{origin}: a position {away:g} m away: are these millimetres?"
-        raise FormatError(given, f"metres, up to {FARTHEST:g} m", "give it in metres")
+        fault = f"{origin}: a position {away:g} m away: are these millimetres?"
+        raise FormatError(fault, f"metres, up to {FARTHEST:g} m", "give it in metres")
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_quat(turn).as_matrix()
     matrix[:3, 3] = entry["position"]
@@ -152,10 +152,10 @@ def pose_matrix(entry: dict[str, Any], origin: str) -> np.ndarray:
 
 def _check_spread(spread: dict[str, float] | None, origin: str) -> None:
     """Refuse a standard uncertainty that is negative, in millimetres or in degrees."""
-    for name, most, unit, other in (("position", *WORST[0]), ("rotation", *WORST[1])):
-        if spread is not None and not 0 <= spread[name] <= most:
-            given = f"{origin}: a spread of the {name} of {spread[name]:g} {unit}: {other}"
-            raise FormatError(given, f"0 to {most:g} {unit}", f"give it in {unit}, or calibrate the camera again")
+    for name, limit, unit, hint in (("position", *WORST[0]), ("rotation", *WORST[1])):
+        if spread is not None and not 0 <= spread[name] <= limit:
+            fault = f"{origin}: a spread of the {name} of {spread[name]:g} {unit}: {hint}"
+            raise FormatError(fault, f"0 to {limit:g} {unit}", f"give it in {unit}, or calibrate the camera again")
 
 
 def _errors(values: tuple[float, float]) -> dict[str, float]:

@@ -56,8 +56,8 @@ def read_gains(path: StrPath | None = None) -> Gains:
     order = document["fingers"]
     for task, values in document["tasks"].items():
         if len(values) != len(order):
-            given = f"{path or DEFAULT}: tasks/{task}: {len(values)} gains"
-            raise FormatError(given, f"{len(order)}: {', '.join(order)}", "give every finger a gain, 0 for none")
+            fault = f"{path or DEFAULT}: tasks/{task}: {len(values)} gains"
+            raise FormatError(fault, f"{len(order)}: {', '.join(order)}", "give every finger a gain, 0 for none")
         if (largest := max(map(float, values))) > MOST:
             raise FormatError(
                 f"{path or DEFAULT}: tasks/{task}: a gain of {largest:g} m/mm, {1000 * largest:g} mm a millimetre felt",

@@ -97,11 +97,11 @@ class Demonstration:
 
         That is where the network has not been trained on similar readings, and all of it if it is fitted to no unit.
         """
-        words, chosen = [], tuple(fingers) or tuple(self.tracks)
-        networks = {name: one for name, one in self.networks.items() if name in chosen}
-        words += dict.fromkeys(one["unfitted"] for one in networks.values() if "unfitted" in one)
+        words, selection = [], tuple(fingers) or tuple(self.tracks)
+        networks = {name: network for name, network in self.networks.items() if name in selection}
+        words += dict.fromkeys(network["unfitted"] for network in networks.values() if "unfitted" in network)
         for name, track in self.tracks.items():
-            if name in chosen and track.signals is not None and track.novelty is not None:
+            if name in selection and track.signals is not None and track.novelty is not None:
                 words += touch.unknown(name, track.signals, track.novelty)
         return words
 

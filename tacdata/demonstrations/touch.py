@@ -46,10 +46,10 @@ def on_grid(stream: TaxelStream, values: np.ndarray, times_ns: np.ndarray) -> np
     if not len(values):
         return result
     last = len(values) - 1
-    after = np.clip(np.searchsorted(stream.sample_ns, times_ns), min(1, last), last)
-    before = np.maximum(after - 1, 0)
-    is_nearer = times_ns - stream.sample_ns[before] < stream.sample_ns[after] - times_ns
-    nearest = np.where(is_nearer, before, after)
+    upper = np.clip(np.searchsorted(stream.sample_ns, times_ns), min(1, last), last)
+    lower = np.maximum(upper - 1, 0)
+    is_nearer = times_ns - stream.sample_ns[lower] < stream.sample_ns[upper] - times_ns
+    nearest = np.where(is_nearer, lower, upper)
     near = np.abs(stream.sample_ns[nearest] - times_ns) <= 1.5e9 * _period(stream)
     result[near] = values[nearest[near]]
     return result
@@ -89,18 +89,18 @@ def unknown(name: str, signals: np.ndarray, novelty: np.ndarray) -> list[str]:
         signals: Tared readings [counts], shape (n, taxels).
         novelty: Novelty of the readings [1], shape (n,).
     """
-    known = np.isfinite(novelty) & np.isfinite(signals).all(axis=1)
-    strongest = np.max(signals[known], axis=1, initial=0.0)
-    touching = novelty[known][strongest > FELT * np.max(strongest, initial=0.0)]
+    mask = np.isfinite(novelty) & np.isfinite(signals).all(axis=1)
+    strongest = np.max(signals[mask], axis=1, initial=0.0)
+    touching = novelty[mask][strongest > FELT * np.max(strongest, initial=0.0)]
     strange = touching > 1.0
     if len(touching) == 0 or strange.mean() <= ODD:
         return []
-    most = float(touching.max())
+    peak = float(touching.max())
     how, what = "just outside of", "may be off there"
-    if most > ALIEN:
+    if peak > ALIEN:
         how, what = "unlike all of", "is a guess there"
     return [
-        f"{name}: {strange.mean():.0%} of its touch is {how} what the network learnt from (up to {most:.2f} times as "
+        f"{name}: {strange.mean():.0%} of its touch is {how} what the network learnt from (up to {peak:.2f} times as "
         f"far from it as its validation presses): the predicted depth {what}; train on contacts as wide and as deep"
     ]
 

@@ -78,10 +78,10 @@ def onset(height: np.ndarray, answer: np.ndarray, power: float | None = None) ->
     if len(height) < 8 or strength < CLEAR:
         return None
     powers = POWERS if power is None else np.array([power])
-    whole = _fit(height, answer, powers)
-    if whole is None:
+    fit = _fit(height, answer, powers)
+    if fit is None:
         return None
-    place, width, best = whole
+    place, width, best = fit
     foot = height >= place - FOOT
     near = _fit(height[foot], answer[foot], powers) if foot.sum() >= 8 and answer[foot][-1] > CLEAR else None
     # Contact is anywhere within a step of the approach: the standard deviation of a uniform distribution.

@@ -61,7 +61,7 @@ class Recorder:
         rig: Rig,
         sensor: Sensor,
         plan: Plan,
-        out: Path,
+        folder: Path,
         resume: bool = False,
         devices: RigDevices | None = None,
         mount: Callable[[Press], None] | None = None,
@@ -81,7 +81,7 @@ class Recorder:
             rig: The rig; its clock is the recording's.
             sensor: The skin that is pressed.
             plan: Presses. There is no motion without a plan.
-            out: Session folder to create, or to continue with ``resume``.
+            folder: Session folder to create, or to continue with ``resume``.
             resume: Continue with the next press that has no finished recording.
             devices: Drivers; by default those that the rig file names.
             mount: Called when another indenter, or another yaw of it, is needed; returns when it is mounted.
@@ -96,7 +96,7 @@ class Recorder:
                 where the skin begins elsewhere than the registration states.
             interruption: Holds Ctrl-C back while the guide moves; without it, Python raises it anywhere.
         """
-        self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(out), resume
+        self.rig, self.sensor, self.plan, self.out, self.resume = rig, sensor, plan, Path(folder), resume
         self.devices = devices or RigDevices.of(rig)
         self._mount, self._detect, self._progress = mount, detect, progress
         self._mounted: tuple[str, float, float, float] | None = None
@@ -131,11 +131,11 @@ class Recorder:
         self.plan.check_against(self.sensor)
         session = self._existing_session()
         self._latencies = {} if session is None else latencies(session)
-        wanted = tuple(press.index for press in self.plan.presses) if session is None else session.remaining
-        if session is not None and not wanted:
+        numbers = tuple(press.index for press in self.plan.presses) if session is None else session.remaining
+        if session is not None and not numbers:
             return session
         try:
-            return self._open_and_record(session, wanted, confirm)
+            return self._open_and_record(session, numbers, confirm)
         except BaseException as error:
             if isinstance(error, BadReadings) and self._paused(error):
                 # A person has just agreed to go on; the summary needs no second yes.
@@ -161,7 +161,7 @@ class Recorder:
         self._say(f"WARNING: {words}; it goes on, as the plan says")
 
     def _open_and_record(
-        self, session: Session | None, wanted: tuple[int, ...], confirm: Callable[[Preflight], bool]
+        self, session: Session | None, numbers: tuple[int, ...], confirm: Callable[[Preflight], bool]
     ) -> Session:
         self._guard.before_homing(session is not None)
         with self._guard.opened(self.devices) as devices:
@@ -170,7 +170,7 @@ class Recorder:
             rate = cnc.describe().get("status_rate", {}).get("nominal", REPORT_RATE)
             self.plan = replace(self.plan, motion=with_safe_travel(self.plan.motion, limits, rate))
             bounds = cnc.travel, cnc.cautions
-            summary = preflight(self.plan, self.sensor, self.rig, limits, wanted, *bounds, self._tap)
+            summary = preflight(self.plan, self.sensor, self.rig, limits, numbers, *bounds, self._tap)
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
             self._doubtful = self._guard.require_known(self._height, session is not None)
@@ -188,7 +188,7 @@ class Recorder:
             ) as streams:
                 try:
                     with self._interruption.kept():
-                        self._record_all(session, streams, limits, summary, wanted)
+                        self._record_all(session, streams, limits, summary, numbers)
                 except BaseException:
                     with suppress(TacdataError):  # the fault itself must be reported first
                         refresh(session)
@@ -210,19 +210,19 @@ class Recorder:
         return None
 
     def _record_all(
-        self, session: Session, streams: RigStreams, limits: AxisLimits, summary: Preflight, wanted: tuple[int, ...]
+        self, session: Session, streams: RigStreams, limits: AxisLimits, summary: Preflight, numbers: tuple[int, ...]
     ) -> None:
         self._wait_for_streams(streams)
         streams.set_latencies(self._latencies)
         position = self._rise(streams)
         homed = self.devices.cnc.settings().get("homed_at_opening") == "yes"
         if self._prove and (self.resume or not homed):
-            position = self._touch_first(self._prove, self._tap or self.plan.presses[wanted[0]], position, streams)
+            position = self._touch_first(self._prove, self._tap or self.plan.presses[numbers[0]], position, streams)
         if self._tap is not None:
             session, position = self._touch(session, self._tap, position, streams, limits)
-        left = summary.seconds[-len(wanted) :]  # everything before this belongs to the sync tap
+        durations = summary.seconds[-len(numbers) :]  # everything before this belongs to the sync tap
         judged = None
-        for done, number in enumerate(wanted, start=1):
+        for done, number in enumerate(numbers, start=1):
             press = self.plan.presses[number]
             position = self._change_indenter(press, position, streams)
             changed = press.mounting != judged
@@ -232,7 +232,7 @@ class Recorder:
                 require_contact(file_names.finished(self.out)[press.index])
             judged = press.mounting
             if self._progress:
-                self._progress(done, len(wanted), sum(left[done:]) / self.rig.clock.rate)
+                self._progress(done, len(numbers), sum(durations[done:]) / self.rig.clock.rate)
 
     def _wait_for_streams(self, streams: RigStreams) -> None:
         host = self.rig.clock.host
@@ -251,29 +251,29 @@ class Recorder:
 
     def _rise(self, streams: RigStreams) -> Position:
         """Go straight up to the clearance height; return the position there [mm]."""
-        here = streams.position or (np.nan, np.nan, np.nan)
-        above = self.rig.envelope.top_of_rise(here, self._height)
-        if here[2] < self._height:
+        position = streams.position or (np.nan, np.nan, np.nan)
+        above = self.rig.envelope.top_of_rise(position, self._height)
+        if position[2] < self._height:
             speed = self.plan.motion.approach_speed
             try:
-                here = self._motion.drive((Step("", above, speed),), here, streams, None)
+                position = self._motion.drive((Step("", above, speed),), position, streams, None)
             except BaseException:
                 self._motion.lift(self._height, speed)
                 raise
             self._motion.settle()
-        return here
+        return position
 
     def _change_indenter(self, press: Press, position: Position, streams: RigStreams) -> Position:
         """Have the press's indenter mounted, at a height that clears the longest; return the position [mm]."""
-        wanted = press.mounting
-        if wanted != self._mounted and self._mount:
+        mounting = press.mounting
+        if mounting != self._mounted and self._mount:
             if position[2] < self._height:
                 up = Step("", (*position[:2], self._height), self.plan.motion.approach_speed)
                 position = self._motion.drive((up,), position, streams, None)
                 self._motion.settle()
             with self._interruption.at_once():
                 self._mount(press)
-        self._mounted = wanted
+        self._mounted = mounting
         return position
 
     def _touch_first(self, prove: Prove, press: Press, position: Position, streams: RigStreams) -> Position:
@@ -299,7 +299,7 @@ class Recorder:
         """Carry out the sync tap and use the latencies that it measures; return the session and the position [mm]."""
         position = self._change_indenter(tap, position, streams)
         # The tap has to show the whole delay, so nothing is subtracted in its own recording.
-        before, self._latencies = self._latencies, {}
+        previous, self._latencies = self._latencies, {}
         streams.set_latencies({})
         course = tap_motion.steps(tap, self.plan, self.rig.registration_for(tap.indenter_name))
         path = file_names.next_sync_tap(self.out)
@@ -311,11 +311,11 @@ class Recorder:
             self._say(f"{error.given}; the indenter was lifted, and the sync tap is tried once more")
             position, path = self._motion.go_on(), file_names.next_sync_tap(self.out)
             position = self._record(tap, position, streams, limits, path, course)
-        found = delays.measure(read_recording(path))
-        for words in (*found.words, *changes(session, found.latencies)):
+        measurement = delays.measure(read_recording(path))
+        for words in (*measurement.words, *changes(session, measurement.latencies)):
             self._say(words)
-        session = add_sync(session, path, found)
-        self._latencies = {**before, **found.latencies}
+        session = add_sync(session, path, measurement)
+        self._latencies = {**previous, **measurement.latencies}
         streams.set_latencies(self._latencies)
         return session, position
 

@@ -124,18 +124,18 @@ def read_session(folder: StrPath) -> Session:
         raise UsageError(f"{folder} is no session: no {FILE} in it", allowed, remedy)
     document = documents.read(folder / FILE, "session")
     origin = str(folder / FILE)
-    found = file_names.finished(folder)
+    files = file_names.finished(folder)
     missing = [entry["file"] for entry in document["episodes"] if not (folder / entry["file"]).is_file()]
     if missing:
-        others = f" and {len(missing) - 3} others" if len(missing) > 3 else ""
+        more = f" and {len(missing) - 3} others" if len(missing) > 3 else ""
         raise FormatError(
-            f"{origin} names {', '.join(missing[:3])}{others}, not in {folder}",
+            f"{origin} names {', '.join(missing[:3])}{more}, not in {folder}",
             "every finished recording beside its session.json",
             "put the files back, or remove their entries",
         )
     return Session(
         folder,
-        tuple(found.values()),
+        tuple(files.values()),
         tuple(file_names.unfinished(folder)),
         Plan.from_document(document["plan"], f"{origin}: plan"),
         Sensor.from_document(document["sensor"], f"{origin}: sensor"),
@@ -188,13 +188,13 @@ def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
     """
     session = read_session(folder)
     old = session.document
-    for what, before, now in (
+    for what, original, present in (
         ("plan", old["plan_hash"], provenance.content_hash(plan.document)),
         ("sensor", old["sensor_hash"], sensor.content_hash),
         ("registration", old["rig"].get("registration"), rig.get("registration")),
         ("set of tool offsets", old["rig"].get("tools"), rig.get("tools")),
     ):
-        if before != now:
+        if original != present:
             raise UsageError(
                 f"{folder} was begun with another {what}",
                 f"the same {what}; one session holds one of each",
@@ -219,9 +219,9 @@ def refresh(session: Session) -> Session:
     """Update the document to the finished recordings of the folder; return the session."""
     # The disk decides: a sync tap may have been added since this session was read.
     document = read_session(session.folder).document
-    known = {entry["number"]: entry for entry in document["episodes"]}
+    entries = {entry["number"]: entry for entry in document["episodes"]}
     episodes = [
-        known.get(number, {"number": number, "file": path.name, "code_version": provenance.code_version()})
+        entries.get(number, {"number": number, "file": path.name, "code_version": provenance.code_version()})
         for number, path in file_names.finished(session.folder).items()
     ]
     documents.write(session.folder / FILE, {**document, "episodes": episodes}, "session")

@@ -49,5 +49,5 @@ def cut(targets: FingertipTargets, begin: int, end: int) -> FingertipTargets:
     """Return the targets of some rows."""
     rows, first = slice(begin, end), targets.rows.start or 0
     arrays = ("time_ns", "position", "quaternion", "seen", "depth", "gap")
-    kept = {name: getattr(targets, name)[rows] for name in arrays}
-    return replace(targets, **kept, rows=slice(first + begin, first + end))
+    slices = {name: getattr(targets, name)[rows] for name in arrays}
+    return replace(targets, **slices, rows=slice(first + begin, first + end))

@@ -133,8 +133,8 @@ def _search(
             # Seeded by the row: the same targets give the same path, whatever part of them is solved.
             rng = np.random.default_rng(row)
             for begin in (good, model.home, *(search.drawn(rng) for _ in range(OTHERS))):
-                other, left = search.settle(begin)
-                start, cost = (other, left) if left < cost else (start, cost)
+                candidate, candidate_cost = search.settle(begin)
+                start, cost = (candidate, candidate_cost) if candidate_cost < cost else (start, cost)
         values[row] = start
         errors[row], angles[row], coupling[row] = search.errors(start)
         good, missed = (start, 0) if _reached(search, start) else (good, missed + 1)
@@ -143,12 +143,12 @@ def _search(
 
 def _reached(search: KinematicSearch, values: np.ndarray) -> bool:
     place, angle = search.model.robot.tolerance
-    far, turned, coupling_error = search.errors(values)
-    return bool((far <= place).all() and coupling_error <= COUPLED and (angle is None or (turned <= angle).all()))
+    far, rotation, coupling_error = search.errors(values)
+    return bool((far <= place).all() and coupling_error <= COUPLED and (angle is None or (rotation <= angle).all()))
 
 
-def _rows(found: np.ndarray, fingers: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
-    named = {name: tuple(np.flatnonzero(found[:, k]).tolist()) for k, name in enumerate(fingers)}
+def _rows(mask: np.ndarray, fingers: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    named = {name: tuple(np.flatnonzero(mask[:, k]).tolist()) for k, name in enumerate(fingers)}
     return {name: rows for name, rows in named.items() if rows}
 
 
@@ -172,9 +172,9 @@ def _limits(
     fast, abrupt = {}, {}
     for k, joint in enumerate(joints):
         if joint.velocity is not None:
-            over = np.abs(speed[:, k]) > joint.velocity * (1 + 1e-6)
-            fast[joint.name] = tuple((1 + np.flatnonzero(over)).tolist())
+            excess = np.abs(speed[:, k]) > joint.velocity * (1 + 1e-6)
+            fast[joint.name] = tuple((1 + np.flatnonzero(excess)).tolist())
         if joint.acceleration is not None:
-            over = np.abs(acceleration[:, k]) > joint.acceleration * (1 + 1e-6)
-            abrupt[joint.name] = tuple((1 + np.flatnonzero(over)).tolist())
+            excess = np.abs(acceleration[:, k]) > joint.acceleration * (1 + 1e-6)
+            abrupt[joint.name] = tuple((1 + np.flatnonzero(excess)).tolist())
     return {name: rows for name, rows in fast.items() if rows}, {name: rows for name, rows in abrupt.items() if rows}

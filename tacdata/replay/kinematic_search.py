@@ -65,22 +65,22 @@ class KinematicSearch:
                 continue
             tried = self._state.integrate(step, 1.0)
             self._state.update(tried)
-            found, moved = self._cost(), float(np.abs(step).max())
-            if found < cost:
-                values, cost, damping = tried, found, max(damping * LONGER, DAMPING[0] * 1e-3)
+            trial_cost, stride = self._cost(), float(np.abs(step).max())
+            if trial_cost < cost:
+                values, cost, damping = tried, trial_cost, max(damping * LONGER, DAMPING[0] * 1e-3)
             else:
                 self._state.update(values)
                 damping *= SHORTER
-            if moved < REST:
+            if stride < REST:
                 break
         return values, cost
 
     def errors(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Return the errors of joint values: targets [m] and [rad], shapes (f,), and mimic joints [rad or m]."""
         self._state.update(values)
-        left = np.array([task.compute_error(self._state) for task in self._tips])
+        residuals = np.array([task.compute_error(self._state) for task in self._tips])
         coupling_error = 0.0 if self._coupled is None else float(np.abs(self._coupled.compute_error(self._state)).max())
-        return np.linalg.norm(left[:, :3], axis=1), np.linalg.norm(left[:, 3:], axis=1), coupling_error
+        return np.linalg.norm(residuals[:, :3], axis=1), np.linalg.norm(residuals[:, 3:], axis=1), coupling_error
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
         """Return random joint values within the limits, or half a turn, shape (joints,).

@@ -62,12 +62,12 @@ class Kinematics:
             raise FormatError(f"the URDF of {robot.name}: {reason}", "a URDF that MuJoCo reads", "correct it") from None
         self.joints = tuple(self._joint(k) for k in range(self.model.njnt))
         if not self.moving:
-            given = f"robot {robot.name}: no joint moves the fingertip of {', '.join(fingers)}"
-            raise FormatError(given, "a link that joints move", "name another link in the robot file")
+            fault = f"robot {robot.name}: no joint moves the fingertip of {', '.join(fingers)}"
+            raise FormatError(fault, "a link that joints move", "name another link in the robot file")
         for joint, value in zip(self.joints, self.home, strict=True):
             if (joint.lower is not None and value < joint.lower) or (joint.upper is not None and value > joint.upper):
-                given = f"home of joint {joint.name} of {robot.name}: {value:g} {joint.unit}"
-                raise FormatError(given, f"{joint.lower:g} to {joint.upper:g} {joint.unit}", "correct the robot file")
+                fault = f"home of joint {joint.name} of {robot.name}: {value:g} {joint.unit}"
+                raise FormatError(fault, f"{joint.lower:g} to {joint.upper:g} {joint.unit}", "correct the robot file")
 
     def _add_site(self, spec: Any, name: str) -> None:
         from scipy.spatial.transform import Rotation

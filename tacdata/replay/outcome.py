@@ -114,25 +114,25 @@ def replay_targets(
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     path = SceneModel(scene, pads[0], ground).run(pads, seconds, feedback)
     first, last = int(np.argmax(touch)), int(np.flatnonzero(high)[-1])
-    behind = _behind(path.tips.mean(axis=1), path.centre, first, high if wiped else None)
+    lag = _behind(path.tips.mean(axis=1), path.centre, first, high if wiped else None)
     lowest = float((path.centre[high, 2] - ground[2]).min())
     if wiped:
-        held = behind[: last + 1].max() < BEHIND
+        success = lag[: last + 1].max() < BEHIND
     else:
-        held = lowest > HELD * _lift(pads)
-    late = np.flatnonzero(behind[: last + 1] > BEHIND)
-    end = last if held or not len(late) else int(late[0])
+        success = lowest > HELD * _lift(pads)
+    failures = np.flatnonzero(lag[: last + 1] > BEHIND)
+    end = last if success or not len(failures) else int(failures[0])
     rows = slice(min(first, end), end + 1)
     pressing = path.force[rows].sum(axis=1)[touch[rows]] if touch[rows].any() else path.force[rows].sum(axis=1)
     names = targets.fingers
     return ReplayOutcome(
-        bool(held),
+        bool(success),
         lowest,
         dict(zip(names, path.force[high].mean(axis=0).tolist(), strict=True)),
         dict(zip(names, (1000 * path.depth[high].mean(axis=0)).tolist(), strict=True)),
         float(scene.friction * np.median(pressing) / scene.load),
         float(np.linalg.norm(path.slid[rows] - path.slid[rows.start], axis=-1).max()),
-        float(behind[rows].max()),
+        float(lag[rows].max()),
         float(seconds[end]),
         scene,
         names,
@@ -173,10 +173,10 @@ def _behind(fingers: np.ndarray, centre: np.ndarray, first: int, wiping: np.ndar
     """
     distance = centre - centre[first] - (fingers - fingers[first])
     if wiping is None:
-        behind = -distance[:, 2]
+        lag = -distance[:, 2]
     else:
-        moved = fingers[wiping] - fingers[wiping].mean(axis=0)
+        stroke = fingers[wiping] - fingers[wiping].mean(axis=0)
         # Strokes go both ways, so that a lag has either sign.
-        behind = np.abs(distance @ np.linalg.svd(moved, full_matrices=False)[2][0])
-    behind[:first] = 0.0
-    return behind
+        lag = np.abs(distance @ np.linalg.svd(stroke, full_matrices=False)[2][0])
+    lag[:first] = 0.0
+    return lag

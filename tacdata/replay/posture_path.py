@@ -53,12 +53,12 @@ def without_jumps(
         Joint values, shape (n, joints), NaN in rows that are left out; rows served, shape (n,), bool.
     """
     joints, seconds = search.model.joints, (time_ns - time_ns[0]) * 1e-9
-    found = np.where(reached[:, None], values, np.nan)
-    if reached.any() and len(jumps := _jumps(joints, found, seconds)):
-        tracks = list(_tracks(search, aim, is_reached, found, jumps))
-        found = _longest_chain(joints, np.stack(tracks, axis=1), seconds)
-    served = np.asarray(np.isfinite(found).all(axis=1))
-    return _nearest_turns(joints, found, search.model.home), served
+    postures = np.where(reached[:, None], values, np.nan)
+    if reached.any() and len(jumps := _jumps(joints, postures, seconds)):
+        tracks = list(_tracks(search, aim, is_reached, postures, jumps))
+        postures = _longest_chain(joints, np.stack(tracks, axis=1), seconds)
+    served = np.asarray(np.isfinite(postures).all(axis=1))
+    return _nearest_turns(joints, postures, search.model.home), served
 
 
 def _limits(joints: tuple[Joint, ...]) -> np.ndarray:
@@ -75,44 +75,44 @@ def _difference(joints: tuple[Joint, ...], later: np.ndarray, earlier: np.ndarra
 def _jumps(joints: tuple[Joint, ...], values: np.ndarray, seconds: np.ndarray) -> np.ndarray:
     """Return the rows that the joints reach from the one served before only by a jump."""
     rows = np.flatnonzero(np.isfinite(values).all(axis=1))
-    moved = np.abs(_difference(joints, values[rows[1:]], values[rows[:-1]]))
-    return rows[1:][(moved > _limits(joints) * np.diff(seconds[rows])[:, None]).any(axis=1)]
+    steps = np.abs(_difference(joints, values[rows[1:]], values[rows[:-1]]))
+    return rows[1:][(steps > _limits(joints) * np.diff(seconds[rows])[:, None]).any(axis=1)]
 
 
 def _tracks(
     search: KinematicSearch,
     aim: Callable[[int], None],
     is_reached: Callable[[np.ndarray], bool],
-    found: np.ndarray,
+    postures: np.ndarray,
     jumps: np.ndarray,
 ) -> Iterator[np.ndarray]:
     """Yield the postures found, each continued as far as it goes, shape (n, joints), NaN elsewhere."""
     # A fixed seed: the same targets must give the same path.
     joints, rng = search.model.joints, np.random.default_rng(0)
-    rows = np.flatnonzero(np.isfinite(found).all(axis=1))
-    known = [found]
-    yield from _turned(joints, found)
-    before = rows[np.searchsorted(rows, jumps) - 1]
-    starts = [(int(row), found[row]) for row in (*jumps, *before)]
+    rows = np.flatnonzero(np.isfinite(postures).all(axis=1))
+    collection = [postures]
+    yield from _turned(joints, postures)
+    predecessors = rows[np.searchsorted(rows, jumps) - 1]
+    starts = [(int(row), postures[row]) for row in (*jumps, *predecessors)]
     for row in rows[np.linspace(0, len(rows) - 1, ANCHORS).astype(int)]:
         aim(int(row))
         settled = (search.settle(search.drawn(rng))[0] for _ in range(STARTS))
         starts += [(int(row), values) for values in settled if is_reached(values)]
     for row, values in starts:
         # A posture that another track holds over this row's neighbours too is not continued again.
-        around = [r for r in (row - 1, row, row + 1) if 0 <= r < len(found)]
+        around = [r for r in (row - 1, row, row + 1) if 0 <= r < len(postures)]
         if any(
             np.isfinite(track[around]).all()
             and np.abs(_difference(joints, track[row], values)).max() < ALIKE
             and not len(np.intersect1d(around, jumps))
-            for track in known
+            for track in collection
         ):
             continue
-        track = np.full_like(found, np.nan)
+        track = np.full_like(postures, np.nan)
         track[row] = values
-        for way in (range(row + 1, len(found)), range(row - 1, -1, -1)):
+        for way in (range(row + 1, len(postures)), range(row - 1, -1, -1)):
             _continue(search, aim, is_reached, track, values, way)
-        known.append(track)
+        collection.append(track)
         yield from _turned(joints, track)
 
 
@@ -141,35 +141,35 @@ def _turned(joints: tuple[Joint, ...], track: np.ndarray) -> Iterator[np.ndarray
         if joint.unit != "rad" or joint.lower is None or joint.upper is None or joint.upper - joint.lower < 2 * np.pi:
             continue
         for turn in (-2 * np.pi, 2 * np.pi):
-            moved = track.copy()
-            moved[:, k] += turn
-            moved[(moved[:, k] < joint.lower) | (moved[:, k] > joint.upper)] = np.nan
-            if np.isfinite(moved).any():
-                yield moved
+            variant = track.copy()
+            variant[:, k] += turn
+            variant[(variant[:, k] < joint.lower) | (variant[:, k] > joint.upper)] = np.nan
+            if np.isfinite(variant).any():
+                yield variant
 
 
 def _longest_chain(joints: tuple[Joint, ...], tracks: np.ndarray, seconds: np.ndarray) -> np.ndarray:
     """Return the longest chain of rows that the joints can follow; ``tracks`` has shape (n, tracks, joints)."""
     count, width = tracks.shape[:2]
-    there, limits = np.asarray(np.isfinite(tracks).all(axis=2)), _limits(joints)
-    score, before = np.where(there, 1.0, -np.inf), np.full((count, width), -1)
+    mask, limits = np.asarray(np.isfinite(tracks).all(axis=2)), _limits(joints)
+    score, predecessor = np.where(mask, 1.0, -np.inf), np.full((count, width), -1)
     for row in range(1, count):
         first = max(row - WINDOW, 0)
         reach = limits * (seconds[row] - seconds[first:row])[:, None, None]
         reach[:-1] *= CALM
-        for k in np.flatnonzero(there[row]):
+        for k in np.flatnonzero(mask[row]):
             share = np.abs(_difference(joints, tracks[row, k], tracks[first:row])) / reach
             worth = np.where((share <= 1).all(axis=2), score[first:row] + 1 - COST * share.mean(axis=2), -np.inf)
             best = int(np.argmax(worth))
             if worth.flat[best] > score[row, k]:
-                score[row, k], before[row, k] = worth.flat[best], first * width + best
-    chosen = np.full((count, len(joints)), np.nan)
+                score[row, k], predecessor[row, k] = worth.flat[best], first * width + best
+    chain = np.full((count, len(joints)), np.nan)
     at = int(np.argmax(score))
     while at >= 0:
         row, k = divmod(at, width)
-        chosen[row] = tracks[row, k]
-        at = int(before[row, k])
-    return chosen
+        chain[row] = tracks[row, k]
+        at = int(predecessor[row, k])
+    return chain
 
 
 def _nearest_turns(joints: tuple[Joint, ...], values: np.ndarray, home: np.ndarray) -> np.ndarray:

@@ -107,14 +107,14 @@ def scene_of(task: str, name: str | None = None, width: float | None = None, **v
         UsageError: If there is no such object.
     """
     wiped = task == "wipe"
-    chosen = name or ("eraser" if wiped else "ball")
-    if chosen not in OBJECTS:
-        raise UsageError(f"object {chosen!r}", ", ".join(OBJECTS), "name one of them")
-    body = OBJECTS[chosen]
+    item = name or ("eraser" if wiped else "ball")
+    if item not in OBJECTS:
+        raise UsageError(f"object {item!r}", ", ".join(OBJECTS), "name one of them")
+    body = OBJECTS[item]
     if width is not None:
         body = replace(body, sizes=(width, *body.sizes[1:]))
     usual: dict[str, Any] = {"mass": body.mass, "task": "wipe" if wiped else "grasp"}
-    return ReplayScene(chosen, body, **usual | values)
+    return ReplayScene(item, body, **usual | values)
 
 
 def drawn(scene: ReplayScene, fingers: int, seed: int) -> ReplayScene:

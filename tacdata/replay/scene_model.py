@@ -139,8 +139,8 @@ class SceneModel:
         rows, count = len(seconds), len(self._tips)
         moments = np.arange(-SETTLE, seconds[-1] + STEP * COMMAND, STEP * COMMAND)
         flat = pads.reshape(rows, -1)
-        wanted = np.stack([np.interp(moments, seconds, flat[:, c]) for c in range(flat.shape[1])], axis=1)
-        found = Rollout(
+        targets = np.stack([np.interp(moments, seconds, flat[:, c]) for c in range(flat.shape[1])], axis=1)
+        rollout = Rollout(
             np.empty((rows, 3)),
             np.empty((rows, count, 3)),
             np.zeros((rows, count)),
@@ -148,23 +148,23 @@ class SceneModel:
             np.zeros((rows, count, 3)),
         )
         row, slid, data = 0, np.zeros((count, 3)), self._data
-        depth, moved = np.zeros(count), 0.0
-        for moment, command in zip(moments, wanted - self._begin.ravel(), strict=True):
-            data.ctrl[:] = command + moved
+        depth, correction = np.zeros(count), 0.0
+        for moment, command in zip(moments, targets - self._begin.ravel(), strict=True):
+            data.ctrl[:] = command + correction
             step(self._model, data, COMMAND)
             contacts, touching = self._contacts()
             if feedback is not None:
                 depth[:] = 0.0
                 np.maximum.at(depth, touching, -data.contact.dist[contacts])
-                moved = feedback(float(moment), depth, STEP * COMMAND).ravel()
+                correction = feedback(float(moment), depth, STEP * COMMAND).ravel()
             if len(contacts):
                 slid[touching] += self._sliding(contacts, touching) * STEP * COMMAND
             while row < rows and seconds[row] <= moment + STEP * COMMAND:
-                found.centre[row], found.tips[row] = data.xpos[self._object], data.xpos[self._tips]
-                self._press(contacts, touching, found.force[row], found.depth[row])
-                found.slid[row] = slid
+                rollout.centre[row], rollout.tips[row] = data.xpos[self._object], data.xpos[self._tips]
+                self._press(contacts, touching, rollout.force[row], rollout.depth[row])
+                rollout.slid[row] = slid
                 row += 1
-        return found
+        return rollout
 
     def _contacts(self) -> tuple[np.ndarray, np.ndarray]:
         """Return which of the simulation's contacts are between a pad and the object, and each one's pad."""

@@ -52,15 +52,15 @@ def self_collisions(urdf: Path, joints: tuple[str, ...], values: np.ndarray, hom
         engine.mj_kinematics(model, data)
         engine.mj_comPos(model, data)
         engine.mj_collision(model, data)
-        found = set()
+        contact_pairs = set()
         for contact in data.contact[: data.ncon]:
             bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
             # MuJoCo leaves out neighbours, but not those of a fixed link.
             joined = any(int(model.body_parentid[a]) == b for a, b in (bodies, bodies[::-1]))
             if contact.dist < -DEEP and not joined:
                 first, second = sorted(model.body(body).name for body in bodies)
-                found.add((first, second))
-        return found
+                contact_pairs.add((first, second))
+        return contact_pairs
 
     always = touching(home)
     pairs: dict[tuple[str, str], list[int]] = {}

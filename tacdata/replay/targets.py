@@ -90,17 +90,17 @@ def targets_of(
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise UsageError(f"finger {twice} is named twice", "each finger once", "name every finger once with --finger")
-    for what, known in (("path", demonstration.tracks), *((("gain", gains),) if gains is not None else ())):
-        missing = [name for name in names if name not in known]
+    for what, entries in (("path", demonstration.tracks), *((("gain", gains),) if gains is not None else ())):
+        missing = [name for name in names if name not in entries]
         if missing:
-            given = f"no {what} for {', '.join(missing)}"
+            fault = f"no {what} for {', '.join(missing)}"
             remedy = "name other fingers with --finger" + (", or give them a gain" if what == "gain" else "")
-            raise UsageError(given, ", ".join(known), remedy)
+            raise UsageError(fault, ", ".join(entries), remedy)
     tracks = [demonstration.tracks[name] for name in names]
-    known = np.all([np.isfinite(track.position).all(axis=1) for track in tracks], axis=0)
-    if not known.any():
+    mask = np.all([np.isfinite(track.position).all(axis=1) for track in tracks], axis=0)
+    if not mask.any():
         raise UsageError(f"no time at which {', '.join(names)} are all seen", "one or more", "choose fewer fingers")
-    first, last = np.flatnonzero(known)[[0, -1]]
+    first, last = np.flatnonzero(mask)[[0, -1]]
     rows, remarks = slice(int(first), int(last) + 1), list(demonstration.remarks)
     depths = [_depth(track.depth, len(demonstration.time_ns)) for track in tracks]
     observed = np.stack([track.position for track in tracks], axis=1)
@@ -116,8 +116,8 @@ def targets_of(
             position[:, k] = compensate(observed[:, k], track.normal, depths[k], gains[name])
             away = float(np.nanmax(np.linalg.norm(position[rows, k] - observed[rows, k], axis=1)))
             if away > FAR:
-                meant = f"is the gain of {gains[name]:g} m/mm meant?"
-                remarks.append(f"{name}: moved by up to {1000 * away:.0f} mm: {meant}")
+                question = f"is the gain of {gains[name]:g} m/mm meant?"
+                remarks.append(f"{name}: moved by up to {1000 * away:.0f} mm: {question}")
             blind = int(np.isnan(depths[k][rows]).sum())
             if blind:
                 count = rows.stop - rows.start
@@ -210,13 +210,13 @@ def _bridged(targets: FingertipTargets) -> list[tuple[str, np.ndarray, np.ndarra
     """Return for each finger where its targets bridge a gap, and their standard deviation [m]; shape (n,) both."""
     if targets.source is None:
         return []
-    found = []
+    bridges = []
     for k, name in enumerate(targets.fingers):
         covariance = targets.source.tracks[name].covariance[targets.rows]
         # The position comes after the rotation in the covariance.
         spread = np.sqrt(np.max(np.diagonal(covariance[:, 3:, 3:], axis1=1, axis2=2), axis=1))
-        found.append((name, targets.gap[:, k], spread))
-    return found
+        bridges.append((name, targets.gap[:, k], spread))
+    return bridges
 
 
 def _depth(maps: np.ndarray | None, count: int) -> np.ndarray:

@@ -45,13 +45,13 @@ class Board:
         documents.check(document, "calibration_board", origin)
         board = cls(**{key: value for key, value in document.items() if key != "version"})
         if not 0.3 * board.square < board.marker < 0.9 * board.square:
-            given = f"{origin}: a marker of {board.marker:g} mm in a square of {board.square:g} mm"
-            raise FormatError(given, "30 to 90 % of the square", "measure both on the print")
-        needed, known = board.columns * board.rows // 2, int(board.dictionary.split("_")[1])
-        if needed > known:
+            fault = f"{origin}: a marker of {board.marker:g} mm in a square of {board.square:g} mm"
+            raise FormatError(fault, "30 to 90 % of the square", "measure both on the print")
+        needed, available = board.columns * board.rows // 2, int(board.dictionary.split("_")[1])
+        if needed > available:
             raise FormatError(
                 f"{origin}: {board.columns} x {board.rows} squares need {needed} markers",
-                f"{known}, which dictionary {board.dictionary} has",
+                f"{available}, which dictionary {board.dictionary} has",
                 "fewer squares or a larger dictionary",
             )
         return board
@@ -126,16 +126,16 @@ def draw_board(board: Board, paper: str = "a4", dpi: int = DPI) -> np.ndarray:
     if paper not in PAPER:
         raise UsageError(f"paper {paper!r}", ", ".join(PAPER), "choose one of them")
     width, height = PAPER[paper]
-    across, down = board.columns * board.square, board.rows * board.square
-    if across > width - 16 or down > height - 34:
+    breadth, rise = board.columns * board.square, board.rows * board.square
+    if breadth > width - 16 or rise > height - 34:
         raise UsageError(
-            f"a board of {across:g} x {down:g} mm",
+            f"a board of {breadth:g} x {rise:g} mm",
             f"at most {width - 16:g} x {height - 34:g} mm on {paper}",
             "smaller or fewer squares, or larger paper",
         )
     dot = 25.4 / dpi
     sheet = np.full((round(height / dot), round(width / dot)), 255, np.uint8)
-    left, top = round((width - across) / 2 / dot), round(8 / dot)
+    left, top = round((width - breadth) / 2 / dot), round(8 / dot)
     drawn = draw_squares(board, round(board.square / dot))
     sheet[top : top + drawn.shape[0], left : left + drawn.shape[1]] = drawn
     base = top + drawn.shape[0] + round(8 / dot)

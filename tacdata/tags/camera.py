@@ -43,11 +43,11 @@ class PinholeCamera:
         Raises:
             FormatError: If a number is missing or impossible.
         """
-        wanted = ("width", "height", "fx", "fy", "cx", "cy")
-        missing = [name for name in wanted if name not in document]
+        fields = ("width", "height", "fx", "fy", "cx", "cy")
+        missing = [name for name in fields if name not in document]
         if missing:
-            raise FormatError(f"{origin}: no {', '.join(missing)}", ", ".join(wanted), "calibrate the camera")
-        width, height, fx, fy, cx, cy = (document[name] for name in wanted)
+            raise FormatError(f"{origin}: no {', '.join(missing)}", ", ".join(fields), "calibrate the camera")
+        width, height, fx, fy, cx, cy = (document[name] for name in fields)
         if min(width, height, fx, fy) <= 0 or not np.isfinite([fx, fy, cx, cy]).all():
             raise FormatError(
                 f"{origin}: {width} x {height} px, fx {fx}, fy {fy}, cx {cx}, cy {cy} px",
@@ -62,8 +62,8 @@ class PinholeCamera:
             )
         distortion = np.array(document.get("distortion", ()), float)
         if len(distortion) not in (0, 4, 5, 8, 12, 14):
-            given = f"{origin}: {len(distortion)} distortion coefficients"
-            raise FormatError(given, "4, 5, 8, 12 or 14", "calibrate the camera")
+            fault = f"{origin}: {len(distortion)} distortion coefficients"
+            raise FormatError(fault, "4, 5, 8, 12 or 14", "calibrate the camera")
         matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float)
         return cls(int(width), int(height), matrix, distortion)
 
@@ -120,9 +120,9 @@ class PinholeCamera:
         if not self.distortion.any():
             return grey[top:bottom, left:right], matrix
         maps = _straight_maps(self.width, self.height, tuple(self.matrix.ravel()), tuple(self.distortion))
-        across, down = (m[top:bottom, left:right] for m in maps)
+        columns, rows = (m[top:bottom, left:right] for m in maps)
         # OpenCV's cubic kernel shifts by up to 0.05 px between pixels, the linear one by a hundredth at most.
-        return cv2.remap(grey, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), matrix
+        return cv2.remap(grey, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), matrix
 
 
 @lru_cache(maxsize=8)
@@ -133,7 +133,7 @@ def _straight_maps(
     import cv2
 
     square = np.array(matrix).reshape(3, 3)
-    across, down = cv2.initUndistortRectifyMap(
+    columns, rows = cv2.initUndistortRectifyMap(
         square, np.array(distortion), np.eye(3), square, (width, height), cv2.CV_32FC1
     )
-    return across, down
+    return columns, rows

@@ -46,9 +46,9 @@ def fingers_of(document: dict[str, Any], origin: str = "fingers") -> dict[str, F
             two cubes carry the same tag.
     """
     documents.check(document, "fingers", origin)
-    found = {name: _finger(name, entry, origin) for name, entry in document["fingers"].items()}
+    fingers = {name: _finger(name, entry, origin) for name, entry in document["fingers"].items()}
     owners: dict[int, str] = {}
-    for name, finger in found.items():
+    for name, finger in fingers.items():
         for face, tag in finger.cube.ids.items():
             if tag in owners:
                 raise FormatError(
@@ -57,7 +57,7 @@ def fingers_of(document: dict[str, Any], origin: str = "fingers") -> dict[str, F
                     "read the numbers off the cubes and correct ids",
                 )
             owners[tag] = f"{name} {face}"
-    return found
+    return fingers
 
 
 def read_fingers(path: StrPath) -> dict[str, Finger]:
@@ -72,13 +72,13 @@ def read_fingers(path: StrPath) -> dict[str, Finger]:
 
 def _check_tip(place: np.ndarray, cube: Cube, origin: str) -> None:
     """Refuse a fingertip within its cube, as metres would place it, or far away from it."""
-    given = f"{origin}: a fingertip at {[round(1000 * float(value), 3) for value in place]} mm"
+    fault = f"{origin}: a fingertip at {[round(1000 * float(value), 3) for value in place]} mm"
     if 0 < np.abs(place).max() < cube.side / 2000:
         where, remedy = f"is inside the cube of {cube.side:g} mm", "give tip/position in mm, from the cube's centre"
-        raise FormatError(f"{given} {where}: is it in metres?", "a place outside of the cube", remedy)
+        raise FormatError(f"{fault} {where}: is it in metres?", "a place outside of the cube", remedy)
     if not np.linalg.norm(place) <= FARTHEST:
         where, remedy = "is away from its cube", "give tip/position in mm, from the cube's centre"
-        raise FormatError(f"{given} {where}: is it in micrometres?", f"up to {1000 * FARTHEST:g} mm", remedy)
+        raise FormatError(f"{fault} {where}: is it in micrometres?", f"up to {1000 * FARTHEST:g} mm", remedy)
 
 
 def _finger(name: str, entry: dict[str, Any], origin: str) -> Finger:

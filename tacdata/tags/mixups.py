@@ -37,15 +37,17 @@ def mixups(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> tuple[str,
         for name, pose in cubes.items()
         if pose.strays
     ]
-    for (one, a), (other, b) in combinations(cubes.items(), 2):
-        room = (fingers[one].cube.side + fingers[other].cube.side) / 2000
+    for (first_name, a), (second_name, b) in combinations(cubes.items(), 2):
+        room = (fingers[first_name].cube.side + fingers[second_name].cube.side) / 2000
         if np.linalg.norm(a.position - b.position) < 0.9 * room:
-            remarks.append(f"the cubes of {one} and {other} are in one place: tags of both are on one cube")
-    for hand in ("left", "right"):
-        found = handedness({n: f for n, f in fingers.items() if f.hand == hand}, cubes)
-        if found and found != hand:
             remarks.append(
-                f"index and middle finger of the {hand} hand stand as those of a {found} one: "
+                f"the cubes of {first_name} and {second_name} are in one place: tags of both are on one cube"
+            )
+    for hand in ("left", "right"):
+        order = handedness({n: f for n, f in fingers.items() if f.hand == hand}, cubes)
+        if order and order != hand:
+            remarks.append(
+                f"index and middle finger of the {hand} hand stand as those of a {order} one: "
                 "the hands' cubes are swapped, or these two fingers'"
             )
     return tuple(remarks)
@@ -56,34 +58,36 @@ def handedness(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> str:
 
     Looking along the fingers with the pads down, a right hand has its middle finger right of its index.
     """
-    seen = {f.kind: cubes[name] for name, f in fingers.items() if name in cubes and not cubes[name].ambiguous}
-    tips = {f.kind: f.tip for name, f in fingers.items() if f.kind in seen}
-    if not {"index", "middle"} <= set(seen):
+    poses = {f.kind: cubes[name] for name, f in fingers.items() if name in cubes and not cubes[name].ambiguous}
+    tips = {f.kind: f.tip for name, f in fingers.items() if f.kind in poses}
+    if not {"index", "middle"} <= set(poses):
         return ""
-    index, middle = (seen[kind].matrix @ tips[kind] for kind in ("index", "middle"))
-    across = middle[:3, 3] - index[:3, 3]
+    index, middle = (poses[kind].matrix @ tips[kind] for kind in ("index", "middle"))
+    separation = middle[:3, 3] - index[:3, 3]
     forward, out_of_pad = index[:3, 0] + middle[:3, 0], index[:3, 2] + middle[:3, 2]
     # Seen with the pads down, right is forward x up, and up is against the pads.
     right = np.cross(forward, -out_of_pad)
-    length = np.linalg.norm(right) * np.linalg.norm(across)
-    side = float(right @ across) / length if length > 0 else 0.0
+    length = np.linalg.norm(right) * np.linalg.norm(separation)
+    side = float(right @ separation) / length if length > 0 else 0.0
     return "" if abs(side) < SIDEWAYS else "right" if side > 0 else "left"
 
 
-def exchanged(before: dict[str, CubePose], now: dict[str, CubePose]) -> tuple[str, ...]:
+def exchanged(earlier: dict[str, CubePose], later: dict[str, CubePose]) -> tuple[str, ...]:
     """Describe the fingers that seem to have changed places between two images.
 
     Args:
-        before: Poses of the cubes in an image, by finger.
-        now: The same in a later image.
+        earlier: Poses of the cubes in an image, by finger.
+        later: The same in a later image.
     """
     remarks = []
-    for one, other in combinations(sorted(set(before) & set(now)), 2):
-        distance = np.linalg.norm(before[one].position - before[other].position)
+    for name, partner in combinations(sorted(set(earlier) & set(later)), 2):
+        distance = np.linalg.norm(earlier[name].position - earlier[partner].position)
         jumps = (
-            np.linalg.norm(now[one].position - before[other].position),
-            np.linalg.norm(now[other].position - before[one].position),
+            np.linalg.norm(later[name].position - earlier[partner].position),
+            np.linalg.norm(later[partner].position - earlier[name].position),
         )
         if max(jumps) < NEARER * distance:
-            remarks.append(f"{one} and {other} have changed places between two images: their tags' numbers are swapped")
+            remarks.append(
+                f"{name} and {partner} have changed places between two images: their tags' numbers are swapped"
+            )
     return tuple(remarks)

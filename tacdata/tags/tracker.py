@@ -55,9 +55,9 @@ class FingerTracker:
         self.camera.check(grey)
         fresh = {name for name, age in self._ages.items() if age == 0}
         tags = [] if not fresh or self._since >= self._every else self._near(grey, fresh)
-        wanted = {name for name in fresh if not self._has_tag(name, tags)}
+        unread = {name for name in fresh if not self._has_tag(name, tags)}
         self._since += 1
-        if not tags or wanted:
+        if not tags or unread:
             tags, self._since = detect_tags(grey, whole=False), 0
         view = view_of(grey, tags, self.camera, self.fingers, self._hints)
         # Of two consecutive images alone: a finger that was out of sight may well come back at another's place.

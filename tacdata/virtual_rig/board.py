@@ -94,11 +94,11 @@ class VirtualBoard:
 
     def _run(self) -> None:
         while not self._stopped.is_set():
-            now = self.clock.now_ns()
-            while (following := self.timing.sample_ns(self._counter)) <= now:
+            now_ns = self.clock.now_ns()
+            while (following := self.timing.sample_ns(self._counter)) <= now_ns:
                 self._sample(following)
             self._bridge(following)
-            while self._packets and self._packets[0][0] <= now:
+            while self._packets and self._packets[0][0] <= now_ns:
                 self.port.write(self._packets.popleft()[1])
             if self.port.waiting:
                 self.port.write(b"")

@@ -240,14 +240,14 @@ class VirtualDemo:
         return carried
 
 
-def _worn(given: Sensor | Mapping[str, Sensor] | None) -> dict[str, Sensor]:
+def _worn(skins: Sensor | Mapping[str, Sensor] | None) -> dict[str, Sensor]:
     """Return each finger's skin; refuse skins of fingers that are not there."""
-    if isinstance(given, Sensor):
-        return dict.fromkeys(DIRECTIONS, given)
-    strangers = sorted(set(given or {}) - set(DIRECTIONS))
+    if isinstance(skins, Sensor):
+        return dict.fromkeys(DIRECTIONS, skins)
+    strangers = sorted(set(skins or {}) - set(DIRECTIONS))
     if strangers:
         raise UsageError(f"a sensor for {', '.join(strangers)}", ", ".join(DIRECTIONS), "name one of these fingers")
-    return {name: (given or {}).get(name) or default_sensor() for name in DIRECTIONS}
+    return {name: (skins or {}).get(name) or default_sensor() for name in DIRECTIONS}
 
 
 def _when(fault: str) -> str:

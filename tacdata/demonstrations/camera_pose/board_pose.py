@@ -78,20 +78,20 @@ def _pixels(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera) -> np.n
     """Return the pixels, shape (n, 2), of points of the board [m], shape (n, 3)."""
     import cv2
 
-    seen = places @ pose[:3, :3].T + pose[:3, 3]
-    return cv2.projectPoints(seen, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0][:, 0]
+    camera_points = places @ pose[:3, :3].T + pose[:3, 3]
+    return cv2.projectPoints(camera_points, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0][:, 0]
 
 
 def _camera_spread(places: np.ndarray, pose: np.ndarray, camera: PinholeCamera, variance: float) -> float:
     """Return the standard uncertainty of the camera's position in the board's frame, -R^T t [m]."""
     start, step, columns = _pixels(places, pose, camera), 1e-6, []
     for k in range(6):
-        x, moved = step * np.eye(6)[k], pose.copy()
-        moved[:3, :3], moved[:3, 3] = exponential(x[:3]) @ pose[:3, :3], pose[:3, 3] + x[3:]
-        columns.append(((_pixels(places, moved, camera) - start) / step).ravel())
+        x, trial = step * np.eye(6)[k], pose.copy()
+        trial[:3, :3], trial[:3, 3] = exponential(x[:3]) @ pose[:3, :3], pose[:3, 3] + x[3:]
+        columns.append(((_pixels(places, trial, camera) - start) / step).ravel())
     slopes = np.stack(columns, axis=1)
     covariance = variance * np.linalg.pinv(slopes.T @ slopes)
     x, y, z = pose[:3, 3]
     lever = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    both = np.hstack([lever, np.eye(3)])  # a small rotation of the board in the camera, then its translation
-    return float(np.sqrt(np.trace(both @ covariance @ both.T)))
+    jacobian = np.hstack([lever, np.eye(3)])  # a small rotation of the board in the camera, then its translation
+    return float(np.sqrt(np.trace(jacobian @ covariance @ jacobian.T)))

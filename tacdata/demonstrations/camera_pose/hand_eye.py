@@ -42,23 +42,23 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
         FormatError: If the pairs contradict each other altogether.
     """
     if len(grippers) != len(cubes) or len(grippers) < 3:
-        given = f"{len(grippers)} gripper and {len(cubes)} cube poses"
+        fault = f"{len(grippers)} gripper and {len(cubes)} cube poses"
         allowed = "the same number of both, three or more"
-        raise UsageError(given, allowed, "take ten or more, with rotations about all axes")
+        raise UsageError(fault, allowed, "take ten or more, with rotations about all axes")
     _check_turns(grippers)
-    kept, remarks = np.ones(len(grippers), bool), []
+    inliers, remarks = np.ones(len(grippers), bool), []
     # Outliers are left out and the fit is repeated, until the set of pairs no longer changes.
     for _ in range(3):
-        base, held = _refined(*_begun(grippers[kept], cubes[kept]), grippers[kept], cubes[kept])
-        deviation = np.linalg.norm(_residuals(base, held, grippers, cubes).reshape(-1, 6), axis=1)
+        base, mount = _refined(*_begun(grippers[inliers], cubes[inliers]), grippers[inliers], cubes[inliers])
+        deviation = np.linalg.norm(_residuals(base, mount, grippers, cubes).reshape(-1, 6), axis=1)
         good = deviation <= OUTLYING * max(float(np.median(deviation)), 1.0)
-        if good.sum() < 3 or np.array_equal(good, kept):
+        if good.sum() < 3 or np.array_equal(good, inliers):
             break
-        kept = good
-    left_out = np.flatnonzero(~kept)
+        inliers = good
+    left_out = np.flatnonzero(~inliers)
     if len(left_out):
         remarks.append(f"pairs {', '.join(map(str, left_out))} contradict the others and were left out")
-    raw = _residuals(base, held, grippers[kept], cubes[kept]).reshape(-1, 6) * np.repeat(WEIGHTS[::-1], 3)
+    raw = _residuals(base, mount, grippers[inliers], cubes[inliers]).reshape(-1, 6) * np.repeat(WEIGHTS[::-1], 3)
     turn, place = (float(np.sqrt((raw[:, part] ** 2).sum(axis=1).mean())) for part in (slice(0, 3), slice(3, 6)))
     if place > 0.02 or turn > 0.1:
         raise FormatError(
@@ -66,9 +66,9 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
             "pairs of the same moments",
             "check the order of the pairs, the units (metres), xyzw, and that the cube sits firmly on the gripper",
         )
-    spread = _spread(base, held, grippers[kept], cubes[kept])
+    spread = _spread(base, mount, grippers[inliers], cubes[inliers])
     method = "hand-eye (calibrateRobotWorldHandEye, then least squares)"
-    return CameraWorld(camera, frame, base, method, int(kept.sum()), (place, turn), spread, held, tuple(remarks))
+    return CameraWorld(camera, frame, base, method, int(inliers.sum()), (place, turn), spread, mount, tuple(remarks))
 
 
 def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float, spread: float) -> CameraWorld:
@@ -93,26 +93,29 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
     turns = (rotations * Rotation.from_matrix(mean[:3, :3]).inv()).magnitude()  # ty: ignore[missing-union-attribute]
     distance = max(float(np.linalg.norm(mean[:3, 3])), 0.1)
     places = np.array([pose[:3, 3] for pose in poses])
-    apart = np.linalg.norm(places - np.median(places, axis=0), axis=1)
-    if apart.max() > max(MOVED * distance, OUTLYING * spread) or turns.max() > TURNED:
-        worst = int(np.argmax(apart / (MOVED * distance) + turns / TURNED))
+    offset = np.linalg.norm(places - np.median(places, axis=0), axis=1)
+    if offset.max() > max(MOVED * distance, OUTLYING * spread) or turns.max() > TURNED:
+        worst = int(np.argmax(offset / (MOVED * distance) + turns / TURNED))
         raise FormatError(
-            f"the board in image {worst + 1} of {len(poses)}: {1000 * apart[worst]:.0f} mm and "
+            f"the board in image {worst + 1} of {len(poses)}: {1000 * offset[worst]:.0f} mm and "
             f"{np.degrees(turns[worst]):.1f} deg from where it stands in the others",
             "images of a board and a camera that both rest",
             "leave that image out if the board was put elsewhere, or take the images again",
         )
     remarks = () if turns.max() < 0.01 else (f"the images differ by up to {np.degrees(turns.max()):.1f} deg: it moved",)
-    if apart.max() > max(NUDGED * distance, OUTLYING * float(np.median(apart))):
+    if offset.max() > max(NUDGED * distance, OUTLYING * float(np.median(offset))):
         remarks += (
-            f"the board in image {int(np.argmax(apart)) + 1} of {len(poses)} stands {1000 * apart.max():.1f} mm from "
+            f"the board in image {int(np.argmax(offset)) + 1} of {len(poses)} stands {1000 * offset.max():.1f} mm from "
             "where it stands in the others: it or the camera was pushed; leave that image out, or take them all again",
         )
     # The scatter between images counts in the uncertainty as well as the uncertainty of a single image.
-    once = max(spread, float(np.sqrt((apart**2).mean())))
-    known = once / np.sqrt(len(poses)), max(once / distance, float(np.sqrt((turns**2).mean()))) / np.sqrt(len(poses))
+    once = max(spread, float(np.sqrt((offset**2).mean())))
+    uncertainty = (
+        once / np.sqrt(len(poses)),
+        max(once / distance, float(np.sqrt((turns**2).mean()))) / np.sqrt(len(poses)),
+    )
     residual = rms, float(np.sqrt((turns**2).mean()))
-    return CameraWorld(camera, frame, mean, "board", len(poses), residual, known, None, remarks)
+    return CameraWorld(camera, frame, mean, "board", len(poses), residual, uncertainty, None, remarks)
 
 
 def _check_turns(grippers: np.ndarray) -> None:
@@ -134,35 +137,35 @@ def _begun(grippers: np.ndarray, cubes: np.ndarray) -> tuple[np.ndarray, np.ndar
     import cv2
 
     # OpenCV assumes a camera on the gripper: its world is our cube, its base our gripper, its gripper our base.
-    found = cv2.calibrateRobotWorldHandEye(
+    solution = cv2.calibrateRobotWorldHandEye(
         list(cubes[:, :3, :3]), list(cubes[:, :3, 3]), list(grippers[:, :3, :3]), list(grippers[:, :3, 3])
     )
     cube_gripper, camera_base = np.eye(4), np.eye(4)
-    cube_gripper[:3, :3], cube_gripper[:3, 3] = found[0], np.ravel(found[1])
-    camera_base[:3, :3], camera_base[:3, 3] = found[2], np.ravel(found[3])
+    cube_gripper[:3, :3], cube_gripper[:3, 3] = solution[0], np.ravel(solution[1])
+    camera_base[:3, :3], camera_base[:3, 3] = solution[2], np.ravel(solution[3])
     return np.linalg.inv(camera_base), np.linalg.inv(cube_gripper)
 
 
 def _refined(
-    base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray
+    base: np.ndarray, mount: np.ndarray, grippers: np.ndarray, cubes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     from scipy.optimize import least_squares
 
     def moved(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _nudged(base, x[:6]), _nudged(held, x[6:])
+        return _nudged(base, x[:6]), _nudged(mount, x[6:])
 
     # Robust loss against a single wrong pair: residuals beyond two standard deviations count linearly.
-    found = least_squares(lambda x: _residuals(*moved(x), grippers, cubes), np.zeros(12), loss="soft_l1", f_scale=2.0)
-    return moved(found.x)
+    fit = least_squares(lambda x: _residuals(*moved(x), grippers, cubes), np.zeros(12), loss="soft_l1", f_scale=2.0)
+    return moved(fit.x)
 
 
-def _spread(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> tuple[float, float]:
+def _spread(base: np.ndarray, mount: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> tuple[float, float]:
     """Return the standard uncertainty of the camera's position [m] and rotation [rad], from the residuals."""
-    start, step = _residuals(base, held, grippers, cubes), 1e-6
+    start, step = _residuals(base, mount, grippers, cubes), 1e-6
     jacobian = np.empty((len(start), 12))
     for k in range(12):
         x = step * np.eye(12)[k]
-        jacobian[:, k] = (_residuals(_nudged(base, x[:6]), _nudged(held, x[6:]), grippers, cubes) - start) / step
+        jacobian[:, k] = (_residuals(_nudged(base, x[:6]), _nudged(mount, x[6:]), grippers, cubes) - start) / step
     # Two poses of six numbers each were fitted.
     variance = float(start @ start) / max(len(start) - 12, 1)
     covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
@@ -170,14 +173,17 @@ def _spread(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.
 
 
 def _nudged(pose: np.ndarray, x: np.ndarray) -> np.ndarray:
-    moved = pose.copy()
-    moved[:3, :3], moved[:3, 3] = exponential(x[:3]) @ pose[:3, :3], pose[:3, 3] + x[3:]
-    return moved
+    variant = pose.copy()
+    variant[:3, :3], variant[:3, 3] = exponential(x[:3]) @ pose[:3, :3], pose[:3, 3] + x[3:]
+    return variant
 
 
-def _residuals(base: np.ndarray, held: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> np.ndarray:
+def _residuals(base: np.ndarray, mount: np.ndarray, grippers: np.ndarray, cubes: np.ndarray) -> np.ndarray:
     """Return rotation and translation residuals of each pair over `WEIGHTS` [1], shape (6 n,)."""
     rows = []
-    for left, right in zip(grippers @ held, base @ cubes, strict=True):
-        rows += [logarithm(left[:3, :3] @ right[:3, :3].T) / WEIGHTS[1], (left[:3, 3] - right[:3, 3]) / WEIGHTS[0]]
+    for expected, observed in zip(grippers @ mount, base @ cubes, strict=True):
+        rows += [
+            logarithm(expected[:3, :3] @ observed[:3, :3].T) / WEIGHTS[1],
+            (expected[:3, 3] - observed[:3, 3]) / WEIGHTS[0],
+        ]
     return np.concatenate(rows)

@@ -37,28 +37,28 @@ def acquire(sightings: Sightings, times_ns: np.ndarray, wander: ProcessNoise) ->
         wander: Process noise.
     """
     nothing = np.zeros(0, np.int64)
-    taken: list[int] = []
+    resumptions: list[int] = []
     wrong: list[int] = []
     wander = unseen_noise(sightings, wander)
     # Candidates are compared by their likelihood, which the forward pass alone gives.
     best = smooth(sightings, nothing, wander, back=False)
     refused: set[int] = set()
-    while len(taken) + len(wrong) < MOST:
+    while len(resumptions) + len(wrong) < MOST:
         run = next((r for r in _runs(best.accepted) if r[0] not in refused), None)
         if run is None:
             break
         refused.add(run[0])
         if not _agree(sightings, run, wander):
             continue
-        tries = [([*taken, run[0]], wrong)]
+        tries = [([*resumptions, run[0]], wrong)]
         suspects = _first_after_gap(sightings, np.flatnonzero(best.accepted[: run[0]]))
         if suspects:
-            tries.append((taken, [*wrong, *suspects]))
+            tries.append((resumptions, [*wrong, *suspects]))
         for resumed, doubted in tries:
             tried = smooth(sightings, nothing, wander, back=False, reacquired=resumed, left_out=doubted)
             if tried.log_likelihood > best.log_likelihood + PRIOR:
-                taken, wrong, best = resumed, doubted, tried
-    return smooth(sightings, times_ns, wander, reacquired=taken, left_out=wrong)
+                resumptions, wrong, best = resumed, doubted, tried
+    return smooth(sightings, times_ns, wander, reacquired=resumptions, left_out=wrong)
 
 
 def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
@@ -91,7 +91,7 @@ def _first_after_gap(sightings: Sightings, accepted: np.ndarray) -> list[int]:
 
 def _agree(sightings: Sightings, run: tuple[int, int], wander: ProcessNoise) -> bool:
     """Return whether the sightings of a run fit one motion."""
-    kept = np.zeros(len(sightings), bool)
-    kept[run[0] : min(run[1], run[0] + LOOKED_AT)] = True
-    part = sightings.where(kept)
+    mask = np.zeros(len(sightings), bool)
+    mask[run[0] : min(run[1], run[0] + LOOKED_AT)] = True
+    part = sightings.where(mask)
     return float(smooth(part, np.zeros(0, np.int64), wander, back=False).accepted.mean()) >= AGREEING

@@ -71,14 +71,16 @@ def without_bumps(
         recording: The demonstration.
         delays: Camera -> by how much its images were moved back in time [s]; missing for 0.
     """
-    behind = shifts(recording, delays)
-    between = jumps({name: timely(found) for name, found in sightings.items()}, recording.span_ns[0])
-    if behind:
-        shown = {bump.camera for bump in behind}
-        rivals = {bump.begin_ns: {b.camera for b in between if b.begin_ns == bump.begin_ns} for bump in between}
+    image_bumps = shifts(recording, delays)
+    sighting_bumps = jumps({name: timely(series) for name, series in sightings.items()}, recording.span_ns[0])
+    if image_bumps:
+        cameras = {bump.camera for bump in image_bumps}
+        rivals = {
+            bump.begin_ns: {b.camera for b in sighting_bumps if b.begin_ns == bump.begin_ns} for bump in sighting_bumps
+        }
         # A bump seen in the background is reported once, and rules out the other camera of the pair.
-        between = [bump for bump in between if not rivals[bump.begin_ns] & shown]
-    bumps = sorted([*behind, *between], key=lambda bump: bump.begin_ns)
+        sighting_bumps = [bump for bump in sighting_bumps if not rivals[bump.begin_ns] & cameras]
+    bumps = sorted([*image_bumps, *sighting_bumps], key=lambda bump: bump.begin_ns)
     return split(sightings, bumps), [bump.words for bump in bumps]
 
 
@@ -89,7 +91,7 @@ def shifts(recording: DemoRecording, delays: Mapping[str, float]) -> list[Bump]:
         recording: The demonstration; if its file is gone or damaged, nothing is known.
         delays: Camera -> by how much its images were moved back in time [s].
     """
-    found: list[Bump] = []
+    bumps: list[Bump] = []
     images: Mapping[str, list[tuple[int, np.ndarray]]] = {}
     with suppress(UsageError, FormatError):
         images = sampled(recording, IMAGES)
@@ -97,18 +99,18 @@ def shifts(recording: DemoRecording, delays: Mapping[str, float]) -> list[Bump]:
     for camera, looked in images.items():
         scale = _scale(recording, camera)
         if scale is not None and looked:
-            late = round(delays.get(camera, 0.0) * 1e9)
-            found += _bumps(camera, _followed([(time - late, image) for time, image in looked]), scale, begin)
-    return sorted(found, key=lambda bump: bump.begin_ns)
+            delay = round(delays.get(camera, 0.0) * 1e9)
+            bumps += _bumps(camera, _followed([(time - delay, image) for time, image in looked]), scale, begin)
+    return sorted(bumps, key=lambda bump: bump.begin_ns)
 
 
 def _scale(recording: DemoRecording, camera: str) -> float | None:
     """Return the size of a pixel at the fingers [m]; None if the camera saw none, or has no intrinsics."""
     intrinsics = recording.rig.cameras[camera].get("intrinsics")
     distances = [view.position[view.faces > 0, 2] for view in recording.views if view.camera == camera]
-    known = np.concatenate(distances) if distances else np.zeros(0)
-    known = known[np.isfinite(known)]
-    return float(np.median(known)) / intrinsics["fx"] if intrinsics and len(known) else None
+    ranges = np.concatenate(distances) if distances else np.zeros(0)
+    ranges = ranges[np.isfinite(ranges)]
+    return float(np.median(ranges)) / intrinsics["fx"] if intrinsics and len(ranges) else None
 
 
 def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
@@ -118,17 +120,17 @@ def _followed(images: list[tuple[int, np.ndarray]]) -> list[_Look]:
     corners = _corners(first)
     if len(corners) < FEWEST:
         return []
-    looks, most = [_Look(images[0][0], 0.0)], COVERED * _cells(corners[:, 0], first.shape)
+    looks, coverage = [_Look(images[0][0], 0.0)], COVERED * _cells(corners[:, 0], first.shape)
     lk: dict[str, Any] = {"winSize": (21, 21), "maxLevel": 4}
     for time, image in images[1:]:
         if image.shape != first.shape:
             continue
-        there, there_too, _ = cv2.calcOpticalFlowPyrLK(first, image, corners, None, **lk)  # ty: ignore[no-matching-overload]
+        positions, status, _ = cv2.calcOpticalFlowPyrLK(first, image, corners, None, **lk)  # ty: ignore[no-matching-overload]
         # Followed there and back: a corner that a hand covers meanwhile does not return to its place.
-        back, back_too, _ = cv2.calcOpticalFlowPyrLK(image, first, there, None, **lk)  # ty: ignore[no-matching-overload]
-        kept = (there_too.ravel() > 0) & (back_too.ravel() > 0)
-        kept &= np.linalg.norm((back - corners)[:, 0], axis=1) < RETURNED
-        looks.append(_Look(time, _shift(corners[kept, 0], there[kept, 0], most, first.shape)))
+        back, back_status, _ = cv2.calcOpticalFlowPyrLK(image, first, positions, None, **lk)  # ty: ignore[no-matching-overload]
+        mask = (status.ravel() > 0) & (back_status.ravel() > 0)
+        mask &= np.linalg.norm((back - corners)[:, 0], axis=1) < RETURNED
+        looks.append(_Look(time, _shift(corners[mask, 0], positions[mask, 0], coverage, first.shape)))
     return looks
 
 
@@ -141,25 +143,27 @@ def _corners(image: np.ndarray) -> np.ndarray:
 
     clear = cv2.cornerMinEigenVal(image, BLOCK)
     grey = image.astype(np.float32)
-    rough = np.asarray(grey - cv2.GaussianBlur(grey, (0, 0), 1.0), np.float32)
-    noise = 1.4826 * float(np.median(np.abs(rough - np.median(rough))))
+    detail = np.asarray(grey - cv2.GaussianBlur(grey, (0, 0), 1.0), np.float32)
+    noise = 1.4826 * float(np.median(np.abs(detail - np.median(detail))))
     # The gradient energy that noise of this size produces on a grey wall.
     wall = 128 + noise * np.random.default_rng(0).standard_normal((128, 128))
-    least = OVER_NOISE * float(cv2.cornerMinEigenVal(np.clip(np.rint(wall), 0, 255).astype(np.uint8), BLOCK).max())
-    found = []
+    threshold = OVER_NOISE * float(cv2.cornerMinEigenVal(np.clip(np.rint(wall), 0, 255).astype(np.uint8), BLOCK).max())
+    groups = []
     for rows in np.array_split(np.arange(image.shape[0]), CELLS[1]):
         for columns in np.array_split(np.arange(image.shape[1]), CELLS[0]):
             top, left = rows[0], columns[0]
             cell = clear[top : rows[-1] + 1, left : columns[-1] + 1]
             highest = float(cell.max())
-            if highest < least:
+            if highest < threshold:
                 continue
-            own = np.ascontiguousarray(image[top : rows[-1] + 1, left : columns[-1] + 1])
+            tile = np.ascontiguousarray(image[top : rows[-1] + 1, left : columns[-1] + 1])
             # OpenCV takes the threshold as a share of the cell's clearest corner.
-            corners = cv2.goodFeaturesToTrack(own, A_CELL, min(max(least / highest, 0.02), 1.0), 8, blockSize=BLOCK)
+            corners = cv2.goodFeaturesToTrack(
+                tile, A_CELL, min(max(threshold / highest, 0.02), 1.0), 8, blockSize=BLOCK
+            )
             if corners is not None:
-                found.append(corners + np.array([left, top], np.float32))
-    return np.concatenate(found).astype(np.float32) if len(found) >= SPREAD else np.zeros((0, 1, 2), np.float32)
+                groups.append(corners + np.array([left, top], np.float32))
+    return np.concatenate(groups).astype(np.float32) if len(groups) >= SPREAD else np.zeros((0, 1, 2), np.float32)
 
 
 def _cells(corners: np.ndarray, shape: tuple[int, ...]) -> int:
@@ -168,52 +172,52 @@ def _cells(corners: np.ndarray, shape: tuple[int, ...]) -> int:
     return len(np.unique((corners / size).astype(int), axis=0))
 
 
-def _shift(before: np.ndarray, after: np.ndarray, most: float, shape: tuple[int, ...]) -> float | None:
+def _shift(start: np.ndarray, end: np.ndarray, coverage: float, shape: tuple[int, ...]) -> float | None:
     """Return how far most corners shifted together [px]; 0 if most of them stay, None if neither.
 
     Args:
-        before: Corners in the first image [px], shape (n, 2).
-        after: The same, followed into another, shape (n, 2).
-        most: Smallest number of cells of the image that they must cover [count].
+        start: Corners in the first image [px], shape (n, 2).
+        end: The same, followed into another, shape (n, 2).
+        coverage: Smallest number of cells of the image that they must cover [count].
         shape: The image's.
     """
     import cv2
 
-    if len(before) < FEWEST:
+    if len(start) < FEWEST:
         return None
-    stay = np.linalg.norm(after - before, axis=1) < STILL
-    if stay.mean() >= MOST_OF_THEM and _cells(before[stay], shape) >= most:
+    displacement = np.linalg.norm(end - start, axis=1) < STILL
+    if displacement.mean() >= MOST_OF_THEM and _cells(start[displacement], shape) >= coverage:
         return 0.0
-    moved, inside = cv2.estimateAffinePartial2D(before, after, ransacReprojThreshold=1.0)
+    transform, inside = cv2.estimateAffinePartial2D(start, end, ransacReprojThreshold=1.0)
     together = inside.ravel() > 0
-    if moved is None or together.mean() < MOST_OF_THEM or _cells(before[together], shape) < most:
+    if transform is None or together.mean() < MOST_OF_THEM or _cells(start[together], shape) < coverage:
         return None
-    return float(np.median(np.linalg.norm((after - before)[together], axis=1)))
+    return float(np.median(np.linalg.norm((end - start)[together], axis=1)))
 
 
 def _bumps(camera: str, looks: list[_Look], scale: float, begin_ns: int) -> list[Bump]:
     """Return a camera's bumps: stretches of at least two images whose background has the same shift."""
-    known = [look for look in looks if look.shift is not None]
+    views = [look for look in looks if look.shift is not None]
     runs: list[list[_Look]] = []
-    for look in known:
+    for look in views:
         if runs and abs((look.shift or 0.0) - (runs[-1][0].shift or 0.0)) < SHIFTED:
             runs[-1].append(look)
         else:
             runs.append([look])
     runs = [run for run in runs if len(run) > 1]
-    found = []
-    for before, run, after in zip(runs, runs[1:], [*runs[2:], None], strict=False):
+    bumps = []
+    for previous_run, run, next_run in zip(runs, runs[1:], [*runs[2:], None], strict=False):
         shift = run[0].shift or 0.0
         if shift < SHIFTED:
             continue
         # It may have happened right after the last image that shows the place before, and ended right before the next.
-        first, last = before[-1].time_ns, None if after is None else after[0].time_ns
-        sure = run[0].time_ns
-        between = f"between {(first - begin_ns) * 1e-9:.1f} and {(sure - begin_ns) * 1e-9:.1f} s"
+        first, last = previous_run[-1].time_ns, None if next_run is None else next_run[0].time_ns
+        end = run[0].time_ns
+        between = f"between {(first - begin_ns) * 1e-9:.1f} and {(end - begin_ns) * 1e-9:.1f} s"
         until = "" if last is None else f", until {(last - begin_ns) * 1e-9:.1f} s"
         words = (
             f"camera {camera} was moved {between} after the beginning{until}: what stands still in its images is "
             f"shifted by {shift:.1f} px, {1000 * shift * scale:.1f} mm at the fingers"
         )
-        found.append(Bump(camera, first - EARLIER, sure + LATER, last, shift * scale, words))
-    return found
+        bumps.append(Bump(camera, first - EARLIER, end + LATER, last, shift * scale, words))
+    return bumps

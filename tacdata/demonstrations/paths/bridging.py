@@ -53,9 +53,9 @@ def _densities(path: Smoothed, hidden: np.ndarray, longest: float) -> tuple[floa
         begins = _begins(hidden, rows)
         if len(begins) < FEWEST:
             continue
-        deviation, turned = _errors(path, begins, rows)
+        deviation, rotation_error = _errors(path, begins, rows)
         factor = MIDDLE / (rows * STEP) ** 3 / SPREADS**2
-        largest = max(largest[0], factor * deviation**2), max(largest[1], factor * turned**2)
+        largest = max(largest[0], factor * deviation**2), max(largest[1], factor * rotation_error**2)
     return largest
 
 
@@ -84,9 +84,11 @@ def _errors(path: Smoothed, begins: np.ndarray, rows: int) -> tuple[float, float
     bent = rows * STEP / 8 * (path.velocity[begins] - path.velocity[ends])
     middle = (path.position[begins] + path.position[ends]) / 2 + bent
     deviation = np.abs(path.position[middles] - middle).max()
-    turned = 0.0
+    rotation_error = 0.0
     for a, m, b in zip(begins[::3], middles[::3], ends[::3], strict=True):
-        first, second, last, before = (logarithm(path.rotation[k] @ path.rotation[m].T) for k in (a, a + 1, b, b - 1))
-        bridge = (first + last) / 2 + rows / 8 * ((second - first) - (last - before))
-        turned = max(turned, float(np.abs(bridge).max()))
-    return float(deviation), turned
+        first, second, last, penultimate = (
+            logarithm(path.rotation[k] @ path.rotation[m].T) for k in (a, a + 1, b, b - 1)
+        )
+        bridge = (first + last) / 2 + rows / 8 * ((second - first) - (last - penultimate))
+        rotation_error = max(rotation_error, float(np.abs(bridge).max()))
+    return float(deviation), rotation_error

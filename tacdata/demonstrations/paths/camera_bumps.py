@@ -67,8 +67,8 @@ class Bump:
     @property
     def spread(self) -> tuple[float, float]:
         """Prior standard deviation of place [m] and rotation [rad]."""
-        most = self.room * self.size or max(WIDE[0], 2 * self.size)
-        return most, WIDE[1] * most / WIDE[0]
+        reach = self.room * self.size or max(WIDE[0], 2 * self.size)
+        return reach, WIDE[1] * reach / WIDE[0]
 
 
 def jumps(sightings: Mapping[str, Sightings], begin_ns: int) -> list[Bump]:
@@ -78,31 +78,31 @@ def jumps(sightings: Mapping[str, Sightings], begin_ns: int) -> list[Bump]:
         sightings: Finger -> its sightings.
         begin_ns: Beginning of the demonstration [ns], for words.
     """
-    found: list[Bump] = []
-    cameras = sorted({camera for one in sightings.values() for camera in one.camera})
-    for one, other in combinations(cameras, 2):
-        steps = _steps(_apart(sightings, one, other))
+    bumps: list[Bump] = []
+    cameras = sorted({camera for series in sightings.values() for camera in series.camera})
+    for reference, partner in combinations(cameras, 2):
+        steps = _steps(_apart(sightings, reference, partner))
         for k, (moment, size) in enumerate(steps):
             # Another bump close by must not stand for this one.
-            first = max([_before(sightings, (one, other), moment), *(t for t, _ in steps[:k])])
+            first = max([_before(sightings, (reference, partner), moment), *(t for t, _ in steps[:k])])
             last = min([moment + WINDOW * 1e9, *(t for t, _ in steps[k + 1 :])])
-            which, at, gain = _which(sightings, (one, other), moment, (first, last))
+            which, at, gain = _which(sightings, (reference, partner), moment, (first, last))
             if gain < EVIDENT:
                 continue
-            if any(b.camera in which and abs(b.sure_ns - at) < 1e9 for b in found):
+            if any(b.camera in which and abs(b.sure_ns - at) < 1e9 for b in bumps):
                 continue  # a third camera shows the same bump
             seconds, jump = (at - begin_ns) * 1e-9, f"{1000 * size:.1f} mm apart where they agreed before"
             if len(which) == 1:
-                opposite = other if which[0] == one else one
+                opposite = partner if which[0] == reference else reference
                 words = f"it shows the fingers {jump}, against camera {opposite}"
             else:
                 words = f"it and camera {{}} show the fingers {jump}, and the motion does not tell which of them moved"
             for name in which:
-                opposite = other if name == one else one
+                opposite = partner if name == reference else reference
                 start = f"camera {name} was moved {seconds:.1f} s after the beginning: "
                 room = ROOM[len(which) - 1]
-                found.append(Bump(name, at - MARGIN, at + MARGIN, None, size, start + words.format(opposite), room))
-    return sorted(found, key=lambda bump: bump.begin_ns)
+                bumps.append(Bump(name, at - MARGIN, at + MARGIN, None, size, start + words.format(opposite), room))
+    return sorted(bumps, key=lambda bump: bump.begin_ns)
 
 
 def split(sightings: Mapping[str, Sightings], bumps: Sequence[Bump]) -> dict[str, Sightings]:
@@ -113,15 +113,15 @@ def split(sightings: Mapping[str, Sightings], bumps: Sequence[Bump]) -> dict[str
     divided = dict(sightings)
     for number, bump in enumerate(bumps):
         name = f"{bump.camera} (moved, {number + 1})"
-        for finger, found in divided.items():
-            moment = (found.time_ns >= bump.begin_ns) & (found.time_ns < bump.sure_ns)
-            found = found.where(~(moment & _of(found, bump.camera)))
-            divided[finger] = found
-            moved = _of(found, bump.camera) & (found.time_ns >= bump.sure_ns)
+        for finger, series in divided.items():
+            moment = (series.time_ns >= bump.begin_ns) & (series.time_ns < bump.sure_ns)
+            series = series.where(~(moment & _of(series, bump.camera)))
+            divided[finger] = series
+            rows = _of(series, bump.camera) & (series.time_ns >= bump.sure_ns)
             if bump.end_ns is not None:
-                moved &= found.time_ns < bump.end_ns
-            if moved.any():
-                divided[finger] = _renamed(found, moved, bump, name)
+                rows &= series.time_ns < bump.end_ns
+            if rows.any():
+                divided[finger] = _renamed(series, rows, bump, name)
     return divided
 
 
@@ -134,7 +134,7 @@ def _before(sightings: Mapping[str, Sightings], cameras: tuple[str, str], moment
     """Return from when on sightings before a moment tell the place before it [ns]: earlier if fingers were hidden."""
     first = [moment - WINDOW * 1e9]
     for camera in cameras:
-        times = np.sort(np.concatenate([found.time_ns[_of(found, camera)] for found in sightings.values()]))
+        times = np.sort(np.concatenate([series.time_ns[_of(series, camera)] for series in sightings.values()]))
         times = times[times < moment]
         first += [float(times[-min(len(times), LOCAL * len(sightings))])] if len(times) else []
     return min(first)
@@ -145,27 +145,29 @@ def _of(sightings: Sightings, camera: str) -> np.ndarray:
     return np.array([name.partition(" (moved")[0] == camera for name in sightings.camera], bool)
 
 
-def _renamed(sightings: Sightings, moved: np.ndarray, bump: Bump, name: str) -> Sightings:
-    cameras = tuple(name if hit else camera for hit, camera in zip(moved, sightings.camera, strict=True))
-    known = sightings.cameras.get(bump.camera)
+def _renamed(sightings: Sightings, rows: np.ndarray, bump: Bump, name: str) -> Sightings:
+    cameras = tuple(name if hit else camera for hit, camera in zip(rows, sightings.camera, strict=True))
+    viewpoint = sightings.cameras.get(bump.camera)
     # Without a stated error the camera's place is not known here; a turn about the fingers themselves does as well.
-    place = sightings.position[moved].mean(axis=0) if known is None else known.place
+    place = sightings.position[rows].mean(axis=0) if viewpoint is None else viewpoint.place
     return replace(sightings, camera=cameras, cameras={**sightings.cameras, name: CameraError(place, bump.spread)})
 
 
-def _apart(sightings: Mapping[str, Sightings], one: str, other: str) -> list[tuple[np.ndarray, np.ndarray]]:
+def _apart(sightings: Mapping[str, Sightings], reference: str, partner: str) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return, for each finger, times [ns] at which one camera saw it and its distance from the other's path [m]."""
     pairs = []
-    for found in sightings.values():
-        rows, rest = (np.array([camera == name for camera in found.camera], bool) for name in (one, other))
-        if min(rows.sum(), rest.sum()) < 2:
+    for series in sightings.values():
+        rows, partner_rows = (
+            np.array([camera == name for camera in series.camera], bool) for name in (reference, partner)
+        )
+        if min(rows.sum(), partner_rows.sum()) < 2:
             continue
-        times, path, at = found.time_ns[rest], found.position[rest], found.time_ns[rows]
-        after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
-        near = (at >= times[0]) & (at <= times[-1]) & (times[after] - times[after - 1] <= SPACED * 1e9)
+        times, path, at = series.time_ns[partner_rows], series.position[partner_rows], series.time_ns[rows]
+        upper = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+        near = (at >= times[0]) & (at <= times[-1]) & (times[upper] - times[upper - 1] <= SPACED * 1e9)
         begin = times[0]
-        there = np.stack([np.interp(at[near] - begin, times - begin, path[:, k]) for k in range(3)], axis=1)
-        pairs.append((at[near], found.position[rows][near] - there))
+        expected = np.stack([np.interp(at[near] - begin, times - begin, path[:, k]) for k in range(3)], axis=1)
+        pairs.append((at[near], series.position[rows][near] - expected))
     return pairs
 
 
@@ -196,14 +198,14 @@ def _step(pairs: list[tuple[np.ndarray, np.ndarray]]) -> tuple[int, float] | Non
     at = int(min(near, key=lambda moment: _cost(pairs, moment)))
     jump, local, weight, variance = np.zeros(3), np.zeros(3), 0, 0.0
     for t, d in pairs:
-        before, after = d[t < at], d[t >= at]
-        if min(len(before), len(after)) < LOCAL:
+        head, tail = d[t < at], d[t >= at]
+        if min(len(head), len(tail)) < LOCAL:
             continue
-        share = min(len(before), len(after))
-        jump += share * (np.median(after, axis=0) - np.median(before, axis=0))
-        local += share * (np.median(after[:LOCAL], axis=0) - np.median(before[-LOCAL:], axis=0))
+        share = min(len(head), len(tail))
+        jump += share * (np.median(tail, axis=0) - np.median(head, axis=0))
+        local += share * (np.median(tail[:LOCAL], axis=0) - np.median(head[-LOCAL:], axis=0))
         weight += share
-        for part in (before, after):
+        for part in (head, tail):
             # Robust; a median of pairs that share sightings is known as well as a mean of a quarter of them.
             scatter = 1.4826 * np.median(np.abs(part - np.median(part, axis=0)), axis=0)
             variance += share**2 * float(scatter @ scatter) / (len(part) / 4)
@@ -231,19 +233,19 @@ def _which(
 ) -> tuple[tuple[str, ...], int, float]:
     """Return which of two cameras moved, both if the motion does not decide, when [ns], and the gain of likelihood."""
     near = {}
-    for finger, found in sightings.items():
-        kept = (found.time_ns > span[0]) & (found.time_ns < span[1])
-        kept &= np.array([camera in cameras for camera in found.camera], bool)
-        if kept.sum() >= LOCAL:
-            near[finger] = found.where(kept)
+    for finger, series in sightings.items():
+        window = (series.time_ns > span[0]) & (series.time_ns < span[1])
+        window &= np.array([camera in cameras for camera in series.camera], bool)
+        if window.sum() >= LOCAL:
+            near[finger] = series.where(window)
     if not near:
         return cameras, moment, 0.0
     scores: dict[tuple[str, int], float] = {}
     without: dict[str, float] = {}
     for name, opposite in (cameras, cameras[::-1]):
-        noise = {finger: _noise(found, opposite) for finger, found in near.items()}
+        noise = {finger: _noise(series, opposite) for finger, series in near.items()}
         times = np.unique(
-            np.concatenate([found.time_ns[[camera == name for camera in found.camera]] for found in near.values()])
+            np.concatenate([series.time_ns[[camera == name for camera in series.camera]] for series in near.values()])
         )
         middle = int(np.searchsorted(times, moment))
         # Before the bump, too, the camera's place may be a little off: only the change counts.
@@ -264,10 +266,10 @@ def _which(
 def _likelihood(sightings: Mapping[str, Sightings], noise: Mapping[str, ProcessNoise]) -> float:
     """Return the log-likelihood of all fingers' sightings [nats]."""
     none = np.zeros(0, np.int64)
-    return sum(smooth(found, none, noise[finger], back=False).log_likelihood for finger, found in sightings.items())
+    return sum(smooth(series, none, noise[finger], back=False).log_likelihood for finger, series in sightings.items())
 
 
 def _noise(sightings: Sightings, camera: str) -> ProcessNoise:
     """Return the process noise that one camera alone saw: a bump of the other is no motion."""
-    own = np.array([name == camera for name in sightings.camera], bool)
-    return choose(sightings.where(own) if own.sum() >= LOCAL else sightings)
+    rows = np.array([name == camera for name in sightings.camera], bool)
+    return choose(sightings.where(rows) if rows.sum() >= LOCAL else sightings)

@@ -45,19 +45,19 @@ class Estimator:
             )
 
 
-def by_finger(given: Estimator | Mapping[str, Estimator] | None, fingers: tuple[str, ...]) -> dict[str, Estimator]:
+def by_finger(estimators: Estimator | Mapping[str, Estimator] | None, fingers: tuple[str, ...]) -> dict[str, Estimator]:
     """Return each finger's estimator; fingers without one are missing.
 
     Args:
-        given: One for all, or finger -> estimator, in which `ALL` is the default.
+        estimators: One for all, or finger -> estimator, in which `ALL` is the default.
         fingers: Fingers with a board.
 
     Raises:
         UsageError: If a finger is named that has no board.
     """
-    if given is None:
+    if estimators is None:
         return {}
-    named = {ALL: given} if isinstance(given, Estimator) else dict(given)
+    named = {ALL: estimators} if isinstance(estimators, Estimator) else dict(estimators)
     unknown = sorted(set(named) - {ALL, *fingers})
     if unknown:
         raise UsageError(
@@ -65,16 +65,20 @@ def by_finger(given: Estimator | Mapping[str, Estimator] | None, fingers: tuple[
             ", ".join(fingers) or "no finger",
             "correct the names in --network",
         )
-    found = {finger: named.get(finger, named.get(ALL)) for finger in fingers}
-    return {finger: estimator for finger, estimator in found.items() if estimator is not None}
+    assignment = {finger: named.get(finger, named.get(ALL)) for finger in fingers}
+    return {finger: estimator for finger, estimator in assignment.items() if estimator is not None}
 
 
 def identity_of(estimators: Mapping[str, Estimator]) -> dict[str, Any] | None:
     """Return which networks predicted: the one of all, or all of them under ``fingers``; None without any."""
-    known = {finger: estimator.identity for finger, estimator in estimators.items()}
-    if not known:
+    identities = {finger: estimator.identity for finger, estimator in estimators.items()}
+    if not identities:
         return None
-    first = next(iter(known.values()))
-    if all(identity == first for identity in known.values()):
+    first = next(iter(identities.values()))
+    if all(identity == first for identity in identities.values()):
         return first
-    return {**first, "hash": provenance.content_hash([one["hash"] for one in known.values()]), "fingers": known}
+    return {
+        **first,
+        "hash": provenance.content_hash([entry["hash"] for entry in identities.values()]),
+        "fingers": identities,
+    }

@@ -38,20 +38,20 @@ def _stretches(sightings: Sightings) -> list[Sightings]:
         return [sightings]
     stretches = []
     for begin in np.linspace(0, len(sightings) - BLOCK, BLOCKS).astype(int):
-        kept = np.zeros(len(sightings), bool)
-        kept[begin : begin + BLOCK] = True
-        stretches.append(sightings.where(kept))
+        mask = np.zeros(len(sightings), bool)
+        mask[begin : begin + BLOCK] = True
+        stretches.append(sightings.where(mask))
     return stretches
 
 
 def _climb(values: Sequence[float], worth: Callable[[float], float]) -> float:
     """Return the value of largest ``worth``, by hill climbing from the middle: the likelihood has one maximum."""
-    known: dict[int, float] = {}
+    evaluations: dict[int, float] = {}
 
     def at(k: int) -> float:
-        if k not in known:
-            known[k] = worth(values[k]) if 0 <= k < len(values) else -np.inf
-        return known[k]
+        if k not in evaluations:
+            evaluations[k] = worth(values[k]) if 0 <= k < len(values) else -np.inf
+        return evaluations[k]
 
     best = len(values) // 2
     while (better := max((best - 1, best, best + 1), key=at)) != best:

@@ -101,10 +101,14 @@ class _State:
             self.cameras + error[MOTION:],
         )
 
-    def minus(self, other: _State) -> np.ndarray:
-        turn = logarithm(self.rotation @ other.rotation.T)
-        rest = self.position - other.position, self.turning - other.turning, self.velocity - other.velocity
-        return np.concatenate([turn, *rest, self.cameras - other.cameras])
+    def minus(self, reference: _State) -> np.ndarray:
+        turn = logarithm(self.rotation @ reference.rotation.T)
+        differences = (
+            self.position - reference.position,
+            self.turning - reference.turning,
+            self.velocity - reference.velocity,
+        )
+        return np.concatenate([turn, *differences, self.cameras - reference.cameras])
 
 
 def smooth(
@@ -136,18 +140,18 @@ def smooth(
     # Of one time, sightings come before the pose that is asked for, which then contains them.
     order = np.lexsort((which < 0, moments))
     accepted, distance, likelihood, nodes = np.zeros(len(sightings), bool), np.full(len(sightings), np.nan), 0.0, []
-    state, known, now = _first(sightings, first)
+    state, covariance, instant = _first(sightings, first)
     unseen = _over_gaps(sightings, moments)
     for k in order:
         freely = MANOEUVRE if int(which[k]) in again else (wander.unseen or wander) if unseen[k] else wander
-        expected, spread, step = _predicted(state, known, float(moments[k] - now) * NS, freely)
-        state, known, now = expected, spread, moments[k]
+        expected, spread, step = _predicted(state, covariance, float(moments[k] - instant) * NS, freely)
+        state, covariance, instant = expected, spread, moments[k]
         if which[k] >= 0:
             n = int(which[k])
-            state, known, distance[n], gained = _updated(expected, spread, sightings, n, n in wrong)
+            state, covariance, distance[n], gained = _updated(expected, spread, sightings, n, n in wrong)
             accepted[n] = distance[n] < GATE and n not in wrong
             likelihood += gained
-        nodes.append(_Node(expected, spread, step, state, known))
+        nodes.append(_Node(expected, spread, step, state, covariance))
     if back:
         _go_back(nodes)
     poses = [node for node, k in zip(nodes, order, strict=True) if which[k] < 0]
@@ -156,8 +160,8 @@ def smooth(
 
 def _over_gaps(sightings: Sightings, moments: np.ndarray) -> np.ndarray:
     """Return which moments [ns] lie in a gap between sightings, or at its end, shape (n,), bool."""
-    after = np.clip(np.searchsorted(sightings.time_ns, moments), 1, len(sightings) - 1)
-    return sightings.time_ns[after] - sightings.time_ns[after - 1] > GAP / NS
+    upper = np.clip(np.searchsorted(sightings.time_ns, moments), 1, len(sightings) - 1)
+    return sightings.time_ns[upper] - sightings.time_ns[upper - 1] > GAP / NS
 
 
 def _collected(
@@ -192,32 +196,32 @@ def _beginning(sightings: Sightings) -> int:
 def _first(sightings: Sightings, k: int) -> tuple[_State, np.ndarray, int]:
     errors = [error.spread for error in sightings.cameras.values()]
     size = MOTION + 6 * len(errors)
-    known = np.zeros((size, size))
-    known[:6, :6] = 100 * sightings.covariance[k]  # its own sighting comes next and must not count twice
-    known[6:9, 6:9], known[9:MOTION, 9:MOTION] = FIRST_SPEED[1] ** 2 * _EYE, FIRST_SPEED[0] ** 2 * _EYE
+    covariance = np.zeros((size, size))
+    covariance[:6, :6] = 100 * sightings.covariance[k]  # its own sighting comes next and must not count twice
+    covariance[6:9, 6:9], covariance[9:MOTION, 9:MOTION] = FIRST_SPEED[1] ** 2 * _EYE, FIRST_SPEED[0] ** 2 * _EYE
     for number, (position, rotation) in enumerate(errors):
         at = MOTION + 6 * number
-        known[at : at + 3, at : at + 3] = rotation**2 * _EYE
-        known[at + 3 : at + 6, at + 3 : at + 6] = position**2 * _EYE
+        covariance[at : at + 3, at : at + 3] = rotation**2 * _EYE
+        covariance[at + 3 : at + 6, at + 3 : at + 6] = position**2 * _EYE
         # The first pose errs with the camera that saw it.
-        known[:6, :6] += np.diag([rotation**2] * 3 + [position**2] * 3)
+        covariance[:6, :6] += np.diag([rotation**2] * 3 + [position**2] * 3)
     first = _State(sightings.rotation[k], sightings.position[k], np.zeros(3), np.zeros(3), np.zeros(size - MOTION))
-    return first, known, int(sightings.time_ns[k])
+    return first, covariance, int(sightings.time_ns[k])
 
 
 def _predicted(
-    state: _State, known: np.ndarray, dt: float, wander: ProcessNoise
+    state: _State, covariance: np.ndarray, dt: float, wander: ProcessNoise
 ) -> tuple[_State, np.ndarray, np.ndarray]:
     turn = exponential(state.turning * dt)
-    step = np.eye(len(known))
+    step = np.eye(len(covariance))
     # An error of rotation is a vector in the world: it turns along with the finger.
     step[:3, :3] = turn
     step[:3, 6:9] = step[3:6, 9:MOTION] = dt * _EYE
-    of_rates, mixed, of_places = _noise_parts(len(known), wander.turning, wander.velocity)
+    of_rates, mixed, of_places = _noise_parts(len(covariance), wander.turning, wander.velocity)
     noise = dt * of_rates + dt**2 / 2 * mixed + dt**3 / 3 * of_places
     place = state.position + state.velocity * dt
     expected = _State(turn @ state.rotation, place, state.turning, state.velocity, state.cameras)
-    return expected, step @ known @ step.T + noise, step
+    return expected, step @ covariance @ step.T + noise, step
 
 
 @lru_cache(maxsize=64)
@@ -240,21 +244,21 @@ def _updated(
     if sightings.cameras:
         seen_as = _observed(expected, sightings, n)
         surprise = surprise - seen_as[:, MOTION:] @ expected.cameras
-        across = spread @ seen_as.T
-        total = seen_as @ across + sightings.covariance[n]
+        cross = spread @ seen_as.T
+        total = seen_as @ cross + sightings.covariance[n]
     else:  # a sighting shows the pose itself
-        across = spread[:, :6]
-        total = across[:6] + sightings.covariance[n]
+        cross = spread[:, :6]
+        total = cross[:6] + sightings.covariance[n]
     inverse = np.linalg.inv(total)
     distance = float(surprise @ inverse @ surprise)
     # An outlier counts as one at the gate. Without that, every rejection would make a track likelier.
     gained = -0.5 * ((GATE if wrong else min(distance, GATE)) + np.linalg.slogdet(total)[1])
     if wrong or distance >= GATE:
         return expected, spread, distance, gained
-    gain = across @ inverse
-    known = spread - gain @ across.T
+    gain = cross @ inverse
+    covariance = spread - gain @ cross.T
     # Rounding would make the covariance unsymmetric over thousands of steps.
-    return expected.plus(gain @ surprise), (known + known.T) / 2, distance, gained
+    return expected.plus(gain @ surprise), (covariance + covariance.T) / 2, distance, gained
 
 
 def _observed(expected: _State, sightings: Sightings, n: int) -> np.ndarray:
@@ -272,11 +276,11 @@ def _observed(expected: _State, sightings: Sightings, n: int) -> np.ndarray:
 
 def _go_back(nodes: list[_Node]) -> None:
     for k in range(len(nodes) - 2, -1, -1):
-        here, after = nodes[k], nodes[k + 1]
-        gain = np.linalg.solve(after.spread, after.step @ here.known).T
-        moved = gain @ after.state.minus(after.expected)
-        known = here.known + gain @ (after.known - after.spread) @ gain.T
-        here.state, here.known = here.state.plus(moved), (known + known.T) / 2
+        node, successor = nodes[k], nodes[k + 1]
+        gain = np.linalg.solve(successor.spread, successor.step @ node.known).T
+        correction = gain @ successor.state.minus(successor.expected)
+        covariance = node.known + gain @ (successor.known - successor.spread) @ gain.T
+        node.state, node.known = node.state.plus(correction), (covariance + covariance.T) / 2
 
 
 def exponential(vector: np.ndarray) -> np.ndarray:

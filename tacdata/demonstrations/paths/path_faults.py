@@ -43,9 +43,9 @@ def gaps(time_ns: np.ndarray, begin_ns: int, end_ns: int) -> list[tuple[int, int
 def turn_against(sightings: Sightings, path: Smoothed, times_ns: np.ndarray) -> np.ndarray:
     """Return the angle between each sighting and the path at the nearest grid time [rad], shape (p,); NaN outside."""
     nearest, angles = _nearest(times_ns, sightings.time_ns), np.full(len(sightings), np.nan)
-    for k, (rotation, there) in enumerate(zip(sightings.rotation, path.rotation[nearest], strict=True)):
-        if np.isfinite(there).all():
-            angles[k] = np.linalg.norm(logarithm(rotation @ there.T))
+    for k, (rotation, path_rotation) in enumerate(zip(sightings.rotation, path.rotation[nearest], strict=True)):
+        if np.isfinite(path_rotation).all():
+            angles[k] = np.linalg.norm(logarithm(rotation @ path_rotation.T))
     return angles
 
 
@@ -59,10 +59,10 @@ def wrong_tags(sightings: Sightings, path: Smoothed, times_ns: np.ndarray) -> tu
     nearest = _nearest(times_ns, sightings.time_ns)
     turns: dict[int, list[np.ndarray]] = {}
     for k, ids in enumerate(sightings.ids):
-        there = path.rotation[nearest[k]]
-        if len(ids) == 1 and np.isfinite(there).all():
-            turns.setdefault(ids[0], []).append(there.T @ sightings.rotation[k])
-    means = {tag: _mean(found) for tag, found in turns.items() if len(found) >= LEAST}
+        path_rotation = path.rotation[nearest[k]]
+        if len(ids) == 1 and np.isfinite(path_rotation).all():
+            turns.setdefault(ids[0], []).append(path_rotation.T @ sightings.rotation[k])
+    means = {tag: _mean(rotations) for tag, rotations in turns.items() if len(rotations) >= LEAST}
     groups = [[b for b in means if _angle(means[a], means[b]) < TURNED] for a in means]
     if not groups:
         return {}, ()
@@ -74,8 +74,8 @@ def wrong_tags(sightings: Sightings, path: Smoothed, times_ns: np.ndarray) -> tu
 
 def _nearest(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:
     """Return the index of the grid time nearest to each time."""
-    after = np.clip(np.searchsorted(times_ns, wanted_ns), 1, len(times_ns) - 1)
-    return after - ((wanted_ns - times_ns[after - 1]) < (times_ns[after] - wanted_ns))
+    upper = np.clip(np.searchsorted(times_ns, wanted_ns), 1, len(times_ns) - 1)
+    return upper - ((wanted_ns - times_ns[upper - 1]) < (times_ns[upper] - wanted_ns))
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> float:
@@ -84,20 +84,20 @@ def _angle(a: np.ndarray, b: np.ndarray) -> float:
 
 def _mean(rotations: list[np.ndarray]) -> np.ndarray:
     """Return the median rotation, shape (3, 3): the one with the smallest sum of angles to the others."""
-    few = rotations[:: max(len(rotations) // 30, 1)]
-    return few[int(np.argmin([sum(_angle(a, b) for b in few) for a in few]))]
+    sample = rotations[:: max(len(rotations) // 30, 1)]
+    return sample[int(np.argmin([sum(_angle(a, b) for b in sample) for a in sample]))]
 
 
 def flips(sightings: Sightings, accepted: np.ndarray, angle: np.ndarray, name: str) -> list[str]:
     """Describe how many sightings were flipped against the path, and by how much."""
-    turned = ~accepted & (angle > TURNED)
-    if not turned.any():
+    outlier = ~accepted & (angle > TURNED)
+    if not outlier.any():
         return []
-    low, high = np.degrees(np.nanquantile(angle[turned], [0.1, 0.9]))
-    tags = Counter(t for ids, bad in zip(sightings.ids, turned, strict=True) if bad for t in ids)
+    low, high = np.degrees(np.nanquantile(angle[outlier], [0.1, 0.9]))
+    tags = Counter(t for ids, bad in zip(sightings.ids, outlier, strict=True) if bad for t in ids)
     which = ", ".join(f"tag {tag} in {count}" for tag, count in tags.most_common(3))
     return [
-        f"{name}: {int(turned.sum())} of {len(sightings)} sightings are turned by {low:.0f} to {high:.0f} deg against "
+        f"{name}: {int(outlier.sum())} of {len(sightings)} sightings are turned by {low:.0f} to {high:.0f} deg against "
         f"the path and were left out ({which}): a mirrored pose of a single face, or a tag glued on turned"
     ]
 
@@ -107,34 +107,35 @@ def exchanges(
 ) -> list[str]:
     """Describe where sightings of two fingers lie on each other's path: their numbers are exchanged."""
     remarks = []
-    for one, other in combinations(sightings, 2):
-        found = [
-            _on_the_others_path(sightings[a], paths[a], paths[b], times_ns) for a, b in ((one, other), (other, one))
+    for finger, partner in combinations(sightings, 2):
+        encounters = [
+            _on_the_others_path(sightings[a], paths[a], paths[b], times_ns)
+            for a, b in ((finger, partner), (partner, finger))
         ]
-        if all(len(times) >= 2 for times in found):
-            both = np.sort(np.concatenate(found))
-            first, last = (both[[0, -1]] - begin_ns) * 1e-9  # ty: ignore[unsupported-operator]
+        if all(len(times) >= 2 for times in encounters):
+            moments = np.sort(np.concatenate(encounters))
+            first, last = (moments[[0, -1]] - begin_ns) * 1e-9  # ty: ignore[unsupported-operator]
             remarks.append(
-                f"{one} and {other} change places {first:.1f} s after the beginning (seen so until {last:.1f} s): "
+                f"{finger} and {partner} change places {first:.1f} s after the beginning (seen so until {last:.1f} s): "
                 "the numbers of their cubes are exchanged"
             )
     return remarks
 
 
-def _on_the_others_path(sightings: Sightings, own: Smoothed, other: Smoothed, times_ns: np.ndarray) -> np.ndarray:
+def _on_the_others_path(sightings: Sightings, track: Smoothed, rival: Smoothed, times_ns: np.ndarray) -> np.ndarray:
     """Return the times [ns] of outliers that lie much nearer to another finger's path than to their own."""
     refused = (
-        ~own.accepted
+        ~track.accepted
         & (sightings.time_ns >= times_ns[0])
         & (sightings.time_ns <= times_ns[-1])
         & (sightings.timing <= TIMELY)
     )
     times = sightings.time_ns[refused]
-    here, there = (
-        np.stack([np.interp(times, times_ns, path.position[:, k]) for k in range(3)], -1) for path in (own, other)
+    reference, alternative = (
+        np.stack([np.interp(times, times_ns, path.position[:, k]) for k in range(3)], -1) for path in (track, rival)
     )
-    distance = np.linalg.norm(here - there, axis=1)
-    deviation = np.linalg.norm(sightings.position[refused] - there, axis=1)
+    distance = np.linalg.norm(reference - alternative, axis=1)
+    deviation = np.linalg.norm(sightings.position[refused] - alternative, axis=1)
     return times[deviation < NEAR * distance]
 
 
@@ -146,14 +147,14 @@ def other_hand(paths: dict[str, Smoothed], fingers: dict[str, Finger], rate: flo
         if not {"index", "middle"} <= {f.kind for f in hand_fingers.values()}:
             continue
         step = max(round(rate / 10), 1)
-        found = Counter(
+        votes = Counter(
             _stands(hand_fingers, paths, k) for k in range(0, len(next(iter(paths.values())).position), step)
         )
-        wrong = found["left" if hand == "right" else "right"]
-        if wrong > STANDING * max(wrong + found[hand], 1):
+        wrong = votes["left" if hand == "right" else "right"]
+        if wrong > STANDING * max(wrong + votes[hand], 1):
             remarks.append(
                 f"index and middle finger of the {hand} hand stand as those of the other hand in "
-                f"{wrong / (wrong + found[hand]):.0%} of the time: the hands' cubes are swapped, or these two fingers'"
+                f"{wrong / (wrong + votes[hand]):.0%} of the time: the hands' cubes are swapped, or these two fingers'"
             )
     return remarks
 

@@ -55,13 +55,13 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
 
     records = read_records(recording.path, images=False, digests=False, seen=search)
     views: list[TagStream] = []
-    for name, found in sightings.items():
+    for name, detections in sightings.items():
         clock = clock_of(records, name, recording.rig.cameras[name].get("rate"))
         stamps = image_times(records, name, clock)
-        own = None
+        timing = None
         if isinstance(clock, ImageClock):
-            own = clock.uncertainties(stamps.device_ns if clock.axis == "device_ns" else stamps.sequence)
-        views += [_stream(name, finger, stamps.sample_ns, found, own) for finger in recording.rig.fingers]
+            timing = clock.uncertainties(stamps.device_ns if clock.axis == "device_ns" else stamps.sequence)
+        views += [_stream(name, finger, stamps.sample_ns, detections, timing) for finger in recording.rig.fingers]
     notes = tuple(note for note in recording.notes if not note.startswith("camera ") or "failed" in note)
     searched = f"all {sum(map(len, sightings.values()))} images"
     return replace(recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched)
@@ -69,10 +69,10 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
 
 def why_nothing_is_seen(recording: DemoRecording) -> Unread | None:
     """Return why the stored images of a demonstration show no tag that can be read; None if that is not known."""
-    kept: dict[str, list[tuple[int, np.ndarray]]] = {}
+    samples: dict[str, list[tuple[int, np.ndarray]]] = {}
     with suppress(UsageError, FormatError):  # the file may be gone by now: then nothing more is known
-        kept = sampled(recording, SAMPLE)
-    return why_unread([image for images in kept.values() for _, image in images])
+        samples = sampled(recording, SAMPLE)
+    return why_unread([image for images in samples.values() for _, image in images])
 
 
 def sampled(recording: DemoRecording, count: int) -> dict[str, list[tuple[int, np.ndarray]]]:
@@ -85,29 +85,29 @@ def sampled(recording: DemoRecording, count: int) -> dict[str, list[tuple[int, n
         FormatError: If it cannot be read at all.
     """
     named = {topics.image(name): name for name in recording.rig.cameras}
-    kept: dict[str, dict[int, bytes]] = {name: {} for name in named.values()}
-    passed = dict.fromkeys(kept, 0)
-    stride = dict.fromkeys(kept, 1)
+    buffers: dict[str, dict[int, bytes]] = {name: {} for name in named.values()}
+    passed = dict.fromkeys(buffers, 0)
+    stride = dict.fromkeys(buffers, 1)
 
     def keep(topic: str, message: bytes | memoryview) -> None:
         if topic not in named:
             return
         name = named[topic]
         if passed[name] % stride[name] == 0:
-            kept[name][passed[name]] = bytes(message)
+            buffers[name][passed[name]] = bytes(message)
         passed[name] += 1
         # The number of images is known only at the end, so every other one is dropped whenever there are twice too
         # many.
-        if len(kept[name]) > 2 * count:
+        if len(buffers[name]) > 2 * count:
             stride[name] *= 2
-            kept[name] = {k: own for k, own in kept[name].items() if k % stride[name] == 0}
+            buffers[name] = {k: payload for k, payload in buffers[name].items() if k % stride[name] == 0}
 
     records = read_records(recording.path, images=False, digests=False, seen=keep)
     images: dict[str, list[tuple[int, np.ndarray]]] = {}
-    for name, messages in kept.items():
+    for name, messages in buffers.items():
         times = image_times(records, name, clock_of(records, name, recording.rig.cameras[name].get("rate"))).sample_ns
-        chosen = [k for k in list(messages)[:: -(-len(messages) // count) or 1] if k < len(times)]
-        opened = ((int(times[k]), _image(messages[k])) for k in chosen)
+        indices = [k for k in list(messages)[:: -(-len(messages) // count) or 1] if k < len(times)]
+        opened = ((int(times[k]), _image(messages[k])) for k in indices)
         images[name] = [(time, image) for time, image in opened if image is not None]
     return images
 
@@ -121,15 +121,15 @@ def _image(message: bytes) -> np.ndarray | None:
 
 
 def _stream(
-    camera: str, finger: str, times_ns: np.ndarray, found: list[dict[str, TipPose]], timing: np.ndarray | None
+    camera: str, finger: str, times_ns: np.ndarray, detections: list[dict[str, TipPose]], timing: np.ndarray | None
 ) -> TagStream:
-    count = min(len(times_ns), len(found))
+    count = min(len(times_ns), len(detections))
     position, quaternion = np.full((count, 3), np.nan), np.full((count, 4), np.nan)
     covariance, reprojection = np.full((count, 6, 6), np.nan), np.full(count, np.nan)
     faces, ambiguous = np.zeros(count, np.int64), np.zeros(count, bool)
     ids: list[tuple[int, ...]] = [()] * count
     for row in range(count):
-        tip = found[row].get(finger)
+        tip = detections[row].get(finger)
         if tip is None:
             continue
         position[row], quaternion[row] = tip.position, tip.quaternion

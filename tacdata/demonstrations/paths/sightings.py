@@ -60,19 +60,19 @@ class Sightings:
         """Number of sightings."""
         return len(self.time_ns)
 
-    def where(self, kept: np.ndarray) -> Sightings:
-        """Return some of the sightings; ``kept`` has shape (p,), bool."""
-        chosen = np.flatnonzero(kept)
+    def where(self, mask: np.ndarray) -> Sightings:
+        """Return some of the sightings; ``mask`` has shape (p,), bool."""
+        indices = np.flatnonzero(mask)
         return Sightings(
             self.finger,
-            self.time_ns[kept],
-            self.position[kept],
-            self.rotation[kept],
-            self.covariance[kept],
-            self.ambiguous[kept],
-            tuple(self.camera[k] for k in chosen),
-            tuple(self.ids[k] for k in chosen),
-            self.timing[kept],
+            self.time_ns[mask],
+            self.position[mask],
+            self.rotation[mask],
+            self.covariance[mask],
+            self.ambiguous[mask],
+            tuple(self.camera[k] for k in indices),
+            tuple(self.ids[k] for k in indices),
+            self.timing[mask],
             self.cameras,
         )
 
@@ -144,12 +144,12 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     if pose is None:
         sightings[:] = False
         pose = np.eye(4)
-    chosen, turn = np.flatnonzero(sightings), pose[:3, :3]
-    count = len(chosen)
+    indices, turn = np.flatnonzero(sightings), pose[:3, :3]
+    count = len(indices)
     covariance = np.full((count, 6, 6), np.nan) if view.covariance is None else view.covariance[sightings].copy()
     # Rotation error and position both turn from the camera's frame into the world's.
-    both = np.kron(np.eye(2), turn)
-    covariance = both @ np.where(np.isfinite(covariance), covariance, np.nan) @ both.T
+    rotation = np.kron(np.eye(2), turn)
+    covariance = rotation @ np.where(np.isfinite(covariance), covariance, np.nan) @ rotation.T
     lost = ~np.isfinite(covariance).all(axis=(1, 2))
     covariance[lost] = _diagonal(*UNKNOWN)
     covariance[np.linalg.eigvalsh(covariance)[:, 0] < -ROUNDING] = _diagonal(*UNKNOWN)
@@ -167,7 +167,7 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
         covariance + _diagonal(*FLOOR),
         ambiguous[sightings],
         (view.camera,) * count,
-        tuple(ids[k] for k in chosen),
+        tuple(ids[k] for k in indices),
         sigma,
     )
 

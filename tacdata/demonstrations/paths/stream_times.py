@@ -75,10 +75,10 @@ def check_together(recording: DemoRecording) -> None:
         first, last = spans.get(device, (int(values[0]), int(values[-1])))
         spans[device] = min(first, int(values[0])), max(last, int(values[-1]))
     for device, (first, last) in spans.items():
-        others = [span for other, span in spans.items() if other != device]
-        if not others:
+        references = [span for key, span in spans.items() if key != device]
+        if not references:
             continue
-        begin, end = min(span[0] for span in others), max(span[1] for span in others)
+        begin, end = min(span[0] for span in references), max(span[1] for span in references)
         distance = max(first - end, begin - last) * 1e-9
         if distance > ASTRAY:
             side = "after" if first > end else "before"
@@ -98,25 +98,25 @@ def in_step(
         recording: The recording.
         sightings: Finger -> its sightings.
     """
-    cameras = sorted({camera for found in sightings.values() for camera in found.camera})
-    moved: dict[str, float] = {}
+    cameras = sorted({camera for series in sightings.values() for camera in series.camera})
+    delays: dict[str, float] = {}
     words = []
-    for one, other in combinations(cameras, 2):
-        lag = _lag(sightings, one, other)
+    for reference, partner in combinations(cameras, 2):
+        lag = _lag(sightings, reference, partner)
         # Of three cameras, a pair with one that is moved already would move it twice.
-        if lag is None or one in moved or other in moved:
+        if lag is None or reference in delays or partner in delays:
             continue
-        late, early = (other, one) if lag > 0 else (one, other)
-        moved[late] = abs(lag)
+        slow, fast = (partner, reference) if lag > 0 else (reference, partner)
+        delays[slow] = abs(lag)
         words.append(
-            f"the images of camera {late} are {abs(lag):.2f} s later than those of camera {early}, by the motion that "
+            f"the images of camera {slow} are {abs(lag):.2f} s later than those of camera {fast}, by the motion that "
             "both saw: they are moved back by that; correct the camera's latency in the demo rig"
         )
     views = tuple(
-        replace(view, sample_ns=view.sample_ns - round(moved.get(view.camera, 0.0) * 1e9)) for view in recording.views
+        replace(view, sample_ns=view.sample_ns - round(delays.get(view.camera, 0.0) * 1e9)) for view in recording.views
     )
-    timing = recording.timing | {name: max(RESIDUAL, recording.timing.get(name, 0.0)) for name in moved}
-    return replace(recording, views=views, timing=timing) if moved else recording, moved, words
+    timing = recording.timing | {name: max(RESIDUAL, recording.timing.get(name, 0.0)) for name in delays}
+    return replace(recording, views=views, timing=timing) if delays else recording, delays, words
 
 
 def late_stretches(sightings: Mapping[str, Sightings], begin_ns: int) -> tuple[dict[str, Sightings], list[str]]:
@@ -129,32 +129,35 @@ def late_stretches(sightings: Mapping[str, Sightings], begin_ns: int) -> tuple[d
         sightings: Finger -> its sightings.
         begin_ns: Beginning of the demonstration [ns], for words.
     """
-    cameras = sorted({camera for found in sightings.values() for camera in found.camera})
+    cameras = sorted({camera for series in sightings.values() for camera in series.camera})
     spans: dict[str, list[tuple[float, float, float]]] = {}
-    times = np.concatenate([np.zeros(0, np.int64), *(found.time_ns for found in sightings.values())])
+    times = np.concatenate([np.zeros(0, np.int64), *(series.time_ns for series in sightings.values())])
     if len(cameras) < 2 or not len(times):
         return dict(sightings), []
     moments = np.arange(times.min(), times.max(), round(WINDOW / 2 * 1e9), dtype=np.int64)
-    for one, other in combinations(cameras, 2):
+    for reference, partner in combinations(cameras, 2):
         for first in moments:
             last = first + round(WINDOW * 1e9)
             part = {n: f.where((f.time_ns >= first) & (f.time_ns < last)) for n, f in sightings.items()}
-            lag = _lag(part, one, other, NEAR_LAGS, FEW)
-            late = other if (lag or 0.0) > 0 else one
-            known = [sigma for f in part.values() for sigma in f.timing[_by(f, late)]]
-            if lag is not None and known and abs(lag) > CLEARLY * float(np.median(known)):
-                spans.setdefault(late, []).append((float(first), float(last), abs(lag)))
+            lag = _lag(part, reference, partner, NEAR_LAGS, FEW)
+            laggard = partner if (lag or 0.0) > 0 else reference
+            sigmas = [sigma for f in part.values() for sigma in f.timing[_by(f, laggard)]]
+            if lag is not None and sigmas and abs(lag) > CLEARLY * float(np.median(sigmas)):
+                spans.setdefault(laggard, []).append((float(first), float(last), abs(lag)))
     judged, words = dict(sightings), []
-    for camera, late in spans.items():
-        for name, found in judged.items():
-            timing = found.timing.copy()
-            for first, last, lag in late:
-                rows = _by(found, camera) & (found.time_ns >= first) & (found.time_ns < last)
+    for camera, stretches in spans.items():
+        for name, series in judged.items():
+            timing = series.timing.copy()
+            for first, last, lag in stretches:
+                rows = _by(series, camera) & (series.time_ns >= first) & (series.time_ns < last)
                 timing[rows] = np.maximum(timing[rows], lag)
-            judged[name] = replace(found, timing=timing, covariance=found.covariance + _more(found, timing))
-        ends = (min(span[0] for span in late) - begin_ns) * 1e-9, (max(span[1] for span in late) - begin_ns) * 1e-9
+            judged[name] = replace(series, timing=timing, covariance=series.covariance + _more(series, timing))
+        ends = (
+            (min(span[0] for span in stretches) - begin_ns) * 1e-9,
+            (max(span[1] for span in laggard) - begin_ns) * 1e-9,
+        )
         words.append(
-            f"the images of camera {camera} are up to {max(span[2] for span in late):.2f} s later than those of "
+            f"the images of camera {camera} are up to {max(span[2] for span in stretches):.2f} s later than those of "
             f"another between {ends[0]:.1f} and {ends[1]:.1f} s: the host did not keep up, and they hardly count there"
         )
     return judged, words
@@ -178,14 +181,14 @@ def carried_through(path: Smoothed, sightings: Sightings, times_ns: np.ndarray) 
     """
     sigma, covariance = known_to(sightings, times_ns), path.covariance.copy()
     seconds, last = (times_ns - times_ns[0]) * 1e-9, len(times_ns) - 1
-    moved = _displacements(sightings, times_ns, sigma)
+    displacement = _displacements(sightings, times_ns, sigma)
     for k in np.flatnonzero(np.isfinite(path.position).all(axis=1)):
         a, b = max(k - 1, 0), min(k + 1, last)
         turn = path.rotation[b] @ path.rotation[a].T
         turning = logarithm(turn) / (seconds[b] - seconds[a]) if np.isfinite(turn).all() and b > a else np.zeros(3)
         smoothed = np.outer(path.velocity[k], path.velocity[k]) * sigma[k] ** 2
         covariance[k, :3, :3] += np.outer(turning, turning) * sigma[k] ** 2
-        covariance[k, 3:, 3:] += max(smoothed, moved[k], key=lambda matrix: float(np.trace(matrix)))
+        covariance[k, 3:, 3:] += max(smoothed, displacement[k], key=lambda matrix: float(np.trace(matrix)))
     return replace(path, covariance=covariance)
 
 
@@ -200,8 +203,8 @@ def known_to(sightings: Sightings, times_ns: np.ndarray) -> np.ndarray:
     for camera in dict.fromkeys(sightings.camera):
         rows = _by(sightings, camera)
         times, sigma = sightings.time_ns[rows], np.minimum(sightings.timing[rows], LONGEST)
-        after = np.clip(np.searchsorted(times, times_ns), 1, max(len(times) - 1, 1))
-        ends = [np.clip(after - 1, 0, len(times) - 1), np.clip(after, 0, len(times) - 1)]
+        upper = np.clip(np.searchsorted(times, times_ns), 1, max(len(times) - 1, 1))
+        ends = [np.clip(upper - 1, 0, len(times) - 1), np.clip(upper, 0, len(times) - 1)]
         away = np.min([np.abs(times[k] - times_ns) for k in ends], axis=0)
         near = away <= SPACED * 1e9
         best[near] = np.minimum(best, np.max([sigma[k] for k in ends], axis=0))[near]
@@ -215,23 +218,23 @@ def known_to(sightings: Sightings, times_ns: np.ndarray) -> np.ndarray:
 def late_words(sightings: Mapping[str, Sightings], begin_ns: int) -> list[str]:
     """Describe which cameras' image times are known badly, when, and the resulting error of moving fingers."""
     words = []
-    for camera in sorted({camera.partition(" (")[0] for found in sightings.values() for camera in found.camera}):
+    for camera in sorted({camera.partition(" (")[0] for series in sightings.values() for camera in series.camera}):
         times, sigma, fastest = [], [], 0.0
-        for found in sightings.values():
-            rows = np.array([name.partition(" (")[0] == camera for name in found.camera], bool)
+        for series in sightings.values():
+            rows = np.array([name.partition(" (")[0] == camera for name in series.camera], bool)
             if rows.sum() > 1:
-                times, sigma = [*times, *found.time_ns[rows]], [*sigma, *found.timing[rows]]
-                step = np.diff(found.time_ns[rows]) * 1e-9
-                speed = np.linalg.norm(np.diff(found.position[rows], axis=0), axis=1) / np.maximum(step, STILL)
+                times, sigma = [*times, *series.time_ns[rows]], [*sigma, *series.timing[rows]]
+                step = np.diff(series.time_ns[rows]) * 1e-9
+                speed = np.linalg.norm(np.diff(series.position[rows], axis=0), axis=1) / np.maximum(step, STILL)
                 fastest = max(fastest, float(np.quantile(speed, 0.99)))
         vague = np.array(sigma) > LATE
         if not vague.any():
             continue
-        when, most = np.array(times)[vague], min(float(np.max(sigma)), LONGEST)
+        when, peak = np.array(times)[vague], min(float(np.max(sigma)), LONGEST)
         span = f" from {(when.min() - begin_ns) * 1e-9:.1f} to {(when.max() - begin_ns) * 1e-9:.1f} s"
         words.append(
-            f"the times of camera {camera}'s images are known to {most:.2f} s only{'' if vague.all() else span}: a "
-            f"finger that moves is known to up to {1000 * most * fastest:.0f} mm; record again on a host that keeps up,"
+            f"the times of camera {camera}'s images are known to {peak:.2f} s only{'' if vague.all() else span}: a "
+            f"finger that moves is known to up to {1000 * peak * fastest:.0f} mm; record again on a host that keeps up,"
             " or with a camera that stamps its images"
         )
     return words
@@ -267,22 +270,22 @@ def _displacements(sightings: Sightings, times_ns: np.ndarray, sigma: np.ndarray
 
 
 def _lag(
-    sightings: Mapping[str, Sightings], one: str, other: str, lags: np.ndarray = LAGS, fewest: int = FEWEST
+    sightings: Mapping[str, Sightings], reference: str, partner: str, lags: np.ndarray = LAGS, fewest: int = FEWEST
 ) -> float | None:
     """Return how much later the images of another camera are than those of one [s]; None if they are not.
 
     Args:
         sightings: Finger -> its sightings.
-        one: A camera.
-        other: Another.
+        reference: A camera.
+        partner: Another.
         lags: Lags that are tried [s], shape (m,).
         fewest: Smallest number of sightings of one that must fall on the other's path.
     """
     pairs = []
-    for found in sightings.values():
-        of = [np.array([camera == name for camera in found.camera]) for name in (one, other)]
+    for series in sightings.values():
+        of = [np.array([camera == name for camera in series.camera]) for name in (reference, partner)]
         if all(rows.sum() >= fewest for rows in of):
-            pairs.append([((found.time_ns[rows] - found.time_ns[0]) * 1e-9, found.position[rows]) for rows in of])
+            pairs.append([((series.time_ns[rows] - series.time_ns[0]) * 1e-9, series.position[rows]) for rows in of])
     if not pairs:
         return None
     coarse = np.array([_difference(pairs, float(lag), fewest) for lag in lags])
@@ -299,16 +302,16 @@ def _difference(pairs: list[list[tuple[np.ndarray, np.ndarray]]], lag: float, fe
     squares, count, total = [], 0, 0
     for (times, path), (other_times, other_path) in pairs:
         at = other_times - lag
-        after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
-        inside = (at >= times[0]) & (at <= times[-1]) & (times[after] - times[after - 1] <= SPACED)
+        upper = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+        inside = (at >= times[0]) & (at <= times[-1]) & (times[upper] - times[upper - 1] <= SPACED)
         count, total = count + int(inside.sum()), total + min(len(at), len(times))
         if inside.sum() < 2:
             continue
-        there = np.stack([np.interp(at[inside], times, path[:, k]) for k in range(3)], axis=1)
-        deviation = other_path[inside] - there
+        expected = np.stack([np.interp(at[inside], times, path[:, k]) for k in range(3)], axis=1)
+        deviation = other_path[inside] - expected
         # A constant distance of the paths is an error of a camera's place and not of its time.
         squares.append(((deviation - np.median(deviation, axis=0)) ** 2).sum(axis=1))
     if count < max(fewest, OVERLAP * total):
         return np.inf
-    every = np.sort(np.concatenate(squares))
-    return float(every[: max(int(KEPT * len(every)), 1)].mean())
+    errors = np.sort(np.concatenate(squares))
+    return float(errors[: max(int(KEPT * len(errors)), 1)].mean())

@@ -61,11 +61,11 @@ def _apart(name: str, tracks: Mapping[str, FingerTrack]) -> np.ndarray | None:
     """Return a finger's distance from the opposite one [m], shape (n,): the one whose pad faces it most."""
     rows = tracks[name]
     facing = {
-        other: float(np.nanmean((rows.normal * track.normal).sum(axis=1)))
-        for other, track in tracks.items()
-        if other != name
+        neighbour: float(np.nanmean((rows.normal * track.normal).sum(axis=1)))
+        for neighbour, track in tracks.items()
+        if neighbour != name
     }
-    opposite = min(facing, key=lambda other: facing[other], default=None)
+    opposite = min(facing, key=lambda neighbour: facing[neighbour], default=None)
     if opposite is None or facing[opposite] > 0:
         return None
     return np.linalg.norm(rows.position - tracks[opposite].position, axis=1)

@@ -63,31 +63,31 @@ def track(
     check_together(recording)
     rig = recording.rig
     sightings = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
-    recording, delays, moved = in_step(recording, sightings)
-    if moved:
+    recording, delays, delay_notes = in_step(recording, sightings)
+    if delay_notes:
         sightings = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
     begin, end = recording.span_ns
     # A fault of time looks like a fault of cameras or tags, so it comes first.
-    sightings, late = late_stretches(sightings, begin)
-    whole = sightings
+    sightings, stretch_notes = late_stretches(sightings, begin)
+    original = sightings
     sightings, bumps = without_bumps(sightings, recording, delays)
     times = begin + np.rint(np.arange(int((end - begin) * 1e-9 * rate) + 1) * (1e9 / rate)).astype(np.int64)
-    remarks = [*moved, *late, *bumps, *(f"while recording: {note}" for note in recording.notes)]
+    remarks = [*delay_notes, *stretch_notes, *bumps, *(f"while recording: {note}" for note in recording.notes)]
     remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in sightings.items() if len(s) < FEWEST]
-    sightings = {name: found for name, found in sightings.items() if len(found) >= FEWEST}
+    sightings = {name: series for name, series in sightings.items() if len(series) >= FEWEST}
     if not sightings or len(times) < 2:
         raise _nothing_seen(recording)
     paths, settings = {}, {}
     # A finger can only be missing where an image was searched: these are the images' times.
     looked = np.unique(np.concatenate([view.sample_ns for view in recording.views]))
     unsearched: set[tuple[float, float]] = set()
-    for name, found in sightings.items():
-        sightings[name], paths[name], settings[name], words = _path(found, times)
+    for name, series in sightings.items():
+        sightings[name], paths[name], settings[name], words = _path(series, times)
         remarks += words
         remarks += path_faults.contradictions(sightings[name], paths[name], begin)
         paths[name] = carried_through(paths[name], sightings[name], times)
         # The sentence about a bump explains already why its moment is left out.
-        doubted = np.setdiff1d(whole[name].time_ns, found.time_ns)
+        doubted = np.setdiff1d(original[name].time_ns, series.time_ns)
         words, passed_over = _gaps(sightings[name], paths[name], times, looked, doubted)
         remarks += words
         unsearched |= passed_over
@@ -113,9 +113,11 @@ def track(
     if network:
         parents["checkpoint"] = network["hash"]
         remarks += [f"{name}: no network, so no predicted depth" for name in recording.taxels if name not in estimators]
-        remarks += [one.identity["unfitted"] for one in estimators.values() if "unfitted" in one.identity]
+        remarks += [
+            predictor.identity["unfitted"] for predictor in estimators.values() if "unfitted" in predictor.identity
+        ]
         # A network that is fitted to no unit learnt from no readings: its own remark names the remedy.
-        if any(one.novelty is None and "unfitted" not in one.identity for one in estimators.values()):
+        if any(predictor.novelty is None and "unfitted" not in predictor.identity for predictor in estimators.values()):
             remarks.append(
                 "whether these readings are like those that the network learnt from is not known: no seen.json of "
                 "this checkpoint lies beside it; tacdata train writes one, unless validation presses hardly touch"
@@ -148,9 +150,9 @@ def _against_touch(
             f"the readings are {-lag:.2f} s later than the images, by when the fingers close: depth belongs to earlier "
             "places than it stands at; record again on a host that keeps up, or correct the boards' latency"
         ]
-    late = {name: replace(found, timing=np.maximum(found.timing, lag)) for name, found in sightings.items()}
+    revision = {name: replace(series, timing=np.maximum(series.timing, lag)) for name, series in sightings.items()}
     judged = {
-        name: replace(track, covariance=carried_through(paths[name], late[name], times).covariance)
+        name: replace(track, covariance=carried_through(paths[name], revision[name], times).covariance)
         for name, track in tracks.items()
     }
     return judged, [
@@ -187,15 +189,15 @@ def _path(sightings: Sightings, times: np.ndarray) -> tuple[Sightings, Smoothed,
     wrong, rivals = path_faults.wrong_tags(sightings, path, times)
     if wrong:
         words += _wrong_words(sightings, wrong, rivals)
-        kept = np.array([not (len(ids) == 1 and ids[0] in wrong) for ids in sightings.ids])
-        if kept.sum() >= FEWEST:
-            sightings = sightings.where(kept)
+        mask = np.array([not (len(ids) == 1 and ids[0] in wrong) for ids in sightings.ids])
+        if mask.sum() >= FEWEST:
+            sightings = sightings.where(mask)
             wander = choose(sightings)
             path = acquire(sightings, times, wander)
     angle = path_faults.turn_against(sightings, path, times)
     words += path_faults.flips(sightings, path.accepted, angle, sightings.finger)
-    chosen = {"velocity_density": wander.velocity, "turning_density": wander.turning}
-    return sightings, path, {**chosen, "left_out_tags": list(wrong)}, words
+    densities = {"velocity_density": wander.velocity, "turning_density": wander.turning}
+    return sightings, path, {**densities, "left_out_tags": list(wrong)}, words
 
 
 def _gaps(
@@ -243,9 +245,9 @@ def _wrong_words(sightings: Sightings, wrong: dict[int, float], rivals: tuple[in
     for tag, angle in wrong.items():
         count, deviation = sightings.ids.count((tag,)), f"{np.degrees(angle):.0f} deg"
         if rivals:
-            others = " and ".join(map(str, rivals))
+            rival_tags = " and ".join(map(str, rivals))
             words.append(
-                f"{sightings.finger}: tags {tag} and {others}, each seen alone, contradict each other: one of them "
+                f"{sightings.finger}: tags {tag} and {rival_tags}, each seen alone, contradict each other: one of them "
                 f"is glued on turned, or is another cube's, and the images do not tell which; tag {tag}, seen less "
                 f"often ({count} images), is left out where it is alone: look at both"
             )

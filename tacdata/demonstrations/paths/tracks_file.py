@@ -73,8 +73,8 @@ def write_tracks(path: Path, demonstration: Demonstration) -> None:
         with replacement(path) as stream:
             pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
     except OSError as error:
-        given = f"writing {path} failed: {error}"
-        raise DeviceError(given, "a disk with room", "make room, then track again") from error
+        fault = f"writing {path} failed: {error}"
+        raise DeviceError(fault, "a disk with room", "make room, then track again") from error
 
 
 def read_tracks(path: StrPath) -> Demonstration:
@@ -87,8 +87,8 @@ def read_tracks(path: StrPath) -> Demonstration:
     path = Path(path)
     folder = path.with_name(path.name.removesuffix(ENDING))
     if not path.is_file() and folder.is_dir():
-        known = ", ".join(sorted(found.name for found in folder.glob(f"*{ENDING}"))) or "none yet"
-        raise UsageError(f"the folder {folder}", f"one of its tracks ({known})", "name one; `tacdata track` makes them")
+        names = ", ".join(sorted(candidate.name for candidate in folder.glob(f"*{ENDING}"))) or "none yet"
+        raise UsageError(f"the folder {folder}", f"one of its tracks ({names})", "name one; `tacdata track` makes them")
     if not path.is_file():
         raise UsageError(f"no file {path}", f"a file that ends in {ENDING}", "run `tacdata track` first")
     try:
@@ -138,8 +138,8 @@ def _track(name: str, entry: dict[str, Any], table: pa.Table, sensor: Sensor | N
         return (values.flatten() if shape else values).to_numpy(zero_copy_only=False).reshape(rows, *shape)
 
     maps = sensor.map.shape if sensor else ()
-    found = column("position", 3), column("quaternion", 4), column("covariance", 6, 6)
-    position, quaternion, covariance = (values for values in found if values is not None)
+    arrays = column("position", 3), column("quaternion", 4), column("covariance", 6, 6)
+    position, quaternion, covariance = (values for values in arrays if values is not None)
     return FingerTrack(
         name,
         entry["hand"],

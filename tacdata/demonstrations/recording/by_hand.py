@@ -17,12 +17,12 @@ from tacdata.recording.live.detection_process import in_background
 from tacdata.tags import look
 
 
-def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool) -> DemoSession:
+def record_by_hand(rig: Path, folder: Path, task: str, seconds: float | None, count: int, resume: bool) -> DemoSession:
     """Record demonstrations into a folder; print progress and warnings.
 
     Args:
         rig: Demo rig file.
-        out: Folder to create, or to add to with ``resume``.
+        folder: Folder to create, or to add to with ``resume``.
         task: Name of the task.
         seconds: Length of each demonstration [s of the rig's clock]; None: until Enter or Ctrl-C.
         count: Number of demonstrations; with ``seconds`` they follow each other without being asked.
@@ -36,7 +36,7 @@ def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count
         raise UsageError(f"--seconds {seconds:g}", "more than 0", "leave it out to end each demonstration by Enter")
     bench = read_demo_rig(rig)
     asks = sys.stdin.isatty() and seconds is None
-    session = open_demo_session(out, bench, task, resume)
+    session = open_demo_session(folder, bench, task, resume)
     stop = _Stop()
     with in_background(look) as detect:
         try:
@@ -53,26 +53,26 @@ def record_by_hand(rig: Path, out: Path, task: str, seconds: float | None, count
                         break
                 return recorder.session
         except BaseException as error:
-            _forget_if_empty(out, resume)
-            error.add_note(_ending(out))
+            _forget_if_empty(folder, resume)
+            error.add_note(_ending(folder))
             raise
 
 
 def _times_known(path: Path) -> str:
     """Return how well the times of a recording's images are known, as a sentence, and a remedy for poor ones."""
-    known = times_known(path)
-    if not known:
+    uncertainties = times_known(path)
+    if not uncertainties:
         return "too few images to know their times: record again"
-    best = min(known.values())
+    best = min(uncertainties.values())
     return f"times known to {best:.3f} s" if best <= TIMELY else f"times known to {best:.2f} s: record again"
 
 
-def _ending(out: Path) -> str:
+def _ending(folder: Path) -> str:
     """Return the last lines on the screen: files on the disk, and the next command."""
-    if not out.is_dir():
+    if not folder.is_dir():
         return "  data:   nothing was written\n  then:   the same command"
-    broken = file_names.unfinished(out)
-    lines = [f"data:   {len(file_names.finished(out))} demonstrations are complete in {out}"]
+    broken = file_names.unfinished(folder)
+    lines = [f"data:   {len(file_names.finished(folder))} demonstrations are complete in {folder}"]
     lines += [f"data:   broken off, readable: {', '.join(path.name for path in broken[-3:])}"] if broken else []
     return "\n".join(f"  {line}" for line in [*lines, "then:   the same command with --resume"])
 
@@ -83,12 +83,12 @@ def _enter() -> bool:
     return bool(ready and sys.stdin.readline() is not None)
 
 
-def _forget_if_empty(out: Path, resume: bool) -> None:
+def _forget_if_empty(folder: Path, resume: bool) -> None:
     """Delete a new folder without any recording, so that the same command can be repeated."""
-    if not resume and out.is_dir() and len(list(out.iterdir())) == 1:
-        for path in out.iterdir():
+    if not resume and folder.is_dir() and len(list(folder.iterdir())) == 1:
+        for path in folder.iterdir():
             path.unlink()
-        out.rmdir()
+        folder.rmdir()
 
 
 class _Stop:

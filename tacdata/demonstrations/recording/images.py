@@ -25,16 +25,16 @@ def stored_images(path: Path) -> tuple[np.ndarray, list[bytes]]:
     Raises:
         FormatError: If the recording is damaged.
     """
-    before, after = topics.image("\0").split("\0")
-    found: dict[str, list[bytes]] = {}
+    prefix, suffix = topics.image("\0").split("\0")
+    streams: dict[str, list[bytes]] = {}
 
     def keep(topic: str, message: bytes | memoryview) -> None:
-        if topic.startswith(before) and topic.endswith(after):
-            name = topic.removeprefix(before).removesuffix(after)
-            found.setdefault(name, []).append(CompressedImage.FromString(bytes(message)).data)
+        if topic.startswith(prefix) and topic.endswith(suffix):
+            name = topic.removeprefix(prefix).removesuffix(suffix)
+            streams.setdefault(name, []).append(CompressedImage.FromString(bytes(message)).data)
 
     records = read_records(path, images=False, digests=False, seen=keep)
-    for name, images in found.items():
+    for name, images in streams.items():
         if images:
             stored = records.metadata.get(f"clock_model/camera {name}")
             times = image_times(records, name, ClockModel.from_document(stored) if stored else None).sample_ns

@@ -129,8 +129,8 @@ class DemoRecorder:
                     )
                 if len(self._streams.silent) == len(self._boards) + len(self._cameras):
                     reason = "; ".join(f"{k}: {v}" for k, v in self._streams.silent.items())
-                    given = f"every stream fell silent ({reason})"
-                    raise DeviceError(given, "a stream that goes on", "check the cables")
+                    fault = f"every stream fell silent ({reason})"
+                    raise DeviceError(fault, "a stream that goes on", "check the cables")
                 time.sleep(WATCH)
             reason = ""
         finally:
@@ -149,9 +149,9 @@ class DemoRecorder:
             raise DeviceError(f"{what}: {error.given}", error.allowed, error.remedy) from None
 
     def _wait(self, streams: DemoStreams) -> None:
-        wanted = {f"taxels {name}" for name in self._boards} | {f"camera {name}" for name in self._cameras}
+        requirements = {f"taxels {name}" for name in self._boards} | {f"camera {name}" for name in self._cameras}
         end = time.monotonic() + FIRST_FRAME
-        while missing := wanted - streams.heard:
+        while missing := requirements - streams.heard:
             if streams.silent or time.monotonic() > end:
                 why = "; ".join(f"{name}: {streams.silent.get(name, 'nothing received')}" for name in sorted(missing))
                 remedy = "check cable and power, then start again"

@@ -65,8 +65,8 @@ def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
     folder = Path(origin).parent
     fingers = _inside(document["fingers"], "fingers", folder, f"{origin}: fingers")
     skins = {
-        name: Sensor.from_document(_inside(given, "sensor", folder, f"{origin}: sensors/{name}"), f"{origin}: {name}")
-        for name, given in document.get("sensors", {}).items()
+        name: Sensor.from_document(_inside(content, "sensor", folder, f"{origin}: sensors/{name}"), f"{origin}: {name}")
+        for name, content in document.get("sensors", {}).items()
     }
     cameras, worlds = {}, {}
     for name, entry in document["cameras"].items():
@@ -76,16 +76,24 @@ def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
             where = _inside(entry["world"], "camera_world", folder, f"{origin}: cameras/{name}/world")
             worlds[name] = CameraWorld.from_document(where, f"{origin}: cameras/{name}/world")
             cameras[name]["world"] = where
-    known = fingers_of(fingers, f"{origin}: fingers")
+    named_fingers = fingers_of(fingers, f"{origin}: fingers")
     sensors = {name: skins.get(name) or default_sensor() for name in document["boards"]}
     document_with_files = {**document, "fingers": fingers, "cameras": cameras}
     document_with_files["sensors"] = {name: sensor.document for name, sensor in sensors.items()}
-    _agree(document, known, worlds, origin)
+    _agree(document, named_fingers, worlds, origin)
     clock = Clock(**document["clock"]) if "clock" in document else Clock.start()
     devices = {name: {k: v for k, v in entry.items() if k != "world"} for name, entry in cameras.items()}
     delays = {name: StreamLatency.from_document(entry) for name, entry in document.get("latencies", {}).items()}
     return DemoRig(
-        document["name"], document["boards"], sensors, devices, worlds, known, delays, clock, document_with_files
+        document["name"],
+        document["boards"],
+        sensors,
+        devices,
+        worlds,
+        named_fingers,
+        delays,
+        clock,
+        document_with_files,
     )
 
 
@@ -94,12 +102,12 @@ def read_demo_rig(path: StrPath) -> DemoRig:
     return demo_rig_of(documents.read(Path(path), "demo_rig"), str(path))
 
 
-def _inside(given: str | dict[str, Any], schema: str, folder: Path, origin: str) -> dict[str, Any]:
+def _inside(entry: str | dict[str, Any], schema: str, folder: Path, origin: str) -> dict[str, Any]:
     """Return a checked document that is either given or named."""
-    if isinstance(given, str):
-        return documents.read(folder / given, schema)
-    documents.check(given, schema, origin)
-    return given
+    if isinstance(entry, str):
+        return documents.read(folder / entry, schema)
+    documents.check(entry, schema, origin)
+    return entry
 
 
 def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[str, CameraWorld], origin: str) -> None:
@@ -114,12 +122,12 @@ def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[st
     streams = {f"taxels {name}" for name in document["boards"]} | {f"camera {name}" for name in document["cameras"]}
     unknown = sorted(set(document.get("latencies", {})) - streams)
     if unknown:
-        given = f"{origin}: a latency of {', '.join(unknown)}"
-        raise FormatError(given, ", ".join(sorted(streams)), "name the streams so")
+        fault = f"{origin}: a latency of {', '.join(unknown)}"
+        raise FormatError(fault, ", ".join(sorted(streams)), "name the streams so")
     boardless = sorted(set(document.get("sensors", {})) - set(document["boards"]))
     if boardless:
-        given = f"{origin}: a sensor but no board for {', '.join(boardless)}"
-        raise FormatError(given, "sensors of fingers that have a board", "add the board, or leave the sensor out")
+        fault = f"{origin}: a sensor but no board for {', '.join(boardless)}"
+        raise FormatError(fault, "sensors of fingers that have a board", "add the board, or leave the sensor out")
     check_worlds(worlds, origin)
     frames = sorted({world.frame for world in worlds.values()})
     if len(frames) > 1:

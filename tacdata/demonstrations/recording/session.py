@@ -80,8 +80,8 @@ def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> De
                     f"{folder} was begun with other {what}", f"the same {what}", "begin a new folder for this rig"
                 )
         if session.task != task:
-            given = f"{folder} holds demonstrations of {session.task!r}, not of {task!r}"
-            raise UsageError(given, "one task per folder", "choose another --out")
+            fault = f"{folder} holds demonstrations of {session.task!r}, not of {task!r}"
+            raise UsageError(fault, "one task per folder", "choose another --out")
         return session
     if Path(folder).exists():
         raise UsageError(f"{folder} exists", "a new folder", "choose another --out, or add to it with --resume")
@@ -100,9 +100,9 @@ def open_demo_session(folder: Path, rig: DemoRig, task: str, resume: bool) -> De
 
 def refresh(session: DemoSession) -> DemoSession:
     """Update the document to the finished recordings of the folder; return the session."""
-    known = {entry["number"]: entry for entry in session.document["episodes"]}
+    entries = {entry["number"]: entry for entry in session.document["episodes"]}
     episodes = [
-        known.get(number, {"number": number, "file": path.name, "code_version": provenance.code_version()})
+        entries.get(number, {"number": number, "file": path.name, "code_version": provenance.code_version()})
         for number, path in file_names.finished(session.folder).items()
     ]
     documents.write(session.folder / FILE, {**session.document, "episodes": episodes}, "demo_session")

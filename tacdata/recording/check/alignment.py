@@ -80,9 +80,9 @@ def _crossings(values: np.ndarray, greatest: float, share: float, time_ns: np.nd
     if not len(above) or above[0] == 0 or above[-1] == len(values) - 1:
         return None
     times = []
-    for before in (above[0] - 1, above[-1]):
-        part = (share * greatest - values[before]) / (values[before + 1] - values[before])
-        times.append(time_ns[before] + part * (time_ns[before + 1] - time_ns[before]))
+    for index in (above[0] - 1, above[-1]):
+        part = (share * greatest - values[index]) / (values[index + 1] - values[index])
+        times.append(time_ns[index] + part * (time_ns[index + 1] - time_ns[index]))
     return np.array(times)
 
 
@@ -93,10 +93,10 @@ def other_place(figures: RecordingFigures, tolerance: float) -> str:
     if not episode.complete or not figures.recording.moves or press.depth < CONTACT:
         return ""
     went = episode.tip[int(np.argmax(episode.tip[:, 2]))]
-    said = np.array([press.x, press.y, press.deepest])
-    if np.abs(went - said).max() <= tolerance:
+    nominal = np.array([press.x, press.y, press.deepest])
+    if np.abs(went - nominal).max() <= tolerance:
         return ""
-    where = [f"x {x:.2f}, y {y:.2f}, depth {depth:.2f} mm" for x, y, depth in (went, said)]
+    where = [f"x {x:.2f}, y {y:.2f}, depth {depth:.2f} mm" for x, y, depth in (went, nominal)]
     return f"the guide went to {where[0]}, and the label says {where[1]}"
 
 
@@ -127,7 +127,7 @@ def stood_still(figures: RecordingFigures, rate: float) -> float:
         figures: Figures of the recording.
         rate: Speed of the recording's clock [1].
     """
-    recording, found = figures.recording, 0.0
+    recording, standstill = figures.recording, 0.0
     arrival = recording.episode.cnc.arrival_ns
     if len(arrival) < 2:
         return 0.0
@@ -138,8 +138,8 @@ def stood_still(figures: RecordingFigures, rate: float) -> float:
         later = _ended_by(recording, move, following) - move.end_ns
         inside = move.command.phase in ("press", "release") and move.profile.length
         if inside and usual < later < np.inf and not _host_was_late(recording, move, later):
-            found = max(found, later / 1e6)
-    return found
+            standstill = max(standstill, later / 1e6)
+    return standstill
 
 
 def _ended_by(recording: Recording, move: AnchoredMove, following: AnchoredMove | None) -> float:
@@ -148,9 +148,9 @@ def _ended_by(recording: Recording, move: AnchoredMove, following: AnchoredMove 
     The next one is sent when the pause behind it was answered. Strokes are over before a report shows their ends.
     """
     episode, stream = recording.episode, recording.episode.cnc
-    off = np.linalg.norm(stream.position - move.profile.target, axis=1)
-    shown = stream.arrival_ns[(off < NEAR + recording.height_resolution) & (stream.arrival_ns > move.start_ns)]
-    ends = [float(shown[0])] if len(shown) else []
+    distance = np.linalg.norm(stream.position - move.profile.target, axis=1)
+    arrivals = stream.arrival_ns[(distance < NEAR + recording.height_resolution) & (stream.arrival_ns > move.start_ns)]
+    ends = [float(arrivals[0])] if len(arrivals) else []
     hold = next((phase for phase in episode.phases if phase.name == "hold"), None)
     if hold is not None and move.command.phase == "press":
         # The end of the hold is an acknowledgement, and its length is known: the press ended before it began.

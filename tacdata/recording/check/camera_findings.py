@@ -26,21 +26,21 @@ def camera_warnings(entries: dict[str, Any], values: dict[str, Any], rate_of_clo
         values: Figures of each (`camera_figures`).
         rate_of_clock: Seconds that the host's clock shows per real second.
     """
-    found = []
+    remarks = []
     for name, entry in entries.items():
         figures, stream = values.get(name), f"camera {name}"
         if figures is None or not figures["images"]:
-            found.append((stream, "no image"))
+            remarks.append((stream, "no image"))
             continue
         texts = [*_still(figures, rate_of_clock), *_losses(figures, rate_of_clock), *figures["notes"]]
         if figures["clock"] and figures["missed"] is not None:
             texts += clock_warnings({**figures["clock"], "drift": None}, rate_of_clock)
         if "cube" in entry:
             texts += _view("tag", figures, figures["images"])
-        for finger, seen in figures["fingers"].items():
-            texts += _view(f"tag of {finger}", seen, figures["images"])
-        found += [(stream, text) for text in texts]
-    return found
+        for finger, view in figures["fingers"].items():
+            texts += _view(f"tag of {finger}", view, figures["images"])
+        remarks += [(stream, text) for text in texts]
+    return remarks
 
 
 def _view(what: str, values: dict[str, Any], images: int) -> list[str]:
@@ -57,26 +57,26 @@ def _view(what: str, values: dict[str, Any], images: int) -> list[str]:
 
 def _losses(values: dict[str, Any], rate_of_clock: float) -> list[str]:
     """Describe the images that are missing."""
-    found = []
+    remarks = []
     if values["lost"]:
-        found.append(f"{values['lost']} images lost: the host did not fetch them in time")
+        remarks.append(f"{values['lost']} images lost: the host did not fetch them in time")
     if values["damaged"]:
-        found.append(f"{values['damaged']} damaged images discarded")
+        remarks.append(f"{values['damaged']} damaged images discarded")
     if (values["missed"] or 0) > MISSED_SHARE * values["images"]:
-        found.append(f"{values['missed']} images missing by its own times, beside {values['images']} received")
+        remarks.append(f"{values['missed']} images missing by its own times, beside {values['images']} received")
     nominal, rate = values["nominal_rate"], values["rate"]
     if nominal and rate and rate < SLOW_SHARE * nominal / max(rate_of_clock, 1.0):
-        found.append(f"{rate:.1f} images/s, nominal {nominal:g}")
-    return found
+        remarks.append(f"{rate:.1f} images/s, nominal {nominal:g}")
+    return remarks
 
 
 def _still(values: dict, rate_of_clock: float) -> list[str]:
     """Describe a camera that stopped sending, or that repeated the same image."""
     period = 1000 / (values["nominal_rate"] or values["rate"] or 1.0)
     limit = max(IMAGE_GAP_MS * rate_of_clock, 10 * period)
-    found = []
+    remarks = []
     if values["longest_gap"] > limit:
-        found.append(f"no image for {values['longest_gap'] / 1000:.1f} s")
+        remarks.append(f"no image for {values['longest_gap'] / 1000:.1f} s")
     if values["longest_still"] > limit:
-        found.append(f"the same image for {values['longest_still'] / 1000:.1f} s: it hangs")
-    return found
+        remarks.append(f"the same image for {values['longest_still'] / 1000:.1f} s: it hangs")
+    return remarks

@@ -56,10 +56,10 @@ def idle_noise(episode: Episode) -> np.ndarray:
     The standard deviation of neighbouring differences over sqrt(2), so that slow drift does not enter. It is taken from
     the interquartile range / 1.349, so that a single jump does not enter either.
     """
-    rest = in_phase(episode, "rest")
-    if len(rest) < 5:
+    idle = in_phase(episode, "rest")
+    if len(idle) < 5:
         return np.full(episode.taxels.counts.shape[1], np.nan)
-    changes = np.diff(rest, axis=0)
+    changes = np.diff(idle, axis=0)
     spread, quartiles = changes.std(axis=0), np.percentile(changes, [25, 75], axis=0)
     middle = (quartiles[1] - quartiles[0]) / 1.349
     # Quantised readings have quartiles of whole counts; the plain standard deviation is right for them.
@@ -77,9 +77,9 @@ def tied_channels(counts: np.ndarray) -> list[list[int]]:
     if len(counts) < RUN:
         return pairs
     live = [k for k in range(count) if np.isfinite(counts[:, k]).all() and np.ptp(counts[:, k]) > 0]
-    seen: dict[bytes, int] = {}
+    owners: dict[bytes, int] = {}
     for channel in live:
-        first = seen.setdefault(counts[:, channel].tobytes(), channel)
+        first = owners.setdefault(counts[:, channel].tobytes(), channel)
         if first != channel:
             pairs.append([first, channel])
     return pairs
@@ -123,8 +123,8 @@ def reading_limits(board: dict[str, Any]) -> tuple[float, float]:
     sign, _, bits = kind.partition("int")
     if not bits.isdigit():
         return -np.inf, np.inf
-    whole = 2 ** int(bits)
-    return (0.0, whole - 1.0) if sign == "u" else (-whole / 2, whole / 2 - 1.0)
+    levels = 2 ** int(bits)
+    return (0.0, levels - 1.0) if sign == "u" else (-levels / 2, levels / 2 - 1.0)
 
 
 def _longest_run(values: np.ndarray) -> tuple[int, float]:
@@ -144,25 +144,27 @@ def jumps(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jum
     """
     usual, size_of = _usual(noise), np.abs(np.nan_to_num(response))
     # A difference of two readings has sqrt(2) times the noise of one.
-    least = JUMP * np.sqrt(2) * usual
+    threshold = JUMP * np.sqrt(2) * usual
     clear = np.flatnonzero(size_of > ANSWERING * usual)  # none where a reading is no number
-    found: dict[int, Jump] = {}
+    largest: dict[int, Jump] = {}
     phase = episode.phase_at(episode.taxels.sample_ns)
     for name in ("rest", "hold"):
         rows = np.flatnonzero(phase == PHASES.index(name))[EDGE : -EDGE or None]
         if len(rows) < 2 * LASTS + 2:
             continue
         counts = episode.taxels.counts[rows]
-        sudden = _lasting(counts, np.maximum(least, JUMP_SHARE * size_of))
+        sudden = _lasting(counts, np.maximum(threshold, JUMP_SHARE * size_of))
         if len(clear) >= TOGETHER and np.isfinite(counts).all():
             together, error = _together((counts - counts[0])[:, clear], response[clear], usual[clear])
-            own = JUMP * np.sqrt(2) * np.hypot(usual, error * size_of)
-            sudden += _lasting(counts - together[:, None] * response, np.maximum(own, ALONE_SHARE * size_of))
+            channel_threshold = JUMP * np.sqrt(2) * np.hypot(usual, error * size_of)
+            sudden += _lasting(
+                counts - together[:, None] * response, np.maximum(channel_threshold, ALONE_SHARE * size_of)
+            )
         for channel, place, size in sudden:
             jump = Jump(channel, int(episode.taxels.sample_ns[rows[place]]), size)
-            if channel not in found or abs(size) > abs(found[channel].size):
-                found[channel] = jump
-    return [found[channel] for channel in sorted(found)]
+            if channel not in largest or abs(size) > abs(largest[channel].size):
+                largest[channel] = jump
+    return [largest[channel] for channel in sorted(largest)]
 
 
 def _together(change: np.ndarray, response: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, float]:
@@ -189,8 +191,8 @@ def _together(change: np.ndarray, response: np.ndarray, noise: np.ndarray) -> tu
 
 def _usual(noise: np.ndarray) -> np.ndarray:
     """Return the noise to compare with [counts]: a second of rest may show too little of one channel's by chance."""
-    others = float(np.nanmedian(noise)) if np.isfinite(noise).any() else 0.0
-    return np.maximum(np.nan_to_num(noise, nan=np.inf), max(others / 2, 0.5))
+    typical = float(np.nanmedian(noise)) if np.isfinite(noise).any() else 0.0
+    return np.maximum(np.nan_to_num(noise, nan=np.inf), max(typical / 2, 0.5))
 
 
 def spikes(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Jump]:
@@ -203,7 +205,7 @@ def spikes(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Ju
     """
     threshold = SPIKE * _usual(noise)
     threshold = np.maximum(threshold, JUMP_SHARE * np.abs(np.nan_to_num(response)))
-    found: dict[int, Jump] = {}
+    largest: dict[int, Jump] = {}
     phase = episode.phase_at(episode.taxels.sample_ns)
     for name in ("rest", "hold"):
         rows = np.flatnonzero(phase == PHASES.index(name))[EDGE : -EDGE or None]
@@ -214,9 +216,9 @@ def spikes(episode: Episode, noise: np.ndarray, response: np.ndarray) -> list[Ju
         around = np.median(np.lib.stride_tricks.sliding_window_view(padded, SPIKE_AROUND, axis=0), axis=-1)
         for place, channel in np.argwhere(np.abs(counts - around) > threshold).tolist():
             size = float(counts[place, channel] - around[place, channel])
-            if channel not in found or abs(size) > abs(found[channel].size):
-                found[channel] = Jump(channel, int(episode.taxels.sample_ns[rows[place]]), size)
-    return [found[channel] for channel in sorted(found)]
+            if channel not in largest or abs(size) > abs(largest[channel].size):
+                largest[channel] = Jump(channel, int(episode.taxels.sample_ns[rows[place]]), size)
+    return [largest[channel] for channel in sorted(largest)]
 
 
 def held_frames(counts: np.ndarray, noise: np.ndarray) -> int:
@@ -265,12 +267,12 @@ def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, 
     padded = np.pad(change, ((2, 2), (0, 0)), mode="edge")
     trend = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
     sudden = np.argwhere(np.abs(change - trend) > threshold)
-    found = []
+    shifts = []
     for place, channel in sudden:
         if not LASTS <= place + 1 <= len(counts) - LASTS:
             continue
-        before = np.median(counts[place + 1 - LASTS : place + 1, channel])
-        size = float(np.median(counts[place + 1 : place + 1 + LASTS, channel]) - before)
+        baseline = np.median(counts[place + 1 - LASTS : place + 1, channel])
+        size = float(np.median(counts[place + 1 : place + 1 + LASTS, channel]) - baseline)
         if abs(size) > 0.6 * threshold[channel]:
-            found.append((int(channel), int(place) + 1, size))
-    return found
+            shifts.append((int(channel), int(place) + 1, size))
+    return shifts

@@ -61,16 +61,16 @@ class Answers:
 
 def answers(recordings: list[RecordingFigures]) -> Answers | None:
     """Collect the answers of a session's complete presses; None if there are none."""
-    chosen = [f for f in recordings if counts_as_press(f)]
-    if not chosen:
+    presses = [f for f in recordings if counts_as_press(f)]
+    if not presses:
         return None
-    episodes = [f.recording.episode for f in chosen]
-    noise = np.array([[np.nan if v is None else v for v in f.document["taxels"]["idle_noise"]] for f in chosen], float)
-    known = ~np.isnan(noise).all(axis=0)
+    episodes = [f.recording.episode for f in presses]
+    noise = np.array([[np.nan if v is None else v for v in f.document["taxels"]["idle_noise"]] for f in presses], float)
+    mask = ~np.isnan(noise).all(axis=0)
     middle = np.full(noise.shape[1], np.nan)
-    middle[known] = np.nanmedian(noise[:, known], axis=0)
+    middle[mask] = np.nanmedian(noise[:, mask], axis=0)
     return Answers(
-        np.array([[0.0 if v is None else v for v in f.document["taxels"]["response"]] for f in chosen]),
+        np.array([[0.0 if v is None else v for v in f.document["taxels"]["response"]] for f in presses]),
         np.array([(e.press.x, e.press.y) for e in episodes]),
         np.array([f"{e.press.indenter_name} {e.press.turned}" for e in episodes]),
         np.maximum(np.nan_to_num(middle, nan=1.0), 0.5),
@@ -96,23 +96,23 @@ class AnswerFit:
     """Predicted answer of a channel of gain 1 below the indenter [counts], shape (presses,)."""
 
 
-def fit_answers(found: Answers, place: np.ndarray | None = None) -> AnswerFit:
+def fit_answers(sample: Answers, place: np.ndarray | None = None) -> AnswerFit:
     """Fit the answers robustly, with channel k at place ``place[k]`` (default: its own)."""
-    place = np.arange(found.response.shape[1]) if place is None else place
-    response, squared = found.response, found.distance[:, place] ** 2
+    place = np.arange(sample.response.shape[1]) if place is None else place
+    response, squared = sample.response, sample.distance[:, place] ** 2
     gain, pattern, amplitude = np.ones(response.shape[1]), np.zeros_like(response), np.zeros(len(response))
     weight = np.ones_like(response)
     for _ in range(ROUNDS):
-        for name in np.unique(found.indenters):
-            rows = found.indenters == name
+        for name in np.unique(sample.indenters):
+            rows = sample.indenters == name
             fits = [
                 _amplitudes(response[rows], np.exp(-squared[rows] / (2 * w**2)) * gain, weight[rows]) for w in WIDTHS
             ]
             best = int(np.argmin([misfit for _, misfit in fits]))
-            shape = np.exp(-(found.distance[rows] ** 2) / (2 * WIDTHS[best] ** 2))
+            shape = np.exp(-(sample.distance[rows] ** 2) / (2 * WIDTHS[best] ** 2))
             amplitude[rows], pattern[rows] = fits[best][0], fits[best][0][:, None] * shape
         expected = pattern[:, place]
-        weight = _trust(response - expected * gain, found.noise)
+        weight = _trust(response - expected * gain, sample.noise)
         raw = (weight * response * expected).sum(axis=0) / np.maximum((weight * expected**2).sum(axis=0), 1e-12)
         # Gains and amplitudes share one free factor: the median gain is set to 1.
         gain = np.clip(raw / max(float(np.median(raw)), 1e-12), 0.2, 5.0)
@@ -130,15 +130,15 @@ def _trust(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
     return 1 / (1 + (residual / (3 * scale)) ** 2)
 
 
-def misplaced(found: Answers) -> dict[int, int]:
+def misplaced(sample: Answers) -> dict[int, int]:
     """Return the channels that answer like another taxel, with that taxel; {} with too few presses."""
-    if len(found.response) < PRESSES:
+    if len(sample.response) < PRESSES:
         return {}
-    score = max((likelihood(found, fit_answers(found, place).pattern) for place in orders(found.taxels)), key=_best)
+    score = max((likelihood(sample, fit_answers(sample, place).pattern) for place in orders(sample.taxels)), key=_best)
     # A wrong channel spoils the fit that the others are compared with. So channels that fit elsewhere are moved there,
     # and all are tested again.
     _, place = linear_sum_assignment(-score)
-    return exchanged(likelihood(found, fit_answers(found, place).pattern))
+    return exchanged(likelihood(sample, fit_answers(sample, place).pattern))
 
 
 def exchanged(score: np.ndarray) -> dict[int, int]:
@@ -147,9 +147,9 @@ def exchanged(score: np.ndarray) -> dict[int, int]:
     Args:
         score: Log-likelihood of each channel at each place (`likelihood`), shape (taxels, taxels).
     """
-    own = np.diag(score)
+    diagonal = np.diag(score)
     _, place = linear_sum_assignment(-score)
-    gain = score[np.arange(len(own)), place] - own
+    gain = score[np.arange(len(diagonal)), place] - diagonal
     # Channels exchange places in cycles, so each channel of the cycle has to fit better.
     return {
         k: int(j) for k, j in enumerate(place) if j != k and gain[k] > CLEAR and _cycle_gain(place, gain, k) > CLEAR
@@ -168,37 +168,37 @@ def _best(score: np.ndarray) -> float:
 
 def _cycle_gain(place: np.ndarray, gain: np.ndarray, start: int) -> float:
     """Return the smallest log-likelihood gain among the channels that change places with ``start``."""
-    least, at = gain[start], int(place[start])
+    smallest, at = gain[start], int(place[start])
     while at != start:
-        least, at = min(least, gain[at]), int(place[at])
-    return float(least)
+        smallest, at = min(smallest, gain[at]), int(place[at])
+    return float(smallest)
 
 
-def likelihood(found: Answers, pattern: np.ndarray) -> np.ndarray:
+def likelihood(sample: Answers, pattern: np.ndarray) -> np.ndarray:
     """Return the log-likelihood of each channel at each place, with a gain of its own, shape (taxels, taxels)."""
-    response, count = found.response, len(found.response)
+    response, count = sample.response, len(sample.response)
     scale = np.maximum(np.abs(pattern).max(axis=1, keepdims=True), 1e-12)  # deep presses must not outweigh all others
     a, b = response / scale, pattern / scale
-    floor = count * (np.median(found.noise / np.median(scale)) ** 2 + 0.02**2)
+    floor = count * (np.median(sample.noise / np.median(scale)) ** 2 + 0.02**2)
     power = (a**2).sum(axis=0)[:, None]
     # A gain is positive: answers of the opposite sign explain nothing.
     shared = np.maximum(a.T @ b, 0.0) ** 2 / np.maximum((b**2).sum(axis=0), 1e-12)
     return -0.5 * count * np.log((power - shared + floor) / (power + floor))
 
 
-def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
+def gain_steps(sample: Answers) -> dict[int, tuple[int, float]]:
     """Return the channels whose gain steps: the press before which it does, and the factor."""
-    if len(found.response) < STEP_PRESSES:
+    if len(sample.response) < STEP_PRESSES:
         return {}
-    pattern = fit_answers(found).pattern
-    near = _near(found, pattern)
+    pattern = fit_answers(sample).pattern
+    near = _near(sample, pattern)
     ratio = np.full(pattern.shape, np.nan)
     # A gain is a factor; in logarithms its step is additive.
-    ratio[near] = np.log(np.clip(found.response[near] / pattern[near], 0.05, 20.0))
-    ratio -= _common(found, ratio)
+    ratio[near] = np.log(np.clip(sample.response[near] / pattern[near], 0.05, 20.0))
+    ratio -= _common(sample, ratio)
     centers = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in ratio.T])
     usual = 1.4826 * float(np.median(np.abs(ratio - centers)[near])) if near.any() else 0.0
-    scatter = _scatter(found, ratio - centers, usual)
+    scatter = _scatter(sample, ratio - centers, usual)
     steps = {}
     for channel in range(ratio.shape[1]):
         rows = np.flatnonzero(near[:, channel])
@@ -208,56 +208,58 @@ def gain_steps(found: Answers) -> dict[int, tuple[int, float]]:
     return steps
 
 
-def _near(found: Answers, pattern: np.ndarray) -> np.ndarray:
+def _near(sample: Answers, pattern: np.ndarray) -> np.ndarray:
     """Return which presses are near which channels, shape (presses, taxels), bool."""
-    return (pattern > NEAR * pattern.max(axis=1, keepdims=True)) & (pattern > SILENT * found.noise)
+    return (pattern > NEAR * pattern.max(axis=1, keepdims=True)) & (pattern > SILENT * sample.noise)
 
 
-def unknown_gains(found: Answers) -> list[int]:
+def unknown_gains(sample: Answers) -> list[int]:
     """Return the channels with too few presses near them for telling a step of their gain."""
-    near = _near(found, fit_answers(found).pattern).sum(axis=0)
+    near = _near(sample, fit_answers(sample).pattern).sum(axis=0)
     return np.flatnonzero(near < 2 * SIDE).tolist()
 
 
-def _common(found: Answers, ratio: np.ndarray) -> np.ndarray:
+def _common(sample: Answers, ratio: np.ndarray) -> np.ndarray:
     """Return the residual that all channels share: an indenter's answer is not Gaussian, and deep presses saturate."""
     shared = np.zeros_like(ratio)
-    own = np.zeros(ratio.shape[1])
-    distance = found.distance
+    offsets = np.zeros(ratio.shape[1])
+    distance = sample.distance
     for _ in range(3):
-        for name in np.unique(found.indenters):
-            rows = found.indenters == name
+        for name in np.unique(sample.indenters):
+            rows = sample.indenters == name
             use = np.isfinite(ratio) & rows[:, None]
             if use.sum() < 12:
                 continue
             terms = np.stack([np.ones_like(distance), distance, distance**2, distance**3], axis=-1)
-            wanted = (ratio - own)[use]
-            weight = np.ones(len(wanted))
+            target = (ratio - offsets)[use]
+            weight = np.ones(len(target))
             for _ in range(3):
-                fitted = np.linalg.lstsq(terms[use] * weight[:, None], wanted * weight, rcond=None)[0]
-                off = wanted - terms[use] @ fitted
-                weight = 1 / np.sqrt(1 + (off / (2 * np.median(np.abs(off)) + 1e-9)) ** 2)
+                fitted = np.linalg.lstsq(terms[use] * weight[:, None], target * weight, rcond=None)[0]
+                residual = target - terms[use] @ fitted
+                weight = 1 / np.sqrt(1 + (residual / (2 * np.median(np.abs(residual)) + 1e-9)) ** 2)
             shared[rows] = (terms @ fitted)[rows]
-        rest = ratio - shared
+        remainder = ratio - shared
         # A press that excites more or less than its fit does so for all channels near it.
-        level = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else 0.0 for row in rest - own])
+        level = np.array(
+            [np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else 0.0 for row in remainder - offsets]
+        )
         shared += level[:, None]
-        own = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in (ratio - shared).T])
+        offsets = np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in (ratio - shared).T])
     return shared
 
 
-def _scatter(found: Answers, rest: np.ndarray, usual: float) -> np.ndarray:
+def _scatter(sample: Answers, residuals: np.ndarray, usual: float) -> np.ndarray:
     """Return the scatter of every press's residuals [1], shape (presses,).
 
     An indenter that is not round fits worse. Presses of one indenter often follow each other, and its misfit must not
     pass for a step.
     """
-    scatter = np.full(len(rest), max(usual, 0.03))
-    for name in np.unique(found.indenters):
-        rows = found.indenters == name
-        own = rest[rows][np.isfinite(rest[rows])]
-        if len(own):
-            scatter[rows] = np.maximum(scatter[rows], np.sqrt(np.mean(np.square(own))))
+    scatter = np.full(len(residuals), max(usual, 0.03))
+    for name in np.unique(sample.indenters):
+        rows = sample.indenters == name
+        values = residuals[rows][np.isfinite(residuals[rows])]
+        if len(values):
+            scatter[rows] = np.maximum(scatter[rows], np.sqrt(np.mean(np.square(values))))
     return scatter
 
 
@@ -267,31 +269,31 @@ def _step(values: np.ndarray, usual: np.ndarray) -> tuple[int, float] | None:
     """
     best: tuple[float, int, float] | None = None
     for at in range(SIDE, len(values) - SIDE + 1):
-        before, after = values[:at], values[at:]
-        change = float(np.median(after) - np.median(before))
+        head, tail = values[:at], values[at:]
+        change = float(np.median(tail) - np.median(head))
         # Standard deviation on either side: an answer after the step that is as before speaks against it.
         variance = sum(
-            max(float(np.var(side, ddof=1)), float(np.mean(np.square(said)))) / len(side)
-            for side, said in ((before, usual[:at]), (after, usual[at:]))
+            max(float(np.var(side, ddof=1)), float(np.mean(np.square(scatter)))) / len(side)
+            for side, scatter in ((head, usual[:at]), (tail, usual[at:]))
         )
-        sure = abs(change) / np.sqrt(variance)
-        if best is None or sure > best[0]:
-            best = sure, at, change
+        significance = abs(change) / np.sqrt(variance)
+        if best is None or significance > best[0]:
+            best = significance, at, change
     if best is None or best[0] < SURE or abs(best[2]) < np.log1p(STEP):
         return None
     return best[1], best[2]
 
 
-def silent(found: Answers) -> list[int]:
+def silent(sample: Answers) -> list[int]:
     """Return the channels that did not answer to any near press, while others did."""
-    close = found.distance < 0.75 * max(found.taxels.pitch_x, found.taxels.pitch_y)
-    answered = (np.abs(found.response) > SILENT * found.noise) & close
+    close = sample.distance < 0.75 * max(sample.taxels.pitch_x, sample.taxels.pitch_y)
+    answered = (np.abs(sample.response) > SILENT * sample.noise) & close
     if not answered.any():
         return []
-    return [k for k in range(found.response.shape[1]) if close[:, k].sum() >= 2 and not answered[:, k].any()]
+    return [k for k in range(sample.response.shape[1]) if close[:, k].sum() >= 2 and not answered[:, k].any()]
 
 
-def unanswered(found: Answers) -> bool:
+def unanswered(sample: Answers) -> bool:
     """Whether at least two presses close to taxels excited no channel at all."""
-    close = (found.distance < 0.75 * max(found.taxels.pitch_x, found.taxels.pitch_y)).any(axis=1)
-    return bool(close.sum() >= 2 and not (np.abs(found.response[close]) > SILENT * found.noise).any())
+    close = (sample.distance < 0.75 * max(sample.taxels.pitch_x, sample.taxels.pitch_y)).any(axis=1)
+    return bool(close.sum() >= 2 and not (np.abs(sample.response[close]) > SILENT * sample.noise).any())

@@ -40,10 +40,10 @@ def clock_figures(
     # Each step begins a line, except for the first line.
     lines = (*clock.earlier, clock)[1:]
     steps = [s for s, line in zip(clock.steps_ns, lines, strict=True) if within[0] < line.first_arrival_ns <= within[1]]
-    known = nominal_period_ns > 0 or clock.axis == "device_ns"
+    has_rate = nominal_period_ns > 0 or clock.axis == "device_ns"
     return {
         "steady": clock.steady,
-        "drift": _rounded(clock.drift(nominal_period_ns), 1) if known else None,
+        "drift": _rounded(clock.drift(nominal_period_ns), 1) if has_rate else None,
         "drift_uncertainty": _rounded(clock.drift_uncertainty * 1e6, 1),
         "delay": _rounded(float(np.mean(beyond)) / 1e6) if len(beyond) else 0.0,
         "jitter": _rounded(float(np.std(beyond)) / 1e6) if len(beyond) else 0.0,
@@ -56,34 +56,34 @@ def clock_figures(
 
 def round_trip(recording: Recording) -> float | None:
     """Return the median time from query to answer of the motion controller [ms]; None if the file does not hold it."""
-    said = recording.polled.get("round_trip_ns")
-    return None if said is None else _rounded(float(said) / 1e6)
+    median_ns = recording.polled.get("round_trip_ns")
+    return None if median_ns is None else _rounded(float(median_ns) / 1e6)
 
 
 def clock_warnings(clock: dict[str, Any] | None, rate_of_clock: float) -> list[str]:
     """Return the warnings about a stream's clock as text; ``rate_of_clock``: seconds shown per real second."""
     if clock is None or not clock["steady"]:
         return []
-    found = []
+    remarks = []
     drift = clock["drift"]
     if drift is not None and abs(drift) - 2 * clock["drift_uncertainty"] > DRIFT_PPM:
-        found.append(
+        remarks.append(
             f"its clock is {drift:+.0f} ppm off its nominal rate (known to {clock['drift_uncertainty']:.0f} ppm): "
             "a bad crystal, or a wrong rate in its description"
         )
     steps = [step for step in clock["steps"] if abs(step) > STEP_MS * rate_of_clock]
     if steps:
-        found.append(
+        remarks.append(
             f"its clock stepped by {', '.join(f'{s:+.0f}' for s in steps)} ms: it restarted, or lost its count"
         )
     if max(clock["delay"], clock["jitter"]) / rate_of_clock > DELAY_MS:
-        found.append(
+        remarks.append(
             f"its frames were read {clock['delay']:.0f} ms late on average, with a jitter of {clock['jitter']:.0f} ms: "
             "this computer was too busy"
         )
     if clock["uncertainty"] / rate_of_clock > UNCERTAIN_MS:
-        found.append(f"its sample times are uncertain by {clock['uncertainty']:.1f} ms")
-    return found
+        remarks.append(f"its sample times are uncertain by {clock['uncertainty']:.1f} ms")
+    return remarks
 
 
 def clock_words(clock: dict[str, Any] | None, timing: bool = True) -> str:

@@ -103,16 +103,16 @@ def _taxels(recording: Recording, lag: np.ndarray) -> dict[str, Any]:
 
 def idle_reading(episode: Episode) -> np.ndarray:
     """Return each channel's reading without contact [counts], shape (taxels,); NaN without a rest."""
-    rest = in_phase(episode, "rest")
-    return np.median(rest, axis=0) if len(rest) else np.full(episode.taxels.counts.shape[1], np.nan)
+    frames = in_phase(episode, "rest")
+    return np.median(frames, axis=0) if len(frames) else np.full(episode.taxels.counts.shape[1], np.nan)
 
 
 def hold_response(episode: Episode) -> np.ndarray:
     """Return each channel's change from rest to hold [counts], shape (taxels,); NaN without either."""
-    rest, hold = in_phase(episode, "rest"), in_phase(episode, "hold")
-    if not len(rest) or not len(hold):
+    idle, hold = in_phase(episode, "rest"), in_phase(episode, "hold")
+    if not len(idle) or not len(hold):
         return np.full(episode.taxels.counts.shape[1], np.nan)
-    return np.median(hold, axis=0) - np.median(rest, axis=0)
+    return np.median(hold, axis=0) - np.median(idle, axis=0)
 
 
 def _cnc(recording: Recording) -> dict[str, Any]:

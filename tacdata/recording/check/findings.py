@@ -77,13 +77,13 @@ def findings(figures: RecordingFigures) -> list[Finding]:
     if is_imported(figures.recording.episode):
         # Quantised or resting channels of a foreign sensor do not prove a fault.
         doubts = [(WARNING, stream, text) for _, stream, text in _channels(figures)]
-        found = [*imported_findings(figures), *doubts]
+        judgements = [*imported_findings(figures), *doubts]
     else:
-        found = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
-        found += _together(figures)
-    found += impossible(figures)
+        judgements = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
+        judgements += _together(figures)
+    judgements += impossible(figures)
     name = figures.recording.episode.path.name
-    return [Finding(severity, stream, name, text) for severity, stream, text in found]
+    return [Finding(severity, stream, name, text) for severity, stream, text in judgements]
 
 
 Judgement = tuple[str, str, str]
@@ -94,23 +94,23 @@ def _rate_of_clock(figures: RecordingFigures) -> float:
 
 
 def _recording(figures: RecordingFigures) -> list[Judgement]:
-    episode, found = figures.recording.episode, []
+    episode, judgements = figures.recording.episode, []
     if not episode.complete:
-        found.append((UNUSABLE, "recording", "; ".join(episode.notes) or "it was broken off"))
+        judgements.append((UNUSABLE, "recording", "; ".join(episode.notes) or "it was broken off"))
     registration = episode.rig.get("registration", {})
     if not registration.get("method") or not registration.get("date"):
-        found.append(
+        judgements.append(
             (WARNING, "registration", "the rig file does not say how and when the sensor was registered to the guide")
         )
     phases = {phase.name for phase in episode.phases}
     missing = [name for name in ("rest", "approach", "press", "hold", "release") if name not in phases]
     if episode.complete and missing:
-        found.append((UNUSABLE, "recording", f"no {', '.join(missing)} phase"))
-    return found
+        judgements.append((UNUSABLE, "recording", f"no {', '.join(missing)} phase"))
+    return judgements
 
 
 def _taxels(figures: RecordingFigures) -> list[Judgement]:
-    values, found = figures.document["taxels"], []
+    values, judgements = figures.document["taxels"], []
     if values["frames"] < 2:
         return [(UNUSABLE, "taxels", f"{values['frames']} frames")]
     period = 1000 / values["nominal_rate"]
@@ -118,136 +118,144 @@ def _taxels(figures: RecordingFigures) -> list[Judgement]:
         share = values["lost"] / (values["frames"] + values["lost"])
         bad = share > LOST_SHARE or values["longest_gap"] > GAP_MS
         text = f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {values['longest_gap']:.0f} ms"
-        found.append((UNUSABLE if bad else WARNING, "taxels", text))
+        judgements.append((UNUSABLE if bad else WARNING, "taxels", text))
     elif values["longest_gap"] > max(GAP_MS, 2.5 * period):
-        found.append((UNUSABLE, "taxels", f"a gap of {values['longest_gap']:.0f} ms without a sample"))
+        judgements.append((UNUSABLE, "taxels", f"a gap of {values['longest_gap']:.0f} ms without a sample"))
     if values["rate"] and abs(values["rate"] / values["nominal_rate"] - 1) > RATE_SHARE:
         text = f"{values['rate']:.2f} Hz, nominal {values['nominal_rate']:g} Hz"
-        found.append((WARNING, "taxels", text))
-    found += [(WARNING, "taxels", text) for text in _line(values["driver_counts"])]
-    found += [(WARNING, "taxels", text) for text in clock_warnings(values["clock"], _rate_of_clock(figures))]
+        judgements.append((WARNING, "taxels", text))
+    judgements += [(WARNING, "taxels", text) for text in _line(values["driver_counts"])]
+    judgements += [(WARNING, "taxels", text) for text in clock_warnings(values["clock"], _rate_of_clock(figures))]
     if figures.recording.episode.taxels.counter.min() < 0:
         text = "the board sends no counter: lost frames cannot be seen, sample times are arrival times"
-        found.append((WARNING, "taxels", text))
+        judgements.append((WARNING, "taxels", text))
     if values["latency"] / _rate_of_clock(figures) > LATENCY_MS:
-        found.append((WARNING, "taxels", f"the host was up to {values['latency']:.0f} ms late in reading"))
+        judgements.append((WARNING, "taxels", f"the host was up to {values['latency']:.0f} ms late in reading"))
     elif (silent := _longest_silence(figures)) > LATENCY_MS * _rate_of_clock(figures):
-        found.append((WARNING, "taxels", f"the host read nothing for {silent:.0f} ms, then what had waited"))
-    return found
+        judgements.append((WARNING, "taxels", f"the host read nothing for {silent:.0f} ms, then what had waited"))
+    return judgements
 
 
 def _longest_silence(figures: RecordingFigures) -> float:
     """Return the longest time in which nothing arrived though readings were taken [ms]."""
     stream = figures.recording.episode.taxels
     longest = int(np.argmax(np.diff(stream.arrival_ns)))
-    taken = stream.sample_ns[longest + 1] - stream.sample_ns[longest]
-    return float(stream.arrival_ns[longest + 1] - stream.arrival_ns[longest] - taken) / 1e6
+    span = stream.sample_ns[longest + 1] - stream.sample_ns[longest]
+    return float(stream.arrival_ns[longest + 1] - stream.arrival_ns[longest] - span) / 1e6
 
 
 def _line(counts: dict) -> list[str]:
     """Describe the driver's counts on the line."""
-    found = []
+    remarks = []
     if counts.get("corrupt", 0):
-        found.append(f"{counts['corrupt']} damaged frames discarded")
+        remarks.append(f"{counts['corrupt']} damaged frames discarded")
     if counts.get("repeated", 0):
-        found.append(f"{counts['repeated']} frames came twice and were discarded")
+        remarks.append(f"{counts['repeated']} frames came twice and were discarded")
     if counts.get("garbage_bytes", 0):
-        found.append(f"{counts['garbage_bytes']} bytes between the frames belong to none")
-    return [*found, *counts.get("notes", [])]
+        remarks.append(f"{counts['garbage_bytes']} bytes between the frames belong to none")
+    return [*remarks, *counts.get("notes", [])]
 
 
 def _channels(figures: RecordingFigures) -> list[Judgement]:
-    values, found = figures.document["taxels"], []
+    values, judgements = figures.document["taxels"], []
     if values["undefined"]:
-        found.append((UNUSABLE, "taxels", f"channel {_list(values['undefined'])} has readings that are no numbers"))
+        judgements.append(
+            (UNUSABLE, "taxels", f"channel {_list(values['undefined'])} has readings that are no numbers")
+        )
     for first, second in values["tied"]:
-        found.append((UNUSABLE, "taxels", f"channels {first} and {second} read the same throughout: tied together"))
+        judgements.append(
+            (UNUSABLE, "taxels", f"channels {first} and {second} read the same throughout: tied together")
+        )
     counts = figures.recording.episode.taxels.counts
     if len(counts) > 1 and (counts == counts[:1]).all() and figures.recording.episode.press.depth >= DEAD_DEPTH:
-        found.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
-    late = figures.document["cnc"]["contradiction"] / _rate_of_clock(figures)
-    if values["jumps"] and late > LATE_MS:
-        text = f"jumps while nothing moves are NOT ASSESSED: the controller moved up to {late:.0f} ms off its profile"
-        found.append((WARNING, "taxels", text))
+        judgements.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
+    delay = figures.document["cnc"]["contradiction"] / _rate_of_clock(figures)
+    if values["jumps"] and delay > LATE_MS:
+        text = f"jumps while nothing moves are NOT ASSESSED: the controller moved up to {delay:.0f} ms off its profile"
+        judgements.append((WARNING, "taxels", text))
     else:
-        found += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1], values["unit"])]
+        judgements += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1], values["unit"])]
     if values["stuck"]:
-        found.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
+        judgements.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
     if values["saturated"]:
-        found.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
+        judgements.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
     noise = np.array([np.nan if v is None else v for v in values["idle_noise"]])
     response = np.array([np.nan if v is None else v for v in values["response"]])
-    held = held_frames(counts, noise)
+    repeats = held_frames(counts, noise)
     idle = counts[idle_rows(figures.recording.episode)]
-    if held >= HELD or (held > 1 and held_by_chance(counts, idle, held) < HELD_BY_CHANCE):
-        found.append((WARNING, "taxels", f"the board repeats one frame: no channel changes for {held} frames"))
+    if repeats >= HELD or (repeats > 1 and held_by_chance(counts, idle, repeats) < HELD_BY_CHANCE):
+        judgements.append((WARNING, "taxels", f"the board repeats one frame: no channel changes for {repeats} frames"))
     begin_ns = figures.recording.episode.taxels.sample_ns[:1]
     for spike in spikes(figures.recording.episode, noise, response):
         at = (spike.time_ns - int(begin_ns[0])) * 1e-9
         size = f"{spike.size:{'+.0f' if values['unit'] == COUNTS else '+.3g'}} {values['unit']}"
-        found.append((WARNING, "taxels", f"channel {spike.channel} has a spike of {size} at {at:.1f} s while still"))
+        judgements.append(
+            (WARNING, "taxels", f"channel {spike.channel} has a spike of {size} at {at:.1f} s while still")
+        )
     if np.isnan(noise).all():
-        found.append((WARNING, "taxels", "no idle stretch to measure noise and baseline"))
+        judgements.append((WARNING, "taxels", "no idle stretch to measure noise and baseline"))
     else:
         loud = np.flatnonzero(noise > NOISE_RATIO * max(float(np.nanmedian(noise)), 1e-9))
         if len(loud):
             text = f"channel {_list(loud.tolist())} is over {NOISE_RATIO:g} times as noisy as the others"
-            found.append((WARNING, "taxels", text))
-    return found
+            judgements.append((WARNING, "taxels", text))
+    return judgements
 
 
 def _together(figures: RecordingFigures) -> list[Judgement]:
     """Judge whether readings, motion and label belong together."""
-    found, rate = [], _rate_of_clock(figures)
+    judgements, rate = [], _rate_of_clock(figures)
     if words := other_place(figures, PLACE_MM):
-        found.append((UNUSABLE, "label", words))
+        judgements.append((UNUSABLE, "label", words))
     if still := stood_still(figures, rate):
         text = f"the controller may have stood still for {still:.0f} ms on its way in or out, and told nothing then"
-        found.append((UNUSABLE, "cnc", text))
-    late, short = missing_ends(figures)
+        judgements.append((UNUSABLE, "cnc", text))
+    start_gap, end_gap = missing_ends(figures)
     allowed = max(GAP_MS * rate, 2500 / figures.document["taxels"]["nominal_rate"])
-    if late > allowed:
-        found.append((UNUSABLE, "taxels", f"they begin {late:.0f} ms after the press does"))
-    if short > allowed:
-        found.append((UNUSABLE, "taxels", f"they end {short:.0f} ms before the press does"))
-    elif (early := ends_before_reports(figures)) > allowed:
-        text = f"they end {early:.0f} ms before the controller's reports: the press is whole, the board fell silent"
-        found.append((WARNING, "taxels", text))
+    if start_gap > allowed:
+        judgements.append((UNUSABLE, "taxels", f"they begin {start_gap:.0f} ms after the press does"))
+    if end_gap > allowed:
+        judgements.append((UNUSABLE, "taxels", f"they end {end_gap:.0f} ms before the press does"))
+    elif (report_gap := ends_before_reports(figures)) > allowed:
+        text = (
+            f"they end {report_gap:.0f} ms before the controller's reports: the press is whole, the board fell silent"
+        )
+        judgements.append((WARNING, "taxels", text))
     lag = reading_lag(figures)
-    off = figures.document["cnc"]["hold_error"] or 0.0
+    deviation = figures.document["cnc"]["hold_error"] or 0.0
     # Where the guide was not where it should be, its times cannot be judged.
-    if lag is not None and off <= HOLD_MM and abs(lag) > max(LAG_MS * rate, LAG_SHARE * loading(figures)):
+    if lag is not None and deviation <= HOLD_MM and abs(lag) > max(LAG_MS * rate, LAG_SHARE * loading(figures)):
         text = f"they come {lag:+.0f} ms after the motion: measure the delay by a sync tap (record --sync-tap)"
-        found.append((WARNING, "taxels", text))
-    return found
+        judgements.append((WARNING, "taxels", text))
+    return judgements
 
 
 def _cnc(figures: RecordingFigures) -> list[Judgement]:
-    values, found = figures.document["cnc"], []
+    values, judgements = figures.document["cnc"], []
     if not values["reports"]:
         return [(UNUSABLE, "cnc", "no status report")]
     # GRBL may append a code to a state, as in Door:1.
     alarms = [state for state in values["states"] if state.split(":")[0] in ("Alarm", "Door")]
     if alarms:
-        found.append((UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"))
+        judgements.append((UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"))
     if values["longest_gap"] / _rate_of_clock(figures) > REPORT_GAP_MS:
-        found.append((WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"))
+        judgements.append((WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"))
     if values["damaged"]:
         text = f"{values['damaged']} status reports could not be read: check the controller's cable and ground"
-        found.append((WARNING, "cnc", text))
+        judgements.append((WARNING, "cnc", text))
     if figures.document["complete"] and values["depth_uncertainty"] > DEPTH_MM[0]:
         severity = UNUSABLE if values["depth_uncertainty"] > DEPTH_MM[1] else WARNING
         text = f"the depth while pressing is uncertain by {values['depth_uncertainty']:.3f} mm"
         if values["contradiction"]:
             text += f": reports contradict the commanded profile by {values['contradiction']:.0f} ms"
-        found.append((severity, "cnc", text))
+        judgements.append((severity, "cnc", text))
     exact = EXACT_MM + np.sqrt(3.0) * figures.recording.height_resolution
     if values["hold_error"] is not None and values["hold_error"] > min(exact, HOLD_MM):
         text = f"the guide stood {values['hold_error']:.3f} mm from the commanded position in the hold"
         if values["hold_error"] <= HOLD_MM:
             text += f"; steps and reports explain {exact - EXACT_MM:.3f} mm"
-        found.append((UNUSABLE if values["hold_error"] > HOLD_MM else WARNING, "cnc", text))
-    return found
+        judgements.append((UNUSABLE if values["hold_error"] > HOLD_MM else WARNING, "cnc", text))
+    return judgements
 
 
 def _cameras(figures: RecordingFigures) -> list[Judgement]:
@@ -256,14 +264,14 @@ def _cameras(figures: RecordingFigures) -> list[Judgement]:
     return [(WARNING, stream, text) for stream, text in doubts]
 
 
-def _jumps(found: list[dict], channels: int, unit: str) -> list[str]:
-    if len(found) > channels / 2:
-        first = min(jump["at"] for jump in found)
-        return [f"{len(found)} channels jump while nothing moves, from {first:.1f} s on"]
+def _jumps(entries: list[dict], channels: int, unit: str) -> list[str]:
+    if len(entries) > channels / 2:
+        first = min(jump["at"] for jump in entries)
+        return [f"{len(entries)} channels jump while nothing moves, from {first:.1f} s on"]
     digits = "+.0f" if unit == COUNTS else "+.3g"
     return [
         f"channel {jump['channel']} jumps by {jump['size']:{digits}} {unit} at {jump['at']:.1f} s while nothing moves"
-        for jump in found
+        for jump in entries
     ]
 
 

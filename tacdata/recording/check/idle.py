@@ -24,12 +24,12 @@ def idle_rows(episode: Episode) -> np.ndarray:
     depth = episode.tip_at(time_ns)[:, 2]
     highest, deepest = float(episode.tip[:, 2].min()), float(episode.tip[:, 2].max())
     surface = max(0.0, highest) if deepest > 0 else highest
-    off = (depth <= surface + LOW * (deepest - highest)) & (deepest > highest)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(int)))
+    mask = (depth <= surface + LOW * (deepest - highest)) & (deepest > highest)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     begins, ends = edges[::2], edges[1::2]
-    chosen = np.zeros(len(time_ns), dtype=bool)
+    rows = np.zeros(len(time_ns), dtype=bool)
     if len(begins):
         first = begins[0] == 0 and ends[0] >= FEWEST
-        one = 0 if first else int(np.argmax(ends - begins))
-        chosen[begins[one] : ends[one]] = True
-    return chosen
+        longest = 0 if first else int(np.argmax(ends - begins))
+        rows[begins[longest] : ends[longest]] = True
+    return rows

@@ -25,11 +25,11 @@ def imported_summary(entries: Sequence[RecordingFigures]) -> list[str]:
     rates = [t["rate"] for t in taxels if t["rate"]]
     spread = float(np.median([t["interval_spread"] for t in taxels]))
     rate = float(np.median(rates)) if rates else np.nan
-    told = f"{np.median(noise):.3g} {taxels[0]['unit']}" if noise else "not known"
+    noise_text = f"{np.median(noise):.3g} {taxels[0]['unit']}" if noise else "not known"
     reports = [entry.document["cnc"]["rate"] for entry in entries if entry.document["cnc"]["rate"]]
     lines = [
         f"  taxels    {rate:.2f} Hz, {sum(t['frames'] for t in taxels)} rows, the time between two varies by "
-        f"{spread:.2g} ms ({spread * rate / 10:.2g} %), idle noise {told}"
+        f"{spread:.2g} ms ({spread * rate / 10:.2g} %), idle noise {noise_text}"
     ]
     return lines + ([f"  position  {np.median(reports):.1f} rows/s"] if reports else [])
 
@@ -41,29 +41,31 @@ def imported_findings(figures: RecordingFigures) -> list[tuple[str, str, str]]:
         return [("unusable", "taxels", f"{values['frames']} frames")]
     if not len(episode.tip_ns):
         return [("unusable", "position", "no position and no schedule")]
-    found = []
+    judgements = []
     if stand_ins := [text.split(":")[0] for text in episode.rig["imported"].get("stand_ins", [])]:
         text = f"the source does not say {', '.join(stand_ins)}: what stands in makes depth or labels a guess"
-        found.append(("warning", "import", text))
-    found += [("warning", "import", text) for text in episode.rig["imported"].get("set_aside", [])]
+        judgements.append(("warning", "import", text))
+    judgements += [("warning", "import", text) for text in episode.rig["imported"].get("set_aside", [])]
     if values["rate"] and values["longest_gap"] > GAP_PERIODS * 1000 / values["rate"]:
-        found.append(("warning", "taxels", f"gaps of up to {values['longest_gap'] / 1000:.1f} s without a sample"))
+        judgements.append(("warning", "taxels", f"gaps of up to {values['longest_gap'] / 1000:.1f} s without a sample"))
     missing = np.isnan(episode.taxels.counts).mean(axis=0)
     if (missing == 1).any():
         dead = ", ".join(map(str, np.flatnonzero(missing == 1).tolist()))
-        found.append(("warning", "taxels", f"channel {dead} has no value at all"))
+        judgements.append(("warning", "taxels", f"channel {dead} has no value at all"))
     if ((missing > 0) & (missing < 1)).any():
         text = f"up to {100 * missing[missing < 1].max():.0f} % of a channel's values are missing"
-        found.append(("warning", "taxels", text))
+        judgements.append(("warning", "taxels", text))
     lost = figures.recording.counts.get("taxels", {}).get("lost", 0)
     if lost:
-        found.append(("warning", "taxels", f"{lost} frames lost by the source's counter"))
+        judgements.append(("warning", "taxels", f"{lost} frames lost by the source's counter"))
     if not episode.phases:
-        found.append(("warning", "recording", "the path is not of one whole press: its phases are not marked"))
+        judgements.append(("warning", "recording", "the path is not of one whole press: its phases are not marked"))
     for text, span in (
         ("begins before", episode.tip_ns[0] - episode.taxels.sample_ns[0]),
         ("ends after", episode.taxels.sample_ns[-1] - episode.tip_ns[-1]),
     ):
         if span > 1_000_000_000:
-            found.append(("warning", "position", f"the channels' time {text} the position's by {span / 1e9:.1f} s"))
-    return found
+            judgements.append(
+                ("warning", "position", f"the channels' time {text} the position's by {span / 1e9:.1f} s")
+            )
+    return judgements

@@ -65,16 +65,16 @@ def _times(time_ns: np.ndarray) -> list[Doubt]:
         return [(UNUSABLE, "taxels", text)]
     if distinct < DISTINCT * rows:
         return [(UNUSABLE, "taxels", f"{rows} rows have only {distinct} different times: they say nothing of a rate")]
-    found: list[Doubt] = []
+    doubts: list[Doubt] = []
     if distinct < rows:
-        found.append((WARNING, "taxels", f"{rows - distinct} of {rows} rows have the time of another row"))
+        doubts.append((WARNING, "taxels", f"{rows - distinct} of {rows} rows have the time of another row"))
     rate = (distinct - 1) / span
     if not RATES[0] <= rate <= RATES[1]:
         text = f"{rate:.3g} rows a second: the times are in another unit than the file says"
-        found.append((UNUSABLE, "taxels", text))
+        doubts.append((UNUSABLE, "taxels", text))
     elif not SPANS[0] <= span <= SPANS[1]:
-        found.append((UNUSABLE, "taxels", f"it lasts {span:.3g} s: no press does"))
-    return found
+        doubts.append((UNUSABLE, "taxels", f"it lasts {span:.3g} s: no press does"))
+    return doubts
 
 
 def _uneven(time_ns: np.ndarray) -> list[Doubt]:
@@ -93,20 +93,20 @@ def _uneven(time_ns: np.ndarray) -> list[Doubt]:
     return [(UNUSABLE, "taxels", text)]
 
 
-def _other_rate(found: float | None, stated: float) -> list[Doubt]:
+def _other_rate(rate: float | None, stated: float) -> list[Doubt]:
     """Compare the rate of the rows with the one that the source states [Hz]."""
-    if not found or max(found / stated, stated / found) <= RATE_RATIO:
+    if not rate or max(rate / stated, stated / rate) <= RATE_RATIO:
         return []
-    text = f"{found:.4g} rows a second, and the source states {stated:.4g}: the unit of the times or the rate is wrong"
+    text = f"{rate:.4g} rows a second, and the source states {stated:.4g}: the unit of the times or the rate is wrong"
     return [(UNUSABLE, "taxels", text)]
 
 
 def _repeats(counts: np.ndarray) -> list[Doubt]:
     """Judge rows that repeat earlier ones, value for value: noise never does, a file played in a loop does."""
-    known = np.nan_to_num(np.ascontiguousarray(counts, dtype=float))
-    if len(known) < 2 * REPEATED:
+    readings = np.nan_to_num(np.ascontiguousarray(counts, dtype=float))
+    if len(readings) < 2 * REPEATED:
         return []
-    _, kind = np.unique(known, axis=0, return_inverse=True)
+    _, kind = np.unique(readings, axis=0, return_inverse=True)
     kind = kind.ravel().astype(np.uint64)
     # A key of the rows in each window; equal windows have equal keys.
     factors = np.random.default_rng(0).integers(1, 2**63, REPEATED, dtype=np.uint64)
@@ -176,11 +176,11 @@ def answer(figures: RecordingFigures) -> float | None:
     if not away.any() or not inside.any():
         return None
     counts = episode.taxels.counts
-    known = np.isfinite(noise) & np.isfinite(counts[inside]).any(axis=0) & np.isfinite(counts[away]).any(axis=0)
-    if not known.any():
+    channels = np.isfinite(noise) & np.isfinite(counts[inside]).any(axis=0) & np.isfinite(counts[away]).any(axis=0)
+    if not channels.any():
         return None
-    change = np.abs(np.nanmedian(counts[inside][:, known], axis=0) - np.nanmedian(counts[away][:, known], axis=0))
-    return float((change / np.maximum(noise[known], _quantum(counts[:, known]))).max())
+    change = np.abs(np.nanmedian(counts[inside][:, channels], axis=0) - np.nanmedian(counts[away][:, channels], axis=0))
+    return float((change / np.maximum(noise[channels], _quantum(counts[:, channels]))).max())
 
 
 def _quantum(counts: np.ndarray) -> np.ndarray:

@@ -58,8 +58,8 @@ class Report:
         """The report as one page of text."""
         lines = [f"{self.source}: {len(self.episodes)} recordings"]
         imported = bool(self.episodes) and is_imported(self.episodes[0].recording.episode)
-        told = imported_summary(self.episodes) if imported else _summary(self.episodes)
-        lines += [*_sync_words(self.episodes), *told]
+        summary = imported_summary(self.episodes) if imported else _summary(self.episodes)
+        lines += [*_sync_words(self.episodes), *summary]
         lines += [f"  NOT ASSESSED  {text}" for text in self.not_assessed]
         lines += _grouped(self.findings) or ["nothing to remark"]
         return "\n".join([*lines, "usable" if self.usable else "NOT usable as it is"])
@@ -92,37 +92,37 @@ def check(path: StrPath) -> Report:
     if not path.is_dir():
         raise UsageError(f"no file or folder {path}", "a recording or a session folder", "check the path")
     session = read_session(path)
-    entries, found = [], []
+    entries, faults = [], []
     for file in session.episodes:
         try:
             entries.append(figures(read_recording(file)))
-            found += findings(entries[-1])
+            faults += findings(entries[-1])
         except FormatError as error:
-            found.append(Finding(UNUSABLE, "recording", file.name, error.given))
+            faults.append(Finding(UNUSABLE, "recording", file.name, error.given))
     unknown = _not_assessed(entries)
     if entries and not is_imported(entries[0].recording.episode):
         unknown += session_not_assessed(entries)
-    return Report(path, tuple(entries), (*found, *_of_session(session, entries)), tuple(unknown))
+    return Report(path, tuple(entries), (*faults, *_of_session(session, entries)), tuple(unknown))
 
 
 def _of_session(session: Any, entries: list[RecordingFigures]) -> list[Finding]:
-    found = []
+    faults = []
     if not session.episodes:
-        found.append(Finding(UNUSABLE, "session", "", "no finished recording"))
+        faults.append(Finding(UNUSABLE, "session", "", "no finished recording"))
     if session.remaining:
         text = f"{len(session.remaining)} of {len(session.plan.presses)} presses of the plan are not recorded"
-        found.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
+        faults.append(Finding(WARNING, "session", "", f"{text}; go on with tacdata record --resume"))
     if entries and is_imported(entries[0].recording.episode):
-        return [*found, *_unanswered(entries), *_weak(entries)]  # the positions of its channels may be stand-ins
-    return [*found, *session_findings(entries)]
+        return [*faults, *_unanswered(entries), *_weak(entries)]  # the positions of its channels may be stand-ins
+    return [*faults, *session_findings(entries)]
 
 
 def _unanswered(entries: list[RecordingFigures]) -> list[Finding]:
     pressed = [answer(entry) for entry in entries if entry.recording.episode.press.depth >= CONTACT]
-    known = [value for value in pressed if value is not None]
-    if not known or max(known) >= ANSWER:
+    levels = [value for value in pressed if value is not None]
+    if not levels or max(levels) >= ANSWER:
         return []
-    text = f"no channel answers to any of {len(known)} presses: at most {max(known):.1f} times its noise"
+    text = f"no channel answers to any of {len(levels)} presses: at most {max(levels):.1f} times its noise"
     return [Finding(UNUSABLE, "taxels", "", text)]
 
 
@@ -157,13 +157,16 @@ def _sync_words(entries: tuple[RecordingFigures, ...]) -> list[str]:
         for pair in entry.document["sync"]:
             pairs.setdefault(f"{pair['first']} - {pair['second']}", []).append(pair)
     measured, unknown = [], []
-    for name, said in pairs.items():
-        known = [pair for pair in said if pair["offset"] is not None]
-        if len(known) < len(said):
-            unknown.append(name + (f" (in {len(said) - len(known)} of {len(said)})" if known else ""))
-        if known:
-            offset, off = _middle(pair["offset"] for pair in known), max(pair["uncertainty"] for pair in known)
-            measured.append(f"{name} {offset:+.2f} +- {off:.2f} ms, taken off")
+    for name, series in pairs.items():
+        estimates = [pair for pair in series if pair["offset"] is not None]
+        if len(estimates) < len(series):
+            unknown.append(name + (f" (in {len(series) - len(estimates)} of {len(series)})" if estimates else ""))
+        if estimates:
+            offset, uncertainty = (
+                _middle(pair["offset"] for pair in estimates),
+                max(pair["uncertainty"] for pair in estimates),
+            )
+            measured.append(f"{name} {offset:+.2f} +- {uncertainty:.2f} ms, taken off")
     lines = [f"  sync    {words}" for words in measured]
     imported = bool(entries) and is_imported(entries[0].recording.episode)
     why = "the source's times are taken as they are" if imported else "record --sync-tap"
@@ -219,20 +222,20 @@ def _seen(views: list[dict[str, Any]]) -> str:
     words = []
     for what, entries in looked.items():
         searched = sum(entry["searched"] for entry in entries)
-        seen = sum(entry["searched"] * (entry["seen"] or 0.0) for entry in entries)
-        words.append(f"{what} in view in {100 * seen / max(searched, 1):.0f} % of {searched} searched")
+        sightings = sum(entry["searched"] * (entry["seen"] or 0.0) for entry in entries)
+        words.append(f"{what} in view in {100 * sightings / max(searched, 1):.0f} % of {searched} searched")
     return ", ".join(words)
 
 
 def _middle(values: Any) -> float:
-    known = [value for value in values if value is not None]
-    return float(np.median(known)) if known else float("nan")
+    numbers = [value for value in values if value is not None]
+    return float(np.median(numbers)) if numbers else float("nan")
 
 
-def _grouped(found: tuple[Finding, ...]) -> list[str]:
+def _grouped(faults: tuple[Finding, ...]) -> list[str]:
     """Return one line per finding; findings that several recordings share are merged."""
     groups: dict[tuple[str, str, str], list[str]] = {}
-    for finding in found:
+    for finding in faults:
         groups.setdefault((finding.severity, finding.stream, finding.text), []).append(finding.file)
     lines = []
     for (severity, stream, text), files in sorted(groups.items(), key=lambda item: item[0][0] != UNUSABLE):

@@ -54,84 +54,84 @@ LOUDER = 3.0
 
 def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
     """Return findings on the channels, from their answers to the session's presses."""
-    apart = [*_delays(entries), *_louder(entries), *_drifts(entries), *_not_felt(entries), *_heights(entries)]
-    found = answers(entries)
-    if found is None:
-        return apart
-    if unanswered(found):
+    faults = [*_delays(entries), *_louder(entries), *_drifts(entries), *_not_felt(entries), *_heights(entries)]
+    sample = answers(entries)
+    if sample is None:
+        return faults
+    if unanswered(sample):
         text = "no channel answered to any press: no contact (check the registration), or the board is not the sensor's"
-        return [*apart, Finding(UNUSABLE, "taxels", "", text)]
-    moved = misplaced(found)
-    texts = [(UNUSABLE, text) for text in _places(found, moved)]
+        return [*faults, Finding(UNUSABLE, "taxels", "", text)]
+    swaps = misplaced(sample)
+    texts = [(UNUSABLE, text) for text in _places(sample, swaps)]
     # A channel that answers at another taxel's place is not silent.
-    if quiet := [channel for channel in silent(found) if channel not in moved]:
+    if quiet := [channel for channel in silent(sample) if channel not in swaps]:
         texts.append((UNUSABLE, f"channel {', '.join(map(str, quiet))} did not answer to presses close by"))
     names = [f.recording.episode.path.name for f in entries if counts_as_press(f)]
-    for channel, (press, factor) in gain_steps(found).items():
+    for channel, (press, factor) in gain_steps(sample).items():
         text = f"channel {channel} answers {factor:.2f} times as strongly from about {names[press]} on"
         texts.append((UNUSABLE, text))
-    texts += [(WARNING, text) for text in _offsets(entries, found)]
-    if not moved:
-        texts += _steps(entries, found, names)
-    return [*apart, *(Finding(severity, "taxels", "", text) for severity, text in texts)]
+    texts += [(WARNING, text) for text in _offsets(entries, sample)]
+    if not swaps:
+        texts += _steps(entries, sample, names)
+    return [*faults, *(Finding(severity, "taxels", "", text) for severity, text in texts)]
 
 
 def session_not_assessed(entries: list[RecordingFigures]) -> list[str]:
     """Say which changes within the session its presses cannot tell, and why."""
-    found = answers(entries)
-    presses = 0 if found is None else len(found.response)
-    if found is None or presses < STEP_PRESSES:
+    sample = answers(entries)
+    presses = 0 if sample is None else len(sample.response)
+    if sample is None or presses < STEP_PRESSES:
         return [f"whether gains, wiring or the tool changed: {presses} presses, at least {STEP_PRESSES} are needed"]
-    if unanswered(found):
+    if unanswered(sample):
         return []
     words = []
-    if few := unknown_gains(found):
-        words.append(f"whether the gain of channel {', '.join(map(str, few))} steps: too few presses near it")
-    unsure = {"strength of all answers": strength_step(entries, found), "height of the tool": height_step(entries)}
+    if channels := unknown_gains(sample):
+        words.append(f"whether the gain of channel {', '.join(map(str, channels))} steps: too few presses near it")
+    unsure = {"strength of all answers": strength_step(entries, sample), "height of the tool": height_step(entries)}
     words += [
         f"whether the {what} steps: depths, sites and indenters explain it as well, or answers scatter too much"
-        for (what, search), least in zip(unsure.items(), TELLING, strict=True)
-        if search.step is None and search.smallest > least
+        for (what, search), threshold in zip(unsure.items(), TELLING, strict=True)
+        if search.step is None and search.smallest > threshold
     ]
     return words
 
 
 def _delays(entries: list[RecordingFigures]) -> list[Finding]:
     """Find the recordings whose readings are late, or early, against the motion when the others' are not."""
-    known = [(entry, lag) for entry in entries if (lag := reading_lag(entry)) is not None]
-    if len(known) < FEWEST:
+    lags = [(entry, lag) for entry in entries if (lag := reading_lag(entry)) is not None]
+    if len(lags) < FEWEST:
         return []
-    usual, found = float(np.median([lag for _, lag in known])), []
-    duration = float(np.median([loading(entry) for entry, _ in known]))
-    for entry, lag in known:
+    usual, faults = float(np.median([lag for _, lag in lags])), []
+    duration = float(np.median([loading(entry) for entry, _ in lags]))
+    for entry, lag in lags:
         episode = entry.recording.episode
         limit = LAG_MS * float(episode.rig.get("clock", {}).get("rate", 1.0))
         if abs(lag - usual) > limit + LAG_SHARE * abs(loading(entry) - duration):
             depth = abs(lag - usual) * 1e-3 * episode.press.speed
             text = f"they come {lag - usual:+.0f} ms later against the motion than in other recordings"
             severity = UNUSABLE if depth > LAG_DEPTH else WARNING
-            found.append(Finding(severity, "taxels", episode.path.name, f"{text}: {depth:.2f} mm of depth"))
-    return found
+            faults.append(Finding(severity, "taxels", episode.path.name, f"{text}: {depth:.2f} mm of depth"))
+    return faults
 
 
 def _drifts(entries: list[RecordingFigures]) -> list[Finding]:
     """Find the recordings in which the board's clock runs otherwise than in the session's others."""
     clocks = [(entry, entry.document["taxels"]["clock"]) for entry in entries]
-    known = [(entry, clock) for entry, clock in clocks if clock and clock["steady"] and clock["drift"] is not None]
-    if len(known) < FEWEST:
+    drifts = [(entry, clock) for entry, clock in clocks if clock and clock["steady"] and clock["drift"] is not None]
+    if len(drifts) < FEWEST:
         return []
-    usual, found = float(np.median([clock["drift"] for _, clock in known])), []
-    for entry, clock in known:
-        off = clock["drift"] - usual
-        if abs(off) <= max(DRIFT_PPM, 3 * clock["drift_uncertainty"]):
+    usual, faults = float(np.median([clock["drift"] for _, clock in drifts])), []
+    for entry, clock in drifts:
+        deviation = clock["drift"] - usual
+        if abs(deviation) <= max(DRIFT_PPM, 3 * clock["drift_uncertainty"]):
             continue
         # A stream far off its nominal rate is named in the recording itself.
         named = abs(clock["drift"]) - 2 * clock["drift_uncertainty"] > DRIFT_PPM
-        low, high = off + _lean(entry)
+        low, high = deviation + _lean(entry)
         if (low > MIDDLE * DRIFT_PPM or high < -MIDDLE * DRIFT_PPM) and not named:
-            text = f"its clock runs {off:+.0f} ppm otherwise than in the session's other recordings"
-            found.append(Finding(WARNING, "taxels", entry.recording.episode.path.name, text))
-    return found
+            text = f"its clock runs {deviation:+.0f} ppm otherwise than in the session's other recordings"
+            faults.append(Finding(WARNING, "taxels", entry.recording.episode.path.name, text))
+    return faults
 
 
 def _lean(entry: RecordingFigures) -> np.ndarray:
@@ -140,25 +140,25 @@ def _lean(entry: RecordingFigures) -> np.ndarray:
     In a recording of seconds a few early frames lead the line astray; they do not lead the middle. The two lie one
     standard deviation apart from it: a slow board has too few frames to tell.
     """
-    every = max(len(entry.lag) // LEANING, 1)
-    time_ms = entry.recording.episode.taxels.sample_ns[::every] / 1e6
-    return 1e6 * np.array(theilslopes(entry.lag[::every], time_ms - time_ms[0], ONE_SIGMA)[2:])
+    stride = max(len(entry.lag) // LEANING, 1)
+    time_ms = entry.recording.episode.taxels.sample_ns[::stride] / 1e6
+    return 1e6 * np.array(theilslopes(entry.lag[::stride], time_ms - time_ms[0], ONE_SIGMA)[2:])
 
 
 def _not_felt(entries: list[RecordingFigures]) -> list[Finding]:
     """Find the presses that no channel answers, where the session's others of their depth are felt."""
-    known = [
+    responses = [
         (entry, press, felt)
         for entry in entries
         if (press := entry.recording.episode.press).depth >= CONTACT and (felt := answer(entry)) is not None
     ]
-    usual = [felt for _, press, felt in known if felt >= PLAIN * ANSWER]
-    felt_from = min((press.depth for _, press, felt in known if felt >= PLAIN * ANSWER), default=np.inf)
-    if 2 * len(usual) < len(known):
+    usual = [felt for _, press, felt in responses if felt >= PLAIN * ANSWER]
+    felt_from = min((press.depth for _, press, felt in responses if felt >= PLAIN * ANSWER), default=np.inf)
+    if 2 * len(usual) < len(responses):
         return []
     return [
         Finding(UNUSABLE, "taxels", entry.recording.episode.path.name, f"no channel answers to this press: {NOT_FELT}")
-        for entry, press, felt in known
+        for entry, press, felt in responses
         if felt < ANSWER and press.depth >= felt_from and over_taxels(entry)
     ]
 
@@ -170,24 +170,24 @@ def _heights(entries: list[RecordingFigures]) -> list[Finding]:
         for entry in entries
         if entry.recording.episode.complete and (contact := first_contact(entry)) is not None
     ]
-    found = []
+    faults = []
     if judged := height_words([contact for _, contact in contacts]):
-        found.append(Finding(UNUSABLE if abs(judged[0]) > LIMITS[1] else WARNING, "taxels", "", judged[1]))
+        faults.append(Finding(UNUSABLE if abs(judged[0]) > LIMITS[1] else WARNING, "taxels", "", judged[1]))
     if words := drift_words(contacts):
-        found.append(Finding(WARNING, "taxels", "", words))
-    return found
+        faults.append(Finding(WARNING, "taxels", "", words))
+    return faults
 
 
 def over_taxels(entry: RecordingFigures) -> bool:
     """Whether a press is over a taxel, so that it must be felt."""
     press, taxels = entry.recording.episode.press, entry.recording.episode.sensor.taxels
-    apart = np.linalg.norm(taxels.centers - np.array([press.x, press.y]), axis=1)
-    return bool(apart.min() < 0.75 * max(taxels.pitch_x, taxels.pitch_y))
+    distances = np.linalg.norm(taxels.centers - np.array([press.x, press.y]), axis=1)
+    return bool(distances.min() < 0.75 * max(taxels.pitch_x, taxels.pitch_y))
 
 
-def _steps(entries: list[RecordingFigures], found: Answers, names: list[str]) -> list[tuple[str, str]]:
+def _steps(entries: list[RecordingFigures], sample: Answers, names: list[str]) -> list[tuple[str, str]]:
     """Describe a step of all answers: sideways, else in height, else in strength, as each changes the next."""
-    if slipped := slip(found):
+    if slipped := slip(sample):
         x, y = slipped.size
         words = "the tool or the skin slipped, or the registration changed"
         return [(UNUSABLE, f"answers lie x {x:+.1f}, y {y:+.1f} mm elsewhere from {names[slipped.row]} on: {words}")]
@@ -198,7 +198,7 @@ def _steps(entries: list[RecordingFigures], found: Answers, names: list[str]) ->
         words = f"the skin is felt about {abs(height):.2f} mm {way} from {names[step.row]} on"
         severity = UNUSABLE if abs(height) > DEPTH_MM[1] else WARNING
         return [(severity, f"{words}: the tool or the skin slipped, or the registration changed")]
-    if step := strength_step(entries, found).step:
+    if step := strength_step(entries, sample).step:
         factor = float(np.exp(step.size[0]))
         words = "the board's gain or supply changed, or the skin did"
         return [(UNUSABLE, f"all channels answer {factor:.2f} times as strongly from {names[step.row]} on: {words}")]
@@ -208,10 +208,10 @@ def _steps(entries: list[RecordingFigures], found: Answers, names: list[str]) ->
 def _louder(entries: list[RecordingFigures]) -> list[Finding]:
     """Find the recordings in which all channels are noisier than in the session's quiet ones."""
     noise = [[v for v in entry.document["taxels"]["idle_noise"] if v is not None] for entry in entries]
-    known = [(entry, float(np.median(values))) for entry, values in zip(entries, noise, strict=True) if values]
-    if len(known) < FEWEST:
+    levels = [(entry, float(np.median(values))) for entry, values in zip(entries, noise, strict=True) if values]
+    if len(levels) < FEWEST:
         return []
-    quiet = max(float(np.percentile([value for _, value in known], 25)), 0.5)
+    quiet = max(float(np.percentile([value for _, value in levels], 25)), 0.5)
     return [
         Finding(
             WARNING,
@@ -219,24 +219,24 @@ def _louder(entries: list[RecordingFigures]) -> list[Finding]:
             entry.recording.episode.path.name,
             f"its noise is {value / quiet:.0f} times that of the session's quiet recordings",
         )
-        for entry, value in known
+        for entry, value in levels
         if value > LOUDER * quiet
     ]
 
 
-def _places(found: Answers, moved: dict[int, int]) -> list[str]:
+def _places(sample: Answers, swaps: dict[int, int]) -> list[str]:
     """Describe the channels that are wired to other taxels than in the sensor file."""
-    for words, order in zip(TURNED, orders(found.taxels)[1:], strict=True):
-        same = sum(int(order[k]) == j for k, j in moved.items())
-        if len(moved) > 0.6 * len(order) and same > 0.9 * len(moved):
+    for words, order in zip(TURNED, orders(sample.taxels)[1:], strict=True):
+        same = sum(int(order[k]) == j for k, j in swaps.items())
+        if len(swaps) > 0.6 * len(order) and same > 0.9 * len(swaps):
             return [f"the channels answer as if the array were {words}: plug, order of channels or registration"]
     return [
         f"channel {channel} answers like taxel {taxel}: swapped wires, or a wrong yaw in the registration"
-        for channel, taxel in moved.items()
+        for channel, taxel in swaps.items()
     ]
 
 
-def _offsets(entries: list[RecordingFigures], found: Answers) -> list[str]:
+def _offsets(entries: list[RecordingFigures], sample: Answers) -> list[str]:
     """Describe the channels whose idle reading steps between two recordings while others' do not."""
     idle = np.array(
         [[np.nan if v is None else v for v in f.document["taxels"]["idle_reading"]] for f in entries], float
@@ -244,14 +244,14 @@ def _offsets(entries: list[RecordingFigures], found: Answers) -> list[str]:
     if len(idle) < 2:
         return []
     change = np.diff(idle, axis=0)
-    known = np.isfinite(change).any(axis=1)
+    rows = np.isfinite(change).any(axis=1)
     shared = np.zeros(len(change))
-    shared[known] = np.nanmedian(change[known], axis=1)
-    alone = np.nan_to_num(change - shared[:, None])
-    limit = np.maximum(OFFSET * found.noise, OFFSET_SHARE * np.abs(found.response).max(axis=0))
+    shared[rows] = np.nanmedian(change[rows], axis=1)
+    excess = np.nan_to_num(change - shared[:, None])
+    limit = np.maximum(OFFSET * sample.noise, OFFSET_SHARE * np.abs(sample.response).max(axis=0))
     words = []
-    for channel in np.flatnonzero((np.abs(alone) > limit).any(axis=0)).tolist():
-        at = int(np.argmax(np.abs(alone[:, channel])))
+    for channel in np.flatnonzero((np.abs(excess) > limit).any(axis=0)).tolist():
+        at = int(np.argmax(np.abs(excess[:, channel])))
         name = entries[at + 1].recording.episode.path.name
-        words.append(f"the idle reading of channel {channel} steps by {alone[at, channel]:+.0f} counts before {name}")
+        words.append(f"the idle reading of channel {channel} steps by {excess[at, channel]:+.0f} counts before {name}")
     return words

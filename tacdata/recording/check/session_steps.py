@@ -54,80 +54,80 @@ class StepSearch:
     """Smallest step half-way through the session that would be sure; infinite if none would be."""
 
 
-def find_step(explained: np.ndarray, values: np.ndarray, least: float) -> StepSearch:
+def find_step(explained: np.ndarray, values: np.ndarray, threshold: float) -> StepSearch:
     """Search for a step.
 
     Args:
         explained: Columns that explain the values otherwise, shape (presses, columns).
         values: Measured quantities, shape (presses, quantities).
-        least: Smallest step that is reported [unit of the values].
+        threshold: Smallest step that is reported [unit of the values].
     """
     count, best, middle = len(values), None, np.inf
     for at in range(FEWEST, count - FEWEST + 1):
         step = (np.arange(count) >= at).astype(float)
         # Only the part of the step that no other column explains determines its size (Frisch, Waugh and Lovell).
-        own = step - explained @ np.linalg.lstsq(explained, step, rcond=None)[0]
+        remainder = step - explained @ np.linalg.lstsq(explained, step, rcond=None)[0]
         design = np.column_stack([explained, step])
         freedom = count - int(np.linalg.matrix_rank(design))
-        if freedom < FREEDOM or own @ own < 1e-6 * count:
+        if freedom < FREEDOM or remainder @ remainder < 1e-6 * count:
             continue
         solved = np.linalg.lstsq(design, values, rcond=None)[0]
         spread = ((values - design @ solved) ** 2).sum(axis=0) / freedom
-        error = np.maximum(np.sqrt(spread / (own @ own)), 1e-9)
-        sure = float((np.abs(solved[-1]) / error).max())
-        if best is None or sure > best[0]:
-            best = sure, at, solved[-1]
+        error = np.maximum(np.sqrt(spread / (remainder @ remainder)), 1e-9)
+        significance = float((np.abs(solved[-1]) / error).max())
+        if best is None or significance > best[0]:
+            best = significance, at, solved[-1]
         middle = min(middle, SURE * float(error.max())) if abs(at - count / 2) <= 1 else middle
-    if best is None or best[0] < SURE or np.abs(best[2]).max() < least:
+    if best is None or best[0] < SURE or np.abs(best[2]).max() < threshold:
         return StepSearch(None, middle)
     return StepSearch(AnswerStep(best[1], best[2]), middle)
 
 
-def slip(found: Answers) -> AnswerStep | None:
+def slip(sample: Answers) -> AnswerStep | None:
     """Return from which press on the answers lie elsewhere, and where [mm, sensor frame]; None if they do not."""
-    centers = found.taxels.centers
+    centers = sample.taxels.centers
     low, high = centers.min(axis=0) + INSIDE, centers.max(axis=0) - INSIDE
-    rows = np.flatnonzero(np.all((found.sites > low) & (found.sites < high), axis=1))
-    weight = np.maximum(found.response[rows], 0.0) ** 2
+    rows = np.flatnonzero(np.all((sample.sites > low) & (sample.sites < high), axis=1))
+    weight = np.maximum(sample.response[rows], 0.0) ** 2
     total = weight.sum(axis=1)
     if len(rows) < 2 * FEWEST or not total.all():
         return None
-    sites = found.sites[rows]
-    off = (weight[:, :, None] * centers).sum(axis=1) / total[:, None] - sites
-    step = find_step(np.column_stack([np.ones(len(rows)), sites]), off, SLIP).step
+    sites = sample.sites[rows]
+    offset = (weight[:, :, None] * centers).sum(axis=1) / total[:, None] - sites
+    step = find_step(np.column_stack([np.ones(len(rows)), sites]), offset, SLIP).step
     return None if step is None else AnswerStep(int(rows[step.row]), step.size)
 
 
-def strength_step(entries: list[RecordingFigures], found: Answers) -> StepSearch:
+def strength_step(entries: list[RecordingFigures], sample: Answers) -> StepSearch:
     """Search for a step of the logarithm of all answers."""
     presses = [entry.recording.episode.press for entry in entries if counts_as_press(entry)]
-    amplitude = fit_answers(found).amplitude
-    known = np.flatnonzero(amplitude > 0)
-    if len(known) < 2:
+    amplitude = fit_answers(sample).amplitude
+    rows = np.flatnonzero(amplitude > 0)
+    if len(rows) < 2:
         return StepSearch(None, np.inf)
-    depth = np.log([presses[k].depth for k in known])
-    explained = np.column_stack([_explained([presses[k] for k in known]), depth, depth**2])
-    return _back(find_step(explained, np.log(amplitude[known])[:, None], STRONGER), known)
+    depth = np.log([presses[k].depth for k in rows])
+    explained = np.column_stack([_explained([presses[k] for k in rows]), depth, depth**2])
+    return _back(find_step(explained, np.log(amplitude[rows])[:, None], STRONGER), rows)
 
 
 def height_step(entries: list[RecordingFigures]) -> StepSearch:
     """Search for a step of the height at which the skin is felt [mm], positive if it is felt deeper."""
     pressed = [entry for entry in entries if counts_as_press(entry)]
     heights = [height_felt(entry) for entry in pressed]
-    known = np.array([k for k, height in enumerate(heights) if height is not None], int)
-    if not len(known):
+    rows = np.array([k for k, height in enumerate(heights) if height is not None], int)
+    if not len(rows):
         return StepSearch(None, np.inf)
-    presses = [pressed[k].recording.episode.press for k in known]
+    presses = [pressed[k].recording.episode.press for k in rows]
     depth = np.array([press.deepest for press in presses])
-    values = np.array([heights[k] for k in known], float)
-    return _back(find_step(np.column_stack([_explained(presses), depth]), values[:, None], HIGHER), known)
+    values = np.array([heights[k] for k in rows], float)
+    return _back(find_step(np.column_stack([_explained(presses), depth]), values[:, None], HIGHER), rows)
 
 
-def _back(search: StepSearch, known: np.ndarray) -> StepSearch:
+def _back(search: StepSearch, rows: np.ndarray) -> StepSearch:
     """Count presses among all that were used, not among those in which the quantity is known."""
     if search.step is None:
         return search
-    return StepSearch(AnswerStep(int(known[search.step.row]), search.step.size), search.smallest)
+    return StepSearch(AnswerStep(int(rows[search.step.row]), search.step.size), search.smallest)
 
 
 def _explained(presses: list[Press]) -> np.ndarray:
@@ -135,5 +135,5 @@ def _explained(presses: list[Press]) -> np.ndarray:
     kinds = [(p.mounting, p.approach_from, p.overshoot > 0, p.strokes > 0) for p in presses]
     table = np.array([(p.x, p.y, np.log(p.speed), p.overshoot) for p in presses], float)
     table = (table - table.mean(axis=0)) / np.maximum(table.std(axis=0), 1e-9)
-    each = [[float(kind == known) for known in sorted(set(kinds))] for kind in kinds]
+    each = [[float(kind == category) for category in sorted(set(kinds))] for kind in kinds]
     return np.column_stack([each, table, table[:, :2] ** 2, np.linspace(-1.0, 1.0, len(presses))])

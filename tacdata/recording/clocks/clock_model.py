@@ -108,8 +108,8 @@ class ClockModel:
         which = np.maximum(np.searchsorted(begins, arrival_ns, side="right") - 1, 0)
         times = np.zeros(len(counter), np.int64)
         for number, line in enumerate(lines):
-            chosen = which == number
-            times[chosen] = line.sample_ns(counter[chosen])
+            rows = which == number
+            times[rows] = line.sample_ns(counter[rows])
         return np.where(counter >= 0, times, arrival_ns - constant)
 
     @property

@@ -111,17 +111,17 @@ class _Stretch:
             self._count, self._total = self._count - gone.sums[0], self._total - gone.sums[1]
             # The hull of all arrivals is the hull of the blocks' hulls.
             self.hull = []
-            for kept in (p for block in self.blocks for p in block.hull):
-                append_to_hull(self.hull, kept)
+            for vertex in (p for block in self.blocks for p in block.hull):
+                append_to_hull(self.hull, vertex)
 
     def established(self, rate: float) -> bool:
         return self.frames >= LASTING_FRAMES and self.last[1] - self.origin[1] >= LASTING_NS * rate
 
-    def merge(self, other: _Stretch) -> None:
+    def merge(self, later: _Stretch) -> None:
         """Merge a later block that turned out to belong to this one, arriving late; only its hull matters."""
-        for point in other.hull:
+        for point in later.hull:
             self.add(point)
-        self.frames += other.frames - len(other.hull)
+        self.frames += later.frames - len(later.hull)
 
     def frame_ns(self) -> float:
         """Mean time between frames [ns]."""
@@ -144,13 +144,13 @@ class _Stretch:
 
     def line(self) -> tuple[int, int, float] | None:
         """Return a point on the line and its slope, or None before two different counters are known."""
-        free = self._free_line()
-        if free is None or self.nominal_ns is None:
-            return free
-        slope = min(max(free[2], self.nominal_ns * (1 - CRYSTAL)), self.nominal_ns * (1 + CRYSTAL))
-        off = abs(slope - free[2])
-        if off == 0 or off > self.nominal_ns * 2 * self.uncertainty_ns() / self.span_ns:
-            return free  # the bound by the arrivals outweighs the nominal rate
+        estimate = self._free_line()
+        if estimate is None or self.nominal_ns is None:
+            return estimate
+        slope = min(max(estimate[2], self.nominal_ns * (1 - CRYSTAL)), self.nominal_ns * (1 + CRYSTAL))
+        deviation = abs(slope - estimate[2])
+        if deviation == 0 or deviation > self.nominal_ns * 2 * self.uncertainty_ns() / self.span_ns:
+            return estimate  # the bound by the arrivals outweighs the nominal rate
         x0, y0 = min(self.hull, key=lambda point: point[1] - self.origin[1] - slope * (point[0] - self.origin[0]))
         return x0, y0, slope
 
@@ -170,7 +170,7 @@ class _Stretch:
             return None
         x0, y0, slope = line
         delay, jitter, uncertainty = self._spread(line)
-        free = line == self._free_line()
+        is_free = line == self._free_line()
         # Either end of the line may be off by the uncertainty.
         drift = 2 * uncertainty / self.span_ns
         return ClockModel(
@@ -182,7 +182,7 @@ class _Stretch:
             max(delay, 0.0),
             jitter,
             uncertainty,
-            drift if free else min(drift, 2 * CRYSTAL),
+            drift if is_free else min(drift, 2 * CRYSTAL),
             axis,
         )
 
@@ -195,12 +195,12 @@ class _Stretch:
         jitter = math.sqrt(max(variance, 0.0))
         delay = sy / n + self.origin[1] - y0 - slope * (sx / n + self.origin[0] - x0)
         # The last block is still being filled.
-        whole = self.blocks[:-1] or self.blocks
-        least = [min(y - y0 - slope * (x - x0) for x, y in block.hull) for block in whole]
+        blocks = self.blocks[:-1] or self.blocks
+        minima = [min(y - y0 - slope * (x - x0) for x, y in block.hull) for block in blocks]
         usual = np.median([y - y0 - slope * (x - x0) for block in self.blocks for x, y in block.first])
         # Latencies that come in steps (a latency timer) can hide the same part in every block.
-        uncertainty = max(TYPICAL * float(np.median(least)), HIDDEN * float(usual))
-        if len(whole) < 3:  # too short to compare blocks: the scatter of the mean is the bound
+        uncertainty = max(TYPICAL * float(np.median(minima)), HIDDEN * float(usual))
+        if len(blocks) < 3:  # too short to compare blocks: the scatter of the mean is the bound
             uncertainty = max(uncertainty, jitter / math.sqrt(n))
         return delay, jitter, uncertainty
 
@@ -209,8 +209,8 @@ class _Stretch:
         x0, y0, slope = line
         rows = [block.sums for block in self.blocks]
         mean = [s[2] / s[0] + self.origin[1] - y0 - slope * (s[1] / s[0] + self.origin[0] - x0) for s in rows]
-        most = STALLED * float(np.median(mean)) + LATE_NS
-        return [s for s, latency in zip(rows, mean, strict=True) if latency <= most]
+        limit = STALLED * float(np.median(mean)) + LATE_NS
+        return [s for s, latency in zip(rows, mean, strict=True) if latency <= limit]
 
 
 class EnvelopeFit:
@@ -235,7 +235,7 @@ class EnvelopeFit:
         """Take one arrival [ns]; a counter that falls back (a device reset) starts a new line."""
         if counter < 0:
             return
-        now, last = self._stretch, self._late[-1] if self._late else self._stretch.last
+        stretch, last = self._stretch, self._late[-1] if self._late else self._stretch.last
         if counter == last[0]:
             return
         if counter < last[0]:
@@ -243,21 +243,21 @@ class EnvelopeFit:
             return
         if self._before is not None and self._came_back(self._before, (counter, arrival_ns)):
             return
-        line = now.line() if now.established(self._rate) else None
+        line = stretch.line() if stretch.established(self._rate) else None
         if line is None:
-            now.add((counter, arrival_ns))
+            stretch.add((counter, arrival_ns))
             return
         error = arrival_ns - line[1] - line[2] * (counter - line[0])
-        period = now.frame_ns()
+        period = stretch.frame_ns()
         # A line is less certain beyond the arrivals that it was fitted to.
-        doubt = now.uncertainty_ns() * (1 + 2 * (arrival_ns - now.last[1]) / now.span_ns)
-        if error < -max(EARLY_NS * self._rate, 2.5 * period) - DRIFT * (arrival_ns - now.last[1]) - doubt:
+        doubt = stretch.uncertainty_ns() * (1 + 2 * (arrival_ns - stretch.last[1]) / stretch.span_ns)
+        if error < -max(EARLY_NS * self._rate, 2.5 * period) - DRIFT * (arrival_ns - stretch.last[1]) - doubt:
             self._begin([(counter, arrival_ns)])
         elif error > max(LATE_NS * self._rate, 0.6 * period) + doubt:
             self._wait_for_return((counter, arrival_ns))
         else:
             self._returned()
-            now.add((counter, arrival_ns))
+            stretch.add((counter, arrival_ns))
 
     def _wait_for_return(self, point: Point) -> None:
         self._late.append(point)
@@ -267,20 +267,20 @@ class EnvelopeFit:
             self._begin(self._late)
             self._before = ended
 
-    def _came_back(self, before: _Stretch, point: Point) -> bool:
+    def _came_back(self, previous: _Stretch, point: Point) -> bool:
         """Undo a new line if a frame is on the old one again: then the host was late, and nothing stepped."""
-        line = before.line()
-        if line is None or point[1] - before.last[1] > RETURN_NS * self._rate:
+        line = previous.line()
+        if line is None or point[1] - previous.last[1] > RETURN_NS * self._rate:
             self._before = None
             return False
         error = point[1] - line[1] - line[2] * (point[0] - line[0])
-        if abs(error) > max(LATE_NS * self._rate, 0.6 * before.frame_ns()):
+        if abs(error) > max(LATE_NS * self._rate, 0.6 * previous.frame_ns()):
             return False
-        before.merge(self._stretch)
-        late, self._late = self._late, []
-        for kept in (*late, point):
-            before.add(kept)
-        self._stretch, self._before = before, None
+        previous.merge(self._stretch)
+        backlog, self._late = self._late, []
+        for arrival in (*backlog, point):
+            previous.add(arrival)
+        self._stretch, self._before = previous, None
         # `_begin` stored this line as ended.
         self._earlier.pop()
         return True

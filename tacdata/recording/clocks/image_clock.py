@@ -60,18 +60,18 @@ class ImageClock:
 
     def sample_times(self, arrival_ns: np.ndarray, counter: np.ndarray) -> np.ndarray:
         """Return times of exposure [ns], shape (m,), int64; the arrival [ns] of an image that is not known."""
-        rows, known = self._rows(counter)
-        return np.where(known, self.time_ns[rows], arrival_ns)
+        rows, hits = self._rows(counter)
+        return np.where(hits, self.time_ns[rows], arrival_ns)
 
     def uncertainties(self, counter: np.ndarray) -> np.ndarray:
         """Return standard uncertainties of times [s], shape (m,); the largest for an image that is not known."""
-        rows, known = self._rows(counter)
-        return np.where(known, self.uncertainty[rows], self.uncertainty.max())
+        rows, hits = self._rows(counter)
+        return np.where(hits, self.uncertainty[rows], self.uncertainty.max())
 
     def _rows(self, counter: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        wanted = np.asarray(counter, np.int64)
-        rows = np.clip(np.searchsorted(self.counter, wanted), 0, len(self.counter) - 1)
-        return rows, self.counter[rows] == wanted
+        numbers = np.asarray(counter, np.int64)
+        rows = np.clip(np.searchsorted(self.counter, numbers), 0, len(self.counter) - 1)
+        return rows, self.counter[rows] == numbers
 
 
 def image_clock(
@@ -97,10 +97,10 @@ def image_clock(
     arrival, counter = arrival[order], counter[order]
     if len(arrival) < 3 or (np.diff(counter) <= 0).any():
         return None
-    before = model if model is not None and model.axis == ("device_ns" if stamped else "order") else None
-    late, spread = _stamped(arrival, counter, before) if stamped else _numbered(arrival, counter, before, rate)
+    previous = model if model is not None and model.axis == ("device_ns" if stamped else "order") else None
+    lateness, spread = _stamped(arrival, counter, previous) if stamped else _numbered(arrival, counter, previous, rate)
     constant = model.latency if model is not None else None
-    time_ns = arrival - np.rint(late).astype(np.int64) - (constant.latency_ns if constant else 0)
+    time_ns = arrival - np.rint(lateness).astype(np.int64) - (constant.latency_ns if constant else 0)
     sigma = np.hypot(spread, constant.uncertainty_ns if constant else 0) * NS
     return ImageClock("device_ns" if stamped else "order", counter, time_ns, sigma)
 
@@ -108,7 +108,7 @@ def image_clock(
 def _stamped(arrival: np.ndarray, device: np.ndarray, model: ClockModel | None) -> tuple[np.ndarray, np.ndarray]:
     """Return the lateness of images with time stamps, and its standard uncertainty [ns], shape (n,) both."""
     excess = (arrival - arrival[0]) - (device - device[0]).astype(float)
-    late, spread = np.zeros(len(arrival)), np.zeros(len(arrival))
+    lateness, spread = np.zeros(len(arrival)), np.zeros(len(arrival))
     begins = [0, *(np.flatnonzero(np.abs(np.diff(excess)) > STEP_NS) + 1), len(arrival)]
     for first, end in pairwise(begins):
         rows = slice(first, end)
@@ -116,9 +116,9 @@ def _stamped(arrival: np.ndarray, device: np.ndarray, model: ClockModel | None) 
         above = excess[rows] - slope * (device[rows] - device[first])
         # The recorder's clock may know images before this recording that were less late.
         floor = min([float(above.min()), *_earlier(model, arrival[rows], device[rows], above)])
-        late[rows] = above - floor
-        spread[rows] = np.hypot(_unsure(arrival[rows], late[rows]), UNSURE_NS)
-    return late, spread
+        lateness[rows] = above - floor
+        spread[rows] = np.hypot(_unsure(arrival[rows], lateness[rows]), UNSURE_NS)
+    return lateness, spread
 
 
 def _earlier(model: ClockModel | None, arrival: np.ndarray, device: np.ndarray, above: np.ndarray) -> list[float]:
@@ -152,13 +152,13 @@ def _numbered(
     steps = np.diff(begun) / np.diff(number)
     period, drift = _period(begun, float(np.median(steps)), 1e9 / rate if rate else None)
     excess = begun - period * (number - number[0])
-    least = excess - np.minimum.accumulate(excess[::-1])[::-1]
-    most = np.empty(len(excess))
-    most[0] = max(least[0], _before(model, int(arrival[0]), int(number[0])))
+    lower = excess - np.minimum.accumulate(excess[::-1])[::-1]
+    upper = np.empty(len(excess))
+    upper[0] = max(lower[0], _before(model, int(arrival[0]), int(number[0])))
     for k in range(1, len(excess)):
-        most[k] = max(least[k], most[k - 1] + excess[k] - excess[k - 1])
-    spread = np.hypot(_unsure(arrival, least), drift * min(float(begun[-1]), FAR_NS))
-    return least, np.hypot((most - least) / 2, spread)
+        upper[k] = max(lower[k], upper[k - 1] + excess[k] - excess[k - 1])
+    spread = np.hypot(_unsure(arrival, lower), drift * min(float(begun[-1]), FAR_NS))
+    return lower, np.hypot((upper - lower) / 2, spread)
 
 
 def _before(model: ClockModel | None, arrival_ns: int, number: int) -> float:
@@ -206,10 +206,10 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
     return (nominal or usual), FITTED_SIGMA
 
 
-def _unsure(arrival: np.ndarray, late: np.ndarray) -> float:
+def _unsure(arrival: np.ndarray, lateness: np.ndarray) -> float:
     """Return the standard uncertainty of the smallest latency [ns]: how well blocks of images agree on it."""
     block = (arrival - arrival[0]) // BLOCK_NS
     # The smallest is usually 0 by construction, so the second block is the first that can disagree.
-    least = np.sort([late[block == k].min() for k in np.unique(block)])
-    usual = float(np.median(late))
-    return max(TYPICAL * float(least[min(1, len(least) - 1)]), HIDDEN * min(usual, float(np.quantile(late, 0.3))))
+    minima = np.sort([lateness[block == k].min() for k in np.unique(block)])
+    usual = float(np.median(lateness))
+    return max(TYPICAL * float(minima[min(1, len(minima) - 1)]), HIDDEN * min(usual, float(np.quantile(lateness, 0.3))))

@@ -48,14 +48,18 @@ def stream_pairs(latencies: dict[str, StreamLatency | None], motion: bool = True
         latencies: Constant latency of each stream, or None.
         motion: Whether the recording holds a motion, too; latencies are measured against it.
     """
-    beside = {MOTION: StreamLatency(0, 0)} if motion else {}
+    reference = {MOTION: StreamLatency(0, 0)} if motion else {}
     # Motion comes last, so that offsets are those of a stream against the motion.
-    ordered = {**dict(sorted(latencies.items())), **beside}
+    ordered = {**dict(sorted(latencies.items())), **reference}
     return tuple(_pair(first, second, ordered[first], ordered[second]) for first, second in combinations(ordered, 2))
 
 
-def _pair(first: str, second: str, one: StreamLatency | None, other: StreamLatency | None) -> StreamPair:
-    if one is None or other is None:
+def _pair(
+    first: str, second: str, first_latency: StreamLatency | None, second_latency: StreamLatency | None
+) -> StreamPair:
+    if first_latency is None or second_latency is None:
         return StreamPair(first, second)
-    offset = (one.latency_ns - other.latency_ns) / 1e6
-    return StreamPair(first, second, offset, math.hypot(one.uncertainty_ns, other.uncertainty_ns) / 1e6)
+    offset = (first_latency.latency_ns - second_latency.latency_ns) / 1e6
+    return StreamPair(
+        first, second, offset, math.hypot(first_latency.uncertainty_ns, second_latency.uncertainty_ns) / 1e6
+    )

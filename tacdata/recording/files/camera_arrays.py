@@ -49,7 +49,7 @@ def device_times(records: Records, camera: str) -> dict[int, int]:
 def image_times(records: Records, camera: str, clock: ClockModel | ImageClock | None) -> ImageTimes:
     """Return the times of a camera's images by its clock."""
     arrival, sequence, device = image_stamps(records, camera)
-    digest = _array([int.from_bytes(own, "little") for own in records.columns_of(topics.image(camera)).data])
+    digest = _array([int.from_bytes(value, "little") for value in records.columns_of(topics.image(camera)).data])
     return ImageTimes(arrival, _sample(clock, arrival, sequence, device), digest, sequence, device)
 
 
@@ -74,15 +74,18 @@ def cube_stream(records: Records, camera: str, clock: ClockModel | None) -> TagS
 def finger_streams(records: Records, camera: str, clock: ClockModel | ImageClock | None) -> tuple[TagStream, ...]:
     """Return the poses of each fingertip that a camera looked for."""
     names = topics.fingers((c.topic for c in records.channels.values()), camera)
-    found = (_stream(records, camera, clock, topics.finger(camera, name), name) for name in names)
-    return tuple(stream for stream in found if len(stream.faces))
+    streams = (_stream(records, camera, clock, topics.finger(camera, name), name) for name in names)
+    return tuple(stream for stream in streams if len(stream.faces))
 
 
 def _stream(
     records: Records, camera: str, clock: ClockModel | ImageClock | None, pair: tuple[str, str], finger: str
 ) -> TagStream:
-    views, given = list(map(pb.CubeView.FromString, records.columns_of(pair[0]).data)), records.columns_of(pair[1])
-    poses = {k: PoseInFrame.FromString(own).pose for k, own in zip(given.sequence.tolist(), given.data, strict=True)}
+    views, messages = list(map(pb.CubeView.FromString, records.columns_of(pair[0]).data)), records.columns_of(pair[1])
+    poses = {
+        k: PoseInFrame.FromString(message).pose
+        for k, message in zip(messages.sequence.tolist(), messages.data, strict=True)
+    }
     position, quaternion = np.full((len(views), 3), np.nan), np.full((len(views), 4), np.nan)
     covariance = np.full((len(views), 6, 6), np.nan)
     for row, view in enumerate(views):
@@ -93,8 +96,8 @@ def _stream(
         if len(view.covariance) == 36:
             covariance[row] = np.array(view.covariance).reshape(6, 6)
     arrival, sequence = _array([v.arrival_ns for v in views]), _array([v.sequence for v in views])
-    own = device_times(records, camera)
-    device = _array([own.get(int(k) & 0xFFFFFFFF, -1) for k in sequence])
+    stamps = device_times(records, camera)
+    device = _array([stamps.get(int(k) & 0xFFFFFFFF, -1) for k in sequence])
     return TagStream(
         camera,
         _sample(clock, arrival, sequence, device),

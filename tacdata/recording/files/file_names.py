@@ -28,15 +28,15 @@ def partial(path: Path) -> Path:
 def next_interrupted(path: Path) -> Path:
     """Return the first free name for a recording of that press that was broken off."""
     stem = path.name.removesuffix(".mcap")
-    taken = {p.name for p in path.parent.glob(f"{stem}.interrupted-*.mcap")}
-    number = next(k for k in range(len(taken) + 1) if f"{stem}.interrupted-{k}.mcap" not in taken)
+    names = {p.name for p in path.parent.glob(f"{stem}.interrupted-*.mcap")}
+    number = next(k for k in range(len(names) + 1) if f"{stem}.interrupted-{k}.mcap" not in names)
     return path.with_name(f"{stem}.interrupted-{number}.mcap")
 
 
 def finished(folder: Path) -> dict[int, Path]:
     """Return the finished recordings by their number, in order."""
-    found = ((EPISODE.fullmatch(path.name), path) for path in folder.iterdir())
-    return dict(sorted((int(match.group(1)), path) for match, path in found if match))
+    matches = ((EPISODE.fullmatch(path.name), path) for path in folder.iterdir())
+    return dict(sorted((int(match.group(1)), path) for match, path in matches if match))
 
 
 def unfinished(folder: Path) -> list[Path]:

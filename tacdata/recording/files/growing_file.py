@@ -37,7 +37,7 @@ class GrowingFile:
 
     def update(self) -> bool:
         """Read the appended bytes, up to the last complete record; return whether there was anything."""
-        found = False
+        is_longer = False
         while not self.finished:
             at = self._stream.tell()
             head = self._stream.read(HEAD)
@@ -45,15 +45,15 @@ class GrowingFile:
             body = self._stream.read(length) if len(head) == HEAD and length <= self._left() else b""
             if len(head) < HEAD or len(body) < length:
                 self._stream.seek(at)  # the rest has not reached the disk
-                return found
+                return is_longer
             try:
                 for block in content(head[0], head, body, self.records.damage):
                     take(self.records, block, images=False, digests=False, seen=self._seen)
             except Exception as error:  # damaged lengths raise any of the parser's errors
                 name = type(error).__name__
                 self.records.damage.append(f"an unreadable record at byte {at} is left out ({name})")
-            self.finished, found = head[0] == Opcode.FOOTER, True
-        return found
+            self.finished, is_longer = head[0] == Opcode.FOOTER, True
+        return is_longer
 
     def _left(self) -> int:
         at = self._stream.tell()

@@ -109,15 +109,15 @@ def take(
         _take(records, block)
         return
     try:
-        kept = [_parsed(*block.record(k)) for k in block.others()]
-        named = {own.id: own.topic for own in kept if isinstance(own, Channel)}
+        entries = [_parsed(*block.record(k)) for k in block.others()]
+        named = {entry.id: entry.topic for entry in entries if isinstance(entry, Channel)}
         cameras = {} if images else _cameras(records, named)
         heads, data = block.messages(cameras)
     except Exception as error:  # a record's own fields may be damaged in any way
         records.damage.append(f"a damaged chunk is left out ({type(error).__name__})")
         return
-    for own in kept:
-        _take(records, own)
+    for entry in entries:
+        _take(records, entry)
     for k in np.flatnonzero(np.isin(heads["channel"], list(cameras))).tolist() if cameras else ():
         data[k] = _stand_in(cameras[int(heads["channel"][k])], data[k], digests, seen)
     records.table.extend(heads, data)
@@ -131,8 +131,8 @@ def _stand_in(topic: str, message: memoryview, digests: bool, seen: Callable[[st
 
 def _cameras(records: Records, named: dict[int, str]) -> dict[int, str]:
     """Return the camera channels: those known before and those that a chunk names."""
-    known = {channel.id: channel.topic for channel in records.channels.values()} | named
-    return {number: topic for number, topic in known.items() if topic.endswith("/image")}
+    channels = {channel.id: channel.topic for channel in records.channels.values()} | named
+    return {number: topic for number, topic in channels.items() if topic.endswith("/image")}
 
 
 def _take(records: Records, record: Any) -> None:

@@ -75,16 +75,16 @@ class ChunkContent:
         flat = np.frombuffer(self.content, np.uint8)
         starts = np.array(self.starts, dtype=np.int64)
         ends = np.append(starts[1:], len(flat))
-        mine = flat[starts] == Opcode.MESSAGE
-        starts, ends = starts[mine], ends[mine]
+        is_message = flat[starts] == Opcode.MESSAGE
+        starts, ends = starts[is_message], ends[is_message]
         first = starts + RECORD.size + HEAD.itemsize
         if (first > ends).any():
             raise ValueError("a message without its head")
         octets = flat[starts[:, None] + np.arange(RECORD.size, RECORD.size + HEAD.itemsize)]
-        heads, content, seen = octets.reshape(-1).view(HEAD), self.content, memoryview(self.content)
+        heads, content, view = octets.reshape(-1).view(HEAD), self.content, memoryview(self.content)
         through = np.isin(heads["channel"], list(large)).tolist() if large else [False] * len(heads)
         places = zip(first.tolist(), ends.tolist(), through, strict=True)
-        return heads, [(seen if own else content)[a:b] for a, b, own in places]
+        return heads, [(view if is_large else content)[a:b] for a, b, is_large in places]
 
 
 @dataclass
@@ -103,8 +103,8 @@ class MessageTable:
 
     def add(self, message: Message) -> None:
         """Append one message."""
-        own = (message.channel_id, message.sequence, message.log_time, message.publish_time)
-        self.extend(np.array([own], HEAD), [message.data])
+        head = (message.channel_id, message.sequence, message.log_time, message.publish_time)
+        self.extend(np.array([head], HEAD), [message.data])
 
     @property
     def heads(self) -> np.ndarray:
@@ -118,8 +118,10 @@ class MessageTable:
         """Return the messages of some channels by column."""
         heads = self.heads
         rows = np.flatnonzero(np.isin(heads["channel"], sorted(channels)))
-        own, data = heads[rows], self.data
-        return Topic(own["sequence"].astype(np.int64), own["log"].astype(np.int64), [data[k] for k in rows.tolist()])
+        selection, data = heads[rows], self.data
+        return Topic(
+            selection["sequence"].astype(np.int64), selection["log"].astype(np.int64), [data[k] for k in rows.tolist()]
+        )
 
     def objects(self, channels: set[int] | None = None) -> list[Message]:
         """Return messages as objects of the mcap package, all or those of some channels."""
@@ -128,6 +130,6 @@ class MessageTable:
             rows = np.flatnonzero(np.isin(heads["channel"], sorted(channels)))
             heads, data = heads[rows], [data[k] for k in rows.tolist()]
         return [
-            Message(channel, log_time=log, data=own, publish_time=publish, sequence=sequence)
-            for (channel, sequence, log, publish), own in zip(heads.tolist(), data, strict=True)
+            Message(channel, log_time=log, data=payload, publish_time=publish, sequence=sequence)
+            for (channel, sequence, log, publish), payload in zip(heads.tolist(), data, strict=True)
         ]

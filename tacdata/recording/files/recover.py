@@ -59,7 +59,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
     if not path.is_file():
         raise UsageError(f"no file {path}", "an MCAP recording", "check the path")
     target = target or path.with_name(path.name.removesuffix(".mcap") + ".recovered.mcap")
-    found = Recovered(target)
+    result = Recovered(target)
     try:
         stream = target.open("xb")
     except FileExistsError:
@@ -70,24 +70,24 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
         raise _refused(target, error) from error
     try:
         with stream:
-            _Copy(Writer(stream, compression=CompressionType.ZSTD), found).run(path)
-        if not found.messages:
-            raise _nothing(path, found)
-        _read_back(found)
+            _Copy(Writer(stream, compression=CompressionType.ZSTD), result).run(path)
+        if not result.messages:
+            raise _nothing(path, result)
+        _read_back(result)
     except OSError as error:
         target.unlink(missing_ok=True)
         raise _refused(target, error) from error
     except BaseException:
         target.unlink(missing_ok=True)
         raise
-    return found
+    return result
 
 
 class _Copy:
     """Copies record by record, so that memory stays small."""
 
-    def __init__(self, writer: Writer, found: Recovered) -> None:
-        self.writer, self.found = writer, found
+    def __init__(self, writer: Writer, result: Recovered) -> None:
+        self.writer, self.found = writer, result
         self.begun = False
         self.schemas: dict[int, int] = {}
         self.channels: dict[int, int] = {}
@@ -108,8 +108,8 @@ class _Copy:
         if self.orphans:
             damage.append(f"{self.orphans} messages without their channel are left out")
         if damage or self.episode is None:
-            before = (self.episode or {}).get("reason", "")
-            reason = "; ".join(filter(None, [before, "recovered", *damage]))
+            cause = (self.episode or {}).get("reason", "")
+            reason = "; ".join(filter(None, [cause, "recovered", *damage]))
             self.episode = {"complete": json.dumps(False), "reason": reason}
         self.writer.add_metadata("episode", self.episode)
         self.writer.finish()
@@ -142,35 +142,35 @@ class _Copy:
                 self.writer.add_metadata(record.name, record.metadata)
 
 
-def _read_back(found: Recovered) -> None:
+def _read_back(result: Recovered) -> None:
     """Read the copy as any MCAP reader does.
 
     Raises:
         DeviceError: If it does not hold every message that was written.
     """
     try:
-        with found.path.open("rb") as stream:
+        with result.path.open("rb") as stream:
             count = sum(1 for _ in SeekingReader(stream, validate_crcs=True).iter_messages())
-        wrong = "" if count == found.messages else f"{count} of {found.messages} messages"
+        wrong = "" if count == result.messages else f"{count} of {result.messages} messages"
     except (McapError, struct.error, ValueError) as error:
         wrong = str(error)
     if wrong:
         raise DeviceError(
-            f"{found.path} was written and does not read back: {wrong}",
+            f"{result.path} was written and does not read back: {wrong}",
             "a disk that keeps what it was given",
             "use another disk with --out; the damaged recording is unchanged",
         )
 
 
-def _nothing(path: Path, found: Recovered) -> NothingRecovered:
-    if not found.attachments:
+def _nothing(path: Path, result: Recovered) -> NothingRecovered:
+    if not result.attachments:
         return NothingRecovered(
             f"{path} is no MCAP file, or nothing of it can be read",
             "an MCAP file recorded by tacdata",
             "check the path; for a file of another kind, convert it first",
         )
     return NothingRecovered(
-        f"{path} breaks off before its first message: {'; '.join(found.damage) or 'it holds none'}",
+        f"{path} breaks off before its first message: {'; '.join(result.damage) or 'it holds none'}",
         "a recording with at least one message",
         "nothing can be restored; record that press again with tacdata record --resume",
     )

@@ -38,23 +38,23 @@ def taxel_frames(data: list[bytes]) -> TaxelFrames:
     Raises:
         google.protobuf.message.DecodeError: If a message is damaged.
     """
-    found: dict[str, np.ndarray] = {}
+    arrays: dict[str, np.ndarray] = {}
     lengths = np.fromiter(map(len, data), np.int64, len(data))
-    left = np.ones(len(data), dtype=bool)
+    pending = np.ones(len(data), dtype=bool)
     # Messages of one length mostly share a layout, so that they can be decoded as columns.
     for length in np.unique(lengths).tolist():
         rows = np.flatnonzero(lengths == length)
         flat = np.frombuffer(b"".join([data[k] for k in rows.tolist()]), np.uint8).reshape(len(rows), -1)
         alike, columns = _columns(flat)
         for name, values in columns.items():
-            if name not in found:
-                found[name] = np.zeros((len(data), *values.shape[1:]), values.dtype)
-            if found[name].shape[1:] == values.shape[1:]:
-                found[name][rows[alike]] = values[alike]
+            if name not in arrays:
+                arrays[name] = np.zeros((len(data), *values.shape[1:]), values.dtype)
+            if arrays[name].shape[1:] == values.shape[1:]:
+                arrays[name][rows[alike]] = values[alike]
             else:
                 alike &= False
-        left[rows[alike]] = False
-    return _with_rest(data, found, np.flatnonzero(left))
+        pending[rows[alike]] = False
+    return _with_rest(data, arrays, np.flatnonzero(pending))
 
 
 def _columns(flat: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -103,20 +103,20 @@ def _varints(octets: np.ndarray, alike: np.ndarray) -> np.ndarray:
     return values.view(np.int64)
 
 
-def _with_rest(data: list[bytes], found: dict[str, np.ndarray], rest: np.ndarray) -> TaxelFrames:
+def _with_rest(data: list[bytes], arrays: dict[str, np.ndarray], rows: np.ndarray) -> TaxelFrames:
     """Return all frames; messages of another layout are decoded one by one."""
-    frames = [pb.Taxels.FromString(data[k]) for k in rest.tolist()]
+    frames = [pb.Taxels.FromString(data[k]) for k in rows.tolist()]
     widths = {len(frame.counts) for frame in frames}
-    if len(rest) < len(data):
-        widths.add(found["counts"].shape[1])
+    if len(rows) < len(data):
+        widths.add(arrays["counts"].shape[1])
     names = ("arrival_ns", "counter", "device_ns")
-    numbers = {name: found.get(name, np.zeros(len(data), np.int64)) for name in names}
+    numbers = {name: arrays.get(name, np.zeros(len(data), np.int64)) for name in names}
     for name, values in numbers.items():
-        values[rest] = [getattr(frame, name) for frame in frames]
+        values[rows] = [getattr(frame, name) for frame in frames]
     width = next(iter(widths)) if len(widths) == 1 else 0
-    counts = found.get("counts", np.zeros((len(data), 0)))
+    counts = arrays.get("counts", np.zeros((len(data), 0)))
     if counts.shape[1] != width:
         counts = np.zeros((len(data), width))
     if frames and width:
-        counts[rest] = [list(frame.counts) for frame in frames]
+        counts[rows] = [list(frame.counts) for frame in frames]
     return TaxelFrames(numbers["arrival_ns"], numbers["counter"], numbers["device_ns"], counts, tuple(sorted(widths)))

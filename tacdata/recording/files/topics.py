@@ -65,14 +65,14 @@ def finger(camera: str, name: str) -> tuple[str, str]:
 
 def fingers(topics: Iterable[str], camera: str) -> tuple[str, ...]:
     """Return the fingers for which topics of a camera exist."""
-    found = (topic.split("/") for topic in topics)
+    paths = (topic.split("/") for topic in topics)
     ours = ["", "camera", camera, "finger"]
-    return tuple(sorted(parts[4] for parts in found if parts[:4] == ours and parts[5:] == ["view"]))
+    return tuple(sorted(parts[4] for parts in paths if parts[:4] == ours and parts[5:] == ["view"]))
 
 
 def of_camera(camera: str, fingers: Iterable[str] = ()) -> dict[str, Any]:
     """Return the topics of one camera that looks at these fingers, by name."""
-    own = {
+    channels = {
         image(camera): CompressedImage,
         image_time(camera): tacdata_pb2.ImageTime,
         cube(camera): tacdata_pb2.CubeView,
@@ -80,5 +80,5 @@ def of_camera(camera: str, fingers: Iterable[str] = ()) -> dict[str, Any]:
     }
     for name in fingers:
         view, tip = finger(camera, name)
-        own |= {view: tacdata_pb2.CubeView, tip: PoseInFrame}
-    return own
+        channels |= {view: tacdata_pb2.CubeView, tip: PoseInFrame}
+    return channels

@@ -247,8 +247,8 @@ class EpisodeWriter:
 
     def note(self, text: str, level: str = "info") -> None:
         """Write a remark for a person."""
-        now = self._clock.now_ns()
-        self._add(topics.LOG, now, now, 0, self._log_message(text, level))
+        now_ns = self._clock.now_ns()
+        self._add(topics.LOG, now_ns, now_ns, 0, self._log_message(text, level))
 
     def _log_message(self, text: str, level: str) -> Log:
         message = Log(level=LEVELS[level], message=text, name="tacdata")
@@ -284,8 +284,8 @@ class EpisodeWriter:
                 raise self._failure
             for name, model in (clock_models or {}).items():
                 self._file.describe(f"clock_model/{name}", model.document)
-            known = {k: m.latency for k, m in (clock_models or {}).items() if isinstance(m, ClockModel)}
-            pairs = stream_pairs({**dict.fromkeys(self._streams), **known}, self._moves)
+            latencies = {k: m.latency for k, m in (clock_models or {}).items() if isinstance(m, ClockModel)}
+            pairs = stream_pairs({**dict.fromkeys(self._streams), **latencies}, self._moves)
             self._file.describe("sync", {pair.name: pair.words for pair in pairs})
             for name, count in (counts or {}).items():
                 self._file.describe(f"stream_counts/{name}", {k: json.dumps(v) for k, v in vars(count).items()})

@@ -72,23 +72,23 @@ class CameraStream:
             return
         self._search, self.ready = None, True
         try:
-            found = search.result()
-            self._last = found.cubes if self._fingers else found
+            outcome = search.result()
+            self._last = outcome.cubes if self._fingers else outcome
         except Exception as error:  # any error of a detector: the press goes on
             self._detect = None
             if sink:
                 sink.note(f"camera {self.name}: the search for tags failed ({type(error).__name__}: {error})", "error")
             return
         if sink:
-            self._write(sink, (frame.arrival_ns, sample_ns, frame.sequence), found)
+            self._write(sink, (frame.arrival_ns, sample_ns, frame.sequence), outcome)
 
-    def _write(self, sink: EpisodeWriter, stamps: tuple[int, int, int], found: Any) -> None:
+    def _write(self, sink: EpisodeWriter, stamps: tuple[int, int, int], outcome: Any) -> None:
         if self._fingers is None:
-            sink.cube(self.name, *stamps, _record(found))
+            sink.cube(self.name, *stamps, _record(outcome))
             return
         for finger in self._fingers["fingers"]:
-            sink.cube(self.name, *stamps, _record(found.tips.get(finger)), finger)
-        for remark in set(found.remarks) - self._remarks:
+            sink.cube(self.name, *stamps, _record(outcome.tips.get(finger)), finger)
+        for remark in set(outcome.remarks) - self._remarks:
             sink.note(f"camera {self.name}: {remark}", "warning")
             self._remarks.add(remark)
 

@@ -77,8 +77,8 @@ class DeviceStreams(ABC):
 
     def _busy(self, name: str) -> str:
         """Name this computer's own lateness in a stream's silence, as part of a sentence; empty if it was in time."""
-        late = self._late.get(name, 0.0)
-        return f", while this computer was {late:.1f} s late in reading" if late > LATE else ""
+        delay = self._late.get(name, 0.0)
+        return f", while this computer was {delay:.1f} s late in reading" if delay > LATE else ""
 
     def _silence_of(self, name: str) -> float:
         """Time without data after which a stream counts as silent [s of real time]."""
@@ -127,7 +127,7 @@ class DeviceStreams(ABC):
     @property
     def counts(self) -> dict[str, StreamCounts]:
         """Counts of each stream's data since the last call of `record_into`."""
-        return {name: _since(self._before.get(name, StreamCounts()), now) for name, now in self._totals().items()}
+        return {name: _since(self._before.get(name, StreamCounts()), totals) for name, totals in self._totals().items()}
 
     def record_into(self, sink: EpisodeWriter | None) -> None:
         """Send all arrivals from now on to a recording, or to none."""
@@ -163,9 +163,9 @@ class DeviceStreams(ABC):
         patience = Patience(self._silence_of(name), step=2 * POLL, host=self._host)
         looked = self._host.monotonic()
         while not self._stop.is_set():
-            now = self._host.monotonic()
-            self._late[name] = self._late.get(name, 0.0) + max(now - looked - 2 * POLL, 0.0)
-            looked = now
+            instant = self._host.monotonic()
+            self._late[name] = self._late.get(name, 0.0) + max(instant - looked - 2 * POLL, 0.0)
+            looked = instant
             self._passes[name] = self._passes.get(name, 0) + 1
             try:
                 if count := read():
@@ -236,6 +236,6 @@ def stream_clock(board: TaxelBoard) -> StreamClock:
     return StreamClock(axis, board.clock.rate, nominal_period_ns(described))
 
 
-def _since(before: StreamCounts, now: StreamCounts) -> StreamCounts:
-    numbers = {k: v - getattr(before, k) for k, v in vars(now).items() if isinstance(v, int)}
-    return StreamCounts(**numbers, notes=now.notes[len(before.notes) :])
+def _since(earlier: StreamCounts, later: StreamCounts) -> StreamCounts:
+    numbers = {k: v - getattr(earlier, k) for k, v in vars(later).items() if isinstance(v, int)}
+    return StreamCounts(**numbers, notes=later.notes[len(earlier.notes) :])

@@ -19,15 +19,15 @@ def ending(motion: GuardedMotion, lost: str, data: tuple[str, ...], command: str
         command: How to go on.
         error: Error that broke the session off.
     """
-    said = error.given if isinstance(error, TacdataError) else ""
+    detail = error.given if isinstance(error, TacdataError) else ""
     first = "find its zero again (home it, or touch off), then " if lost else ""
-    moved = motion.ending
-    told = lost in said or any(lost in line for line in moved)
-    why = "do not trust the position that the machine reports" if told else lost
+    motion_lines = motion.ending
+    is_reported = lost in detail or any(lost in line for line in motion_lines)
+    why = "do not trust the position that the machine reports" if is_reported else lost
     position = (f"zero:   LOST: {why}",) if lost else ()
-    lines = (*moved, *position, *(f"data:   {line}" for line in data), f"then:   {first}{command}")
-    for known in (f" ({said})", f", and {said}") if said else ():
-        lines = tuple(line.replace(known, "") for line in lines)
+    lines = (*motion_lines, *position, *(f"data:   {line}" for line in data), f"then:   {first}{command}")
+    for phrase in (f" ({detail})", f", and {detail}") if detail else ():
+        lines = tuple(line.replace(phrase, "") for line in lines)
     return "\n".join(f"  {line}" for line in lines)
 
 

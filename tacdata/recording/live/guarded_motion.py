@@ -69,10 +69,10 @@ class GuardedMotion:
 
     def off_path(self, status: CncStatus) -> DeviceError | None:
         """Return the fault of a reported position, by the moves that were sent; or None."""
-        found = self._path.off(status) if self._path else None
-        if found and self._path:
+        fault = self._path.off(status) if self._path else None
+        if fault and self._path:
             self._path.forget()  # it was noticed; from now on reports say where it comes to rest
-        return found
+        return fault
 
     def stop(self) -> None:
         """Send a feed hold now, and no further step. Thread-safe."""
@@ -174,7 +174,7 @@ class GuardedMotion:
                     return
                 if writer and step.phase != phase:
                     writer.phase(step.phase, self._clock.now_ns())
-                before, phase = position, step.phase
+                origin, phase = position, step.phase
                 if step.target is None:
                     done = self._cnc.dwell(step.seconds)
                     self._allowed.rested(done.acknowledged_ns)
@@ -185,7 +185,7 @@ class GuardedMotion:
                     self._allowed.taken(done.acknowledged_ns)
                 if writer:
                     times = done.sent_ns, done.acknowledged_ns
-                    ends = np.array(before, float), np.array(position, float)
+                    ends = np.array(origin, float), np.array(position, float)
                     writer.motion(Command(phase, *ends, step.speed, step.seconds, *times, done.line))
             self._cnc.wait_idle(MARGIN)
             self._allowed.rested(self._clock.now_ns())
@@ -306,16 +306,16 @@ class GuardedMotion:
         return f"; it last reported {_text(self._reported)} mm" if self._reported else ""
 
 
-def _look_again(looked: float, now: float) -> float:
-    """Return ``now`` [s]; raise if this computer stood still since it ``looked``."""
-    if now - looked > STALL:
+def _look_again(looked: float, moment: float) -> float:
+    """Return ``instant`` [s]; raise if this computer stood still since it ``looked``."""
+    if moment - looked > STALL:
         raise DeviceError(
-            f"this computer stood still for {now - looked:.1f} s while the guide moved (suspended, a closed lid, or "
+            f"this computer stood still for {moment - looked:.1f} s while the guide moved (suspended, a closed lid, or "
             "far too busy); what the devices sent meanwhile is partly lost",
             f"at most {STALL:g} s",
             "keep it awake while the guide moves, then start again",
         )
-    return now
+    return moment
 
 
 def _text(position: Position) -> str:

@@ -76,11 +76,11 @@ class Interruption:
 
     @contextmanager
     def _set(self, keeping: bool) -> Iterator[None]:
-        before, self._keeping = self._keeping, keeping
+        previous, self._keeping = self._keeping, keeping
         try:
             yield
         finally:
-            self._keeping = before
+            self._keeping = previous
 
     def _heard(self, number: int, frame: FrameType | None) -> None:
         if self._keeping and not self._asked:

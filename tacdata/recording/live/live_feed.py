@@ -37,10 +37,10 @@ class LiveFeed:
         self._offer("camera", f"camera {camera}", arrival_ns, image)
 
     def _offer(self, kind: str, stream: str, arrival_ns: int, value: Any) -> None:
-        now = time.monotonic()
-        if self._watch is None or now - self._shown.get(stream, 0.0) < 1 / RATE[kind]:
+        instant = time.monotonic()
+        if self._watch is None or instant - self._shown.get(stream, 0.0) < 1 / RATE[kind]:
             return
-        self._shown[stream] = now
+        self._shown[stream] = instant
         try:
             self._watch(stream, arrival_ns, value)
         except Exception:  # any error of a viewer: the recording goes on

@@ -84,13 +84,13 @@ class MachineState:
     @property
     def difference(self) -> str:
         """How the reported position differs from the recorded one, in words; empty if it does not."""
-        before, now = self._read().get("position"), self._cnc.reported
-        if before is None or now is None:
+        record, report = self._read().get("position"), self._cnc.reported
+        if record is None or report is None:
             return ""
         resolution = float(np.linalg.norm(report_resolution(self._cnc.settings())))
-        if np.linalg.norm(np.subtract(now, before)) <= resolution:
+        if np.linalg.norm(np.subtract(report, record)) <= resolution:
             return ""
-        return f"the controller reports {_text(now)} mm, and the machine was left at {_text(before)} mm"
+        return f"the controller reports {_text(report)} mm, and the machine was left at {_text(record)} mm"
 
     @property
     def lost_since(self) -> str:

@@ -93,10 +93,10 @@ class ReadingHealth:
             arrivals.popleft()
         # One long gap is a stall of this computer, or silence; a board that became slow has gaps everywhere.
         gaps = np.diff(np.array(arrivals, np.int64))
-        left = (arrivals[-1] - arrivals[0] - int(gaps.max())) * 1e-9
-        if len(gaps) <= FEWEST or left <= 0.0:
+        span = (arrivals[-1] - arrivals[0] - int(gaps.max())) * 1e-9
+        if len(gaps) <= FEWEST or span <= 0.0:
             return ""
-        rate = (len(gaps) - 1) / left
+        rate = (len(gaps) - 1) / span
         if self._first_rate is None:
             self._first_rate = min(rate, self._rate) if self._rate else rate
         self._low = self._low + 1 if rate < SLOW * self._first_rate else 0

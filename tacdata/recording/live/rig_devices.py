@@ -56,10 +56,10 @@ def require_channels(board: TaxelBoard, sensor: Sensor, what: str = "the board",
     Raises:
         UsageError: If it sends another number of channels than the sensor has taxels.
     """
-    sent, wanted = board.describe().get("channels"), sensor.taxels.count
-    if sent is not None and sent != wanted:
+    sent, expected = board.describe().get("channels"), sensor.taxels.count
+    if sent is not None and sent != expected:
         raise UsageError(
-            f"{what} sends {sent} channels, and the sensor {sensor.name} has {wanted} taxels",
+            f"{what} sends {sent} channels, and the sensor {sensor.name} has {expected} taxels",
             "a channel for each taxel",
             f"name the skin's own file with {remedy}, or correct the board's format in the rig file",
         )

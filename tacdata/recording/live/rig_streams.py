@@ -72,8 +72,8 @@ class RigStreams(DeviceStreams):
         self._health_of = lambda: ReadingHealth(reading_limits(described), rate, devices.board.clock.rate)
         self._health, self._on_bad_readings, self._quiet_until_ns = self._health_of(), on_bad_readings, 0
         # An emulated board faster than time shares this computer: it may wait where a real one goes on.
-        known = rate and devices.board.clock.rate == 1
-        self._board_silence = max(BOARD_SILENCE, SILENT_FRAMES / rate) if known else self.silence
+        is_timed = rate and devices.board.clock.rate == 1
+        self._board_silence = max(BOARD_SILENCE, SILENT_FRAMES / rate) if is_timed else self.silence
         self._work["motion controller"] = self._read_status
 
     def __enter__(self) -> RigStreams:
@@ -86,8 +86,8 @@ class RigStreams(DeviceStreams):
         """The first error of a stream or of writing, or None."""
         failure = self._sink.failure if self._sink else None
         if self._fault is None and failure is not None:
-            given = f"writing failed: {failure}"
-            self._fail(DeviceError(given, "a disk with free space", "free some space, then start again"))
+            text = f"writing failed: {failure}"
+            self._fail(DeviceError(text, "a disk with free space", "free some space, then start again"))
         return self._fault
 
     @property
@@ -101,12 +101,14 @@ class RigStreams(DeviceStreams):
     def nothing_yet(self, seconds: float) -> DeviceError:
         """Return the message when board or controller has delivered nothing of use for ``seconds`` [s]."""
         if self.frames >= 2 and self.position is None:
-            given = f"the motion controller has sent no position for {seconds:g} s"
-            return DeviceError(given, "a running stream", "check cable and power")
+            text = f"the motion controller has sent no position for {seconds:g} s"
+            return DeviceError(text, "a running stream", "check cable and power")
         return self._no_frames(seconds)
 
     def _no_frames(self, seconds: float) -> DeviceError:
-        repeated, corrupt, garbage = (now - then for now, then in zip(self._damage(), self._damage_then, strict=True))
+        repeated, corrupt, garbage = (
+            total - then for total, then in zip(self._damage(), self._damage_then, strict=True)
+        )
         if repeated:
             return DeviceError(
                 f"taxel board: its counter stands still; {repeated} frames came with a number already seen",

@@ -72,12 +72,12 @@ class AllowedPath:
         Where the moves so far lead there, they are kept: a report of one of them may still be read. Else reports that
         were asked for before ``now_ns`` are not judged.
         """
-        here = np.array(position, float)
+        place = np.array(position, float)
         with self._lock:
-            if self._legs and np.allclose(self._legs[-1].profile.target, here, atol=1e-6):
+            if self._legs and np.allclose(self._legs[-1].profile.target, place, atol=1e-6):
                 return
             self._since_ns = now_ns
-            self._legs = [_Leg(self._limits.straight_move(here, here, 1.0), now_ns, now_ns)]
+            self._legs = [_Leg(self._limits.straight_move(place, place, 1.0), now_ns, now_ns)]
 
     def forget(self) -> None:
         """Take that nobody knows where the guide is: everything is allowed until `stand`."""
@@ -97,10 +97,10 @@ class AllowedPath:
         with self._lock:
             if not self._legs:
                 return
-            leg, before = self._legs[-1], self._legs[-2] if len(self._legs) > 1 else None
-            waits = before is not None and before.ended_ns is None and (before.expected_ns or 0) > now_ns
-            begins = before.expected_ns if waits and before else now_ns
-            leg.chain = leg.profile.duration + (before.chain if waits and before else 0.0)
+            leg, previous = self._legs[-1], self._legs[-2] if len(self._legs) > 1 else None
+            waits = previous is not None and previous.ended_ns is None and (previous.expected_ns or 0) > now_ns
+            begins = previous.expected_ns if waits and previous else now_ns
+            leg.chain = leg.profile.duration + (previous.chain if waits and previous else 0.0)
             leg.expected_ns = (begins or now_ns) + round(leg.profile.duration * 1e9)
 
     def rested(self, now_ns: int) -> None:
@@ -122,18 +122,18 @@ class AllowedPath:
         x, y, z = status.position.tolist()
         # The last move sent, and those that may have run since the query; of a move that had ended, only its end.
         legs = [leg for leg in sent if leg is sent[-1] or leg.ended_ns is None or leg.ended_ns >= asked_ns]
-        nearest, distance, behind = None, np.inf, None
+        nearest, distance, laggard = None, np.inf, None
         for leg in legs:
-            off, ahead = self._distance(leg, asked_ns, status)
-            if off <= self._tolerance and not ahead:
+            deviation, is_ahead = self._distance(leg, asked_ns, status)
+            if deviation <= self._tolerance and not is_ahead:
                 if not self._is_behind(leg, asked_ns, status):
                     self._seen = status
                     return None
-                behind = leg
-            if off < distance:
-                nearest, distance = leg, off
-        if behind:
-            return _slow(behind, asked_ns, status)
+                laggard = leg
+            if deviation < distance:
+                nearest, distance = leg, deviation
+        if laggard:
+            return _slow(laggard, asked_ns, status)
         if far := self.out_of_reach((x, y, z), status.arrival_ns):
             return DeviceError(
                 f"the guide cannot be where a report says: {far}",
@@ -145,8 +145,10 @@ class AllowedPath:
             return _answered_too_early(earlier, status)
         leg = nearest or legs[-1]
         ways = f"from {_text(leg.profile.start)} to {_text(leg.profile.target)} mm"
-        ahead = distance <= self._tolerance
-        how = f"farther on its way {ways} than its speed allows" if ahead else f"{distance:.2f} mm off its way {ways}"
+        is_ahead = distance <= self._tolerance
+        how = (
+            f"farther on its way {ways} than its speed allows" if is_ahead else f"{distance:.2f} mm off its way {ways}"
+        )
         return DeviceError(
             f"the guide reports {_text(status.position)} mm, {how}",
             f"at most {self._tolerance:.2f} mm off the way that it was sent, at the speed that it was given",
@@ -162,12 +164,12 @@ class AllowedPath:
     def _believed_ended(self, sent: list[_Leg], status: CncStatus) -> _Leg | None:
         """Return the latest move with the reported place on its way, though an answer reported its end."""
         for leg in reversed(sent[:-1]):
-            profile, here = leg.profile, status.position
-            if leg.ended_ns is None or np.linalg.norm(here - profile.target) <= self._tolerance or not profile.length:
+            profile, place = leg.profile, status.position
+            if leg.ended_ns is None or np.linalg.norm(place - profile.target) <= self._tolerance or not profile.length:
                 continue
-            along = float(np.clip(profile.progress(here[None])[0], 0.0, profile.length))
-            way = profile.start + along / profile.length * (profile.target - profile.start)
-            if np.linalg.norm(here - way) <= self._tolerance:
+            progress = float(np.clip(profile.progress(place[None])[0], 0.0, profile.length))
+            way = profile.start + progress / profile.length * (profile.target - profile.start)
+            if np.linalg.norm(place - way) <= self._tolerance:
                 return leg
             return None
         return None
@@ -186,26 +188,26 @@ class AllowedPath:
         )
 
     def _is_behind(self, leg: _Leg, asked_ns: int, status: CncStatus) -> bool:
-        off = float(np.linalg.norm(status.position - leg.profile.target))
-        return leg.due_ns is not None and leg.due_ns < asked_ns and off > self._tolerance
+        deviation = float(np.linalg.norm(status.position - leg.profile.target))
+        return leg.due_ns is not None and leg.due_ns < asked_ns and deviation > self._tolerance
 
     def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
         """Return the distance of a report from the move [mm], and whether it is farther along than time allows."""
         profile, position = leg.profile, status.position
         if not profile.length or (leg.ended_ns is not None and leg.ended_ns < asked_ns):
             return float(np.linalg.norm(position - profile.target)), False
-        along = min(max(float(profile.progress(position[None])[0]), 0.0), profile.length)
-        on = profile.start + along / profile.length * (profile.target - profile.start)
+        progress = min(max(float(profile.progress(position[None])[0]), 0.0), profile.length)
+        on = profile.start + progress / profile.length * (profile.target - profile.start)
         since = EARLY[0] * (status.arrival_ns - leg.sent_ns) * 1e-9 + EARLY[1]
-        ahead = along > float(profile.distance(np.array([since]))[0]) + self._tolerance
-        return float(np.linalg.norm(position - on)), ahead
+        is_ahead = progress > float(profile.distance(np.array([since]))[0]) + self._tolerance
+        return float(np.linalg.norm(position - on)), is_ahead
 
 
 def _slow(leg: _Leg, asked_ns: int, status: CncStatus) -> DeviceError:
     ways = f"from {_text(leg.profile.start)} to {_text(leg.profile.target)} mm"
-    late = (asked_ns - (leg.expected_ns or asked_ns)) * 1e-9
+    delay = (asked_ns - (leg.expected_ns or asked_ns)) * 1e-9
     return DeviceError(
-        f"the guide reports {_text(status.position)} mm, still on its way {ways}, {late:.1f} s too late",
+        f"the guide reports {_text(status.position)} mm, still on its way {ways}, {delay:.1f} s too late",
         f"moves within {LATE[0]:g} times their duration and {LATE[1]:g} s",
         "set the feed override back to 100 % (a pendant may have changed it), and let $110 to $122 be what the machine "
         "can do; then start again",

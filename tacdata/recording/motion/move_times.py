@@ -139,17 +139,17 @@ def _anchor_move(
     following: Command | None,
     statuses: StatusTimes,
     limits: AxisLimits,
-    known: tuple[int, np.ndarray],
+    precision: tuple[int, np.ndarray],
 ) -> AnchoredMove:
-    quickest, resolution = known
+    quickest, resolution = precision
     profile = limits.straight_move(command.start, command.target, command.speed)
     earliest, latest = [command.sent_ns], [command.acknowledged_ns + PLANNER_TURN_NS]
     if following is not None:
         end = following.sent_ns if following.is_move else following.acknowledged_ns - round(following.dwell * 1e9)
         latest.append(max(end + PLANNER_TURN_NS - round(profile.duration * 1e9), command.sent_ns))
     if profile.length:
-        early, late = _report_bounds(profile, command, following, statuses, resolution)
-        earliest, latest = earliest + early, latest + late
+        lower_bounds, upper_bounds = _report_bounds(profile, command, following, statuses, resolution)
+        earliest, latest = earliest + lower_bounds, latest + upper_bounds
     low, high = max(earliest), min(latest)
     if low > high:
         return AnchoredMove(command, profile, (low + high) // 2, (low - high) // 2, low - high)
@@ -161,18 +161,18 @@ def _report_bounds(
     profile: Trapezoid, command: Command, following: Command | None, statuses: StatusTimes, resolution: np.ndarray
 ) -> tuple[list[int], list[int]]:
     until = following.acknowledged_ns if following is not None else np.iinfo(np.int64).max
-    chosen = (statuses.sent_ns >= command.sent_ns) & (statuses.stream.arrival_ns <= until)
-    if not chosen.any():
+    mask = (statuses.sent_ns >= command.sent_ns) & (statuses.stream.arrival_ns <= until)
+    if not mask.any():
         return [], []
-    sent, arrival = statuses.sent_ns[chosen], statuses.stream.arrival_ns[chosen]
-    progress = profile.progress(statuses.stream.position[chosen])
+    sent, arrival = statuses.sent_ns[mask], statuses.stream.arrival_ns[mask]
+    progress = profile.progress(statuses.stream.position[mask])
     direction = np.abs(profile.target - profile.start) / profile.length
-    off = float(direction @ resolution) + profile.acceleration * min(SEGMENT**2 / 8, profile.ramp**2 / 2)
+    margin = float(direction @ resolution) + profile.acceleration * min(SEGMENT**2 / 8, profile.ramp**2 / 2)
     # A report at rest before the move bounds no latest start, and one at its end no earliest start.
-    moved, unfinished = progress > off, progress < profile.length - off
-    late = arrival - _nanoseconds(profile.time(progress - off))
-    early = sent - _nanoseconds(profile.time(progress + off))
-    return early[unfinished].tolist(), late[moved].tolist()
+    has_begun, unfinished = progress > margin, progress < profile.length - margin
+    latest = arrival - _nanoseconds(profile.time(progress - margin))
+    earliest = sent - _nanoseconds(profile.time(progress + margin))
+    return earliest[unfinished].tolist(), latest[has_begun].tolist()
 
 
 def _nanoseconds(seconds: np.ndarray) -> np.ndarray:
@@ -193,9 +193,9 @@ def machine_path(moves: list[AnchoredMove], statuses: CncStream, complete: bool)
         positions.append(position)
     if len(trusted) < len(moves) or not moves:
         since = moves[-1].command.sent_ns if moves else np.iinfo(np.int64).min
-        after = statuses.sample_ns > since
-        times.append(statuses.sample_ns[after])
-        positions.append(statuses.position[after])
+        mask = statuses.sample_ns > since
+        times.append(statuses.sample_ns[mask])
+        positions.append(statuses.position[mask])
     time, position = np.concatenate(times), np.concatenate(positions)
     # Neighbouring estimates may overlap by their errors, and times must increase.
     order = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]]) if len(time) else np.empty(0, bool)
@@ -217,7 +217,9 @@ def phases(commands: list[Command], moves: list[AnchoredMove]) -> tuple[Phase, .
         if command.phase:
             begins.setdefault(command.phase, start)
             ends[command.phase] = end
-    found = sorted((begins[name], name) for name in begins if name in PHASES)
-    bounds = [*(start for start, _ in found), np.iinfo(np.int64).max][1:]
+    starts = sorted((begins[name], name) for name in begins if name in PHASES)
+    bounds = [*(start for start, _ in starts), np.iinfo(np.int64).max][1:]
     # A phase never overlaps the next one, whatever the errors of two neighbouring estimates.
-    return tuple(Phase(name, start, min(ends[name], bound)) for (start, name), bound in zip(found, bounds, strict=True))
+    return tuple(
+        Phase(name, start, min(ends[name], bound)) for (start, name), bound in zip(starts, bounds, strict=True)
+    )

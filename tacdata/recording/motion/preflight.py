@@ -72,7 +72,7 @@ def preflight(
     sensor: Sensor,
     rig: Rig,
     limits: AxisLimits,
-    wanted: tuple[int, ...],
+    numbers: tuple[int, ...],
     travel: tuple[np.ndarray, np.ndarray] | None = None,
     cautions: tuple[str, ...] = (),
     tap: Press | None = None,
@@ -84,7 +84,7 @@ def preflight(
         sensor: The skin that is pressed.
         rig: The rig: registration and envelope.
         limits: The controller's axis limits.
-        wanted: Numbers of the presses still to do.
+        numbers: Numbers of the presses still to do.
         travel: Machine box of the controller's soft limits [mm], shapes (3,) and (3,); None if they are off.
         cautions: Remarks before the first move.
         tap: The touch of a sync tap before the first press (`sync_tap.touch`), if there is one.
@@ -104,7 +104,7 @@ def preflight(
         needed, position = duration(path, corners[0], limits)
         seconds.append(needed)
         indenters.append(tap.indenter_name)
-    for press in (plan.presses[k] for k in wanted):
+    for press in (plan.presses[k] for k in numbers):
         path = steps(press, plan.motion, rig.registration_for(press.indenter_name))
         for target in (step.target for step in path if step.target is not None):
             _refuse_outside(f"plan {plan.name}: presses/{press.index}", target, rig.envelope, travel)
@@ -119,10 +119,10 @@ def preflight(
     bounds = np.array(corners) if corners else np.full((1, 3), np.nan)
     return Preflight(
         plan.name,
-        len(wanted),
+        len(numbers),
         len(plan.presses),
         tuple(indenters),
-        max((plan.presses[k].deepest for k in wanted), default=0.0),
+        max((plan.presses[k].deepest for k in numbers), default=0.0),
         tuple(bounds.min(axis=0).tolist()),
         tuple(bounds.max(axis=0).tolist()),
         tuple(seconds),

@@ -51,10 +51,10 @@ def steps(press: Press, motion: MotionSettings, registration: Registration) -> t
     above, standoff, target = (
         registration.to_machine(press.x, press.y, depth) for depth in (-motion.clearance, -near, press.depth)
     )
-    rest = motion.rest if press.rest is None else press.rest
+    pause = motion.rest if press.rest is None else press.rest
     x, y = (c + motion.run_up * step for c, step in zip((press.x, press.y), SIDES[press.approach_from], strict=True))
     path = [Step("", registration.to_machine(x, y, -motion.clearance), motion.travel_speed)]
-    path += [Step("rest", seconds=max(rest, SYNC))]
+    path += [Step("rest", seconds=max(pause, SYNC))]
     if press.approach_from:
         path += [Step("approach", above, motion.travel_speed), Step("approach", seconds=SYNC)]
     path += [Step("approach", standoff, motion.approach_speed), Step("approach", seconds=SYNC)]

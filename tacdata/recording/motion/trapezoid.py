@@ -54,10 +54,10 @@ class Trapezoid:
         t = np.clip(np.asarray(time, dtype=float), 0.0, self.duration)
         if not self.length:
             return np.zeros_like(t)
-        rest = self.duration - t
+        remainder = self.duration - t
         cruise = self.peak * (t - self.ramp / 2)
-        rising, falling = self.acceleration * t**2 / 2, self.length - self.acceleration * rest**2 / 2
-        return np.where(t < self.ramp, rising, np.where(rest < self.ramp, falling, cruise))
+        rising, falling = self.acceleration * t**2 / 2, self.length - self.acceleration * remainder**2 / 2
+        return np.where(t < self.ramp, rising, np.where(remainder < self.ramp, falling, cruise))
 
     def time(self, distance: np.ndarray) -> np.ndarray:
         """Return the time since the start [s] at which distances [mm], shape (n,), are reached; clamped."""

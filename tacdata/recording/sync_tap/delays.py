@@ -60,28 +60,28 @@ class SyncTap:
     @property
     def words(self) -> tuple[str, ...]:
         """One line per stream, for a person."""
-        found = (
+        lines = (
             f"sync tap: {name} {latency.latency_ns / 1e6:.1f} ms late, known to {latency.uncertainty_ns / 1e6:.1f} ms"
             for name, latency in self.latencies.items()
         )
-        return (*found, *(f"sync tap: {remark}" for remark in self.remarks))
+        return (*lines, *(f"sync tap: {remark}" for remark in self.remarks))
 
 
 def measure(recording: Recording) -> SyncTap:
     """Measure the latencies of all streams in the recording of a sync tap (`motion.sync_tap`)."""
     latencies: dict[str, StreamLatency] = {}
     remarks: list[str] = []
-    found = taxel_latency(recording)
-    if isinstance(found, StreamLatency):
-        latencies["taxels"] = found
+    taxel_result = taxel_latency(recording)
+    if isinstance(taxel_result, StreamLatency):
+        latencies["taxels"] = taxel_result
     else:
-        remarks.append(f"taxels: {found}")
+        remarks.append(f"taxels: {taxel_result}")
     for tags in recording.episode.tags:
-        seen = camera_latency(recording, tags)
-        if isinstance(seen, StreamLatency):
-            latencies[f"camera {tags.camera}"] = seen
+        camera_result = camera_latency(recording, tags)
+        if isinstance(camera_result, StreamLatency):
+            latencies[f"camera {tags.camera}"] = camera_result
         else:
-            remarks.append(f"camera {tags.camera}: {seen}")
+            remarks.append(f"camera {tags.camera}: {camera_result}")
     return SyncTap(latencies, tuple(remarks))
 
 
@@ -125,10 +125,10 @@ def taxel_latency(recording: Recording) -> StreamLatency | str:
     if not slow or len(quick) < LEAST_TOUCHES:
         return f"{len(slow)} slow and {len(quick)} quick touches, 1 and {LEAST_TOUCHES} are needed"
     delay = _match(slow, quick, origin, _coarse(quick, origin))
-    others = [_match(slow, quick[:k] + quick[k + 1 :], origin, delay) for k in range(len(quick))]
+    estimates = [_match(slow, quick[:k] + quick[k + 1 :], origin, delay) for k in range(len(quick))]
     n = len(quick)
     # Jackknife over the quick touches.
-    spread = float(np.sqrt((n - 1) / n * np.sum((np.array(others) - np.mean(others)) ** 2)))
+    spread = float(np.sqrt((n - 1) / n * np.sum((np.array(estimates) - np.mean(estimates)) ** 2)))
     clock = recording.clocks.get("taxels")
     line = clock.uncertainty_ns if clock else 0.0
     return StreamLatency(round(delay * 1e9), round(float(np.hypot(spread * 1e9, line))))
@@ -142,23 +142,23 @@ def _signal(sample_ns: np.ndarray, counts: np.ndarray, moves: list[AnchoredMove]
     if idle.sum() < 5:
         idle = sample_ns < moves[0].end_ns
     noise = np.maximum(np.diff(counts[idle], axis=0).std(axis=0) / np.sqrt(2), 0.3)
-    rest = np.median(counts[idle], axis=0)
+    baseline = np.median(counts[idle], axis=0)
     answers = []
     for move in moves:
-        held = (sample_ns > move.end_ns) & (sample_ns < move.end_ns + round(RANGE[1] * 1e9))
-        if held.any():
-            answers.append(counts[held].max(axis=0, initial=-np.inf) - rest)
+        mask = (sample_ns > move.end_ns) & (sample_ns < move.end_ns + round(RANGE[1] * 1e9))
+        if mask.any():
+            answers.append(counts[mask].max(axis=0, initial=-np.inf) - baseline)
     weight = np.median(answers, axis=0) / noise**2 if answers else np.zeros(counts.shape[1])
     weight = np.where(bad | (weight < 0), 0.0, weight)
     scale = max(float(np.sqrt(np.sum((weight * noise) ** 2))), 1e-12)
     strongest = float(np.median(answers, axis=0) @ weight / scale) if answers else 0.0
-    return (counts - rest) @ weight / scale, strongest
+    return (counts - baseline) @ weight / scale, strongest
 
 
 def _cut(move: AnchoredMove, sample_ns: np.ndarray, signal: np.ndarray) -> _Touch:
-    before = (sample_ns > move.start_ns - round(BASELINE * 1e9)) & (sample_ns < move.start_ns + round(RANGE[0] * 1e9))
+    mask = (sample_ns > move.start_ns - round(BASELINE * 1e9)) & (sample_ns < move.start_ns + round(RANGE[0] * 1e9))
     inside = (sample_ns > move.start_ns + round(RANGE[0] * 1e9)) & (sample_ns < move.end_ns + round(RANGE[1] * 1e9))
-    base = float(np.median(signal[before])) if before.any() else 0.0
+    base = float(np.median(signal[mask])) if mask.any() else 0.0
     return _Touch(move, (sample_ns[inside] - move.start_ns) / 1e9, signal[inside] - base)
 
 
@@ -204,13 +204,13 @@ def _curve(slow: list[_Touch], origin: float, delay: float) -> Callable[[np.ndar
     low, deepest = -ABOVE - KNOT, float(depth.max())
     inner = np.arange(low, deepest + KNOT, KNOT)
     knots = np.concatenate([[inner[0]] * 2, inner, [inner[-1]] * 2])
-    chosen = depth >= low
-    table = BSpline.design_matrix(depth[chosen], knots, 2).toarray()
-    rough = SMOOTH * np.diff(np.eye(table.shape[1]), 3, axis=0)
+    rows = depth >= low
+    table = BSpline.design_matrix(depth[rows], knots, 2).toarray()
+    roughness = SMOOTH * np.diff(np.eye(table.shape[1]), 3, axis=0)
     # The first coefficients are held near 0, as nothing answers above the skin.
     still = 10.0 * np.eye(table.shape[1])[:2]
-    system = np.vstack([table, rough, still])
-    values = np.concatenate([signal[chosen], np.zeros(len(rough) + len(still))])
+    system = np.vstack([table, roughness, still])
+    values = np.concatenate([signal[rows], np.zeros(len(roughness) + len(still))])
     spline = BSpline(knots, np.linalg.lstsq(system, values, rcond=None)[0], 2)
     slope = float(spline.derivative()(deepest))
 
@@ -223,10 +223,10 @@ def _curve(slow: list[_Touch], origin: float, delay: float) -> Callable[[np.ndar
 
 def camera_latency(recording: Recording, tags: TagStream) -> StreamLatency | str:
     """Return a camera's latency from its tag's motion, or why it cannot be measured."""
-    seen = tags.faces > 0
-    if seen.sum() < LEAST_VIEWS:
-        return f"the tag was seen {seen.sum()} times, {LEAST_VIEWS} or more are needed"
-    episode, time, place = recording.episode, tags.sample_ns[seen], tags.position[seen] * 1e3
+    mask = tags.faces > 0
+    if mask.sum() < LEAST_VIEWS:
+        return f"the tag was seen {mask.sum()} times, {LEAST_VIEWS} or more are needed"
+    episode, time, place = recording.episode, tags.sample_ns[mask], tags.position[mask] * 1e3
     jumps = np.abs(place - np.median(place, axis=0)).max(axis=1) < 50.0  # a mirrored face is no motion [mm]
     time, place = time[jumps], place[jumps]
     covered = (time > episode.tip_ns[0]) & (time < episode.tip_ns[-1] + round(RANGE[1] * 1e9))
@@ -234,31 +234,31 @@ def camera_latency(recording: Recording, tags: TagStream) -> StreamLatency | str
     if len(time) < LEAST_VIEWS:
         return f"the tag was seen {len(time)} times during the motion, {LEAST_VIEWS} or more are needed"
 
-    def misfit(delay: float, chosen: np.ndarray) -> float:
-        path = episode.tip_at(time[chosen] - round(delay * 1e9))
+    def misfit(delay: float, rows: np.ndarray) -> float:
+        path = episode.tip_at(time[rows] - round(delay * 1e9))
         # An affine map from guide to camera, so that the camera's pose need not be known.
         table = np.column_stack([path, np.ones(len(path))])
-        fitted, *_ = np.linalg.lstsq(table, place[chosen], rcond=None)
-        off = np.linalg.norm(table @ fitted - place[chosen], axis=1)
+        fitted, *_ = np.linalg.lstsq(table, place[rows], rcond=None)
+        deviation = np.linalg.norm(table @ fitted - place[rows], axis=1)
         # An outlier counts as three median residuals at most.
-        return float(np.minimum(off**2, 9 * np.median(off) ** 2 + 1e-12).sum())
+        return float(np.minimum(deviation**2, 9 * np.median(deviation) ** 2 + 1e-12).sum())
 
-    def best(chosen: np.ndarray) -> float:
+    def best(rows: np.ndarray) -> float:
         delays = np.arange(RANGE[0], RANGE[1], 0.005)
-        at = delays[int(np.argmin([misfit(float(d), chosen) for d in delays]))]
+        at = delays[int(np.argmin([misfit(float(d), rows) for d in delays]))]
         fine = minimize_scalar(
-            lambda d: misfit(float(d), chosen), bounds=(at - 0.01, at + 0.01), method="bounded", options={"xatol": 2e-5}
+            lambda d: misfit(float(d), rows), bounds=(at - 0.01, at + 0.01), method="bounded", options={"xatol": 2e-5}
         )
         return float(fine.x)
 
     if np.ptp(episode.tip_at(time), axis=0).max() < LEAST_WAY:
         return f"the guide moved less than {LEAST_WAY:g} mm while the tag was seen"
-    whole = best(np.ones(len(time), bool))
+    estimate = best(np.ones(len(time), bool))
     # Jackknife over consecutive eighths: neighbouring images share their errors.
     parts = np.arange(len(time)) * 8 // len(time)
-    others = np.array([best(parts != part) for part in range(8)])
-    spread = float(np.sqrt(7 / 8 * np.sum((others - others.mean()) ** 2)))
+    replicates = np.array([best(parts != part) for part in range(8)])
+    spread = float(np.sqrt(7 / 8 * np.sum((replicates - replicates.mean()) ** 2)))
     # A minimum at the edge of the search is no estimate.
-    if spread > LEAST_SURE or not RANGE[0] + 0.006 < whole < RANGE[1] - 0.006:
+    if spread > LEAST_SURE or not RANGE[0] + 0.006 < estimate < RANGE[1] - 0.006:
         return "the tag's motion does not show the delay; let the tag be larger in the image, or the host less busy"
-    return StreamLatency(round(whole * 1e9), round(spread * 1e9))
+    return StreamLatency(round(estimate * 1e9), round(spread * 1e9))

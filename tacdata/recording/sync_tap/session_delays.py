@@ -18,28 +18,28 @@ LEAST_CHANGE_NS = 2_000_000
 
 def latencies(session: Session) -> dict[str, StreamLatency]:
     """Return the latest latency of each stream; {} without a sync tap."""
-    found: dict[str, StreamLatency] = {}
+    result: dict[str, StreamLatency] = {}
     for entry in session.document.get("sync", []):
-        found |= {name: StreamLatency.from_document(values) for name, values in entry["latencies"].items()}
-    return found
+        result |= {name: StreamLatency.from_document(values) for name, values in entry["latencies"].items()}
+    return result
 
 
-def changes(session: Session, now: dict[str, StreamLatency]) -> tuple[str, ...]:
+def changes(session: Session, fresh: dict[str, StreamLatency]) -> tuple[str, ...]:
     """Describe the latencies that differ from an earlier sync tap of the session."""
     words = []
-    for name, before in latencies(session).items():
-        after = now.get(name, before)
-        change = after.latency_ns - before.latency_ns
-        sure = CHANGE * (after.uncertainty_ns**2 + before.uncertainty_ns**2) ** 0.5
-        if abs(change) > max(sure, LEAST_CHANGE_NS):
+    for name, old in latencies(session).items():
+        new = fresh.get(name, old)
+        change = new.latency_ns - old.latency_ns
+        threshold = CHANGE * (new.uncertainty_ns**2 + old.uncertainty_ns**2) ** 0.5
+        if abs(change) > max(threshold, LEAST_CHANGE_NS):
             words.append(f"sync tap: the delay of {name} has changed by {change / 1e6:+.1f} ms; was a cable replugged?")
     return tuple(words)
 
 
-def add_sync(session: Session, file: Path, found: SyncTap) -> Session:
+def add_sync(session: Session, file: Path, tap: SyncTap) -> Session:
     """Write a sync tap into the session's document and return the session."""
-    delays = {name: latency.document for name, latency in found.latencies.items()}
-    entry = {"file": file.name, "latencies": delays, "remarks": list(found.remarks)}
+    delays = {name: latency.document for name, latency in tap.latencies.items()}
+    entry = {"file": file.name, "latencies": delays, "remarks": list(tap.remarks)}
     document = {
         **session.document,
         "version": schemas.version("session"),

@@ -42,10 +42,12 @@ def control_arms(
     outward, touch = normals(direct), np.nan_to_num(direct.depth) > LEAST_DEPTH
     shift = ((compensated.position - direct.position) * outward).sum(axis=-1)
     mean = float(shift[touch].mean()) if touch.any() else 0.0
-    moved = {CLOSE: CLOSING * touch, CONSTANT: mean * touch}
+    displacements = {CLOSE: CLOSING * touch, CONSTANT: mean * touch}
     if readings is not None:
         level = np.maximum(np.nan_to_num(readings), 0.0)
         usual = float(level[touch].mean()) if touch.any() else 0.0
         if usual > 0:
-            moved[TAXELS] = mean * level / usual
-    return {name: replace(direct, position=direct.position + by[..., None] * outward) for name, by in moved.items()}
+            displacements[TAXELS] = mean * level / usual
+    return {
+        name: replace(direct, position=direct.position + by[..., None] * outward) for name, by in displacements.items()
+    }

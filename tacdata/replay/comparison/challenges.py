@@ -22,8 +22,8 @@ class Challenge:
 
 def _wider(by: float) -> Callable[[ReplayScene, np.random.Generator], ReplayScene]:
     def change(scene: ReplayScene, rng: np.random.Generator) -> ReplayScene:
-        first, *others = scene.body.sizes
-        return replace(scene, body=replace(scene.body, sizes=(first + by, *others)))
+        first, *remainder = scene.body.sizes
+        return replace(scene, body=replace(scene.body, sizes=(first + by, *remainder)))
 
     return change
 

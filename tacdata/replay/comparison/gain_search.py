@@ -101,11 +101,11 @@ class GripSearch:
             )
         while high - low > self.tolerance:
             middle = (low + high) / 2
-            found = self._tried(middle)
-            if found is None:
+            candidate = self._tried(middle)
+            if candidate is None:
                 low = middle
             else:
-                high, best = middle, found
+                high, best = middle, candidate
         return best
 
     def _tried(self, gain: float) -> FoundGain | None:
@@ -113,12 +113,12 @@ class GripSearch:
         slip, force, grip = 0.0, 0.0, float("inf")
         for seed in tuple(self._seeds):
             end = self.outcome(gain, seed)
-            most = max(end.force.values())
+            peak = max(end.force.values())
             demand = self.demand
-            if not end.held or end.slip > demand.slip or most > demand.force or end.grip < demand.grip:
+            if not end.held or end.slip > demand.slip or peak > demand.force or end.grip < demand.grip:
                 self._seeds.remove(seed)
                 self._seeds.insert(0, seed)
-                self._reasons[gain] = f"{end.reason}, and a pad pressed with {most:.1f} N"
+                self._reasons[gain] = f"{end.reason}, and a pad pressed with {peak:.1f} N"
                 return None
-            slip, force, grip = max(slip, end.slip), max(force, most), min(grip, end.grip)
+            slip, force, grip = max(slip, end.slip), max(force, peak), min(grip, end.grip)
         return FoundGain(gain, self.demand, slip, force, grip)

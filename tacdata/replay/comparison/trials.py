@@ -54,9 +54,9 @@ class Trials:
         self._centre = object_centre(targets, self._span[1], scene.reach)
         self.paths = {DIRECT: self._cut(None)}
         if DEPTH in gains:
-            moved = self._cut(gains[DEPTH])
-            self.paths |= {**control_arms(self.paths[DIRECT], moved, self._readings()), DEPTH: moved}
-        self.paths |= {kind: self._cut(own) for kind, own in gains.items() if kind != DEPTH}
+            depth_targets = self._cut(gains[DEPTH])
+            self.paths |= {**control_arms(self.paths[DIRECT], depth_targets, self._readings()), DEPTH: depth_targets}
+        self.paths |= {kind: self._cut(values) for kind, values in gains.items() if kind != DEPTH}
 
     def one(self, kind: str, scene: ReplayScene, seed: int = 0) -> ReplayOutcome:
         """Return the outcome of one trial, of a kind of replay, in a scene; the seed draws a controller's errors."""
@@ -81,7 +81,7 @@ class Trials:
             seeds: Number of scenes.
             challenge: One of `CHALLENGES`, which changes each scene; none for the scenes as drawn.
         """
-        found: dict[str, list[bool]] = {kind: [] for kind in kinds}
+        outcomes: dict[str, list[bool]] = {kind: [] for kind in kinds}
         felt = self.paths[DIRECT].depth
         stands = CHALLENGES[challenge].force if challenge else None
         # The force of the demonstration is the felt depth times the stiffness of the skin.
@@ -91,17 +91,17 @@ class Trials:
             world = changed(challenge, world, seed) if challenge else world
             for kind in kinds:
                 end = self.one(kind, world, seed)
-                found[kind].append(bool(end.held) and end.hardest <= limit)
-        return found
+                outcomes[kind].append(bool(end.held) and end.hardest <= limit)
+        return outcomes
 
     def _readings(self) -> np.ndarray | None:
         """Return the sum of each finger's tared readings [counts], shape (n, f); None if a finger has none."""
         path = self.paths[DIRECT]
         signals = [self.made.tracks[name].signals for name in path.fingers]
-        known = [values for values in signals if values is not None]
-        if len(known) < len(signals):
+        series = [values for values in signals if values is not None]
+        if len(series) < len(signals):
             return None
-        return np.stack([np.nansum(values[path.rows], axis=1) for values in known], axis=1)
+        return np.stack([np.nansum(values[path.rows], axis=1) for values in series], axis=1)
 
     def find_gain(self, demand: GripDemand) -> FoundGain:
         """Return the smallest common gain that meets a demand in scenes of its own, which no trial below has.
@@ -119,12 +119,12 @@ class Trials:
 
     def trials(self, seeds: int) -> list[dict[str, Any]]:
         """Run all trials of seeds 0, 1, ...; return them as plain data."""
-        found = []
+        records = []
         for seed in range(seeds):
             world = drawn(self._scene, len(self.paths[DIRECT].fingers), seed)
             for kind in self.paths:
                 end = self.one(kind, world, seed)
-                found.append(
+                records.append(
                     {
                         "recording": self.made.recording,
                         "seed": seed,
@@ -140,14 +140,14 @@ class Trials:
                         "depth": end.depth,
                     }
                 )
-        return found
+        return records
 
     def _cut(self, gains: dict[str, float] | None) -> FingertipTargets:
         return cut(targets_of(self.made, gains), self._span[0], self._span[2])
 
 
 def result(
-    tried: Sequence[Trials], seeds: int, scene: ReplayScene, chosen: tuple[Demonstration, FoundGain] | None = None
+    tried: Sequence[Trials], seeds: int, scene: ReplayScene, selection: tuple[Demonstration, FoundGain] | None = None
 ) -> dict[str, Any]:
     """Return the result over recordings and seeds (`schemas/replay_result.schema.json`).
 
@@ -155,77 +155,82 @@ def result(
         tried: One or more demonstrations.
         seeds: Trials of each kind and demonstration.
         scene: The undisturbed scene.
-        chosen: Demonstration on which the gain of the kind "chosen" was found, and that gain.
+        selection: Demonstration on which the gain of the kind "chosen" was found, and that gain.
     """
-    found = [trial for one in tried for trial in one.trials(seeds)]
+    records = [trial for recording in tried for trial in recording.trials(seeds)]
     kinds, first = list(tried[0].paths), tried[0]
     parents = {"recording": first.made.recording_hash, "checkpoint": (first.made.network or {}).get("hash", "")}
     gains = {kind: first.paths[kind].gains for kind in kinds if kind in (DEPTH, CHOSEN)}
-    held = {kind: [t["held"] for t in found if t["kind"] == kind] for kind in kinds}
+    outcomes = {kind: [t["held"] for t in records if t["kind"] == kind] for kind in kinds}
     return {
         "version": schemas.version("replay_result"),
         "recording": first.made.recording,
         "task": first.made.task,
         "gains": gains[DEPTH],
         "scene": {**scene.document, "spreads": SPREADS},
-        **{kind: rate(held[kind]) for kind in kinds if kind not in CONTROLS},
-        "controls": {kind: rate(held[kind]) for kind in kinds if kind in CONTROLS},
-        "worth": worth(held[DEPTH], {kind: held[kind] for kind in kinds if kind in CONTROLS}),
+        **{kind: rate(outcomes[kind]) for kind in kinds if kind not in CONTROLS},
+        "controls": {kind: rate(outcomes[kind]) for kind in kinds if kind in CONTROLS},
+        "worth": worth(outcomes[DEPTH], {kind: outcomes[kind] for kind in kinds if kind in CONTROLS}),
         "recordings": [
             {
-                "name": one.made.recording,
-                "hash": one.made.recording_hash,
+                "name": recording.made.recording,
+                "hash": recording.made.recording_hash,
                 "rates": {kind: rate([t["held"] for t in trials if t["kind"] == kind]) for kind in kinds},
             }
-            for k, one in enumerate(tried)
-            for trials in (found[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
+            for k, recording in enumerate(tried)
+            for trials in (records[k * seeds * len(kinds) : (k + 1) * seeds * len(kinds)],)
         ],
-        **({"gain_chosen": _chosen(*chosen, gains[CHOSEN])} if chosen else {}),
-        "trials": found,
+        **({"gain_chosen": _chosen(*selection, gains[CHOSEN])} if selection else {}),
+        "trials": records,
         "provenance": provenance.stamp("tacdata replay", parents, {"seeds": seeds}),
     }
 
 
-def _chosen(demonstration: Demonstration, found: FoundGain, gains: dict[str, float]) -> dict[str, Any]:
+def _chosen(demonstration: Demonstration, selection: FoundGain, gains: dict[str, float]) -> dict[str, Any]:
     return {
         "recording": demonstration.recording,
         "hash": demonstration.recording_hash,
         "gains": gains,
-        **found.document,
+        **selection.document,
     }
 
 
-def rate(held: Sequence[bool]) -> dict[str, Any]:
+def rate(outcomes: Sequence[bool]) -> dict[str, Any]:
     """Return the number of successes and trials, and Wilson's interval of the proportion, 95 %."""
-    interval = binomtest(sum(held), len(held)).proportion_ci(method="wilson")
-    return {"held": sum(held), "of": len(held), "wilson_95": list(interval)}
+    interval = binomtest(sum(outcomes), len(outcomes)).proportion_ci(method="wilson")
+    return {"held": sum(outcomes), "of": len(outcomes), "wilson_95": list(interval)}
 
 
 def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
     """Return the outcomes of each arm at each of `STIFFNESSES`, as plain data, with the benefit of depth there."""
-    kinds = [kind for kind in tried[0].paths if all(kind in one.paths for one in tried)]
+    kinds = [kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)]
     return [
-        _row({"stiffness": value}, [one.held_in(replace(scene, stiffness=value), kinds, seeds) for one in tried])
+        _row(
+            {"stiffness": value},
+            [recording.held_in(replace(scene, stiffness=value), kinds, seeds) for recording in tried],
+        )
         for value in STIFFNESSES
     ]
 
 
 def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
     """Return the outcomes of each arm and of the closed loop in each of `CHALLENGES`, as plain data."""
-    kinds = [*(kind for kind in tried[0].paths if all(kind in one.paths for one in tried)), CLOSED]
+    kinds = [*(kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)), CLOSED]
     return [
-        _row({"challenge": name}, [one.held_in(scene, kinds, seeds, name) for one in tried], CLOSED)
+        _row({"challenge": name}, [recording.held_in(scene, kinds, seeds, name) for recording in tried], CLOSED)
         for name in CHALLENGES
     ]
 
 
 def _row(named: dict[str, Any], each: Sequence[dict[str, list[bool]]], judged: str = DEPTH) -> dict[str, Any]:
-    held = {kind: [hit for found in each for hit in found[kind]] for kind in each[0]}
-    rivals = {kind: held[kind] for kind in held if kind in (CONTROLS if judged == DEPTH else (*CONTROLS, DEPTH))}
+    outcomes = {kind: [hit for results in each for hit in results[kind]] for kind in each[0]}
+    rivals = {
+        kind: outcomes[kind] for kind in outcomes if kind in (CONTROLS if judged == DEPTH else (*CONTROLS, DEPTH))
+    }
     return {
         **named,
-        "rates": {kind: rate(values) for kind, values in held.items()},
-        "worth": worth(held[judged], rivals),
+        "rates": {kind: rate(values) for kind, values in outcomes.items()},
+        "worth": worth(outcomes[judged], rivals),
     }
 
 
@@ -234,4 +239,4 @@ def like_published(row: dict[str, Any], task: str) -> bool:
     if task not in PUBLISHED:
         return False
     shares = [row["rates"][kind]["held"] / row["rates"][kind]["of"] for kind in (DIRECT, DEPTH)]
-    return all(abs(share - there) <= ALIKE for share, there in zip(shares, PUBLISHED[task], strict=True))
+    return all(abs(share - reference) <= ALIKE for share, reference in zip(shares, PUBLISHED[task], strict=True))

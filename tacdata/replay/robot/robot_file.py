@@ -67,15 +67,15 @@ def read_robot(path: StrPath) -> Robot:
     document = documents.read(Path(path), "robot")
     origin = Path(path).parent / document["urdf"]
     urdf = read_urdf(origin)
-    for what, given, known in (
+    for what, entries, members in (
         ("link", [entry["link"] for entry in document["fingers"].values()], urdf.links),
         ("joint", [n for key in ("home", "velocity", "acceleration") for n in document.get(key, {})], urdf.joints),
     ):
-        unknown = sorted(set(given) - set(known))
+        unknown = sorted(set(entries) - set(members))
         if unknown:
             raise FormatError(
                 f"{path}: {what} {', '.join(unknown)}, not in {origin.name}",
-                ", ".join(sorted(known)),
+                ", ".join(sorted(members)),
                 f"name a {what} of the URDF",
             )
     velocity = urdf.velocity | document.get("velocity", {})
@@ -85,8 +85,8 @@ def read_robot(path: StrPath) -> Robot:
     }
     allowed = document.get("tolerance", {})
     weight = float(document.get("orientation_weight", ORIENTATION_WEIGHT))
-    turned = allowed.get("rotation", ROTATION_TOLERANCE if weight > 0 else None)
-    tolerance = float(allowed.get("position", POSITION_TOLERANCE)), turned
+    rotation = allowed.get("rotation", ROTATION_TOLERANCE if weight > 0 else None)
+    tolerance = float(allowed.get("position", POSITION_TOLERANCE)), rotation
     return Robot(
         document["name"],
         urdf.text,
@@ -108,16 +108,16 @@ def read_robot(path: StrPath) -> Robot:
 HERE = {"position": [0.0, 0.0, 0.0], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 
 
-def _pose(given: dict[str, Any], origin: str, farthest: float) -> np.ndarray:
+def _pose(entry: dict[str, Any], origin: str, farthest: float) -> np.ndarray:
     """Return a pose, shape (4, 4) [m]; refuse a position in millimetres."""
-    away = float(np.linalg.norm(given["position"]))
+    away = float(np.linalg.norm(entry["position"]))
     if away > farthest:
         raise FormatError(
             f"{origin}: a position {away:g} m away: are these millimetres?",
             f"metres, up to {farthest:g} m",
             "give it in metres",
         )
-    return pose_matrix(given, origin)
+    return pose_matrix(entry, origin)
 
 
 def _workspace(document: dict[str, Any], origin: str) -> tuple[np.ndarray, np.ndarray] | None:
@@ -126,6 +126,6 @@ def _workspace(document: dict[str, Any], origin: str) -> tuple[np.ndarray, np.nd
         return None
     low, high = np.array(box["min"], float), np.array(box["max"], float)
     if (low >= high).any():
-        given = f"{origin}: workspace min {box['min']}, max {box['max']} m"
-        raise FormatError(given, "min below max on every axis", "correct the workspace")
+        fault = f"{origin}: workspace min {box['min']}, max {box['max']} m"
+        raise FormatError(fault, "min below max on every axis", "correct the workspace")
     return low, high

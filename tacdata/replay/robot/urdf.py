@@ -105,16 +105,16 @@ def read_urdf(path: StrPath) -> Urdf:
         for child in [child for child in parent if child.tag in SHAPES]:
             parent.remove(child)
     names = tuple(_name(joint) for joint in joints)
-    told = tuple(f"joint {', '.join(which)}: {words}" for words, which in remarks.items())
-    return Urdf(ET.tostring(root, encoding="unicode"), tuple(links), names, velocity, told)
+    notes = tuple(f"joint {', '.join(which)}: {words}" for words, which in remarks.items())
+    return Urdf(ET.tostring(root, encoding="unicode"), tuple(links), names, velocity, notes)
 
 
 def _name(joint: ET.Element) -> str:
     return str(joint.get("name"))
 
 
-def _wrong(path: Path, given: str, allowed: str, next_step: str = "correct the URDF") -> FormatError:
-    return FormatError(f"{path}: {given}", allowed, next_step)
+def _wrong(path: Path, fault: str, allowed: str, next_step: str = "correct the URDF") -> FormatError:
+    return FormatError(f"{path}: {fault}", allowed, next_step)
 
 
 def _check_tree(links: list[str], joints: list[ET.Element], path: Path) -> None:
@@ -150,8 +150,8 @@ def _check_tree(links: list[str], joints: list[ET.Element], path: Path) -> None:
     if shared:
         raise _wrong(path, f"link {', '.join(shared)} hangs on two joints: a loop", "a tree", "cut the loop open")
     if len(roots) != 1:
-        given = f"links {', '.join(roots)} hang on no joint" if roots else "every link hangs on another: a loop"
-        raise _wrong(path, given, "one root, from which joints lead to all links", "add a fixed joint, or cut a loop")
+        fault = f"links {', '.join(roots)} hang on no joint" if roots else "every link hangs on another: a loop"
+        raise _wrong(path, fault, "one root, from which joints lead to all links", "add a fixed joint, or cut a loop")
 
 
 def _numbers(joint: ET.Element, tag: str, attribute: str, path: Path) -> np.ndarray | None:
@@ -161,12 +161,12 @@ def _numbers(joint: ET.Element, tag: str, attribute: str, path: Path) -> np.ndar
     if text is None:
         return None
     try:
-        found = np.array([float(part) for part in text.split()])
+        numbers = np.array([float(part) for part in text.split()])
     except ValueError:
-        found = np.empty(0)
-    if found.shape != (3,) or not np.isfinite(found).all():
+        numbers = np.empty(0)
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise _wrong(path, f"joint {_name(joint)}: {attribute} {text!r} of its {tag}", "three numbers, spaces between")
-    return found
+    return numbers
 
 
 def _check_place(joint: ET.Element, path: Path) -> None:
@@ -180,10 +180,10 @@ def _check_place(joint: ET.Element, path: Path) -> None:
             f"metres, up to {FARTHEST:g} m",
             "export it in metres",
         )
-    if turn is not None and (most := np.abs(turn).max()) > TURN:
+    if turn is not None and (angle := np.abs(turn).max()) > TURN:
         raise _wrong(
             path,
-            f"{name}: an origin turned by {most:g} rad: are these degrees?",
+            f"{name}: an origin turned by {angle:g} rad: are these degrees?",
             f"radians, up to {TURN:g} rad",
             "export it in radians",
         )
@@ -195,32 +195,32 @@ def _checked_limits(joint: ET.Element, path: Path) -> tuple[dict[str, float], li
     """Return a joint's speed limit, if it has one, and remarks on it; write its limits as MuJoCo understands them."""
     name, kind = _name(joint), str(joint.get("type"))
     unit, limit = MOVING[kind], joint.find("limit")
-    given: dict[str, float] = {}
+    bounds: dict[str, float] = {}
     for end in ("lower", "upper", "velocity"):
         text = None if limit is None else limit.get(end)
         if text is None:
             continue
         try:
-            given[end] = float(text)
+            bounds[end] = float(text)
         except ValueError:
-            given[end] = np.nan
-        if np.isnan(given[end]):
+            bounds[end] = np.nan
+        if np.isnan(bounds[end]):
             raise _wrong(path, f"joint {name}: {end} {text!r}", "numbers as limits")
     remarks = []
-    ends = {end: value for end, value in given.items() if end != "velocity"}
+    ends = {end: value for end, value in bounds.items() if end != "velocity"}
     if kind != "continuous" and limit is not None:
         remarks += _bounded(joint, limit, ends, path)
     elif kind != "continuous":
         remarks.append(UNBOUNDED)
-    speed = given.get("velocity", 0.0)
+    speed = bounds.get("velocity", 0.0)
     if speed < 0:
         raise _wrong(path, f"joint {name}: a largest speed of {speed:g} {unit}/s", f"above 0 {unit}/s")
     if not 0 < speed < np.inf:
         return {}, remarks
     if speed > FASTEST[unit]:
-        other = "degrees or a stand-in" if unit == "rad" else "millimetres or a stand-in"
+        guess = "degrees or a stand-in" if unit == "rad" else "millimetres or a stand-in"
         remarks.append(
-            f"a largest speed of {speed:g} {unit}/s is more than robots do ({other}?); velocity in the robot file "
+            f"a largest speed of {speed:g} {unit}/s is more than robots do ({guess}?); velocity in the robot file "
             "replaces it"
         )
     return {name: speed}, remarks
@@ -234,12 +234,12 @@ def _bounded(joint: ET.Element, limit: ET.Element, ends: dict[str, float], path:
         for end in ("lower", "upper"):
             limit.attrib.pop(end, None)
         return [UNBOUNDED]
-    most = np.abs([value for value in (low, high) if np.isfinite(value)]).max()
-    if most > WIDEST[unit]:
-        other = "degrees" if unit == "rad" else "millimetres"
+    extent = np.abs([value for value in (low, high) if np.isfinite(value)]).max()
+    if extent > WIDEST[unit]:
+        guess = "degrees" if unit == "rad" else "millimetres"
         raise _wrong(
             path,
-            f"joint {name}: a limit of {most:g} {unit}: are these {other}?",
+            f"joint {name}: a limit of {extent:g} {unit}: are these {guess}?",
             f"{'radians' if unit == 'rad' else 'metres'}, up to {WIDEST[unit]:g} {unit}",
             f"export it in {'radians' if unit == 'rad' else 'metres'}",
         )
@@ -269,7 +269,7 @@ def _check_mimics(joints: list[ET.Element], path: Path) -> None:
             continue
         name, leader = _name(joint), str(element.get("joint"))
         if kinds.get(leader) not in MOVING or joint.get("type") not in MOVING:
-            able = [other for other, kind in kinds.items() if kind in MOVING and other != name]
+            able = [candidate for candidate, kind in kinds.items() if kind in MOVING and candidate != name]
             raise _wrong(path, f"joint {name} mimics {leader!r}", f"one that moves: {', '.join(able)}")
         for attribute in ("multiplier", "offset"):
             text = element.get(attribute, "0")
@@ -281,10 +281,10 @@ def _check_mimics(joints: list[ET.Element], path: Path) -> None:
                 raise _wrong(path, f"joint {name}: {attribute} {text!r} of its mimic", "a number")
         leaders[name] = leader
     for name in leaders:
-        seen, at = {name}, name
+        chain, at = {name}, name
         while at in leaders:
             at = leaders[at]
-            if at in seen:
+            if at in chain:
                 way = "itself" if at == name == leaders[name] else f"itself by way of {leaders[name]}"
                 raise _wrong(path, f"joint {name} mimics {way}", "a leader that follows no other")
-            seen.add(at)
+            chain.add(at)

@@ -43,12 +43,12 @@ def mismatch(images: Sequence[np.ndarray], board: Board) -> Mismatch | None:
         images: A few images, grey or BGR, uint8.
         board: The board of the file.
     """
-    seen = _Seen(images)
+    evidence = _Seen(images)
     best: tuple[int, Mismatch] | None = None
-    own, others = _usual([board.dictionary], board), _usual(seen.dictionaries(board), board)
-    for candidates in (own, others, _other_sizes(seen, board)):
+    nominal, alternatives = _usual([board.dictionary], board), _usual(evidence.dictionaries(board), board)
+    for candidates in (nominal, alternatives, _other_sizes(evidence, board)):
         for name, candidate in candidates:
-            views = seen.views(name, candidate)
+            views = evidence.views(name, candidate)
             corners = sum(len(view.ids) for view in views if view is not None)
             if corners > (best[0] if best else LEAST_CORNERS - 1):
                 best = corners, _in_words(board, candidate, name)
@@ -68,8 +68,8 @@ class _Seen:
     def markers(self, change: str, dictionary: str) -> list[Markers]:
         """Return a dictionary's markers in each image."""
         if (change, dictionary) not in self._markers:
-            found = [find_markers(image, dictionary) for image in self._images[change]]
-            self._markers[change, dictionary] = found
+            markers = [find_markers(image, dictionary) for image in self._images[change]]
+            self._markers[change, dictionary] = markers
         return self._markers[change, dictionary]
 
     def views(self, change: str, board: Board) -> list[BoardView | None]:
@@ -97,15 +97,17 @@ def _usual(dictionaries: Iterable[str], board: Board) -> Iterator[tuple[str, Boa
         for name in _CHANGES:
             for is_turned in (False, True):
                 for is_legacy in (board.legacy, not board.legacy):
-                    turned = replace(named, columns=board.rows, rows=board.columns) if is_turned else named
-                    changed = replace(turned, legacy=is_legacy)
+                    variant = replace(named, columns=board.rows, rows=board.columns) if is_turned else named
+                    changed = replace(variant, legacy=is_legacy)
                     if changed != board or name:
                         yield name, changed
 
 
-def _other_sizes(seen: _Seen, board: Board) -> Iterator[tuple[str, Board]]:
+def _other_sizes(evidence: _Seen, board: Board) -> Iterator[tuple[str, Board]]:
     """Yield boards of other sizes that have as many markers as the images show."""
-    markers = 1 + max((int(each.ids.max()) for each in seen.markers("", board.dictionary) if len(each.ids)), default=-1)
+    markers = 1 + max(
+        (int(each.ids.max()) for each in evidence.markers("", board.dictionary) if len(each.ids)), default=-1
+    )
     if markers < LEAST_MARKERS:
         return
     for columns in range(_FEWEST, 2 * markers // _FEWEST + 1):
@@ -116,23 +118,23 @@ def _other_sizes(seen: _Seen, board: Board) -> Iterator[tuple[str, Board]]:
 
 
 def _in_words(board: Board, changed: Board, change: str) -> Mismatch:
-    found, remedy = [], []
+    causes, remedy = [], []
     if change == MIRRORED:
-        found.append("the images are mirrored")
+        causes.append("the images are mirrored")
         remedy.append("switch the camera's mirroring off")
     if change == NEGATIVE:
-        found.append("black and white are changed over")
+        causes.append("black and white are changed over")
         remedy.append("print the board black on white, or switch the camera's negative off")
     if changed.legacy != board.legacy:
-        found.append(f"the pattern begins as OpenCV drew it {'before' if changed.legacy else 'from'} 4.6")
+        causes.append(f"the pattern begins as OpenCV drew it {'before' if changed.legacy else 'from'} 4.6")
         remedy.append(f"legacy: {'true' if changed.legacy else 'false'}")
     if (changed.columns, changed.rows) != (board.columns, board.rows):
-        found.append(f"{changed.columns} squares across and {changed.rows} down")
+        causes.append(f"{changed.columns} squares across and {changed.rows} down")
         remedy.append(f"columns: {changed.columns} and rows: {changed.rows}")
     if changed.dictionary != board.dictionary:
-        found.append(f"markers of the dictionary {changed.dictionary}")
+        causes.append(f"markers of the dictionary {changed.dictionary}")
         remedy.append(f"dictionary: {changed.dictionary}")
     settings = [text for text in remedy if ":" in text]
-    others = [text for text in remedy if ":" not in text]
-    words = others + ([f"write {', '.join(settings)} in the board file"] if settings else [])
-    return Mismatch(", ".join(found), ", and ".join(words))
+    steps = [text for text in remedy if ":" not in text]
+    words = steps + ([f"write {', '.join(settings)} in the board file"] if settings else [])
+    return Mismatch(", ".join(causes), ", and ".join(words))

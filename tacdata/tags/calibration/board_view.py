@@ -26,12 +26,12 @@ class BoardView:
     corners: np.ndarray
     """Positions of the corners [px], shape (n, 2); whole numbers are pixel centres."""
 
-    def moved(self, other: BoardView) -> float:
+    def moved(self, reference: BoardView) -> float:
         """Return the distance between the corners that both views show [px], median; infinite if they share none."""
-        _, here, there = np.intersect1d(self.ids, other.ids, return_indices=True)
-        if not len(here):
+        _, rows, reference_rows = np.intersect1d(self.ids, reference.ids, return_indices=True)
+        if not len(rows):
             return np.inf
-        return float(np.median(np.linalg.norm(self.corners[here] - other.corners[there], axis=1)))
+        return float(np.median(np.linalg.norm(self.corners[rows] - reference.corners[reference_rows], axis=1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +67,12 @@ def find_board(image: np.ndarray, board: Board, name: str = "", markers: Markers
     """
     import cv2
 
-    known: dict[str, Any] = {}
+    hints: dict[str, Any] = {}
     if markers is not None:
         if not len(markers.ids):
             return None
-        known = {"markerCorners": markers.corners, "markerIds": markers.ids[:, None]}
-    found, ids, _, _ = cv2.aruco.CharucoDetector(board.opencv).detectBoard(to_grey(image), **known)
-    if found is None or ids is None or len(ids) < LEAST_CORNERS:
+        hints = {"markerCorners": markers.corners, "markerIds": markers.ids[:, None]}
+    corners, ids, _, _ = cv2.aruco.CharucoDetector(board.opencv).detectBoard(to_grey(image), **hints)
+    if corners is None or ids is None or len(ids) < LEAST_CORNERS:
         return None
-    return BoardView(name, np.asarray(ids).ravel(), np.asarray(found, float).reshape(-1, 2))
+    return BoardView(name, np.asarray(ids).ravel(), np.asarray(corners, float).reshape(-1, 2))

@@ -134,35 +134,35 @@ def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model
         )
     first = MODELS[0] if model == "auto" else model
     views, left_out = _without_strays(views, _fit(views, board, size, first))
-    kept, dropped = _fitting(views, board, size, first, len(views))
-    chosen = _choose_model(kept, board, size) if model == "auto" else model
-    kept, more = _fitting(kept, board, size, chosen, len(views) - len(dropped))
-    fit, held_out = _fit(kept, board, size, chosen), _held_out(kept, board, size, chosen)
-    found = _judged(fit, kept, [*dropped, *more], size, chosen, held_out)
-    return replace(found, remarks=(*found.remarks, *left_out))
+    members, dropped = _fitting(views, board, size, first, len(views))
+    choice = _choose_model(members, board, size) if model == "auto" else model
+    members, more = _fitting(members, board, size, choice, len(views) - len(dropped))
+    fit, held_out = _fit(members, board, size, choice), _held_out(members, board, size, choice)
+    calibration = _judged(fit, members, [*dropped, *more], size, choice, held_out)
+    return replace(calibration, remarks=(*calibration.remarks, *left_out))
 
 
 def _without_strays(views: list[BoardView], fit: _Fit) -> tuple[list[BoardView], list[str]]:
     """Return the views without outlier corners, and a remark on how many those were."""
     deviation = [np.linalg.norm(each, axis=1) for each in fit.residuals]
     limit = max(STRAY * float(np.median(np.concatenate(deviation))), LEAST_STRAY)
-    kept, count = [], 0
+    members, count = [], 0
     for view, far in zip(views, deviation, strict=True):
         good = far <= limit
-        few = (~good).sum() <= MOST_STRAYS * len(good)
-        count += int((~good).sum()) if few else 0
-        kept.append(replace(view, ids=view.ids[good], corners=view.corners[good]) if few else view)
-    every = sum(len(each) for each in deviation)
-    return kept, [f"{count} of {every} corners left out, found more than {limit:.1f} px away"] if count else []
+        is_minority = (~good).sum() <= MOST_STRAYS * len(good)
+        count += int((~good).sum()) if is_minority else 0
+        members.append(replace(view, ids=view.ids[good], corners=view.corners[good]) if is_minority else view)
+    total = sum(len(each) for each in deviation)
+    return members, [f"{count} of {total} corners left out, found more than {limit:.1f} px away"] if count else []
 
 
 def _fitting(
     views: list[BoardView], board: Board, size: tuple[int, int], model: str, count: int
 ) -> tuple[list[BoardView], list[UsedView]]:
     """Return the views that fit one camera, and those dropped, worst first: at most `MOST_DROPPED` of ``count``."""
-    kept, dropped = list(views), []
+    members, dropped = list(views), []
     while True:
-        rms = _fit(kept, board, size, model).rms
+        rms = _fit(members, board, size, model).rms
         if np.median(rms) > BAD:
             raise FormatError(
                 f"the corners' reprojection error is {np.median(rms):.1f} px",
@@ -172,16 +172,16 @@ def _fitting(
         # One at a time: a wrong view pulls the fit, which makes the errors of good views larger.
         worst = int(np.argmax(rms))
         if rms[worst] <= max(OUTLIER * float(np.median(rms)), LEAST_OUTLIER):
-            return kept, dropped
+            return members, dropped
         reason = f"its corners' reprojection error is {rms[worst]:.2f} px, that of the others {np.median(rms):.2f} px"
-        dropped.append(UsedView(kept.pop(worst), float(rms[worst]), None, reason))
+        dropped.append(UsedView(members.pop(worst), float(rms[worst]), None, reason))
         if len(dropped) > MOST_DROPPED * count:
             raise FormatError(
                 f"more than {MOST_DROPPED:.0%} of {count} views do not fit one camera",
                 "views with one focus and zoom of one flat board",
                 "fix focus and zoom, glue the board to something flat, hold it still",
             )
-        _check_count(kept, f", {len(dropped)} dropped that do not fit")
+        _check_count(members, f", {len(dropped)} dropped that do not fit")
 
 
 def coverage_of(views: list[BoardView], size: tuple[int, int]) -> float:
@@ -214,11 +214,11 @@ def _check_count(views: list[BoardView], what: str) -> None:
 
 
 def _judged(
-    fit: _Fit, kept: list[BoardView], dropped: list[UsedView], size: tuple[int, int], model: str, held_out: float
+    fit: _Fit, members: list[BoardView], dropped: list[UsedView], size: tuple[int, int], model: str, held_out: float
 ) -> Calibration:
     """Return the calibration, or refuse it."""
     tilt = float(np.degrees(np.arccos(np.clip((fit.normals @ fit.normals.T).min(), -1, 1))))
-    share = coverage_of(kept, size)
+    share = coverage_of(members, size)
     unsure = float((fit.spread[:2] / np.diag(fit.matrix)[:2]).max())
     if tilt < LEAST_TILT or unsure > REFUSED:
         raise FormatError(
@@ -233,7 +233,8 @@ def _judged(
     if unsure > UNSURE:
         remarks.append(f"focal length uncertain by {unsure:.2%}, and so are distances of tags")
     used = [
-        UsedView(view, float(rms), residuals) for view, rms, residuals in zip(kept, fit.rms, fit.residuals, strict=True)
+        UsedView(view, float(rms), residuals)
+        for view, rms, residuals in zip(members, fit.rms, fit.residuals, strict=True)
     ]
     views = tuple(sorted([*used, *dropped], key=lambda each: each.view.name))
     return Calibration(
@@ -243,11 +244,11 @@ def _judged(
 
 def _choose_model(views: list[BoardView], board: Board, size: tuple[int, int]) -> str:
     scores = {model: _held_out(views, board, size, model) for model in MODELS}
-    chosen = MODELS[0]
+    choice = MODELS[0]
     for model in MODELS[1:]:
-        if scores[model] < BETTER * scores[chosen]:
-            chosen = model
-    return chosen
+        if scores[model] < BETTER * scores[choice]:
+            choice = model
+    return choice
 
 
 def _held_out(views: list[BoardView], board: Board, size: tuple[int, int], model: str) -> float:
@@ -262,8 +263,8 @@ def _held_out(views: list[BoardView], board: Board, size: tuple[int, int], model
             points = board.corners[view.ids]
             good, turn, place = cv2.solvePnP(points, view.corners, fit.matrix, fit.distortion)
             if good:
-                seen = cv2.projectPoints(points, turn, place, fit.matrix, fit.distortion)[0][:, 0]
-                squares.append(np.square(seen - view.corners).sum(axis=1))
+                projection = cv2.projectPoints(points, turn, place, fit.matrix, fit.distortion)[0][:, 0]
+                squares.append(np.square(projection - view.corners).sum(axis=1))
     return float(np.sqrt(np.concatenate(squares).mean())) if squares else np.inf
 
 

@@ -56,10 +56,10 @@ def _bars(picture: np.ndarray, calibration: Calibration, corner: tuple[int, int]
 
     x, y = corner
     _write(picture, "rms of each view [px]", (x, y - 12), 0.45)
-    most = max((used.rms for used in calibration.views if np.isfinite(used.rms)), default=1.0)
+    peak = max((used.rms for used in calibration.views if np.isfinite(used.rms)), default=1.0)
     for k, used in enumerate(calibration.views):
         base = y + k * (BAR + 3)
-        length = round(200 * (used.rms / most if np.isfinite(used.rms) else 0))
+        length = round(200 * (used.rms / peak if np.isfinite(used.rms) else 0))
         cv2.rectangle(picture, (x, base), (x + length, base + BAR), DROPPED if used.reason else USED, -1)
         label = f"{used.rms:.2f}  {used.view.name[-28:]}" + ("  dropped" if used.reason else "")
         _write(picture, label, (x + 208, base + BAR - 3), 0.38)

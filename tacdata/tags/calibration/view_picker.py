@@ -52,7 +52,7 @@ class ViewPicker:
             )
         self.size, self.seen = size, self.seen + 1
         view = find_board(image, self.board, name)
-        before, self._last = self._last, view
+        previous, self._last = self._last, view
         if view is None:
             if len(self._without_board) < LOOKED_AT_AGAIN:
                 self._without_board.append(image.copy())
@@ -60,9 +60,9 @@ class ViewPicker:
         self.with_board += 1
         if self.still:
             unit = size[0] / 1000
-            if before is None or view.moved(before) > STILL * unit:
+            if previous is None or view.moved(previous) > STILL * unit:
                 return False
-            if any(view.moved(kept) < NEW * unit for kept in self.views):
+            if any(view.moved(member) < NEW * unit for member in self.views):
                 return False
         self.views.append(view)
         return True
@@ -76,12 +76,12 @@ class ViewPicker:
         Raises:
             FormatError: If the reason holds for most images, or if too few are left.
         """
-        if not self._without_board or (other := mismatch(self._without_board, self.board)) is None:
+        if not self._without_board or (change := mismatch(self._without_board, self.board)) is None:
             return ""
-        given = f"the board in {self.with_board} of {self.seen} images; in the others {other.found}"
+        fault = f"the board in {self.with_board} of {self.seen} images; in the others {change.found}"
         if 2 * self.with_board < self.seen or len(self.views) < least:
-            raise FormatError(given, "the board that the board file describes", other.remedy)
-        return f"{given}: {other.remedy}"
+            raise FormatError(fault, "the board that the board file describes", change.remedy)
+        return f"{fault}: {change.remedy}"
 
 
 def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:

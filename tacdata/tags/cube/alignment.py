@@ -64,13 +64,13 @@ class _Step:
 
 
 def align(
-    start: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray, grey: np.ndarray, steps: int = STEPS
+    start: Alignment, faces: set[str], cube: Cube, matrix: np.ndarray, grey: np.ndarray, steps: int = STEPS
 ) -> Alignment:
     """Return the pose at which rendering and image agree best near ``start``.
 
     Args:
         start: First pose, within about half a cell of the truth.
-        seen: Faces whose tags were detected; others take part if they correlate with their pattern.
+        faces: Faces whose tags were detected; others take part if they correlate with their pattern.
         cube: The cube.
         matrix: Camera matrix [px], shape (3, 3).
         grey: Image without distortion, uint8, shape (height, width).
@@ -79,9 +79,9 @@ def align(
     pose = start
     for step in range(max(steps, 1)):
         patches = _patches(pose, cube, matrix, grey, COARSE if step == 0 else FINE)
-        used = [p for f, p in patches.items() if f in seen or p.likeness > ENTIRE]
-        detected = [p for f, p in patches.items() if f in seen]
-        found = _step(used, pose, matrix, cube, None if step == 0 else pose.residual) if steps else None
+        used = [p for f, p in patches.items() if f in faces or p.likeness > ENTIRE]
+        detected = [p for f, p in patches.items() if f in faces]
+        solution = _step(used, pose, matrix, cube, None if step == 0 else pose.residual) if steps else None
         pose = Alignment(
             pose.rotation,
             pose.translation,
@@ -90,24 +90,24 @@ def align(
             _residual(detected, np.zeros(7)),
             pose.covariance,
         )
-        if found is None:
+        if solution is None:
             return pose if step == 0 else replace(start, likeness=pose.likeness)
         pose = Alignment(
-            _rotation(found.move[:3]) @ pose.rotation,
-            pose.translation + found.move[3:6],
-            float(np.sqrt(np.clip(pose.blur**2 + found.move[6], 0.2**2, 3.0**2))),
+            _rotation(solution.move[:3]) @ pose.rotation,
+            pose.translation + solution.move[3:6],
+            float(np.sqrt(np.clip(pose.blur**2 + solution.move[6], 0.2**2, 3.0**2))),
             pose.likeness,
-            _residual(detected, found.move),
-            found.covariance,
+            _residual(detected, solution.move),
+            solution.covariance,
         )
-        if step > 0 and found.pixels < SETTLED:
+        if step > 0 and solution.pixels < SETTLED:
             break
-    return replace(pose, covariance=pose.covariance + _grain(pose, seen, cube, matrix))
+    return replace(pose, covariance=pose.covariance + _grain(pose, faces, cube, matrix))
 
 
-def _grain(pose: Alignment, seen: set[str], cube: Cube, matrix: np.ndarray) -> np.ndarray:
+def _grain(pose: Alignment, faces: set[str], cube: Cube, matrix: np.ndarray) -> np.ndarray:
     """Return the covariance of rotation [rad] and translation [m] by `GRAIN`, shape (6, 6)."""
-    arms = np.concatenate([cube.corners(face) for face in seen]) @ pose.rotation.T
+    arms = np.concatenate([cube.corners(face) for face in faces]) @ pose.rotation.T
     slopes = np.empty((2, 6, len(arms)))
     for row, (x, y) in zip(slopes, ((-1.0, 0.0), (0.0, -1.0)), strict=True):
         ones = np.ones(len(arms))
@@ -120,12 +120,12 @@ def _residual(patches: list[FacePatch], move: np.ndarray) -> float:
     """Return the residual after a step, to first order, over each face's contrast; covered pixels get little weight."""
     if not patches:
         return np.inf
-    left = [p.rest / max(p.contrast, 1.0) - move @ p.columns[:7] for p in patches]
-    return float(COVERED[1] * np.sqrt(np.log1p(np.square(np.concatenate(left) / COVERED[1])).mean()))
+    residuals = [p.rest / max(p.contrast, 1.0) - move @ p.columns[:7] for p in patches]
+    return float(COVERED[1] * np.sqrt(np.log1p(np.square(np.concatenate(residuals) / COVERED[1])).mean()))
 
 
 def _step(
-    patches: list[FacePatch], pose: Alignment, matrix: np.ndarray, cube: Cube, left: float | None
+    patches: list[FacePatch], pose: Alignment, matrix: np.ndarray, cube: Cube, scatter: float | None
 ) -> _Step | None:
     """Return the Gauss-Newton step on some faces; None if they do not determine one.
 
@@ -134,7 +134,7 @@ def _step(
         pose: The pose of the rendering.
         matrix: Camera matrix [px].
         cube: The cube.
-        left: Residual of the step before, over the contrast [1]. None at the first step, where large differences come
+        scatter: Residual of the step before, over the contrast [1]. None at the first step: large differences then come
             from the pose.
     """
     normal, right = np.zeros((7, 7)), np.zeros(7)
@@ -142,17 +142,17 @@ def _step(
     for patch in patches:
         if patch.contrast <= 1.0:
             continue
-        weighted, rest = patch.columns, patch.rest
+        weighted, residual = patch.columns, patch.rest
         # In the first step the residual is not known, and no pixel can be suspected.
-        if left is not None:
+        if scatter is not None:
             # Cauchy weights: pixels that cover a part of the face count little.
-            weight = 1 / (1 + np.square(rest / (patch.contrast * np.clip(3 * left, *COVERED))))
-            weighted, rest = weighted * weight, weight * rest
+            weight = 1 / (1 + np.square(residual / (patch.contrast * np.clip(3 * scatter, *COVERED))))
+            weighted, residual = weighted * weight, weight * residual
             count += float(weight.sum())
         else:
-            count += len(rest)
-        squares += float(rest @ patch.rest)
-        product, towards = weighted @ patch.columns.T, patch.columns @ rest
+            count += len(residual)
+        squares += float(residual @ patch.rest)
+        product, towards = weighted @ patch.columns.T, patch.columns @ residual
         # Black and white of a face are parameters of their own: they are solved for and eliminated.
         inner = product[:7, 7:] @ np.linalg.inv(product[7:, 7:])
         normal += patch.contrast**2 * (product[:7, :7] - inner @ product[7:, :7])
@@ -170,8 +170,8 @@ def _step(
     if not np.isfinite(move).all() or np.linalg.norm(move[:3]) > 0.5:
         return None
     focal, depth = matrix[0, 0], max(float(pose.translation[2]), 1e-3)
-    turned, moved = np.linalg.norm(move[:3]) * cube.side / 1000, np.linalg.norm(move[3:6])
-    return _Step(move, squares / count * inverse[:6, :6], float(turned + moved) * focal / depth)
+    rotation, shift = np.linalg.norm(move[:3]) * cube.side / 1000, np.linalg.norm(move[3:6])
+    return _Step(move, squares / count * inverse[:6, :6], float(rotation + shift) * focal / depth)
 
 
 def _patches(pose: Alignment, cube: Cube, matrix: np.ndarray, grey: np.ndarray, detail: float) -> dict[str, FacePatch]:

@@ -50,19 +50,19 @@ def candidates(tags: list[Tag], cube: Cube, camera: PinholeCamera) -> list[PoseC
         cube: The cube.
         camera: The camera.
     """
-    found: list[PoseCandidate] = []
+    poses: list[PoseCandidate] = []
     several = len({tag.id for tag in tags}) > 1
     for tag in sorted(tags, key=lambda tag: -tag.size):
         for candidate in _solved(tag, tags, cube, camera):
-            found.append(candidate)
+            poses.append(candidate)
             if several and len(candidate.tags) == len(tags) and candidate.reprojection < LEAST:
                 return [candidate]  # several faces allow one pose only
-    most = max((len(c.tags) for c in found), default=0)
-    kept: list[PoseCandidate] = []
-    for candidate in sorted((c for c in found if len(c.tags) == most), key=lambda c: c.reprojection):
-        if all(angle_between(candidate.rotation, other.rotation) > np.radians(2.0) for other in kept):
-            kept.append(candidate)
-    return kept
+    support = max((len(c.tags) for c in poses), default=0)
+    distinct: list[PoseCandidate] = []
+    for candidate in sorted((c for c in poses if len(c.tags) == support), key=lambda c: c.reprojection):
+        if all(angle_between(candidate.rotation, rival.rotation) > np.radians(2.0) for rival in distinct):
+            distinct.append(candidate)
+    return distinct
 
 
 def contradicting(
@@ -82,7 +82,7 @@ def contradicting(
     import cv2
 
     near = _fitting(cv2.Rodrigues(rotation)[0], translation.reshape(3, 1), tags, cube, camera, LOOSE)
-    return [tag for tag in tags if not any(tag is other for other in near)]
+    return [tag for tag in tags if not any(tag is neighbour for neighbour in near)]
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> float:
@@ -140,15 +140,15 @@ def _fitting(
     if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
         return []
     square, place = cv2.Rodrigues(rotation)[0], translation.ravel()
-    chosen: dict[int, tuple[float, Tag]] = {}
+    inliers: dict[int, tuple[float, Tag]] = {}
     for tag in tags:
         outward = square @ AXES[cube.faces[tag.id]][:, 2]
         if place[2] <= 0 or outward @ (place + outward * cube.side / 2000) >= 0:
             continue
         error = _error(square, place, tag, cube, camera)
-        if error <= max(limit * tag.size, LEAST) and (tag.id not in chosen or error < chosen[tag.id][0]):
-            chosen[tag.id] = (error, tag)
-    return [tag for _, tag in chosen.values()]
+        if error <= max(limit * tag.size, LEAST) and (tag.id not in inliers or error < inliers[tag.id][0]):
+            inliers[tag.id] = (error, tag)
+    return [tag for _, tag in inliers.values()]
 
 
 def _error(rotation: np.ndarray, translation: np.ndarray, tag: Tag, cube: Cube, camera: PinholeCamera) -> float:

@@ -63,19 +63,19 @@ class Cube:
         """
         missing = {"side", "tag", "ids"} - set(document)
         if missing:
-            given = f"{origin}: no {', '.join(sorted(missing))}"
-            raise FormatError(given, "side, tag [mm] and ids", "add it")
+            fault = f"{origin}: no {', '.join(sorted(missing))}"
+            raise FormatError(fault, "side, tag [mm] and ids", "add it")
         side, tag, ids = document["side"], document["tag"], document["ids"]
         if not 0 < tag <= side:
-            given = f"{origin}: tag {tag} mm on a side of {side} mm"
-            raise FormatError(given, "0 < tag <= side", "measure the black square")
+            fault = f"{origin}: tag {tag} mm on a side of {side} mm"
+            raise FormatError(fault, "0 < tag <= side", "measure the black square")
         if not SIDES[0] <= side <= SIDES[1]:
-            given = f"{origin}: a side of {side} mm: is it in another unit?"
-            raise FormatError(given, f"{SIDES[0]:g} to {SIDES[1]:g} mm", "give side and tag in millimetres")
+            fault = f"{origin}: a side of {side} mm: is it in another unit?"
+            raise FormatError(fault, f"{SIDES[0]:g} to {SIDES[1]:g} mm", "give side and tag in millimetres")
         unknown = sorted(set(ids) - set(NORMALS))
         if unknown or not ids:
-            given = f"{origin}: ids for {', '.join(unknown) or 'no face'}"
-            raise FormatError(given, ", ".join(NORMALS), "correct ids")
+            fault = f"{origin}: ids for {', '.join(unknown) or 'no face'}"
+            raise FormatError(fault, ", ".join(NORMALS), "correct ids")
         # Family 36h11 has 587 tags.
         if len(set(ids.values())) < len(ids) or not all(0 <= i <= 586 for i in ids.values()):
             raise FormatError(f"{origin}: ids {ids}", "different numbers from 0 to 586", "correct ids")

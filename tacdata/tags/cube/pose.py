@@ -89,11 +89,11 @@ def detect_cube(
         >>> bool(np.linalg.norm(pose.position - true[:3, 3]) < 1e-4)  # m
         True
     """
-    grey, camera, known = to_grey(image), PinholeCamera.from_document(intrinsics), Cube.from_document(cube)
+    grey, camera, geometry = to_grey(image), PinholeCamera.from_document(intrinsics), Cube.from_document(cube)
     camera.check(grey)
-    near = None if hint is None else surroundings(hint, known, camera)
+    near = None if hint is None else surroundings(hint, geometry, camera)
     for within in (near, None) if near else (None,):
-        pose = solve_cube(grey, detect_tags(grey, whole=False, within=within), known, camera, hint)
+        pose = solve_cube(grey, detect_tags(grey, whole=False, within=within), geometry, camera, hint)
         if pose is not None:
             return pose
     return None
@@ -111,21 +111,23 @@ def solve_cube(
         camera: The camera.
         hint: The previous pose, if known; decides only between ambiguous poses.
     """
-    own = [Tag(tag.id, camera.straighten(tag.corners), tag.margin, tag.hamming) for tag in tags if tag.id in cube.faces]
-    before = None
+    cube_tags = [
+        Tag(tag.id, camera.straighten(tag.corners), tag.margin, tag.hamming) for tag in tags if tag.id in cube.faces
+    ]
+    previous = None
     if hint is not None:
         # No residual is clearly below 0: after an ambiguous pose all candidates are compared again.
-        before = Before(hint.matrix[:3, :3], 0.0 if hint.ambiguous else hint.residual)
-    found = best_rival(own, grey, cube, camera, before)
-    if found is None:
+        previous = Before(hint.matrix[:3, :3], 0.0 if hint.ambiguous else hint.residual)
+    pair = best_rival(cube_tags, grey, cube, camera, previous)
+    if pair is None:
         return None
-    best, other = found
+    best, rival = pair
     # By identity: two tags of one image may have the same number.
     used, aligned = {id(tag) for tag in best.tags}, best.alignment
-    others = [tag for tag in own if id(tag) not in used]
-    away = contradicting(others, aligned.rotation, aligned.translation, cube, camera)
+    remainder = [tag for tag in cube_tags if id(tag) not in used]
+    away = contradicting(remainder, aligned.rotation, aligned.translation, cube, camera)
     strays = tuple(sorted({tag.id for tag in away}))
-    return _pose(best, strays, None if other is None else _pose(other, strays, None))
+    return _pose(best, strays, None if rival is None else _pose(rival, strays, None))
 
 
 def surroundings(pose: CubePose, cube: Cube, camera: PinholeCamera) -> tuple[int, int, int, int] | None:
@@ -141,7 +143,7 @@ def surroundings(pose: CubePose, cube: Cube, camera: PinholeCamera) -> tuple[int
     return (int(left), int(top), int(right), int(bottom)) if right > left and bottom > top else None
 
 
-def _pose(rival: PoseHypothesis, strays: tuple[int, ...], other: CubePose | None) -> CubePose:
+def _pose(rival: PoseHypothesis, strays: tuple[int, ...], second: CubePose | None) -> CubePose:
     from scipy.spatial.transform import Rotation
 
     ids = tuple(sorted(tag.id for tag in rival.tags))
@@ -152,9 +154,9 @@ def _pose(rival: PoseHypothesis, strays: tuple[int, ...], other: CubePose | None
         reprojection=float(rival.reprojection),
         faces=len(ids),
         ids=ids,
-        ambiguous=other is not None,
+        ambiguous=second is not None,
         covariance=aligned.covariance,
         residual=aligned.residual,
-        rival=other,
+        rival=second,
         strays=strays,
     )

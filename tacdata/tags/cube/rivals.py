@@ -73,7 +73,7 @@ class Before:
 
 
 def best_rival(
-    tags: list[Tag], grey: np.ndarray, cube: Cube, camera: PinholeCamera, before: Before | None
+    tags: list[Tag], grey: np.ndarray, cube: Cube, camera: PinholeCamera, previous: Before | None
 ) -> tuple[PoseHypothesis, PoseHypothesis | None] | None:
     """Return the pose that the image supports best, and another that it supports about as well, if any.
 
@@ -82,33 +82,33 @@ def best_rival(
         grey: The image, uint8, shape (height, width).
         cube: The cube.
         camera: The camera.
-        before: The previous pose, if known; decides between equal ones.
+        previous: The previous pose, if known; decides between equal ones.
     """
     while tags:
         starts = candidates(tags, cube, camera)
         if not starts:
             return None
-        start = None if before is None else _continuing(starts, before)
-        if before is not None and start is not None:
+        start = None if previous is None else _continuing(starts, previous)
+        if previous is not None and start is not None:
             rival = PoseHypothesis(start, grey, cube, camera)
-            if not rival.false and rival.alignment.residual < CLEARLY * before.residual:
+            if not rival.false and rival.alignment.residual < CLEARLY * previous.residual:
                 return rival, None
         rivals = [PoseHypothesis(candidate, grey, cube, camera) for candidate in starts]
         first = rivals[0]
         turns = [angle_between(first.alignment.rotation, r.alignment.rotation) for r in rivals]
         if len(first.seen) == 1 and max(turns) < APART:
             rivals = [first, PoseHypothesis(_mirrored(first, cube), grey, cube, camera)]
-        best, other = _choose(rivals, before)
+        best, second = _choose(rivals, previous)
         if not best.false:
-            return best, other
+            return best, second
         # A tag that was read where the image shows none spoils all candidates: they are solved again without it.
         tags = [tag for tag in tags if not any(tag is false for false in best.false)]
     return None
 
 
-def _continuing(starts: list[PoseCandidate], before: Before) -> PoseCandidate | None:
+def _continuing(starts: list[PoseCandidate], previous: Before) -> PoseCandidate | None:
     """Return the pose that continues the previous one, if the other is far from it; None if that is uncertain."""
-    angles = sorted((angle_between(start.rotation, before.rotation), k) for k, start in enumerate(starts))
+    angles = sorted((angle_between(start.rotation, previous.rotation), k) for k, start in enumerate(starts))
     if len(angles) < 2 or angles[0][0] > STRIDE or angles[1][0] < AWAY * angles[0][0] + 2 * STRIDE:
         return None
     return starts[angles[0][1]]
@@ -127,9 +127,9 @@ def _mirrored(rival: PoseHypothesis, cube: Cube) -> PoseCandidate:
     axis = np.cross(normal, towards)
     # A minimum tilt, so that the other minimum is in reach.
     angle = np.arctan2(np.linalg.norm(axis), normal @ towards)
-    turned = _turn(axis, max(angle, LEAST_TILT)) @ rotation
-    place = centre - turned @ AXES[face][:, 2] * cube.side / 2000
-    return PoseCandidate(turned, place, rival.tags, rival.reprojection)
+    mirror = _turn(axis, max(angle, LEAST_TILT)) @ rotation
+    place = centre - mirror @ AXES[face][:, 2] * cube.side / 2000
+    return PoseCandidate(mirror, place, rival.tags, rival.reprojection)
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -139,10 +139,10 @@ def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
     return cv2.Rodrigues(axis * (angle / length))[0] if length > 1e-9 else np.eye(3)
 
 
-def _choose(rivals: list[PoseHypothesis], before: Before | None) -> tuple[PoseHypothesis, PoseHypothesis | None]:
+def _choose(rivals: list[PoseHypothesis], previous: Before | None) -> tuple[PoseHypothesis, PoseHypothesis | None]:
     rivals = [r for r in rivals if not r.false] or rivals
-    most = max(rival.support for rival in rivals)
-    rivals = sorted((r for r in rivals if r.support == most), key=lambda r: r.alignment.residual)
+    support = max(rival.support for rival in rivals)
+    rivals = sorted((r for r in rivals if r.support == support), key=lambda r: r.alignment.residual)
     best = rivals[0]
     close = [
         r
@@ -154,13 +154,13 @@ def _choose(rivals: list[PoseHypothesis], before: Before | None) -> tuple[PoseHy
         return best, None
     # A missing face speaks against a pose, but may be covered: it decides nothing with certainty.
     equals = sorted([best, *close], key=lambda r: (r.missing, r.alignment.residual))
-    if before is not None:
-        equals.sort(key=lambda r: angle_between(r.alignment.rotation, before.rotation))
+    if previous is not None:
+        equals.sort(key=lambda r: angle_between(r.alignment.rotation, previous.rotation))
     return equals[0], equals[1]
 
 
 def _aligned(
-    start: Alignment, seen: set[str], grey: np.ndarray, cube: Cube, camera: PinholeCamera, steps: int = STEPS
+    start: Alignment, faces: set[str], grey: np.ndarray, cube: Cube, camera: PinholeCamera, steps: int = STEPS
 ) -> Alignment:
     """Align with a window of the image that holds the whole cube, at half size or less where it is large."""
     half = cube.side / 2000
@@ -171,7 +171,7 @@ def _aligned(
     pixels = camera.project(points)
     image, matrix = camera.window(grey, pixels.min(axis=0) - 8, pixels.max(axis=0) + 8)
     size = cube.tag / 1000 * camera.matrix[0, 0] / start.translation[2]
-    return align(start, seen, cube, *_shrunk(image, matrix, int(size / LARGE)), steps)
+    return align(start, faces, cube, *_shrunk(image, matrix, int(size / LARGE)), steps)
 
 
 def _shrunk(image: np.ndarray, matrix: np.ndarray, factor: int) -> tuple[np.ndarray, np.ndarray]:
@@ -181,8 +181,8 @@ def _shrunk(image: np.ndarray, matrix: np.ndarray, factor: int) -> tuple[np.ndar
     height, width = image.shape
     if factor < 2 or min(height, width) < 8 * factor:
         return matrix, image
-    kept = image[: height // factor * factor, : width // factor * factor]
-    small = cv2.resize(kept, (width // factor, height // factor), interpolation=cv2.INTER_AREA)
+    window = image[: height // factor * factor, : width // factor * factor]
+    small = cv2.resize(window, (width // factor, height // factor), interpolation=cv2.INTER_AREA)
     # Pixel centres: a pixel of the small image covers `factor` whole ones.
     shift = (factor - 1) / (2 * factor)
     to_small = np.array([[1 / factor, 0, -shift], [0, 1 / factor, -shift], [0, 0, 1.0]])

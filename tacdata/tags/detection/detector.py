@@ -52,8 +52,8 @@ def detect_tags(image: np.ndarray, *, whole: bool = True, within: tuple[int, int
     if not part.size:
         return []
     offset = np.array([left, top], float)
-    found = _read(part, (0, 0, part.shape[1], part.shape[0]), 1.0) if whole else _read_suspects(part)
-    return [Tag(tag.id, tag.corners + offset, tag.margin, tag.hamming) for tag in found]
+    tags = _read(part, (0, 0, part.shape[1], part.shape[0]), 1.0) if whole else _read_suspects(part)
+    return [Tag(tag.id, tag.corners + offset, tag.margin, tag.hamming) for tag in tags]
 
 
 def to_grey(image: np.ndarray) -> np.ndarray:
@@ -77,9 +77,9 @@ def to_grey(image: np.ndarray) -> np.ndarray:
 
 
 def _refused(image: Any) -> UsageError:
-    given = f"{type(image).__name__} {getattr(image, 'dtype', '')} of shape {getattr(image, 'shape', '()')}"
+    description = f"{type(image).__name__} {getattr(image, 'dtype', '')} of shape {getattr(image, 'shape', '()')}"
     allowed = "uint8, shape (height, width) or (height, width, 3) BGR"
-    return UsageError(f"image: {given}", allowed, "convert the image")
+    return UsageError(f"image: {description}", allowed, "convert the image")
 
 
 @cache
@@ -93,15 +93,15 @@ def _april() -> Any:
 def _read_suspects(grey: np.ndarray) -> list[Tag]:
     """Read the candidates, then the neighbourhood of each tag read; without one, the smallest remaining boxes."""
     tags: list[Tag] = []
-    rest = []
+    remainder = []
     for suspect in suspects(grey):
         if suspect.framed:
             _read_one(grey, suspect, tags)
         else:
-            rest.append(suspect)
+            remainder.append(suspect)
     read = [(tag.corners, NEAR * tag.size) for tag in tags]
-    beside = [s for s in rest if any(s.is_near(corners, reach) for corners, reach in read)]
-    for suspect in beside if tags else sorted(rest, key=lambda s: s.size)[:LAST]:
+    neighbours = [s for s in remainder if any(s.is_near(corners, reach) for corners, reach in read)]
+    for suspect in neighbours if tags else sorted(remainder, key=lambda s: s.size)[:LAST]:
         _read_one(grey, suspect, tags)
     return tags
 
@@ -114,11 +114,11 @@ def _read_one(grey: np.ndarray, suspect: Suspect, tags: list[Tag]) -> None:
         scale /= 2
     scales = (2.0, scale) if suspect.size < TINY else (scale, 2.0) if suspect.size < SMALL else (scale,)
     box = suspect.box(ROOM * suspect.size + 3, width, height)
-    found = next((found for each in scales if (found := _read(grey, box, each))), [])
-    for tag in found:
+    readings = next((readings for each in scales if (readings := _read(grey, box, each))), [])
+    for tag in readings:
         same = [t for t in tags if t.id == tag.id and np.abs(t.corners - tag.corners).max() < tag.size / 2]
-        if all(tag.margin > other.margin for other in same):
-            tags[:] = [t for t in tags if not any(t is other for other in same)] + [tag]
+        if all(tag.margin > rival.margin for rival in same):
+            tags[:] = [t for t in tags if not any(t is rival for rival in same)] + [tag]
 
 
 def _read(grey: np.ndarray, box: tuple[int, int, int, int], scale: float) -> list[Tag]:
@@ -131,13 +131,13 @@ def _read(grey: np.ndarray, box: tuple[int, int, int, int], scale: float) -> lis
         kind = cv2.INTER_CUBIC if scale > 1 else cv2.INTER_AREA
         crop = cv2.resize(crop, None, fx=scale, fy=scale, interpolation=kind)
     with _LOCK:
-        found = _april().detect(np.ascontiguousarray(crop))
+        detections = _april().detect(np.ascontiguousarray(crop))
     # In the library's coordinates a pixel's corner is a whole number, so scaling is plain division, by the ratio of the
     # rounded sides.
     scales = np.array([crop.shape[1] / (right - left), crop.shape[0] / (bottom - top)])
     offset = np.array([left, top], float) - HALF_PIXEL
     return [
         Tag(int(d.tag_id), d.corners / scales + offset, float(d.decision_margin), int(d.hamming))
-        for d in found
+        for d in detections
         if d.hamming <= HAMMING and d.decision_margin >= MARGIN and np.isfinite(d.corners).all()
     ]

@@ -73,10 +73,10 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
     dark = cv2.adaptiveThreshold(half, 1, kind, cv2.THRESH_BINARY_INV, WINDOW, darker)
     # The default algorithm is two to three times slower on one core.
     _, labels, boxes, _ = cv2.connectedComponentsWithStatsWithAlgorithm(dark, 8, cv2.CV_32S, cv2.CCL_GRANA)
-    across, down = boxes[:, cv2.CC_STAT_WIDTH], boxes[:, cv2.CC_STAT_HEIGHT]
-    short, long = np.minimum(across, down), np.maximum(across, down)
+    widths, heights = boxes[:, cv2.CC_STAT_WIDTH], boxes[:, cv2.CC_STAT_HEIGHT]
+    short, long = np.minimum(widths, heights), np.maximum(widths, heights)
     likely = (short >= LEAST_SIDE) & (long <= SLENDER * short)
-    likely &= boxes[:, cv2.CC_STAT_AREA] >= 0.5 * DARK * across * down
+    likely &= boxes[:, cv2.CC_STAT_AREA] >= 0.5 * DARK * widths * heights
     likely[0] = False  # bright cells
     places, quads = [], []
     labels_left = np.flatnonzero(likely)
@@ -134,8 +134,8 @@ def _framed(grey: np.ndarray, quads: np.ndarray) -> np.ndarray:
     import cv2
 
     places = np.einsum("pk,nkd->npd", _WEIGHTS, quads).astype(np.float32)
-    seen = cv2.remap(grey, places[..., 0], places[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    paper, frame, inside = (seen[:, kind].mean(axis=1) for kind in (_PAPER, _FRAME, _INSIDE))
+    patterns = cv2.remap(grey, places[..., 0], places[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    paper, frame, inside = (patterns[:, kind].mean(axis=1) for kind in (_PAPER, _FRAME, _INSIDE))
     contrast = paper - frame
     share = (inside - frame) / np.maximum(contrast, 1e-3)
     return (contrast > DARKER[0]) & (share > PATTERN[0]) & (share < PATTERN[1])

@@ -40,9 +40,9 @@ def why_unread(images: Sequence[np.ndarray]) -> Unread | None:
     """
     greys = [to_grey(image) for image in images]
     for count, reason in _readings():
-        shown = sum(count(grey) > 0 for grey in greys)
-        if greys and shown >= max(SHARE * len(greys), min(2, len(greys))):
-            return Unread(f"{shown} of {len(greys)} images show {reason.found}", reason.remedy)
+        hits = sum(count(grey) > 0 for grey in greys)
+        if greys and hits >= max(SHARE * len(greys), min(2, len(greys))):
+            return Unread(f"{hits} of {len(greys)} images show {reason.found}", reason.remedy)
     return None
 
 

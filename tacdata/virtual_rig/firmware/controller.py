@@ -100,41 +100,41 @@ class Controller:
         if code == SOFT_LIMIT:
             self._faults.put(self.machine.overtravel)
         else:
-            self._faults.put(lambda now: self._wiped(lambda: self.machine.stop_dead(now, code)))
+            self._faults.put(lambda now_ns: self._wiped(lambda: self.machine.stop_dead(now_ns, code)))
 
     def inject_brown_out(self) -> None:
         """Fault: the supply voltage drops; the firmware restarts and assumes position zero."""
-        self._faults.put(lambda now: self._wiped(lambda: self.machine.brown_out(now)))
+        self._faults.put(lambda now_ns: self._wiped(lambda: self.machine.brown_out(now_ns)))
 
     def inject_reset(self) -> None:
         """Fault: another program sends 0x18."""
-        self._faults.put(lambda now: self._wiped(lambda: self.machine.reset(now)))
+        self._faults.put(lambda now_ns: self._wiped(lambda: self.machine.reset(now_ns)))
 
     def inject_stop(self) -> None:
         """Fault: another program sends grblHAL's 0x19, or a digit 9 loses a bit."""
-        self._faults.put(lambda now: self._take(NAMES["grblHAL"].stop_byte, now))
+        self._faults.put(lambda now_ns: self._take(NAMES["grblHAL"].stop_byte, now_ns))
 
     def inject_stall(self, seconds: float) -> None:
         """Fault: the firmware does something else for so long [s], neither steps nor answers, and then goes on."""
 
-        def stand(now: int) -> None:
-            self.machine.busy_until = now + round(seconds * NS)
-            self.planner.stall(now, self.machine.busy_until)
+        def stand(now_ns: int) -> None:
+            self.machine.busy_until = now_ns + round(seconds * NS)
+            self.planner.stall(now_ns, self.machine.busy_until)
 
         self._faults.put(stand)
 
     def inject_silence(self) -> None:
         """Fault: nothing is answered any more."""
-        self._faults.put(lambda now: setattr(self, "_muted", True))
+        self._faults.put(lambda now_ns: setattr(self, "_muted", True))
 
     def inject_bytes(self, data: bytes) -> None:
         """Fault: bytes appear on the line."""
-        self._faults.put(lambda now: self.port.write(data))
+        self._faults.put(lambda now_ns: self.port.write(data))
 
     def inject_wire(self, to_controller: Wire | None = None, to_host: Wire | None = None) -> None:
         """Fault: lines, or answers and reports, are changed or lost on their way from now on."""
 
-        def lay(now: int) -> None:
+        def lay(now_ns: int) -> None:
             self._to_controller = to_controller or self._to_controller
             self._to_host = to_host or self._to_host
 
@@ -147,35 +147,35 @@ class Controller:
     def inject_door(self, is_open: bool) -> None:
         """Fault: the safety door opens or closes."""
 
-        def turn(now: int) -> None:
+        def turn(now_ns: int) -> None:
             self.machine.door_open = is_open
             if is_open:
-                self.machine.open_door(now)
+                self.machine.open_door(now_ns)
 
         self._faults.put(turn)
 
     def inject_byte(self, byte: int) -> None:
         """Fault: another program sends a real-time byte, or a button does."""
-        self._faults.put(lambda now: self.machine.realtime(byte, now))
+        self._faults.put(lambda now_ns: self.machine.realtime(byte, now_ns))
 
     def inject_unreadable_memory(self) -> None:
         """Fault: stored parameters cannot be read; ``$#`` answers error:7 and then ok."""
-        self._faults.put(lambda now: setattr(self.machine, "unreadable", True))
+        self._faults.put(lambda now_ns: setattr(self.machine, "unreadable", True))
 
     def unplug(self) -> None:
         """Fault: the cable is pulled."""
-        self._faults.put(lambda now: self.port.close())
+        self._faults.put(lambda now_ns: self.port.close())
 
     def _run(self) -> None:
         while not self._stopped.is_set():
             data = self.port.read(self._pause())
-            now = self.clock.now_ns()
+            now_ns = self.clock.now_ns()
             while not self._faults.empty():
-                self._faults.get()(now)
+                self._faults.get()(now_ns)
             for byte in data:
-                self._take(byte, now)
-            self.machine.serve(now)
-            self._serve_lines(now)
+                self._take(byte, now_ns)
+            self.machine.serve(now_ns)
+            self._serve_lines(now_ns)
             self._serve_output(self.clock.now_ns())
 
     def _pause(self) -> float:
@@ -189,24 +189,24 @@ class Controller:
             return 0.02
         return min(max((min(due) - self.clock.now_ns()) / NS / self.clock.rate, 0.0002), 0.02)
 
-    def _take(self, byte: int, now: int) -> None:
+    def _take(self, byte: int, now_ns: int) -> None:
         if byte == ord("?") or (byte == TELL_ALL and self.machine.firmware is NAMES["grblHAL"]):
             self.machine.whole |= byte == TELL_ALL
             if self._report_ns is None:
                 step = self.machine.firmware.dwell_step if self.machine.dwell_ns is not None else 0.0
-                self._report_ns = now + int(self._rng.uniform(0.001, max(step, 0.014)) * NS)
+                self._report_ns = now_ns + int(self._rng.uniform(0.001, max(step, 0.014)) * NS)
         elif byte in REALTIME or byte > 0x7F or byte == self.machine.firmware.stop_byte:
-            self.heard.append((byte, now))
+            self.heard.append((byte, now_ns))
             if byte == 0x18:
-                self._wiped(lambda: self.machine.reset(now))
+                self._wiped(lambda: self.machine.reset(now_ns))
             elif byte == self.machine.firmware.stop_byte:
-                self._wiped(lambda: self.machine.realtime(byte, now))
+                self._wiped(lambda: self.machine.realtime(byte, now_ns))
             else:
-                self.machine.realtime(byte, now)
+                self.machine.realtime(byte, now_ns)
         elif self._waiting() >= self.machine.firmware.rx_bytes:
             return  # bytes beyond the buffer are lost, as in the firmware's ring buffer
         elif byte in (0x0A, 0x0D):
-            due = now + int((len(self._received) + 1) * BYTE_SECONDS * NS)
+            due = now_ns + int((len(self._received) + 1) * BYTE_SECONDS * NS)
             line = self._to_controller(self._received.decode("ascii", "replace"))
             if line is not None:
                 self._lines.append((due, line))
@@ -225,32 +225,32 @@ class Controller:
         self._report_ns = None
         restart()
 
-    def _serve_lines(self, now: int) -> None:
-        while self._lines and self._lines[0][0] <= now and self.machine.takes_lines(now):
+    def _serve_lines(self, now_ns: int) -> None:
+        while self._lines and self._lines[0][0] <= now_ns and self.machine.takes_lines(now_ns):
             line = DROPPED.sub("", self._lines[0][1])
-            self.machine.reading = not self.machine.admits(line, now)
+            self.machine.reading = not self.machine.admits(line, now_ns)
             if self.machine.reading:
                 return
             self._lines.popleft()
             if self._echo:
-                self._say(now, f"[echo: {line}]")
-            self.machine.execute(line, now)
+                self._say(now_ns, f"[echo: {line}]")
+            self.machine.execute(line, now_ns)
 
-    def _serve_output(self, now: int) -> None:
-        if self._report_ns is not None and now >= self._report_ns:
+    def _serve_output(self, now_ns: int) -> None:
+        if self._report_ns is not None and now_ns >= self._report_ns:
             due, self._report_ns = self._report_ns, None
-            if not self.machine.silent(now):
+            if not self.machine.silent(now_ns):
                 text = self.machine.report(due, self.machine.firmware.rx_bytes - self._waiting())
-                self._say(now, text, lag=0.0)
+                self._say(now_ns, text, lag=0.0)
         if self.port.waiting:
             self.port.write(b"")
-        while self._out and self._out[0][0] <= now:
+        while self._out and self._out[0][0] <= now_ns:
             text = self._to_host(self._out.popleft()[1])
             if not self._muted and text is not None:
                 self.port.write(text.encode("ascii") + b"\r\n")
 
-    def _say(self, now: int, text: str, lag: float | None = None) -> None:
+    def _say(self, now_ns: int, text: str, lag: float | None = None) -> None:
         # The USB bridge passes its bytes on once a millisecond.
         lag = self._rng.uniform(0.0005, 0.0015) if lag is None else lag
-        due = now + int((lag + len(text) * BYTE_SECONDS) * NS)
+        due = now_ns + int((lag + len(text) * BYTE_SECONDS) * NS)
         self._out.append((max(due, self._out[-1][0]) if self._out else due, text))

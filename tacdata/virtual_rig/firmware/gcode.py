@@ -157,11 +157,11 @@ def _takes_axes(
     if commands.get("once") == "G92.1":
         state.shift = np.zeros(3)
     if commands.get("once") == "G92":
-        told = [
+        shift = [
             p - o - values[a] * state.unit if a in values else s
             for a, p, o, s in zip(AXES, position, offset, state.shift, strict=True)
         ]
-        state.shift = np.array(told)
+        state.shift = np.array(shift)
     elif commands.get("scaling") == "G51":
         state.scale = np.array([values.get(axis, 1.0) for axis in AXES])
     elif commands.get("length") == "G43.1":

@@ -11,43 +11,43 @@ from tacdata.virtual_rig.firmware.machine import Machine
 class Interpreter(Machine):
     """The machine with its main loop's work: one line in, one answer out."""
 
-    def execute(self, line: str, now: int) -> None:
+    def execute(self, line: str, now_ns: int) -> None:
         """Carry out a line and send its answer."""
         try:
             if len(line) > self.firmware.line_bytes:
                 raise gcode.Refused(11)
             if line.startswith("$"):
-                self._dollar(line.upper(), now)
+                self._dollar(line.upper(), now_ns)
             elif line:
-                self._gcode(line, now)
+                self._gcode(line, now_ns)
             else:
-                self._say(now, "ok")
+                self._say(now_ns, "ok")
             self._refused = 0
         except gcode.Refused as refusal:
             self._refused = refusal.code if self.firmware.refuses_after_error else 0
-            self._say(now, f"error:{refusal.code}")
+            self._say(now_ns, f"error:{refusal.code}")
 
-    def _gcode(self, line: str, now: int) -> None:
-        if self.alarm is not None or self.state(now) == "Jog":
+    def _gcode(self, line: str, now_ns: int) -> None:
+        if self.alarm is not None or self.state(now_ns) == "Jog":
             raise gcode.Refused(9)
         if self._refused:
             raise gcode.Refused(self._refused)
-        if self._act(line, now):
-            self._say(now, "ok")
+        if self._act(line, now_ns):
+            self._say(now_ns, "ok")
 
-    def _dollar(self, line: str, now: int) -> None:
-        state = self.state(now).split(":")[0]
+    def _dollar(self, line: str, now_ns: int) -> None:
+        state = self.state(now_ns).split(":")[0]
         if self.critical and line not in ("$G", "$#", "$$", "$I", "$N"):
             raise gcode.Refused(79)
         if line.startswith("$J="):
-            self._jog(line[3:], now)
+            self._jog(line[3:], now_ns)
         elif line == "$G":
-            said = self.modal.said if self.firmware.names_length else self.modal.said.replace(" G43.1", "")
-            self._answer(now, [f"[GC:{said} T0 F{self.modal.feed:g} S0]"])
+            modes = self.modal.said if self.firmware.names_length else self.modal.said.replace(" G43.1", "")
+            self._answer(now_ns, [f"[GC:{modes} T0 F{self.modal.feed:g} S0]"])
         elif line in ("$", "$$", "$#", "$I", "$N", "$C", "$H", "$X", "$SLP") or "=" in line:
             if state not in self._states_for(line):
                 raise gcode.Refused(8)
-            self._idle_command(line, now)
+            self._idle_command(line, now_ns)
         else:
             raise gcode.Refused(3)
 
@@ -57,50 +57,50 @@ class Interpreter(Machine):
             return "Idle", "Alarm", "Check"
         return ("Idle", "Alarm", "Check", "Jog", "Door") if line in ("$$", "$X") else ("Idle", "Alarm")
 
-    def _idle_command(self, line: str, now: int) -> None:
+    def _idle_command(self, line: str, now_ns: int) -> None:
         bent = self.modal.shift, self.modal.length
-        told = texts.information(line, self.firmware, self.settings, self.offset, self.startup, *bent)
-        if told is not None:
-            self._answer(now, ["error:7"] if line == "$#" and self.unreadable else told)
+        reply = texts.information(line, self.firmware, self.settings, self.offset, self.startup, *bent)
+        if reply is not None:
+            self._answer(now_ns, ["error:7"] if line == "$#" and self.unreadable else reply)
         elif line == "$X":
-            self._answer(now, ["[MSG:Caution: Unlocked]"] if self.alarm is not None else [])
+            self._answer(now_ns, ["[MSG:Caution: Unlocked]"] if self.alarm is not None else [])
             self.alarm = None
         elif line == "$C":
-            self._turn_check_mode(now)
+            self._turn_check_mode(now_ns)
         elif line == "$SLP":
             self.sleeping = True
-            self._answer(now, [])
-            self._say(now, "[MSG:Sleeping]")
+            self._answer(now_ns, [])
+            self._say(now_ns, "[MSG:Sleeping]")
         elif line == "$H":
-            self._home(now)
+            self._home(now_ns)
         elif line.startswith("$N"):
-            self._keep(line, now)
+            self._keep(line, now_ns)
         else:
-            self._set(line, now)
+            self._set(line, now_ns)
 
-    def _turn_check_mode(self, now: int) -> None:
+    def _turn_check_mode(self, now_ns: int) -> None:
         """Switch it on, or off; the checked lines have changed the modal state, so leaving it is a reset."""
         if self.alarm is not None:
             raise gcode.Refused(8)
         self.check = not self.check
-        self._answer(now, [f"[MSG:{'Enabled' if self.check else 'Disabled'}]"])
+        self._answer(now_ns, [f"[MSG:{'Enabled' if self.check else 'Disabled'}]"])
         if not self.check:
-            self.reset(now)
+            self.reset(now_ns)
 
-    def _answer(self, now: int, lines: list[str]) -> None:
+    def _answer(self, now_ns: int, lines: list[str]) -> None:
         for text in [*lines, "ok"]:
-            self._say(now, text)
+            self._say(now_ns, text)
 
-    def _keep(self, line: str, now: int) -> None:
+    def _keep(self, line: str, now_ns: int) -> None:
         number, _, text = line[2:].partition("=")
         if number not in ("0", "1"):
             raise gcode.Refused(3)
         if text:
-            self._act(text, now)
+            self._act(text, now_ns)
         self.startup[int(number)] = text
-        self._say(now, "ok")
+        self._say(now_ns, "ok")
 
-    def _set(self, line: str, now: int) -> None:
+    def _set(self, line: str, now_ns: int) -> None:
         name, _, value = line.partition("=")
         if name not in self.settings:
             raise gcode.Refused(3)
@@ -112,18 +112,18 @@ class Interpreter(Machine):
         if (name, value) == ("$20", "1") and self.settings["$22"] != "1":
             raise gcode.Refused(10)
         self.settings[name] = value
-        self._say(now, "ok")
+        self._say(now_ns, "ok")
 
-    def _home(self, now: int) -> None:
+    def _home(self, now_ns: int) -> None:
         if self.settings["$22"] != "1":
             raise gcode.Refused(5)
         self.homing, self.error = True, np.zeros(3)
-        self._move(np.full(3, -float(self.settings["$27"])), float(self.settings["$25"]) / 60, now, "Home")
+        self._move(np.full(3, -float(self.settings["$27"])), float(self.settings["$25"]) / 60, now_ns, "Home")
 
-    def _jog(self, line: str, now: int) -> None:
+    def _jog(self, line: str, now_ns: int) -> None:
         if self.alarm is not None:
             raise gcode.Refused(9)
-        if self.state(now) not in ("Idle", "Jog"):
+        if self.state(now_ns) not in ("Idle", "Jog"):
             raise gcode.Refused(8)
         scratch = gcode.Modal(dict(self.modal.words), 0.0)
         action = gcode.interpret(line, scratch, self.planner.target - self.error, self.offset, jog=True)
@@ -133,5 +133,5 @@ class Interpreter(Machine):
             raise gcode.Refused(15)
         words = dict(gcode.split(line))
         unit = 25.4 if "G20" in line or (self.modal.unit != 1.0 and "G21" not in line) else 1.0
-        self._move(action.target, words["F"] * unit / 60, now, "Jog")
-        self._say(now, "ok")
+        self._move(action.target, words["F"] * unit / 60, now_ns, "Jog")
+        self._say(now_ns, "ok")

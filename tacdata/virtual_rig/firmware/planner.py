@@ -115,13 +115,13 @@ class Planner:
                 if speed <= 0:
                     break
                 room = block.length - way
-                out = math.sqrt(max(speed**2 - 2 * block.acceleration * room, 0.0))
-                seconds = (speed - out) / block.acceleration
+                exit_speed = math.sqrt(max(speed**2 - 2 * block.acceleration * room, 0.0))
+                seconds = (speed - exit_speed) / block.acceleration
                 self._append(now_ns, elapsed, seconds, block, way, speed, -block.acceleration)
                 elapsed += seconds
-                if out > 0 or speed**2 >= 2 * block.acceleration * room - 1e-9:
+                if exit_speed > 0 or speed**2 >= 2 * block.acceleration * room - 1e-9:
                     self._ends.append(now_ns + round(elapsed * 1e9))
-                way, speed = 0.0, out
+                way, speed = 0.0, exit_speed
 
     def resume(self, now_ns: int) -> None:
         """Continue from rest."""
@@ -249,14 +249,14 @@ class Planner:
             entry[i] = min(corner, math.sqrt(entry[i + 1] ** 2 + 2 * blocks[i].acceleration * blocks[i].length))
         for i, block in enumerate(blocks):
             a, room = block.acceleration, max(block.length - way, 0.0)
-            out = min(entry[i + 1], math.sqrt(speed**2 + 2 * a * room))
-            peak = max(min(block.speed, math.sqrt(max(a * room + 0.5 * (speed**2 + out**2), 0.0))), out)
-            rise, fall = (peak - speed) / a, (peak - out) / a
+            exit_speed = min(entry[i + 1], math.sqrt(speed**2 + 2 * a * room))
+            peak = max(min(block.speed, math.sqrt(max(a * room + 0.5 * (speed**2 + exit_speed**2), 0.0))), exit_speed)
+            rise, fall = (peak - speed) / a, (peak - exit_speed) / a
             far = way + (speed + peak) / 2 * rise
-            cruise = max(block.length - (peak + out) / 2 * fall - far, 0.0) / peak if peak > 0 else 0.0
+            cruise = max(block.length - (peak + exit_speed) / 2 * fall - far, 0.0) / peak if peak > 0 else 0.0
             self._append(now_ns, elapsed, abs(rise), block, way, speed, math.copysign(a, rise))
             self._append(now_ns, elapsed + abs(rise), cruise, block, far, peak, 0.0)
             self._append(now_ns, elapsed + abs(rise) + cruise, fall, block, far + peak * cruise, peak, -a)
             elapsed += abs(rise) + cruise + fall
             self._ends.append(now_ns + round(elapsed * 1e9))
-            way, speed = 0.0, out
+            way, speed = 0.0, exit_speed

@@ -77,8 +77,8 @@ def information(
     inches = settings["$13"] == "1"
     unit, digits = (25.4, 4) if inches else (1.0, 3)
     zero = triple(np.zeros(3), digits)
-    told = {54: offset, 92: np.zeros(3) if shift is None else shift}
-    tags = [f"[G{n}:{triple(told.get(n, np.zeros(3)) / unit, digits)}]" for n in (*range(54, 60), 28, 30, 92)]
+    offsets = {54: offset, 92: np.zeros(3) if shift is None else shift}
+    tags = [f"[G{n}:{triple(offsets.get(n, np.zeros(3)) / unit, digits)}]" for n in (*range(54, 60), 28, 30, 92)]
     return {
         "$$": [f"{name}={value}" for name, value in settings.items()],
         "$#": [*tags, f"[TLO:{length / unit:.{digits}f}]", f"[PRB:{zero}:0]"],
@@ -105,7 +105,7 @@ def report(
     machine: np.ndarray,
     speed: float,
     offset: np.ndarray,
-    free: tuple[int, int],
+    capacity: tuple[int, int],
     counters: Counters,
     override: int,
     pins: str,
@@ -119,7 +119,7 @@ def report(
         machine: Machine position by the controller's count [mm], shape (3,).
         speed: Present speed [mm/s].
         offset: Work coordinate offset with G92 and the tool's length [mm], shape (3,).
-        free: Free planner blocks and bytes of the receive buffer.
+        capacity: Free planner blocks and bytes of the receive buffer.
         counters: Updated.
         override: Feed override [%].
         pins: Letters of the active inputs.
@@ -129,22 +129,22 @@ def report(
     steps = axis_setting(settings, "$10")
     position = np.round(machine * steps) / steps - (0 if mask & 1 else offset)
     fields = [state, f"{'MPos' if mask & 1 else 'WPos'}:{triple(position / unit, digits)}"]
-    told = {name for name in ("Bf", "FS", "Pn", "WCO", "Ov") if name not in bits or mask & bits[name]}
-    if "Bf" in told:
-        fields.append(f"Bf:{free[0]},{free[1]}")
-    if "FS" in told:
+    contents = {name for name in ("Bf", "FS", "Pn", "WCO", "Ov") if name not in bits or mask & bits[name]}
+    if "Bf" in contents:
+        fields.append(f"Bf:{capacity[0]},{capacity[1]}")
+    if "FS" in contents:
         fields.append(f"FS:{60 * speed / unit:.{digits - 3}f},0")
-    if pins and "Pn" in told:
+    if pins and "Pn" in contents:
         fields.append(f"Pn:{pins}")
     if counters.offset != tuple(offset):
         counters.wco, counters.offset = 0, tuple(offset)
     busy = state.split(":")[0] in ("Run", "Hold", "Jog", "Door", "Home")
     if counters.wco == 0:
         counters.wco, counters.overrides = WCO_PERIOD[busy], max(counters.overrides, 1)
-        fields += [f"WCO:{triple(offset / unit, digits)}"] if "WCO" in told else []
+        fields += [f"WCO:{triple(offset / unit, digits)}"] if "WCO" in contents else []
     elif counters.overrides == 0:
         counters.overrides = OV_PERIOD[busy]
-        fields += [f"Ov:{override},100,100"] if "Ov" in told else []
+        fields += [f"Ov:{override},100,100"] if "Ov" in contents else []
     counters.wco -= 1
     counters.overrides -= counters.overrides > 0
     return f"<{'|'.join(fields)}>"

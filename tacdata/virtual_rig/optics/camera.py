@@ -95,12 +95,12 @@ class VirtualCamera:
                     self._image = (number, data)
                     self._changed.notify_all()
             # A camera that cannot keep up skips exposures; it does not fall behind.
-            late = int((self.clock.now_ns() - self.exposure_ns(number)) / NS * self.rate)
-            number += max(1, late)
+            lag = int((self.clock.now_ns() - self.exposure_ns(number)) / NS * self.rate)
+            number += max(1, lag)
 
-    def _next(self, after: int) -> tuple[int, bytes] | None:
+    def _next(self, number: int) -> tuple[int, bytes] | None:
         with self._changed:
-            self._changed.wait_for(lambda: self._image[0] > after or self._stopped.is_set())
+            self._changed.wait_for(lambda: self._image[0] > number or self._stopped.is_set())
             return None if self._stopped.is_set() else self._image
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:

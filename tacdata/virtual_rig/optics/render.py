@@ -103,10 +103,10 @@ def expose(
         rows, columns = slice(max(top - margin, 0), bottom + margin), slice(max(left - margin, 0), right + margin)
         image[rows, columns] = cv2.GaussianBlur(sharp[rows, columns], (0, 0), look.blur)
     image += look.noise * rng.standard_normal((height, width), dtype=np.float32)
-    seen = cv2.convertScaleAbs(np.maximum(image, 0.0))
+    picture = cv2.convertScaleAbs(np.maximum(image, 0.0))
     if look.jpeg is None:
-        return seen
-    coded = cv2.imencode(".jpg", seen, [cv2.IMWRITE_JPEG_QUALITY, look.jpeg])[1]
+        return picture
+    coded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, look.jpeg])[1]
     return np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE))
 
 
@@ -147,10 +147,10 @@ def _through_exposure(pose: np.ndarray, look: Look) -> list[np.ndarray]:
         return [pose]
     poses = []
     for when in (np.arange(MOMENTS) + 0.5) / MOMENTS - 0.5:
-        moved = pose.copy()
-        moved[:3, :3] = cv2.Rodrigues(when * np.array(look.turn, float))[0] @ pose[:3, :3]
-        moved[:3, 3] += when * np.array(look.shift)
-        poses.append(moved)
+        sample = pose.copy()
+        sample[:3, :3] = cv2.Rodrigues(when * np.array(look.turn, float))[0] @ pose[:3, :3]
+        sample[:3, 3] += when * np.array(look.shift)
+        poses.append(sample)
     return poses
 
 

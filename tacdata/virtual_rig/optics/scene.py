@@ -37,12 +37,12 @@ class CubeScene:
         return {"pose_machine_camera": self.machine_camera.tolist(), "cube_on_carriage": self.carriage_cube.tolist()}
 
 
-def draw_scene(seed: int, over: tuple[float, float, float]) -> CubeScene:
-    """Place the camera, as if by hand, to look at the cube when the carriage is at ``over`` [mm]."""
+def draw_scene(seed: int, carriage: tuple[float, float, float]) -> CubeScene:
+    """Place the camera, as if by hand, to look at the cube when the carriage is at ``carriage`` [mm]."""
     from scipy.spatial.transform import Rotation
 
     rng = np.random.default_rng([seed, 6])
-    cube = np.add(over, (0.0, 0.0, CUBE_HEIGHT))
+    cube = np.add(carriage, (0.0, 0.0, CUBE_HEIGHT))
     eye = cube + CAMERA_OFFSET + rng.normal(0, 4, 3)
     camera = looking_at(eye / 1000, cube / 1000)
     riding = np.eye(4)

@@ -73,22 +73,22 @@ class Hand:
         """Return the fingertip's frame in the world, shape (4, 4) [m], at a time [s]."""
         t = seconds % PERIOD
         away = REACH * (1 - _blend(t, TIMES[0], TIMES[1]) + _blend(t, TIMES[6], TIMES[7]))
-        out = self._out(finger)
-        normal = -out
-        along = np.array([0.0, 0.0, -1.0]) - (-normal[2]) * normal
-        along /= np.linalg.norm(along)
+        outward = self._out(finger)
+        normal = -outward
+        axis = np.array([0.0, 0.0, -1.0]) - (-normal[2]) * normal
+        axis /= np.linalg.norm(axis)
         # The whole hand sways a little, so that no pose is ever at rest.
         phase = 2 * np.pi * (seconds + 0.37 * self.seed)
-        free = 1.0 if self.task == "grasp" else 0.1  # an eraser is flat on its board, and the hand with it
-        sway = 4.0 * free * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
+        freedom = 1.0 if self.task == "grasp" else 0.1  # an eraser is flat on its board, and the hand with it
+        sway = 4.0 * freedom * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
         shake = self.tremor * np.array([np.sin(8 * phase), np.sin(8 * phase + 1), np.sin(8 * phase + 2)])
         matrix = np.eye(4)
-        matrix[:3, :3] = np.stack([along, np.cross(normal, along), normal], axis=-1)
+        matrix[:3, :3] = np.stack([axis, np.cross(normal, axis), normal], axis=-1)
         x, y, depth = self.press(finger, seconds)
-        touch = self._middle(finger, t) + out * (THINGS[self.thing] + away - depth)
+        touch = self._middle(finger, t) + outward * (THINGS[self.thing] + away - depth)
         # The pad's origin is the array's centre; the contact is offset from it by the skew.
         place = touch - matrix[:3, 0] * x - matrix[:3, 1] * y
-        turn = _turn(0.06 * free * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
+        turn = _turn(0.06 * freedom * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
         matrix[:3, :3] = turn @ matrix[:3, :3]
         matrix[:3, 3] = (turn @ place + sway + shake) / 1000
         return matrix
@@ -97,17 +97,17 @@ class Hand:
         """Return the direction from the object to a finger [1]."""
         if self.thing in FLAT:
             return np.array([-1.0 if finger == "thumb" else 1.0, 0.0, 0.0])
-        out = np.array(DIRECTIONS[finger])
+        direction = np.array(DIRECTIONS[finger])
         if self.thing == "can":
-            out[2] = 0.0  # it is upright
-        return out / np.linalg.norm(out)
+            direction[2] = 0.0  # it is upright
+        return direction / np.linalg.norm(direction)
 
     def _middle(self, finger: str, t: float) -> np.ndarray:
         """Return the point of the object that a finger's normal goes through [mm]."""
         aside = ASIDE[finger] if self.thing in FLAT else 0.0
         if self.task == "wipe":
-            along = STROKE * np.sin(2 * np.pi * STROKES * _blend(t, TIMES[2], TIMES[5]))
-            return np.array([0.0, along + aside, ERASER_HEIGHT])
+            stroke = STROKE * np.sin(2 * np.pi * STROKES * _blend(t, TIMES[2], TIMES[5]))
+            return np.array([0.0, stroke + aside, ERASER_HEIGHT])
         lift = LIFT * (_blend(t, TIMES[2], TIMES[3]) - _blend(t, TIMES[4], TIMES[5]))
         return np.array([0.0, aside, HEIGHT + lift])
 
@@ -123,8 +123,8 @@ def draw_hand(seed: int, task: str = "grasp", thing: str | None = None) -> Hand:
     rng = np.random.default_rng([seed, 11])
     depth = {name: float(rng.uniform(0.7, 1.2)) for name in DIRECTIONS}
     skew = {name: tuple(rng.uniform(-1.0, 1.0, 2).tolist()) for name in DIRECTIONS}
-    held = thing or ("eraser" if task == "wipe" else "ball")
-    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)), task, thing=held)
+    item = thing or ("eraser" if task == "wipe" else "ball")
+    return Hand(seed, depth, skew, float(rng.uniform(0.02, 0.08)), task, thing=item)
 
 
 def _blend(t: float, begin: float, end: float) -> float:

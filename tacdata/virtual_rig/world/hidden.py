@@ -27,7 +27,7 @@ def hidden_from(words: list[str]) -> dict[str, float]:
     Raises:
         UsageError: If one is not known or has no positive size.
     """
-    found = {}
+    sizes = {}
     for word in words:
         kind, _, size = word.partition("=")
         try:
@@ -40,8 +40,8 @@ def hidden_from(words: list[str]) -> dict[str, float]:
                 "; ".join(f"{name}=SIZE, {meaning}" for name, meaning in KINDS.items()),
                 "for example --hide play=0.06",
             )
-        found[kind] = value
-    return found
+        sizes[kind] = value
+    return sizes
 
 
 class HiddenWorld(World):
@@ -91,12 +91,12 @@ class HiddenWorld(World):
 
     def _late(self, frame: np.ndarray, time_ns: int) -> np.ndarray:
         """Return the frame of an earlier time, interpolated between two."""
-        late = round(self._hidden.get("late", 0.0) * 1e9)
-        if late == 0:
+        delay = round(self._hidden.get("late", 0.0) * 1e9)
+        if delay == 0:
             return frame
         self._frames.append((time_ns, frame))
-        while len(self._frames) > 2 and self._frames[1][0] <= time_ns - late:
+        while len(self._frames) > 2 and self._frames[1][0] <= time_ns - delay:
             self._frames.popleft()
         (first, old), (second, new) = self._frames[0], self._frames[min(1, len(self._frames) - 1)]
-        share = float(np.clip((time_ns - late - first) / max(second - first, 1), 0.0, 1.0))
+        share = float(np.clip((time_ns - delay - first) / max(second - first, 1), 0.0, 1.0))
         return np.round(old + share * (new - old))

@@ -65,12 +65,12 @@ class LowerFace:
         """Return the height [mm] at (x, y) [mm], interpolated linearly; `FAR` outside."""
         last = len(self.heights) - 1
         i, j = ((np.asarray(v) + self.extent) / SPACING for v in (x, y))
-        beside = (i < 0) | (i > last) | (j < 0) | (j > last)
+        outside = (i < 0) | (i > last) | (j < 0) | (j > last)
         a, b = (np.clip(np.floor(v).astype(int), 0, last - 1) for v in (i, j))
         s, t = np.clip(i - a, 0, 1), np.clip(j - b, 0, 1)
         h = self.heights
         low, high = (1 - t) * h[a, b] + t * h[a, b + 1], (1 - t) * h[a + 1, b] + t * h[a + 1, b + 1]
-        return np.where(beside, FAR, (1 - s) * low + s * high)
+        return np.where(outside, FAR, (1 - s) * low + s * high)
 
 
 def _places(extent: float) -> tuple[np.ndarray, np.ndarray]:

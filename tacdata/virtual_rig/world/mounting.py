@@ -114,10 +114,10 @@ class Mounted:
 
     def _watch(self) -> None:
         while not self._stopped.wait(POLL):
-            before = self._seen
+            snapshot = self._seen
             try:
                 self.look()
             except TacdataError as error:  # whoever mounts reads in its answer that the file was refused
                 print(error, file=sys.stderr, flush=True)
-            if self._seen != before:
+            if self._seen != snapshot:
                 taken(self.path).write_text(str(self._seen))
