@@ -181,24 +181,24 @@ def _refuse_growth(node: yaml.Node, origin: str) -> None:
         """Return the number of nodes that a node becomes with its aliases written out."""
         if isinstance(part, yaml.ScalarNode):
             return 1
-        known = sizes.get(id(part), 0)
+        count = sizes.get(id(part), 0)
         line = part.start_mark.line + 1
-        if known is None:
+        if count is None:
             raise FormatError(f"{origin}: line {line} contains itself by an alias", "a finite document", "write it out")
-        if not known:
+        if not count:
             sizes[id(part)] = None
             inside = (
                 part.value if isinstance(part, yaml.SequenceNode) else [node for pair in part.value for node in pair]
             )
-            known = 1 + sum(map(size, inside))
-            sizes[id(part)] = known
-        if known > LARGEST:
+            count = 1 + sum(map(size, inside))
+            sizes[id(part)] = count
+        if count > LARGEST:
             raise FormatError(
-                f"{origin}: with its aliases the document has {known:.3g} values from line {line} on",
+                f"{origin}: with its aliases the document has {count:.3g} values from line {line} on",
                 f"at most {LARGEST:,} values",
                 "write the values without aliases inside aliases",
             )
-        return known
+        return count
 
     size(node)
 

@@ -26,12 +26,12 @@ ROOMS = {
 """Who asks decides, where two extras bring the same package: torch solves for `fem` and trains for `learn`."""
 
 
-def missing_package(error: ImportError, asked: str, instead: str = "") -> PackageError | None:
+def missing_package(error: ImportError, feature: str, instead: str = "") -> PackageError | None:
     """Return the message for a package that is not installed; None if no extra brings it.
 
     Args:
         error: Error of the import.
-        asked: Who needs the package, for example ``"tacdata label"``.
+        feature: Who needs the package, for example ``"tacdata label"``.
         instead: Alternative to installing it.
     """
     if not isinstance(error, ModuleNotFoundError) or not error.name:
@@ -46,7 +46,7 @@ def missing_package(error: ImportError, asked: str, instead: str = "") -> Packag
     name = package if package == module else f"{module.capitalize()} ({package})"
     line = install_line(extra)
     return PackageError(
-        f"{asked} needs {name}, which is not installed",
+        f"{feature} needs {name}, which is not installed",
         f"an install with the extra {extra}",
         f"{line}, or {instead}" if instead else line,
     )

@@ -38,8 +38,8 @@ class WorldWithPlay(World):
         z = float(tip[2])
         low, high = z, z + PLAY
         self.carriage = z if self.carriage is None else min(max(self.carriage, low), high)
-        moved = np.array([tip[0], tip[1], self.carriage])
-        return super().readings(moved, indenter, yaw, time_ns)
+        contact = np.array([tip[0], tip[1], self.carriage])
+        return super().readings(contact, indenter, yaw, time_ns)
 
     def _relaxed(self, elastic, time_ns):
         return elastic
@@ -77,19 +77,19 @@ def tacdata(*arguments: object) -> None:
     subprocess.run([sys.executable, "-m", "tacdata.cli", *map(str, arguments)], check=True)
 
 
-def loop(out: Path, speed: float, rounds: int = ROUNDS) -> str:
+def loop(folder: Path, speed: float, rounds: int = ROUNDS) -> str:
     """Record, judge, plan and record again until the effect has a name; return the last verdict's status."""
-    out.mkdir(parents=True)
-    rig = VirtualRig(out / "rig", speed=speed, seed=5, camera=False)
+    folder.mkdir(parents=True)
+    rig = VirtualRig(folder / "rig", speed=speed, seed=5, camera=False)
     rig.world = WorldWithPlay(rig.truth, rig.sensor)
-    first_plan(out / "plan-1.yaml")
-    plan, sessions, status = out / "plan-1.yaml", [], ""
+    first_plan(folder / "plan-1.yaml")
+    plan, sessions, status = folder / "plan-1.yaml", [], ""
     rig.start()
     try:
         for turn in range(1, rounds + 1):
-            sessions.append(out / f"session-{turn}")
+            sessions.append(folder / f"session-{turn}")
             tacdata("record", "--rig", rig.path, "--plan", plan, "--out", sessions[-1], "--yes")
-            verdict, revision = out / f"verdict-{turn}", out / f"revision-{turn}"
+            verdict, revision = folder / f"verdict-{turn}", folder / f"revision-{turn}"
             tacdata("discrepancy", *sessions, "--out", verdict)
             tacdata("revise", verdict, *sessions, "--out", revision)
             status = json.loads((verdict / "verdict.json").read_text())["status"]
@@ -106,11 +106,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", type=Path, default=Path("loop"))
     parser.add_argument("--speed", type=float, default=4.0, help="seconds of the rig per real second")
-    chosen = parser.parse_args()
-    if chosen.out.exists():
-        parser.error(f"{chosen.out} exists: choose another --out")
-    status = loop(chosen.out, chosen.speed)
-    print(f"hidden: play of {PLAY} mm; the last verdict: {status} ({chosen.out}/verdict-*/verdict.txt)")
+    options = parser.parse_args()
+    if options.out.exists():
+        parser.error(f"{options.out} exists: choose another --out")
+    status = loop(options.out, options.speed)
+    print(f"hidden: play of {PLAY} mm; the last verdict: {status} ({options.out}/verdict-*/verdict.txt)")
 
 
 if __name__ == "__main__":

@@ -75,13 +75,13 @@ def read_case(path: StrPath) -> Case:
 
 
 def solve_case(
-    case: Case, out: Path, done: Callable[[float], None] = lambda depth: None, picture: bool = False
+    case: Case, folder: Path, done: Callable[[float], None] = lambda depth: None, picture: bool = False
 ) -> Path:
-    """Solve a case and write ``<name>.parquet`` and ``<name>.json`` into ``out``, and ``<name>.png`` if wanted.
+    """Solve a case and write ``<name>.parquet`` and ``<name>.json`` into ``folder``, and ``<name>.png`` if wanted.
 
     Args:
         case: The case.
-        out: Folder for the results.
+        folder: Folder for the results.
         done: Called with each depth [mm] that is solved.
         picture: Whether to draw the deepest state.
 
@@ -92,14 +92,14 @@ def solve_case(
         UsageError: If results of that name lie there already.
         SolveError: If the press is impossible or an equilibrium is not found.
     """
-    report, table, drawing = (out / f"{case.name}.{ending}" for ending in ("json", "parquet", "png"))
+    report, table, drawing = (folder / f"{case.name}.{ending}" for ending in ("json", "parquet", "png"))
     for path in (report, table, *([drawing] if picture else [])):
         if path.exists():
             raise UsageError(
                 f"{path} exists", "a folder without it: results are never overwritten", "choose another --out"
             )
     result: CaseAnswer = answer(case.sensor, case.request, case.settings, case.error_estimate, done)
-    out.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     result.write_table(table, case.name)
     document = {**result.document, "case": case.document, "displacements": table.name}
     if picture:

@@ -92,17 +92,19 @@ class TableResponse(Response):
         try:
             with np.load(path, allow_pickle=False) as data:
                 values = {name: data[name] for name in FIELDS}
-                off = float(data["error"]) if "error" in data else 0.0
+                load_error = float(data["error"]) if "error" in data else 0.0
         except (ValueError, KeyError, OSError, TypeError) as error:
             raise FormatError(
                 f"{path} is no response table ({error})", f"an .npz file with {', '.join(FIELDS)}", "make it again"
             ) from None
-        if not 0.0 <= off < 1.0:
+        if not 0.0 <= load_error < 1.0:
             raise FormatError(
-                f"{path}: an error of the loads of {off:g}", "a share of the loads, from 0 to 1", "make the table again"
+                f"{path}: an error of the loads of {load_error:g}",
+                "a share of the loads, from 0 to 1",
+                "make the table again",
             )
         tools = tuple(str(name) for name in values.pop("tools"))
-        return cls(**values, tools=tools, error=off)
+        return cls(**values, tools=tools, error=load_error)
 
     def idling_at(self, offset: np.ndarray) -> TableResponse:
         """Return the same response with other readings without load, shape (channels,)."""

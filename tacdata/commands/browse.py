@@ -72,10 +72,10 @@ def run(
     return Result({"episodes": episodes.entries, "remarks": episodes.remarks})
 
 
-def _print(episodes: EpisodeList, most: int, scored: bool) -> None:
+def _print(episodes: EpisodeList, rows: int, scored: bool) -> None:
     from tacdata.viewers.browse.list_table import list_table
 
-    print(list_table(episodes, most, scored))
+    print(list_table(episodes, rows, scored))
     for remark in episodes.remarks:
         print(f"note: {remark}")
 
@@ -87,7 +87,7 @@ def serve(path: Path, labels: Path | None, predictions: Path | None) -> None:
     _serve(episodes_at(path, labels, predictions).by("error" if predictions else "number"), labels, predictions)
 
 
-def _catalogue(episodes: EpisodeList, labels: Path | None, predictions: Path | None, most: int) -> None:
+def _catalogue(episodes: EpisodeList, labels: Path | None, predictions: Path | None, rows: int) -> None:
     from tacdata.viewers.browse.catalogue import catalogue_server
     from tacdata.viewers.rerun import window
 
@@ -97,7 +97,7 @@ def _catalogue(episodes: EpisodeList, labels: Path | None, predictions: Path | N
     with catalogue_server(episodes, labels, predictions, drawn) as served:
         print(f"open {served.whole}\ncatalogue {served.address}")
         if served.dataset:
-            for entry in episodes.entries[:most]:
+            for entry in episodes.entries[:rows]:
                 print(f"episode {entry.number} at its deepest: {served.at_deepest(entry.number)}")
         else:
             say("Rerun lays them out itself; `pip install 'rerun-sdk[catalog]'` brings our layout and links to moments")

@@ -63,7 +63,7 @@ def run(
     return _calibrate(picker, pattern, source, model, out, picture)
 
 
-def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: Path, picture: Path) -> Result:
+def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, target: Path, picture: Path) -> Result:
     import cv2
     import yaml
 
@@ -77,7 +77,7 @@ def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: P
     calibration = calibrate(picker.views, board, picker.size or (0, 0), model)
     date = datetime.now(UTC).isoformat(timespec="seconds")
     document = calibration.document(board, source, provenance.code_version(), date)
-    documents.write(out, document, "camera_calibration")
+    documents.write(target, document, "camera_calibration")
     picture.write_bytes(cv2.imencode(".png", draw_calibration(calibration))[1].tobytes())
     for used in calibration.views:
         if used.reason:
@@ -94,7 +94,7 @@ def _calibrate(picker: ViewPicker, board: Board, source: str, model: str, out: P
         f"{calibration.model}; rms {calibration.rms:.3f} px over {used_views} views, "
         f"{calibration.held_out_rms:.3f} px on views held out; corners in {calibration.coverage:.0%} of the image"
     )
-    print(f"written to {out} and {picture}")
+    print(f"written to {target} and {picture}")
     say("next: put this into the camera's entry of the rig file\n")
     say(yaml.safe_dump({"intrinsics": calibration.intrinsics}, sort_keys=False, default_flow_style=None).rstrip())
     return Result(document)

@@ -169,22 +169,22 @@ class _Place:
         }
 
 
-def _new_folder(wanted: Path) -> Path:
+def _new_folder(target: Path) -> Path:
     """Make a folder that did not exist: the wanted one, or the first free of wanted-2, wanted-3, ..."""
-    folder, number = wanted, 1
+    folder, number = target, 1
     while True:
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
             number += 1
-            folder = wanted.with_name(f"{wanted.name}-{number}")
+            folder = target.with_name(f"{target.name}-{number}")
             continue
         except OSError as error:
             raise UsageError(
                 f"the folder {folder} cannot be made: {error.strerror}", "a place to write", "choose another --out"
             ) from None
         if number > 1:
-            print(f"{wanted} exists and is left as it is; this run goes into {folder}")
+            print(f"{target} exists and is left as it is; this run goes into {folder}")
         return folder
 
 

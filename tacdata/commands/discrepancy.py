@@ -67,18 +67,18 @@ def run(
     return Result(verdict.document)
 
 
-def _solved(recordings: list[Path], spec: Path | None, out: Path) -> Path:
+def _solved(recordings: list[Path], spec: Path | None, target: Path) -> Path:
     """Solve the presses of the recordings; return the spec that starts from it."""
     from tacdata.commands import surrogate
     from tacdata.errors import UsageError
 
-    if spec is not None or out.exists():
+    if spec is not None or target.exists():
         raise UsageError(
-            f"--fem with --spec {spec}" if spec is not None else f"{out} exists",
+            f"--fem with --spec {spec}" if spec is not None else f"{target} exists",
             "one base, and a new folder",
             "leave one of them out" if spec is not None else "choose another --out",
         )
-    base = out.with_name(f"{out.name}-base")
+    base = target.with_name(f"{target.name}-base")
     surrogate.run(recordings, base, None, False, None, "cpu", 1, False)
     return base / "spec.json"
 
@@ -93,7 +93,7 @@ def _healthy(spec: Path | None) -> list[Path]:
     return [spec.parent / name for name in response["sessions"]]
 
 
-def _compared(recordings: list[Path], healthy: list[Path], out: Path, spec: Path | None, fem: bool) -> Result:
+def _compared(recordings: list[Path], healthy: list[Path], target: Path, spec: Path | None, fem: bool) -> Result:
     """Compare with a healthy machine, print and write it."""
     from tacdata.errors import UsageError
     from tacdata.reference.run import compare, write
@@ -102,13 +102,13 @@ def _compared(recordings: list[Path], healthy: list[Path], out: Path, spec: Path
         raise UsageError(
             "--reference with --fem" if fem else f"--reference with --spec {spec}", "one model", "leave one of them out"
         )
-    if out.exists():
-        raise UsageError(f"{out} exists", "a new folder", "choose another --out")
+    if target.exists():
+        raise UsageError(f"{target} exists", "a new folder", "choose another --out")
     with progress.console().status("comparing with the healthy machine"):
         compared = compare(recordings, healthy)
     print(compared.text, end="")
-    write(compared, out)
-    print(f"written: {out}")
+    write(compared, target)
+    print(f"written: {target}")
     return Result(compared.document)
 
 
@@ -118,10 +118,10 @@ def _between(recordings: list[Path]) -> str:
     from tacdata.reference.report import sentence
     from tacdata.reference.run import compare
 
-    others, first = recordings[1:], recordings[0]
-    named = f"sessions: {', '.join(map(str, others))} with {first} as the reference"
+    remainder, first = recordings[1:], recordings[0]
+    named = f"sessions: {', '.join(map(str, remainder))} with {first} as the reference"
     try:
-        compared = compare(others, [first])
+        compared = compare(remainder, [first])
     except TacdataError as error:
         return f"{named}: not compared, {error.given}"
     return f"{named}: {sentence(compared.found, compared.heading.unit)}"

@@ -87,21 +87,21 @@ def _network_errors(model: Path, visits: list[Visit]) -> dict[str, NetworkError]
             "labelled sessions: a network's error is against labels",
             "run `tacdata label` on each, or leave --model out",
         )
-    found = {}
+    results = {}
     for visit in labelled:
         present = file_names.present(file_names.folder(visit.session.folder))
         episodes = [entry.recording.episode for entry in visit.entries]
         with TemporaryDirectory(dir=visit.session.folder.parent, prefix=".health-") as folder:
-            kept = [e for e in episodes if e.number in present]
-            packed = pack(kept, lambda e, paths=present: read_label(paths[e.number]), Path(folder) / "dataset")
+            members = [e for e in episodes if e.number in present]
+            packed = pack(members, lambda e, paths=present: read_label(paths[e.number]), Path(folder) / "dataset")
             unpacked = {name for name, _ in packed.left_out}
-            numbers = [e.number for e in kept if e.path.name not in unpacked]
+            numbers = [e.number for e in members if e.path.name not in unpacked]
             scored = evaluate(trained, read_frames(packed.root))
             errors = {
                 number: float(np.nanmean(scores.contact_rmse[result.valid & scores.labelled]))
                 for number, result in zip(numbers, scored.episodes, strict=True)
                 if ((scores := result.scores).labelled & result.valid).any()
             }
-        found[str(visit.session.folder)] = NetworkError(trained.content_hash, errors)
+        results[str(visit.session.folder)] = NetworkError(trained.content_hash, errors)
         say(f"scored {visit.session.folder}")
-    return found
+    return results

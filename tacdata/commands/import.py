@@ -60,8 +60,8 @@ def _together(notes: tuple[str, ...]) -> list[str]:
     """Return notes with those that say the same of several files as one."""
     files: dict[str, list[str]] = {}
     for note in notes:
-        name, colon, rest = note.partition(": ")
-        files.setdefault(rest if colon and "." in name else note, []).append(name)
+        name, colon, message = note.partition(": ")
+        files.setdefault(message if colon and "." in name else note, []).append(name)
     return [
         f"{names[0]} and {len(names) - 1} more files: {text}"
         if len(names) > 1

@@ -33,8 +33,8 @@ def run(
         raise UsageError(f"no session in {demo}", "the folder that `tacdata demo` made", "run `tacdata demo` first")
     predictions = network if (network / "predictions").is_dir() else None
     listed = episodes_at(session, predictions=predictions)
-    shown = max(listed.entries, key=lambda entry: (entry.error is not None, entry.depth or 0.0))
-    scene = scene_at(session, predictions=predictions, episode=shown.number)
+    deepest = max(listed.entries, key=lambda entry: (entry.error is not None, entry.depth or 0.0))
+    scene = scene_at(session, predictions=predictions, episode=deepest.number)
     drawn = [small_page(scene, out / "episode.png"), small_film(scene, out / "press.gif")]
     for path, name in ((verdict, "verdict.png"), (demonstration, "demonstration.png")):
         if path is not None:

@@ -127,7 +127,7 @@ def run(
 
 
 def _by_hand(
-    rig: Path, out: Path, task: str, seconds: float | None, count: int, resume: bool, unwanted: list[str]
+    rig: Path, folder: Path, task: str, seconds: float | None, count: int, resume: bool, unwanted: list[str]
 ) -> Result:
     from tacdata.demonstrations.recording.by_hand import record_by_hand
     from tacdata.errors import UsageError
@@ -135,14 +135,14 @@ def _by_hand(
     if unwanted:
         raise UsageError(f"--demo with {', '.join(unwanted)}", "--rig, --out, --task", "the demo rig names the sensors")
     try:
-        session = record_by_hand(rig, out, task, seconds, count, resume)
+        session = record_by_hand(rig, folder, task, seconds, count, resume)
     except KeyboardInterrupt as error:
         print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
         raise typer.Exit(Exit.INTERRUPTED) from None
     count = len(session.episodes)
-    print(f"{count} demonstration{'' if count == 1 else 's'} in {out}")
-    suggest("track", out)
-    return Result({"session": out, "demonstrations": [path.name for path in session.episodes]})
+    print(f"{count} demonstration{'' if count == 1 else 's'} in {folder}")
+    suggest("track", folder)
+    return Result({"session": folder, "demonstrations": [path.name for path in session.episodes]})
 
 
 def _answer(question: str) -> str:

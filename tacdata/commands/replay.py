@@ -91,27 +91,35 @@ def run(
             raise UsageError(f"--{option} {value:g}", f"{lower:g} to {upper:g} {unit}", "correct it")
     demonstrations = [read_tracks(_tracks(path)) for path in paths]
     source = read_tracks(_tracks(gain_from)) if gain_from is not None else demonstrations[0]
-    names = {task or one.task for one in (*demonstrations, source)}
+    names = {task or demonstration.task for demonstration in (*demonstrations, source)}
     if len(names) > 1:
         raise UsageError(f"recordings of the tasks {', '.join(sorted(names))}", "one task", "replay each task alone")
-    if gain_from is not None and source.recording_hash in {one.recording_hash for one in demonstrations}:
+    if gain_from is not None and source.recording_hash in {
+        demonstration.recording_hash for demonstration in demonstrations
+    }:
         raise UsageError(f"{gain_from} among those tried", "other recordings than that", "try others")
     name = names.pop()
     weight = {} if mass is None else {"mass": mass}
     scene = scene_of(name, thing, None if radius is None else radius / 1000, stiffness=stiffness, **weight)
     gain_sets, gain = {"compensated": read_gains(gains).of(name)}, None
     # Before the search: these remarks may explain its failure.
-    for one in {one.recording_hash: one for one in (source, *demonstrations)}.values():
-        original = Trials(one, {}, scene).seen
+    for demonstration in {
+        demonstration.recording_hash: demonstration for demonstration in (source, *demonstrations)
+    }.values():
+        original = Trials(demonstration, {}, scene).seen
         if not with_guesses:
             check_guesses(original)
-        for words in (*doubts(original), *one.guesses(), *(_other_network(source, one) if find_gain else ())):
-            print(f"note: {one.recording}: {words}")
+        for words in (
+            *doubts(original),
+            *demonstration.guesses(),
+            *(_other_network(source, demonstration) if find_gain else ()),
+        ):
+            print(f"note: {demonstration.recording}: {words}")
     if find_gain:
         search = Trials(source, {}, scene).find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
         print(f"found on {source.recording}: {search.text}")
         gain, gain_sets["chosen"] = (source, search), dict.fromkeys(source.tracks, search.gain)
-    tried = [Trials(one, gain_sets, scene) for one in demonstrations]
+    tried = [Trials(demonstration, gain_sets, scene) for demonstration in demonstrations]
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
     document = result(tried, seeds, scene, gain)
@@ -146,20 +154,20 @@ def _print_rows(rows: list[dict[str, Any]], first: str, task: str) -> None:
     for row in rows:
         print(f"{row[first]:g} N/m: {row['worth']}" if first == "stiffness" else f"{row[first]}: {row['worth']}")
     if first == "stiffness":
-        direct, moved = PUBLISHED.get(task, (0.0, 0.0))
+        direct, touch = PUBLISHED.get(task, (0.0, 0.0))
         print(
-            f"* as often as in the paper (Exp. 2): direct {direct:.0%}, compensated {moved:.0%}; the stiffness of its "
+            f"* as often as in the paper (Exp. 2): direct {direct:.0%}, compensated {touch:.0%}; the stiffness of its "
             "hand, a LinkerHand O20, is not published"
         )
 
 
-def _other_network(source: Demonstration, made: Demonstration) -> tuple[str, ...]:
+def _other_network(source: Demonstration, demonstration: Demonstration) -> tuple[str, ...]:
     """Say that a gain was found with another network than the one that predicted a demonstration's depth."""
-    theirs, own = ((one.network or {}).get("hash", "") for one in (source, made))
-    if theirs == own:
+    theirs, ours = ((entry.network or {}).get("hash", "") for entry in (source, demonstration))
+    if theirs == ours:
         return ()
     return (
-        f"its depth is predicted by checkpoint {own[:12]}, the gain is found with {theirs[:12]}: a gain makes up for "
+        f"its depth is predicted by checkpoint {ours[:12]}, the gain is found with {theirs[:12]}: a gain makes up for "
         "the errors of one network on one unit, so find it with the same",
     )
 

@@ -101,8 +101,8 @@ def run(
             pair = ("–" if m[side] is None else f"{m[side]:.4g}" for side in ("before", "after"))
             print(f"  {m['title']} [{m['unit']}]: {' before, '.join(pair)} after")
     for c in document["confirmed"]:
-        told = f"{100 * c['difference']:.1f} % off" if c["solved"] else "no equilibrium"
-        print(f"finite elements, {c['tool']} {c['depth']:.3f} mm deep: {told}")
+        outcome = f"{100 * c['difference']:.1f} % off" if c["solved"] else "no equilibrium"
+        print(f"finite elements, {c['tool']} {c['depth']:.3f} mm deep: {outcome}")
     if document["added"]:
         print(f"added: {', '.join(document['added'])} in {out / SPEC}")
     for words in (document["next"]["remark"], *document["next"]["presses"]):

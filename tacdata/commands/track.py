@@ -57,10 +57,10 @@ def run(
     for recording in recordings:
         read = read_demo(recording)
         demonstration = track(look_again(read, _told) if every_image else read, rate, estimators)
-        before = path_of(recording)
-        if not estimators and before.is_file() and (lost := read_tracks(before).network):
-            print(f"note: {before.name} held depth predicted by {lost['hash'][:12]}; without --network it goes")
-        write_tracks(before, demonstration)
+        tracks_path = path_of(recording)
+        if not estimators and tracks_path.is_file() and (lost := read_tracks(tracks_path).network):
+            print(f"note: {tracks_path.name} held depth predicted by {lost['hash'][:12]}; without --network it goes")
+        write_tracks(tracks_path, demonstration)
         _draw(demonstration, recording)
         length = f"{demonstration.seconds[-1]:.1f} s in frame {demonstration.frame!r}"
         print(f"{recording.name}: {length}, written to {path_of(recording).name}")
@@ -87,7 +87,7 @@ def run(
         )
         for remark in demonstration.remarks:
             print(f"  note: {remark}")
-    if any(words.startswith(UNSEARCHED) for one in summary for words in one["remarks"]) and not every_image:
+    if any(words.startswith(UNSEARCHED) for entry in summary for words in entry["remarks"]) and not every_image:
         named = " ".join(f"--network {words}" for words in network or [])
         suggest("track", path, f"{named} --every-image".strip())
         return Result({"recordings": summary})

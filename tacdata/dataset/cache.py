@@ -27,9 +27,9 @@ LAYOUT = 1
 
 def cache_root() -> Path:
     """Return the folder of all caches."""
-    given = os.environ.get("TACDATA_CACHE")
-    if given:
-        return Path(given).expanduser() / "datasets"
+    setting = os.environ.get("TACDATA_CACHE")
+    if setting:
+        return Path(setting).expanduser() / "datasets"
     home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     return Path(home).expanduser() / "tacdata" / "datasets"
 
@@ -58,17 +58,17 @@ def dataset_hash(root: Path, info: dict[str, Any], paths: list[Path], place: Pat
     """
     memory = place / "hashes.json"
     try:
-        known = json.loads(memory.read_text())
+        entries = json.loads(memory.read_text())
     except (OSError, ValueError):
-        known = {}
+        entries = {}
     digests, fresh = {}, {}
     for path in paths:
         name, state = path.relative_to(root).as_posix(), path.stat()
         mark = f"{state.st_size}-{state.st_mtime_ns}-{state.st_ino}"
-        entry = known.get(name, [])
+        entry = entries.get(name, [])
         fresh[name] = entry if entry[:1] == [mark] else [mark, provenance.file_hash(path)]
         digests[name] = fresh[name][1]
-    if fresh != known:
+    if fresh != entries:
         documents.write_text(memory, json.dumps(fresh))
     content = {"features": info["features"], "fps": info["fps"], "frames": info["total_frames"], "files": digests}
     return provenance.content_hash(content)
@@ -107,10 +107,10 @@ def open_columns(
                 raise
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
-        for other in place.iterdir():
+        for sibling in place.iterdir():
             # Maps of an earlier content of this dataset; who has them open keeps them.
-            if other.is_dir() and other != target and not other.name.startswith("."):
-                shutil.rmtree(other, ignore_errors=True)
+            if sibling.is_dir() and sibling != target and not sibling.name.startswith("."):
+                shutil.rmtree(sibling, ignore_errors=True)
     return {key: np.load(target / f"{key}.npy", mmap_mode="r") for key in info["features"]}
 
 
@@ -171,9 +171,9 @@ def column_values(column: pa.ChunkedArray, feature: dict[str, Any]) -> np.ndarra
         return metres * scale
     if column.null_count:
         raise ValueError(f"{column.null_count} values are missing")
-    whole = column.combine_chunks()
-    whole = whole.chunk(0) if isinstance(whole, pa.ChunkedArray) else whole
-    flat = whole.flatten() if shape else whole
+    array = column.combine_chunks()
+    array = array.chunk(0) if isinstance(array, pa.ChunkedArray) else array
+    flat = array.flatten() if shape else array
     values = flat.to_numpy(zero_copy_only=False)
     if values.dtype != np.dtype(feature["dtype"]):
         raise ValueError(f"it is {values.dtype}")

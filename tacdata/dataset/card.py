@@ -100,12 +100,12 @@ def document(dataset: Dataset) -> dict[str, Any]:
         "indenters": [
             {
                 "name": name,
-                "presses": len(mine),
-                "shape": mine[0].indenter.document,
-                "depths_mm": [min(p.depth for p in mine), max(p.depth for p in mine)],
-                "speeds_mm_s": [min(p.speed for p in mine), max(p.speed for p in mine)],
+                "presses": len(group),
+                "shape": group[0].indenter.document,
+                "depths_mm": [min(p.depth for p in group), max(p.depth for p in group)],
+                "speeds_mm_s": [min(p.speed for p in group), max(p.speed for p in group)],
             }
-            for name, mine in ((name, [p for p in presses if p.indenter_name == name]) for name in names)
+            for name, group in ((name, [p for p in presses if p.indenter_name == name]) for name in names)
         ],
         "coverage": {"depth_borders_mm": DEPTH_BORDERS, "counts": coverage(presses, dataset).counts},
         "labels": [record.label_provenance for record in records],
@@ -124,8 +124,12 @@ def _simulated(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
     drawn = Counter(f"plan {r.simulated['plan']}, seed {r.simulated['seed']}" for r in records if r.simulated)
     if not drawn:
         return []
-    whole = dataset.simulated == len(dataset.episodes)
-    share = "Nobody recorded" if whole else f"{dataset.simulated} of {len(dataset.episodes)} episodes, not recorded, of"
+    all_simulated = dataset.simulated == len(dataset.episodes)
+    share = (
+        "Nobody recorded"
+        if all_simulated
+        else f"{dataset.simulated} of {len(dataset.episodes)} episodes, not recorded, of"
+    )
     return [
         f"**Simulated.** {share} this dataset: the skin model solved drawn presses, the sensor file's transduction "
         "read them.",
@@ -138,8 +142,8 @@ def _simulated(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
 
 def _laid_over(records: list[EpisodeRecord]) -> list[str]:
     """Name the effects that are laid over simulated readings."""
-    over = Counter(effect["effect"] for r in records if r.simulated for effect in r.simulated.get("effects", []))
-    return [f"- laid over their readings: {_counted(over)}"] if over else []
+    counts = Counter(effect["effect"] for r in records if r.simulated for effect in r.simulated.get("effects", []))
+    return [f"- laid over their readings: {_counted(counts)}"] if counts else []
 
 
 def _sensor(dataset: Dataset, records: list[EpisodeRecord]) -> list[str]:
@@ -164,10 +168,10 @@ def _presses(presses: list[Press]) -> list[str]:
     heads = "| Indenter | Shape and sizes (mm, deg) | Presses | Depths (mm) | Speeds (mm/s) |"
     lines = ["## Indenters", "", heads, "| --- | --- | ---: | ---: | ---: |"]
     for name in sorted({p.indenter_name for p in presses}):
-        mine = [p for p in presses if p.indenter_name == name]
-        words = ", ".join([mine[0].indenter.shape, *_sizes([p.indenter.document for p in mine])])
-        depths, speeds = _range([p.depth for p in mine]), _range([p.speed for p in mine])
-        lines.append(f"| {name} | {words} | {len(mine)} | {depths} | {speeds} |")
+        group = [p for p in presses if p.indenter_name == name]
+        words = ", ".join([group[0].indenter.shape, *_sizes([p.indenter.document for p in group])])
+        depths, speeds = _range([p.depth for p in group]), _range([p.speed for p in group])
+        lines.append(f"| {name} | {words} | {len(group)} | {depths} | {speeds} |")
     purposes = Counter(p.purpose for p in presses if p.purpose)
     return [*lines, "", *([f"Purposes: {_counted(purposes)}.", ""] if purposes else [])]
 
@@ -187,7 +191,7 @@ def _sizes(shapes: list[dict[str, Any]]) -> list[str]:
 def _coverage(presses: list[Press], dataset: Dataset) -> list[str]:
     if not presses:
         return []
-    found = coverage(presses, dataset)
+    table = coverage(presses, dataset)
     borders = ["0", *(f"{b:g}" for b in DEPTH_BORDERS)]
     bands = [f"{a} to {b} mm" for a, b in itertools.pairwise(borders)] + [f"deeper than {borders[-1]} mm"]
     lines = ["## Coverage of positions x depths", "", "| Part of the array | " + " | ".join(bands) + " |"]
@@ -195,18 +199,18 @@ def _coverage(presses: list[Press], dataset: Dataset) -> list[str]:
     names_x, names_y = ("-x", "middle", "+x"), ("-y", "middle", "+y")
     for i in range(COLUMNS):
         for j in range(ROWS):
-            cells = " | ".join(map(str, found.counts[i, j].tolist()))
+            cells = " | ".join(map(str, table.counts[i, j].tolist()))
             lines.append(f"| {names_x[i]}, {names_y[j]} | {cells} |")
-    return [*lines, "", f"{found.empty} of {found.counts.size} cells have no press. Picture: {PICTURE}.", ""]
+    return [*lines, "", f"{table.empty} of {table.counts.size} cells have no press. Picture: {PICTURE}.", ""]
 
 
 def _labels(records: list[EpisodeRecord]) -> list[str]:
     if not records:
         return []
-    made = [r.label_provenance for r in records]
-    models = Counter(str(m.get("parents", {}).get("model", ""))[:12] or "not named" for m in made)
-    codes = Counter(str(m.get("code_version", "")) or "not named" for m in made)
-    makers = Counter(str(m.get("made_by", "")) or "not named" for m in made)
+    stamps = [r.label_provenance for r in records]
+    models = Counter(str(m.get("parents", {}).get("model", ""))[:12] or "not named" for m in stamps)
+    codes = Counter(str(m.get("code_version", "")) or "not named" for m in stamps)
+    makers = Counter(str(m.get("made_by", "")) or "not named" for m in stamps)
     return [
         "## Labels",
         "",

@@ -34,11 +34,16 @@ def draw(path: Path | BinaryIO, dataset: Dataset) -> None:
         (along_x, lambda p: p.x, lambda p: p.depth),
         (along_y, lambda p: p.y, lambda p: p.depth),
     ]
-    for axes, across, up in views:
+    for axes, horizontal, vertical in views:
         for number, name in enumerate(names):
-            mine = [press for press in presses if press.indenter_name == name]
+            group = [press for press in presses if press.indenter_name == name]
             axes.scatter(
-                [across(p) for p in mine], [up(p) for p in mine], s=14, color=f"C{number % 10}", label=name, alpha=0.75
+                [horizontal(p) for p in group],
+                [vertical(p) for p in group],
+                s=14,
+                color=f"C{number % 10}",
+                label=name,
+                alpha=0.75,
             )
     centers = sensor.taxels.centers
     plane.plot(centers[:, 0], centers[:, 1], "+", color="0.6", markersize=5, zorder=0)

@@ -21,19 +21,19 @@ from tacdata.dataset.restore import restore
 from tacdata.errors import FormatError, UsageError
 
 
-def delete(root: Path, episodes: Sequence[int], out: Path) -> list[int]:
+def delete(root: Path, episodes: Sequence[int], target: Path) -> list[int]:
     """Write a dataset without some of its episodes; the others are renumbered.
 
     Args:
         root: The dataset.
         episodes: Numbers of the episodes to leave out.
-        out: Folder of the new dataset.
+        target: Folder of the new dataset.
 
     Returns:
         Numbers of the new dataset's episodes whose record was not found.
 
     Raises:
-        UsageError: If ``out`` exists, a number is not there, or no episode would stay.
+        UsageError: If ``target`` exists, a number is not there, or no episode would stay.
         FormatError: If the dataset is damaged.
         ModuleNotFoundError: If lerobot is not installed.
     """
@@ -42,31 +42,31 @@ def delete(root: Path, episodes: Sequence[int], out: Path) -> list[int]:
         raise UsageError(
             f"all {count} episodes of {root} to delete", "at least one that stays", "remove the folder instead"
         )
-    chosen = sorted(set(episodes))
+    numbers = sorted(set(episodes))
 
-    def edit(tools: Any, made: Path) -> None:
-        tools.delete_episodes(_open(root), chosen, output_dir=made, repo_id=_name(out))
+    def edit(tools: Any, directory: Path) -> None:
+        tools.delete_episodes(_open(root), numbers, output_dir=directory, repo_id=_name(target))
 
-    return _write(out, [root], edit)[""]
+    return _write(target, [root], edit)[""]
 
 
-def split(root: Path, parts: Mapping[str, Sequence[int]], out: Path) -> dict[str, list[int]]:
+def split(root: Path, parts: Mapping[str, Sequence[int]], target: Path) -> dict[str, list[int]]:
     """Write parts of a dataset as datasets of their own.
 
     Args:
         root: The dataset.
         parts: Name of each part -> numbers of its episodes. Episodes of no part are left out.
-        out: New folder, with a folder for each part in it.
+        target: New folder, with a folder for each part in it.
 
     Returns:
         Name of each part -> numbers of its episodes whose record was not found.
 
     Raises:
-        UsageError: If ``out`` exists, a number is not there or in two parts, or a part is empty.
+        UsageError: If ``target`` exists, a number is not there or in two parts, or a part is empty.
         FormatError: If the dataset is damaged.
         ModuleNotFoundError: If lerobot is not installed.
     """
-    seen: dict[int, str] = {}
+    owners: dict[int, str] = {}
     for name, episodes in parts.items():
         if not episodes or not name or Path(name).name != name:
             raise UsageError(
@@ -74,54 +74,54 @@ def split(root: Path, parts: Mapping[str, Sequence[int]], out: Path) -> dict[str
                 "a plain name and one episode or more",
                 "name it as in --part train=0-7",
             )
-        if (twice := next((number for number in episodes if number in seen), None)) is not None:
+        if (twice := next((number for number in episodes if number in owners), None)) is not None:
             raise UsageError(
-                f"episode {twice} in the parts {seen[twice]} and {name}",
+                f"episode {twice} in the parts {owners[twice]} and {name}",
                 "each episode in one part at most",
                 "take it out of one",
             )
-        seen |= dict.fromkeys(episodes, name)
-    _check_numbers(root, list(seen))
+        owners |= dict.fromkeys(episodes, name)
+    _check_numbers(root, list(owners))
 
-    def edit(tools: Any, made: Path) -> None:
-        tools.split_dataset(_open(root), {name: sorted(part) for name, part in parts.items()}, output_dir=made)
+    def edit(tools: Any, directory: Path) -> None:
+        tools.split_dataset(_open(root), {name: sorted(part) for name, part in parts.items()}, output_dir=directory)
 
-    return _write(out, [root], edit, tuple(parts))
+    return _write(target, [root], edit, tuple(parts))
 
 
-def merge(roots: Sequence[Path], out: Path) -> list[int]:
+def merge(roots: Sequence[Path], target: Path) -> list[int]:
     """Write datasets below each other as one.
 
     Args:
         roots: The datasets, in the order of their episodes.
-        out: Folder of the new dataset.
+        target: Folder of the new dataset.
 
     Returns:
         Numbers of the new dataset's episodes whose record was not found.
 
     Raises:
-        UsageError: If ``out`` exists, or two of the datasets hold the same recording.
+        UsageError: If ``target`` exists, or two of the datasets hold the same recording.
         FormatError: If a dataset is damaged, or their columns or rates differ.
         ModuleNotFoundError: If lerobot is not installed.
     """
     if len(roots) < 2:
         raise UsageError(f"{len(roots)} datasets to merge", "two or more", "name them all")
-    held: dict[str, Path] = {}
+    holders: dict[str, Path] = {}
     for root in roots:
         folder.read_info(root)
-        own = metadata.read_records(root).values()
-        if twice := next((record for record in own if record.recording in held), None):
+        records = metadata.read_records(root).values()
+        if twice := next((record for record in records if record.recording in holders), None):
             raise UsageError(
-                f"{held[twice.recording]} and {root} both hold {twice.recording_file}",
+                f"{holders[twice.recording]} and {root} both hold {twice.recording_file}",
                 "each recording once: a copy in training and one in the test would flatter a network",
                 "leave it out of one with tacdata dataset delete",
             )
-        held |= {record.recording: root for record in own}
+        holders |= {record.recording: root for record in records}
 
-    def edit(tools: Any, made: Path) -> None:
-        tools.merge_datasets([_open(root) for root in roots], output_repo_id=_name(out), output_dir=made)
+    def edit(tools: Any, directory: Path) -> None:
+        tools.merge_datasets([_open(root) for root in roots], output_repo_id=_name(target), output_dir=directory)
 
-    return _write(out, roots, edit)[""]
+    return _write(target, roots, edit)[""]
 
 
 def _check_numbers(root: Path, episodes: Sequence[int]) -> int:
@@ -135,47 +135,47 @@ def _check_numbers(root: Path, episodes: Sequence[int]) -> int:
 
 
 def _write(
-    out: Path, sources: Sequence[Path], edit: Callable[[Any, Path], None], parts: Sequence[str] = ("",)
+    target: Path, sources: Sequence[Path], edit: Callable[[Any, Path], None], parts: Sequence[str] = ("",)
 ) -> dict[str, list[int]]:
     """Let lerobot write into a hidden folder, restore dropped fields, carry the flags along, and rename the folder."""
-    refuse_existing(out, append=False)
+    refuse_existing(target, append=False)
     for source in sources:
         folder.read_info(source)
     os.environ.setdefault("HF_HUB_OFFLINE", "1")  # before lerobot is imported: nothing here is on the hub
     from lerobot.datasets import dataset_tools
 
-    out.parent.mkdir(parents=True, exist_ok=True)
+    target.parent.mkdir(parents=True, exist_ok=True)
     lacking = {}
-    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as work:
-        made = Path(work) / out.name
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as work:
+        draft = Path(work) / target.name
         try:
             with _quiet():
-                edit(dataset_tools, made)
+                edit(dataset_tools, draft)
         except (ValueError, KeyError, RuntimeError, OSError) as error:
             reason = next(iter(str(error).splitlines()), type(error).__name__)
             raise FormatError(
-                f"lerobot cannot write {out}: {reason}",
+                f"lerobot cannot write {target}: {reason}",
                 "whole datasets with the same columns, rate and robot_type",
                 "compare their meta/info.json; pack the sessions again if one is damaged",
             ) from error
         for part in parts:
-            lacking[part] = restore(made / part, sources)
+            lacking[part] = restore(draft / part, sources)
             for source in sources:
-                carry_flags(source, made / part)
-                carry_notes(source, made / part)
-        os.replace(made, out)
+                carry_flags(source, draft / part)
+                carry_notes(source, draft / part)
+        os.replace(draft, target)
     return lacking
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Suppress the log of lerobot: above all a page on a video decoder, which our datasets have no use for."""
-    before = logging.root.manager.disable
+    level = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:
         yield
     finally:
-        logging.disable(before)
+        logging.disable(level)
 
 
 def _open(root: Path) -> Any:

@@ -90,8 +90,8 @@ def set_flag(folder: Path, recording: str, file: str, reason: str) -> Flag:
     """
     reason = " ".join(reason.split())
     if not reason or len(reason) > LONGEST:
-        given = "a flag without a reason" if not reason else f"a reason of {len(reason)} letters"
-        raise UsageError(given, f"1 to {LONGEST} letters", "say in a sentence what is wrong with the episode")
+        fault = "a flag without a reason" if not reason else f"a reason of {len(reason)} letters"
+        raise UsageError(fault, f"1 to {LONGEST} letters", "say in a sentence what is wrong with the episode")
     flag = Flag(recording, file, reason, datetime.now(UTC).isoformat(timespec="seconds"), who())
     change = FlagChange(recording, file, reason, flag.flagged_by, flag.flagged_at)
     _write(folder, read_flags(folder) | {recording: flag}, [change])
@@ -132,12 +132,12 @@ def carry_flags(session: Path, dataset: Path) -> list[Flag]:
         FormatError: If a file of flags is damaged.
         DeviceError: If the disk refuses it.
     """
-    own = read_flags(dataset)
-    held = {record.recording for record in metadata.read_records(dataset).values()}
-    carried = {key: flag for key, flag in read_flags(session).items() if key in held and key not in own}
+    present = read_flags(dataset)
+    recordings = {record.recording for record in metadata.read_records(dataset).values()}
+    carried = {key: flag for key, flag in read_flags(session).items() if key in recordings and key not in present}
     if carried:
-        told = [change for change in read_history(session) if change.recording in carried]
-        _write(dataset, carried | own, told)
+        changes = [change for change in read_history(session) if change.recording in carried]
+        _write(dataset, carried | present, changes)
     return list(carried.values())
 
 

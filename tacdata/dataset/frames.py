@@ -33,20 +33,20 @@ def recording_hash(episode: Episode) -> str:
     return digest.hexdigest()
 
 
-def check_pair(episode: Episode, label: Label, wanted: dict[str, str | None]) -> None:
+def check_pair(episode: Episode, label: Label, expected: dict[str, str | None]) -> None:
     """Refuse a label that is not of this recording, sensor or skin model.
 
     Args:
         episode: The recording.
         label: Its label.
-        wanted: Required parents: recording, sensor, model -> content hash, None if any will do.
+        expected: Required parents: recording, sensor, model -> content hash, None if any will do.
 
     Raises:
         FormatError: Naming the difference.
     """
     where = f"label of {episode.path.name}"
     parents = label.provenance.get("parents", {})
-    for name, digest in wanted.items():
+    for name, digest in expected.items():
         if digest is not None and parents.get(name) != digest:
             have = parents.get(name)
             raise FormatError(

@@ -90,20 +90,20 @@ def states(root: Path, models: dict[str, str] | None = None) -> list[EpisodeStat
     current = document["models"] | (models or {})
     # A record whose append never finished counts for nothing; the next append of its recording writes it again.
     records = list(metadata.read_records(root).values())[:counted]
-    found = []
+    result = []
     for record in records:
-        wanted = current.get(record.sensor, _model(record))
-        stale = _model(record) != wanted
-        reason = f"made by model {_model(record)[:12]}…, the current one is {wanted[:12]}…" if stale else ""
-        found.append(EpisodeState(record.recording_file, "stale" if stale else "complete", reason))
+        model = current.get(record.sensor, _model(record))
+        stale = _model(record) != model
+        reason = f"made by model {_model(record)[:12]}…, the current one is {model[:12]}…" if stale else ""
+        result.append(EpisodeState(record.recording_file, "stale" if stale else "complete", reason))
     for session in document["sessions"].values():
-        there = set(session["packed"])
+        packed = set(session["packed"])
         for name in session["episodes"]:
             if name in session["failed"]:
-                found.append(EpisodeState(name, "failed", session["failed"][name]))
-            elif name not in there:
-                found.append(EpisodeState(name, "waiting"))
-    return found
+                result.append(EpisodeState(name, "failed", session["failed"][name]))
+            elif name not in packed:
+                result.append(EpisodeState(name, "waiting"))
+    return result
 
 
 def _model(record: metadata.EpisodeRecord) -> str:

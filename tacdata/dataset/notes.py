@@ -79,8 +79,8 @@ def add_note(folder: Path, recording: str, file: str, begin: float, end: float, 
             "give both times in seconds after the first reading",
         )
     if not text or len(text) > LONGEST:
-        given = "a note without a text" if not text else f"a note of {len(text)} letters"
-        raise UsageError(given, f"1 to {LONGEST} letters", "say in a sentence what is to be seen there")
+        fault = "a note without a text" if not text else f"a note of {len(text)} letters"
+        raise UsageError(fault, f"1 to {LONGEST} letters", "say in a sentence what is to be seen there")
     at = datetime.now(UTC).isoformat(timespec="seconds")
     note = Note(recording, file, float(begin), float(end), text, who(), at)
     _write(folder, [*read_notes(folder), note])
@@ -91,7 +91,7 @@ def remove_note(folder: Path, note: Note) -> None:
     """Take a note away; nothing happens where there is none like it."""
     notes = read_notes(folder)
     if note in notes:
-        _write(folder, [other for other in notes if other != note])
+        _write(folder, [entry for entry in notes if entry != note])
 
 
 def carry_notes(source: Path, dataset: Path) -> int:
@@ -101,11 +101,11 @@ def carry_notes(source: Path, dataset: Path) -> int:
         FormatError: If a file of notes is damaged.
         DeviceError: If the disk refuses it.
     """
-    own = read_notes(dataset)
-    held = {record.recording for record in metadata.read_records(dataset).values()}
-    new = [note for note in read_notes(source) if note.recording in held and note not in own]
+    present = read_notes(dataset)
+    recordings = {record.recording for record in metadata.read_records(dataset).values()}
+    new = [note for note in read_notes(source) if note.recording in recordings and note not in present]
     if new:
-        _write(dataset, [*own, *new])
+        _write(dataset, [*present, *new])
     return len(new)
 
 

@@ -33,7 +33,7 @@ class Packed:
 def pack(
     episodes: Iterable[Episode],
     label_of: Callable[[Episode], Label | None],
-    out: Path,
+    target: Path,
     *,
     append: bool = False,
     sensor: Sensor | None = None,
@@ -49,7 +49,7 @@ def pack(
     Args:
         episodes: Recordings; read one at a time.
         label_of: Gives an episode's label, or None if it has none.
-        out: Folder of the dataset.
+        target: Folder of the dataset.
         append: Add to the dataset if it exists.
         sensor: The sensor that the labels must be made for; None takes each recording's own.
         model: Content hash of the skin model that all labels must be made with; None takes the first label's.
@@ -57,7 +57,7 @@ def pack(
         done: Called after each episode with the reason for leaving it out, or "".
 
     Raises:
-        UsageError: If ``out`` exists (without ``append``), or no episode can be packed.
+        UsageError: If ``target`` exists (without ``append``), or no episode can be packed.
         FormatError: If a label is of another recording, sensor or skin model.
 
     Example:
@@ -74,7 +74,7 @@ def pack(
         >>> packed.episodes
         2
     """
-    refuse_existing(out, append)
+    refuse_existing(target, append)
     writer: DatasetWriter | None = None
     left_out: list[tuple[str, str]] = []
     count = total = 0
@@ -88,8 +88,8 @@ def pack(
             model = model or label.provenance["parents"].get("model")
             frames.check_pair(episode, label, {"recording": recording, "sensor": skin.content_hash, "model": model})
             if writer is None or writer.sensor != skin:
-                again = out.exists() and (append or writer is not None)
-                writer = (DatasetWriter.open if again else DatasetWriter.create)(out, skin, extra)
+                again = target.exists() and (append or writer is not None)
+                writer = (DatasetWriter.open if again else DatasetWriter.create)(target, skin, extra)
             reason = append_episode(writer, episode, label, recording)
         if reason:
             left_out.append((episode.path.name, reason))
@@ -103,7 +103,7 @@ def pack(
             "at least one recorded and labelled episode",
             "run `tacdata label` first",
         )
-    return Packed(out, count, total, tuple(left_out))
+    return Packed(target, count, total, tuple(left_out))
 
 
 def append_episode(writer: DatasetWriter, episode: Episode, label: Label, recording: str) -> str:
@@ -120,21 +120,21 @@ def append_episode(writer: DatasetWriter, episode: Episode, label: Label, record
     return ""
 
 
-def refuse_existing(out: Path, append: bool) -> None:
+def refuse_existing(target: Path, append: bool) -> None:
     """Refuse a folder that is there already.
 
     Raises:
-        UsageError: If ``out`` exists and is not to be appended to.
+        UsageError: If ``target`` exists and is not to be appended to.
     """
-    if out.exists() and not append:
-        if (out / metadata.MAIN).exists() and not (out / folder.INFO).exists():
+    if target.exists() and not append:
+        if (target / metadata.MAIN).exists() and not (target / folder.INFO).exists():
             raise UsageError(
-                f"{out} holds a first episode that was never finished, and nothing else",
+                f"{target} holds a first episode that was never finished, and nothing else",
                 "a folder that does not exist yet",
                 "give --append: the unfinished episode is replaced",
             )
         raise UsageError(
-            f"{out} exists", "a folder that does not exist yet", "name another folder, or give --append to add to it"
+            f"{target} exists", "a folder that does not exist yet", "name another folder, or give --append to add to it"
         )
 
 
@@ -174,13 +174,13 @@ class LabelFiles:
             FormatError: If a label is damaged, or of another recording, sensor or skin model than wanted; if
                 none is wanted, than the first label.
         """
-        wanted = {"sensor": sensor.content_hash if sensor else None, "model": model}
+        expected = {"sensor": sensor.content_hash if sensor else None, "model": model}
         for recording in recordings:
             path = self.path(recording)
             if not path.is_file():
                 continue
             parents = table.read_header(path)["provenance"]["parents"]
-            of_this = {**wanted, "recording": provenance.file_hash(recording)}
+            of_this = {**expected, "recording": provenance.file_hash(recording)}
             for name, digest in of_this.items():
                 if digest and parents.get(name) != digest:
                     raise FormatError(
@@ -188,4 +188,4 @@ class LabelFiles:
                         f"{name} {digest[:12]}" + ("" if name == "recording" else ", as asked for or as the others"),
                         "run `tacdata label` for this session again",
                     )
-            wanted = {name: digest or parents.get(name) for name, digest in wanted.items()}
+            expected = {name: digest or parents.get(name) for name, digest in expected.items()}

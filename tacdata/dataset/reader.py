@@ -222,9 +222,9 @@ def _check_columns(root: Path, info: dict[str, Any]) -> None:
         )
     for key in (*features.UNITS, *features.extra_of(info["features"])):
         stored = "m" if key == features.DEPTH else features.unit(key)
-        said = (info["features"][key].get("info") or {}).get("unit", stored)
-        if said != stored:
-            raise FormatError(f"{root}: {key} is in {said}", stored, "convert the column, or pack the session again")
+        unit = (info["features"][key].get("info") or {}).get("unit", stored)
+        if unit != stored:
+            raise FormatError(f"{root}: {key} is in {unit}", stored, "convert the column, or pack the session again")
 
 
 def _provenance(root: Path, paths: list[Path]) -> tuple[dict[str, Sensor], dict[int, EpisodeRecord]]:
@@ -236,8 +236,8 @@ def _provenance(root: Path, paths: list[Path]) -> tuple[dict[str, Sensor], dict[
         if not documents and stamps:
             _warn(f"{root}: {metadata.MAIN} is gone; the sensor is taken from the data files")
         documents = documents or {stamp["sensor_hash"]: stamp["sensor"] for stamp in stamps}
-        found = [EpisodeRecord.from_document(stamp["record"], str(root)) for stamp in stamps]
-        records = records or {record.key: record for record in found}
+        entries = [EpisodeRecord.from_document(stamp["record"], str(root)) for stamp in stamps]
+        records = records or {record.key: record for record in entries}
     if not documents:
         raise metadata.lost(root)
     sensors = {digest: Sensor.from_document(document, str(root)) for digest, document in documents.items()}

@@ -37,11 +37,11 @@ def restore(root: Path | str, sources: Path | str | Iterable[Path | str]) -> lis
             raise UsageError(f"no folder {source}", "datasets that this one was made from", "check the path")
     info = folder.read_info(root)
     rows = folder.read_rows(root, info)
-    wanted: set[int] = set()
+    short_hashes: set[int] = set()
     keys: list[int] = []
     for path in cache.data_files(root, rows):
         table = folder.read_parquet(path, [features.SENSOR, features.RECORD])
-        wanted.update(np.unique(table[features.SENSOR].to_numpy()).tolist())
+        short_hashes.update(np.unique(table[features.SENSOR].to_numpy()).tolist())
         keys.extend(dict.fromkeys(table[features.RECORD].to_pylist()))
     sensors: dict[str, dict] = {}
     records: dict[int, EpisodeRecord] = metadata.read_records(root)
@@ -52,9 +52,9 @@ def restore(root: Path | str, sources: Path | str | Iterable[Path | str]) -> lis
         if main is None:
             continue
         rate = main["rate"]
-        sensors |= {k: v for k, v in main["sensors"].items() if features.short_hash(k) in wanted}
+        sensors |= {k: v for k, v in main["sensors"].items() if features.short_hash(k) in short_hashes}
         records = {**metadata.read_records(source), **records}
-    lacking = wanted - {features.short_hash(k) for k in sensors}
+    lacking = short_hashes - {features.short_hash(k) for k in sensors}
     if lacking:
         raise FormatError(
             f"{root}: no source describes the sensor {min(lacking):015x}",

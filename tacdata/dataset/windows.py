@@ -96,8 +96,8 @@ class WindowDataset(torch.utils.data.Dataset):
             FormatError: If a column is not in the dataset.
         """
         self.data = dataset
-        given = {features.STATE: centred()} if offsets is None else offsets
-        self.offsets = {key: np.array(tuple(frames), dtype=np.int64) for key, frames in given.items()}
+        spans = {features.STATE: centred()} if offsets is None else offsets
+        self.offsets = {key: np.array(tuple(frames), dtype=np.int64) for key, frames in spans.items()}
         self.keys = tuple(self.data.columns) if keys is None else tuple(keys)
         # Plain views of the memory maps: numpy's own class for them costs time in every gather.
         self._columns = {key: np.asarray(self.data[key]) for key in (*self.keys, *self.offsets)}
@@ -143,10 +143,10 @@ class WindowDataset(torch.utils.data.Dataset):
         result: dict[str, torch.Tensor] = {}
         for key, column in self._columns.items():
             if key in self.offsets:
-                wanted = frames[:, None] + self.offsets[key]
-                inside = np.clip(wanted, first, last)
+                positions = frames[:, None] + self.offsets[key]
+                inside = np.clip(positions, first, last)
                 result[key] = self._tensor(key, np.take(column, inside, axis=0))
-                result[f"{key}_is_pad"] = torch.from_numpy(wanted != inside)
+                result[f"{key}_is_pad"] = torch.from_numpy(positions != inside)
             else:
                 result[key] = self._tensor(key, np.take(column, frames, axis=0))
         return result

@@ -138,9 +138,11 @@ class DatasetWriter:
         if record.recording in self.recordings:
             raise UsageError(f"{self.root} holds {record.recording_file} already", "each episode once", "leave it out")
         if self.simulated != (record.simulated is not None):
-            held, given = ("simulated presses", "was recorded") if self.simulated else ("recordings", "is simulated")
+            content, addition = (
+                ("simulated presses", "was recorded") if self.simulated else ("recordings", "is simulated")
+            )
             raise UsageError(
-                f"{self.root} holds {held}, {record.recording_file} {given}",
+                f"{self.root} holds {content}, {record.recording_file} {addition}",
                 "recordings and simulated presses in datasets of their own",
                 "name another folder",
             )
@@ -153,7 +155,7 @@ class DatasetWriter:
         frames = _check(columns, self.sensor, features.extra_of(self.info["features"]), record.recording_file)
         episode, first = self.info["total_episodes"], self.info["total_frames"]
         tasks = self.tasks if task in self.tasks else [*self.tasks, task]
-        whole = {
+        frame_columns = {
             **{key: features.cast(key, values) for key, values in columns.items()},
             features.SENSOR: np.full(frames, features.short_hash(record.sensor)),
             features.RECORD: np.full(frames, record.key),
@@ -164,11 +166,11 @@ class DatasetWriter:
             "task_index": np.full(frames, tasks.index(task)),
         }
         # LeRobot takes float depth for metres: millimetres are stored a thousandth.
-        whole[features.DEPTH] = whole[features.DEPTH] / tiff.MM_PER_METRE
+        frame_columns[features.DEPTH] = frame_columns[features.DEPTH] / tiff.MM_PER_METRE
         if not episode:
             metadata.write_main(self.root, {record.sensor: self.sensor.document}, self.sensor.taxels.rate)
-        stats = {key: statistics.column_statistics(whole[key]) for key in self.info["features"]}
-        self._write_files(whole, stats, record, tasks, task)
+        stats = {key: statistics.column_statistics(frame_columns[key]) for key in self.info["features"]}
+        self._write_files(frame_columns, stats, record, tasks, task)
         self.stats = {
             key: statistics.merge([self.stats[key], new]) if key in self.stats else new for key, new in stats.items()
         }
@@ -186,7 +188,7 @@ class DatasetWriter:
 
     def _write_files(
         self,
-        whole: dict[str, np.ndarray],
+        frame_columns: dict[str, np.ndarray],
         stats: dict[str, statistics.Statistics],
         record: EpisodeRecord,
         tasks: list[str],
@@ -194,13 +196,13 @@ class DatasetWriter:
     ) -> None:
         folder.write_parquet(
             self.root / folder.data_path(self.data_file),
-            _table(whole, self.info["features"], metadata.shard_metadata(self.sensor, record)),
+            _table(frame_columns, self.info["features"], metadata.shard_metadata(self.sensor, record)),
         )
         metadata.append_record(self.root, record)
         row = folder.EpisodeRow(
             index=self.info["total_episodes"],
             start=self.info["total_frames"],
-            stop=self.info["total_frames"] + len(whole["index"]),
+            stop=self.info["total_frames"] + len(frame_columns["index"]),
             tasks=(task,),
             data_file=self.data_file,
             row_file=self.row_file,
@@ -233,12 +235,12 @@ def _own(record: EpisodeRecord) -> dict[str, Any]:
 
 def _record_keys(paths: list[Path], info: dict[str, Any]) -> set[int]:
     """Return the record keys of the counted frames."""
-    found: set[int] = set()
+    keys: set[int] = set()
     for path in paths:
         table = folder.read_parquet(path, ["index", features.RECORD])
         counted = table["index"].to_numpy() < info["total_frames"]
-        found.update(np.unique(table[features.RECORD].to_numpy()[counted]).tolist())
-    return found
+        keys.update(np.unique(table[features.RECORD].to_numpy()[counted]).tolist())
+    return keys
 
 
 def _same_columns(root: Path, info: dict[str, Any], sensor: Sensor, extra: Iterable[str] | None) -> None:
@@ -261,14 +263,14 @@ def _same_columns(root: Path, info: dict[str, Any], sensor: Sensor, extra: Itera
 
 
 def _check(columns: dict[str, np.ndarray], sensor: Sensor, extra: tuple[str, ...], origin: str) -> int:
-    wanted = {k: v for k, v in features.shapes(sensor, extra).items() if k not in (features.SENSOR, features.RECORD)}
-    if set(columns) != set(wanted):
-        difference = sorted(set(columns) ^ set(wanted))
+    expected = {k: v for k, v in features.shapes(sensor, extra).items() if k not in (features.SENSOR, features.RECORD)}
+    if set(columns) != set(expected):
+        difference = sorted(set(columns) ^ set(expected))
         raise FormatError(
-            f"{origin}: {', '.join(difference)} missing or unknown", ", ".join(wanted), "correct the columns"
+            f"{origin}: {', '.join(difference)} missing or unknown", ", ".join(expected), "correct the columns"
         )
     frames = len(columns[features.TIME])
-    for key, shape in wanted.items():
+    for key, shape in expected.items():
         values = columns[key]
         if values.shape != (frames, *shape) or frames == 0:
             raise FormatError(
@@ -286,10 +288,10 @@ def _check(columns: dict[str, np.ndarray], sensor: Sensor, extra: tuple[str, ...
     return frames
 
 
-def _table(whole: dict[str, np.ndarray], described: dict[str, Any], stamp: bytes) -> pa.Table:
+def _table(frame_columns: dict[str, np.ndarray], described: dict[str, Any], stamp: bytes) -> pa.Table:
     arrays = {}
     for key in described:
-        values = whole[key]
+        values = frame_columns[key]
         if described[key]["dtype"] == "image":
             arrays[key] = tiff.encode(values)
         elif values.ndim == 2:

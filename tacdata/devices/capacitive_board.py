@@ -145,8 +145,8 @@ class CapacitiveBoard(TaxelBoard):
     def _forget_partial_frame(self) -> None:
         # The port is opened in the middle of a frame: a few bytes before the first good one are no fault of the stream.
         # Two damaged frames, or more bytes than some frames have, are noted.
-        counts, rest = self.counts, 4 * self.format.size if self.format.encoding == "binary" else 4096
-        if counts.corrupt > 1 or counts.garbage_bytes > rest:
+        counts, allowance = self.counts, 4 * self.format.size if self.format.encoding == "binary" else 4096
+        if counts.corrupt > 1 or counts.garbage_bytes > allowance:
             counts.notes.append(f"{counts.garbage_bytes} B, {counts.corrupt} frames were damaged at first")
         counts.garbage_bytes = counts.corrupt = 0
 
@@ -160,26 +160,26 @@ class CapacitiveBoard(TaxelBoard):
             self._changed.notify_all()
 
     def _nothing_understood(self) -> DeviceError:
-        seen, layout, counts = bytes(self._seen), self.format, self.counts
+        sample, layout, counts = bytes(self._seen), self.format, self.counts
         wait, limit = (
             f"no {layout.name} frame on {self.port} within {FIRST_FRAME:g} s at {self.baud} baud",
             "good frames",
         )
-        if not seen:
+        if not sample:
             return DeviceError(
                 f"{wait}: not one byte came",
                 limit,
                 "check power, cable and port (the rig file may have swapped those of cnc and board), and whether the "
                 "board must be started",
             )
-        if WELCOME.search(seen.decode("ascii", "replace")):
+        if WELCOME.search(sample.decode("ascii", "replace")):
             return DeviceError(
                 f"a GRBL controller is on the taxel board's port {self.port}",
                 "a taxel board on that port",
                 "swap port under cnc and port under board in the rig file",
             )
-        what = f"{wait}: {len(seen)} bytes came, beginning {seen[:24].hex(' ')}"
-        if layout.sync and layout.sync not in seen:
+        what = f"{wait}: {len(sample)} bytes came, beginning {sample[:24].hex(' ')}"
+        if layout.sync and layout.sync not in sample:
             return DeviceError(
                 f"{what}; the sync {layout.sync.hex(' ')} is not among them",
                 f"frames that begin with {layout.sync.hex(' ')}",
@@ -194,7 +194,7 @@ class CapacitiveBoard(TaxelBoard):
         )
 
 
-def _format(given: str | dict[str, Any] | None) -> FrameFormat:
-    if given is None:
+def _format(source: str | dict[str, Any] | None) -> FrameFormat:
+    if source is None:
         return default_format()
-    return from_document(given, "board: format") if isinstance(given, dict) else read_format(Path(given))
+    return from_document(source, "board: format") if isinstance(source, dict) else read_format(Path(source))

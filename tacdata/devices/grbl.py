@@ -156,9 +156,9 @@ class Grbl(MotionController):
             return ""
         if link.alarm not in (None, codes.HOMING_REQUIRED):
             return codes.alarm_in_words(link.alarm)
-        here = link.last.position
-        was_on = f"the controller is locked and says {in_words(here)} mm: it was not just switched on"
-        return was_on if np.any(here) else ""
+        position = link.last.position
+        was_on = f"the controller is locked and says {in_words(position)} mm: it was not just switched on"
+        return was_on if np.any(position) else ""
 
     @property
     def unreadable(self) -> str:

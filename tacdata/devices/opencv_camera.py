@@ -113,12 +113,12 @@ class OpencvCamera(Camera):
         if self.backend not in BACKENDS:
             raise UsageError(f"{where}: backend {self.backend!r}", ", ".join(BACKENDS), "correct the rig file")
         if len(self.fourcc) != 4 or not self.fourcc.isascii():
-            given = f"{where}: fourcc {self.fourcc!r}"
-            raise UsageError(given, "four letters, for example MJPG or YUYV", "correct the rig file")
+            fault = f"{where}: fourcc {self.fourcc!r}"
+            raise UsageError(fault, "four letters, for example MJPG or YUYV", "correct the rig file")
         is_time = isinstance(self.exposure, int | float) and self.exposure > 0
         if self.exposure != "auto" and not is_time:
-            given = f"{where}: exposure {self.exposure!r}"
-            raise UsageError(given, "auto, or a time above 0 ms", "correct the rig file")
+            fault = f"{where}: exposure {self.exposure!r}"
+            raise UsageError(fault, "auto, or a time above 0 ms", "correct the rig file")
 
     @property
     def counts(self) -> StreamCounts:
@@ -304,29 +304,29 @@ class OpencvCamera(Camera):
         import cv2
 
         width, height = self.intrinsics["width"], self.intrinsics["height"]
-        wanted: list[tuple[str, int, float]] = [
+        settings: list[tuple[str, int, float]] = [
             ("fourcc", cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*self.fourcc)),
             ("width", cv2.CAP_PROP_FRAME_WIDTH, width),
             ("height", cv2.CAP_PROP_FRAME_HEIGHT, height),
         ]
         if self.rate:
-            wanted.append(("rate", cv2.CAP_PROP_FPS, self.rate))
+            settings.append(("rate", cv2.CAP_PROP_FPS, self.rate))
         name = capture.getBackendName()
         manual, automatic = MANUAL_AUTOMATIC.get(name, (0.25, 0.75))
         if isinstance(self.exposure, int | float):
             # V4L2 counts 0.1 ms, the others powers of two of a second.
             value = 10 * self.exposure if name == "V4L2" else float(np.log2(self.exposure / 1000))
-            wanted += [
+            settings += [
                 ("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, manual),
                 ("exposure", cv2.CAP_PROP_EXPOSURE, value),
             ]
         else:
             capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, automatic)
         if self.gain is not None:
-            wanted.append(("gain", cv2.CAP_PROP_GAIN, self.gain))
-        for what, key, value in wanted:
-            taken = capture.set(key, value)
-            if not taken or abs(capture.get(key) - value) > 0.05 * abs(value) + 1e-6:
+            settings.append(("gain", cv2.CAP_PROP_GAIN, self.gain))
+        for what, key, value in settings:
+            is_accepted = capture.set(key, value)
+            if not is_accepted or abs(capture.get(key) - value) > 0.05 * abs(value) + 1e-6:
                 self.notes.append(f"camera {self.source}: {what} {value:g} asked, {capture.get(key):g} given")
         # A buffer of one image: with more, each is older when it arrives.
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
@@ -343,17 +343,17 @@ class OpencvCamera(Camera):
         return name == "V4L2" and bool(capture.set(cv2.CAP_PROP_CONVERT_RGB, 0))
 
     def _open_folder(self, folder: Path) -> tuple[Grab, Callable[[], None]]:
-        found = sorted((p for p in folder.iterdir() if p.suffix.lower() in IMAGE_ENDINGS), key=_by_number)
-        if not found:
+        images = sorted((p for p in folder.iterdir() if p.suffix.lower() in IMAGE_ENDINGS), key=_by_number)
+        if not images:
             endings = ", ".join(ending[1:] for ending in IMAGE_ENDINGS)
             raise DeviceError(f"camera {folder} holds no image", f"files of type {endings}", "correct source")
-        paths = iter(found)
+        paths = iter(images)
 
         def grab() -> _Grabbed | None:
             nonlocal paths
             path = next(paths, None)
             if path is None and self.loop:
-                paths = iter(found)
+                paths = iter(images)
                 path = next(paths)
             if path is None:
                 return None
@@ -365,11 +365,11 @@ class OpencvCamera(Camera):
         return grab, lambda: None
 
     def _check_index(self, index: int) -> None:
-        found = sorted(str(p) for p in Path("/dev").glob("video*"))
+        devices = sorted(str(p) for p in Path("/dev").glob("video*"))
         if Path("/dev").is_dir() and not Path(f"/dev/video{index}").exists() and Path("/proc").is_dir():
             raise DeviceError(
                 f"no camera {index}",
-                f"a camera that exists: {', '.join(found) or 'this machine shows none'}",
+                f"a camera that exists: {', '.join(devices) or 'this machine shows none'}",
                 "plug it in, or correct source in the rig file",
             )
 

@@ -13,21 +13,21 @@ DEEPEST = 1
 """Number of its deepest press."""
 
 
-def copy_session(out: Path) -> Path:
+def copy_session(target: Path) -> Path:
     """Copy the shipped session to a new folder, labels included.
 
     Raises:
         UsageError: If the folder exists.
         DeviceError: If the disk refuses it.
     """
-    if out.exists():
-        raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "name another one")
+    if target.exists():
+        raise UsageError(f"{target} exists", "a new folder; nothing is overwritten", "name another one")
     try:
-        shutil.copytree(SESSION, out)
+        shutil.copytree(SESSION, target)
     except OSError as error:
         raise DeviceError(
-            f"copying the example to {out} failed: {error}",
+            f"copying the example to {target} failed: {error}",
             "a place to write, on a disk with room",
             "name another folder",
         ) from error
-    return out
+    return target

@@ -19,26 +19,26 @@ from tacdata.replay.targets import FingertipTargets
 class Csv(Exporter):
     """``NAME.csv`` with units in the columns' names, and ``NAME.json`` (`schemas/fingertip_targets.schema.json`)."""
 
-    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], directory: Path) -> list[str]:
         """Write a new folder; numbers are exact to the last bit."""
-        new_folder(out)
+        new_folder(directory)
         for targets in episodes:
             columns, stem = to_columns(targets), Path(targets.recording).stem
             text = io.StringIO()
             rows = csv.writer(text, lineterminator="\n")
             rows.writerow(columns)
             rows.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-            documents.write(out / f"{stem}.json", targets.header(columns), "fingertip_targets")
-            documents.write_text(out / f"{stem}.csv", text.getvalue())
+            documents.write(directory / f"{stem}.json", targets.header(columns), "fingertip_targets")
+            documents.write_text(directory / f"{stem}.csv", text.getvalue())
         return []
 
-    def read(self, out: Path) -> list[FingertipTargets]:
+    def read(self, directory: Path) -> list[FingertipTargets]:
         """Return the targets of a folder."""
-        found = sorted(Path(out).glob("*.csv"))
-        if not found:
+        paths = sorted(Path(directory).glob("*.csv"))
+        if not paths:
             allowed = "a folder that tacdata export --format csv wrote"
-            raise UsageError(f"no CSV file in {out}", allowed, "check the path")
-        return [_read(path) for path in found]
+            raise UsageError(f"no CSV file in {directory}", allowed, "check the path")
+        return [_read(path) for path in paths]
 
 
 def _read(path: Path) -> FingertipTargets:

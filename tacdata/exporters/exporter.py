@@ -34,12 +34,12 @@ class Exporter(ABC):
         """Remarks on the files that `write` made; none of them makes a file unfit."""
 
     @abstractmethod
-    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], directory: Path) -> list[str]:
         """Write a new folder.
 
         Args:
             episodes: Targets, one per demonstration.
-            out: The folder; it does not exist.
+            directory: The folder; it does not exist.
 
         Returns:
             Impossible targets of a robot, as sentences.
@@ -50,7 +50,7 @@ class Exporter(ABC):
         """
 
     @abstractmethod
-    def read(self, out: Path) -> list[FingertipTargets]:
+    def read(self, directory: Path) -> list[FingertipTargets]:
         """Return the targets of a folder that `write` made.
 
         Raises:
@@ -59,19 +59,19 @@ class Exporter(ABC):
         """
 
 
-def new_folder(out: Path) -> None:
+def new_folder(directory: Path) -> None:
     """Make a folder that did not exist.
 
     Raises:
         UsageError: If it exists or cannot be made.
     """
-    if out.exists():
-        raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
+    if directory.exists():
+        raise UsageError(f"{directory} exists", "a new folder; nothing is overwritten", "choose another --out")
     try:
-        out.mkdir(parents=True)
+        directory.mkdir(parents=True)
     except OSError as error:
-        given = f"{out} cannot be made: {error.strerror}"
-        raise UsageError(given, "a place to write", "choose another --out") from None
+        fault = f"{directory} cannot be made: {error.strerror}"
+        raise UsageError(fault, "a place to write", "choose another --out") from None
 
 
 def exporter(name: str, robot: Path | None = None, recordings: Path | None = None) -> Exporter:
@@ -81,7 +81,7 @@ def exporter(name: str, robot: Path | None = None, recordings: Path | None = Non
         UsageError: If there is no such format, or it needs a robot file.
     """
     kind: Any = registry.load(ROOM, BASE, name, Exporter)
-    made: Exporter = kind(robot, recordings)
-    if made.needs_robot and robot is None:
+    writer: Exporter = kind(robot, recordings)
+    if writer.needs_robot and robot is None:
         raise UsageError(f"format {name} without a robot", "--robot ROBOT.yaml", "describe the robot in a file")
-    return made
+    return writer

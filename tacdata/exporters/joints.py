@@ -31,13 +31,13 @@ class Joints(Exporter):
 
     needs_robot = True
 
-    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], directory: Path) -> list[str]:
         """Solve and write a new folder; return unreachable targets, as sentences."""
         if self.robot is None:
             raise UsageError("no robot", "a robot file", "name it with --robot")
         robot, sentences = read_robot(self.robot), []
         solved = [follow(robot, targets)[0] for targets in episodes]
-        new_folder(out)
+        new_folder(directory)
         if solved:
             self.remarks += [*robot.remarks, *_unchecked(solved[0])]
         for targets, path in zip(episodes, solved, strict=True):
@@ -48,40 +48,40 @@ class Joints(Exporter):
             columns = to_columns(targets)
             header = _header(targets, path, robot, columns)
             documents.check(header, "joint_trajectory", stem)
-            whole = columns | {f"{JOINT}{joint.name}": path.values[:, k] for k, joint in enumerate(path.joints)}
-            table = pa.table(whole).replace_schema_metadata({HEADER: json.dumps(header)})
-            with replacement(out / f"{stem}.joints.parquet") as stream:
+            fields = columns | {f"{JOINT}{joint.name}": path.values[:, k] for k, joint in enumerate(path.joints)}
+            table = pa.table(fields).replace_schema_metadata({HEADER: json.dumps(header)})
+            with replacement(directory / f"{stem}.joints.parquet") as stream:
                 pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
         return sentences
 
-    def read(self, out: Path) -> list[FingertipTargets]:
+    def read(self, directory: Path) -> list[FingertipTargets]:
         """Return the targets of a folder; `read_joints` gives the joint values."""
-        return [targets for targets, _, _ in read_joints(out)]
+        return [targets for targets, _, _ in read_joints(directory)]
 
 
-def read_joints(out: Path) -> list[tuple[FingertipTargets, dict[str, np.ndarray], dict[str, Any]]]:
+def read_joints(directory: Path) -> list[tuple[FingertipTargets, dict[str, np.ndarray], dict[str, Any]]]:
     """Return targets, joint values by name [rad or m], shape (n,), and the header of every file in a folder.
 
     Raises:
         UsageError: If there is none.
         FormatError: If a file is damaged.
     """
-    found = sorted(Path(out).glob("*.joints.parquet"))
-    if not found:
+    paths = sorted(Path(directory).glob("*.joints.parquet"))
+    if not paths:
         allowed = "a folder that tacdata export --format joints wrote"
-        raise UsageError(f"no joint trajectory in {out}", allowed, "check the path")
-    return [_read(path) for path in found]
+        raise UsageError(f"no joint trajectory in {directory}", allowed, "check the path")
+    return [_read(path) for path in paths]
 
 
-def in_words(path: JointPath, targets: FingertipTargets, turned: bool = True) -> list[str]:
+def in_words(path: JointPath, targets: FingertipTargets, oriented: bool = True) -> list[str]:
     """Describe the targets that the robot cannot reach, with times; orientations too, where they are prescribed."""
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     sentences = []
     for name, rows in path.unreached.items():
-        chosen = list(rows), targets.fingers.index(name)
-        worst = 1000 * path.position_error[chosen].max(), np.degrees(path.rotation_error[chosen].max())
+        cells = list(rows), targets.fingers.index(name)
+        worst = 1000 * path.position_error[cells].max(), np.degrees(path.rotation_error[cells].max())
         share = f"{len(rows)} of {len(seconds)} targets ({_when(rows, seconds)})"
-        error_words = f"{worst[0]:.1f} mm" + (f", {worst[1]:.0f} deg" if turned else "")
+        error_words = f"{worst[0]:.1f} mm" + (f", {worst[1]:.0f} deg" if oriented else "")
         sentences.append(f"{name} does not reach {share}, off by up to {error_words}")
     if path.uncoupled:
         share = f"{len(path.uncoupled)} of {len(seconds)} targets ({_when(path.uncoupled, seconds)})"
@@ -122,9 +122,13 @@ def use_table(path: JointPath, targets: FingertipTargets) -> str:
         rows.append(f"{name:<24} {1000 * place:>12.3f} {np.degrees(turn):>13.2f}")
     rows.append(f"{'joint':<24} {'to its limit':>12} {'speed':>13} {'of its limit':>13} {'acceleration':>13}")
     for k, joint in enumerate(path.joints):
-        own = path.values[followed, k]
+        trajectory = path.values[followed, k]
         ends = [end for end in (joint.lower, joint.upper) if end is not None]
-        room = min((float(np.abs(own - end).min()) for end in ends), default=float("inf")) if len(own) else float("nan")
+        room = (
+            min((float(np.abs(trajectory - end).min()) for end in ends), default=float("inf"))
+            if len(trajectory)
+            else float("nan")
+        )
         fastest, hardest = (_largest(values[:, k]) for values in (speed, acceleration))
         share = f"{fastest / joint.velocity:.0%}" if joint.velocity else "unknown"
         unit = joint.unit
@@ -136,8 +140,8 @@ def use_table(path: JointPath, targets: FingertipTargets) -> str:
 
 
 def _largest(values: np.ndarray) -> float:
-    known = np.abs(values[np.isfinite(values)])
-    return float(known.max()) if len(known) else float("nan")
+    magnitudes = np.abs(values[np.isfinite(values)])
+    return float(magnitudes.max()) if len(magnitudes) else float("nan")
 
 
 def _unchecked(path: JointPath) -> list[str]:
@@ -145,20 +149,20 @@ def _unchecked(path: JointPath) -> list[str]:
     sentences = []
     if path.collisions.reason:
         sentences.append(f"whether links touch each other was not checked: {path.collisions.reason}")
-    for what, known in (("velocity", "speed"), ("acceleration", "acceleration")):
-        free = [joint.name for joint in path.joints if getattr(joint, what) is None]
-        if free:
-            which = "any joint" if len(free) == len(path.joints) else f"joint {', '.join(free)}"
+    for what, quantity in (("velocity", "speed"), ("acceleration", "acceleration")):
+        joints = [joint.name for joint in path.joints if getattr(joint, what) is None]
+        if joints:
+            which = "any joint" if len(joints) == len(path.joints) else f"joint {', '.join(joints)}"
             sentences.append(
-                f"no limit of the {known} of {which} is known, so none was checked ({what} in the robot file)"
+                f"no limit of the {quantity} of {which} is known, so none was checked ({what} in the robot file)"
             )
     return sentences
 
 
 def _when(rows: tuple[int, ...], seconds: np.ndarray) -> str:
     parts = np.split(np.array(rows), 1 + np.flatnonzero(np.diff(rows) > 1))
-    shown = [f"{seconds[part[0]]:.2f} to {seconds[part[-1]]:.2f} s" for part in parts[:3]]
-    return ", ".join(shown) + (f" and {len(parts) - 3} more stretches" if len(parts) > 3 else "")
+    spans = [f"{seconds[part[0]]:.2f} to {seconds[part[-1]]:.2f} s" for part in parts[:3]]
+    return ", ".join(spans) + (f" and {len(parts) - 3} more stretches" if len(parts) > 3 else "")
 
 
 def _header(targets: FingertipTargets, path: JointPath, robot: Robot, columns: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -191,8 +195,8 @@ def _read(path: Path) -> tuple[FingertipTargets, dict[str, np.ndarray], dict[str
         header = json.loads((table.schema.metadata or {})[HEADER])
     except (pa.ArrowException, OSError, KeyError, ValueError) as error:
         reason = str(error).splitlines()[0]
-        given = f"{path} holds no joint trajectory: {reason}"
-        raise FormatError(given, "a file of tacdata export", "export again") from None
+        fault = f"{path} holds no joint trajectory: {reason}"
+        raise FormatError(fault, "a file of tacdata export", "export again") from None
     documents.check(header, "joint_trajectory", str(path))
     columns = {name: np.asarray(table.column(name).to_numpy()) for name in table.column_names}
     values = {name.removeprefix(JOINT): column for name, column in columns.items() if name.startswith(JOINT)}

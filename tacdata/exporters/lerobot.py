@@ -38,58 +38,58 @@ class Lerobot(Exporter):
     - ``tacdata.predicted_novelty.FINGER``: above 1 the readings are unlike all training readings.
     """
 
-    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], directory: Path) -> list[str]:
         """Write a new dataset."""
         rate = _same([targets.rate for targets in episodes], "rates")
         fingers = _same([targets.fingers for targets in episodes], "fingers")
         _same([json.dumps(targets.network) for targets in episodes], "networks")
         columns = [_columns(targets) for targets in episodes]
         features = _features(episodes[0], columns[0])
-        if any(set(other) != set(columns[0]) for other in columns):
+        if any(set(names) != set(columns[0]) for names in columns):
             raise UsageError("demonstrations with boards on other fingers", "the same in all", "export them separately")
-        new_folder(out)
+        new_folder(directory)
         info = folder.empty_info(features, rate, "fingertips " + " ".join(fingers))
         tasks, first, parts = list(dict.fromkeys(t.task for t in episodes)), 0, []
-        for number, (targets, whole) in enumerate(zip(episodes, columns, strict=True)):
+        for number, (targets, record) in enumerate(zip(episodes, columns, strict=True)):
             count = len(targets.time_ns)
-            whole |= {
+            record |= {
                 "timestamp": (np.arange(count) / info["fps"]).astype(np.float32),
                 "frame_index": np.arange(count),
                 "episode_index": np.full(count, number),
                 "index": np.arange(first, first + count),
                 "task_index": np.full(count, tasks.index(targets.task)),
             }
-            stats = {key: statistics.column_statistics(whole[key]) for key in features}
+            stats = {key: statistics.column_statistics(record[key]) for key in features}
             parts.append(stats)
-            folder.write_parquet(out / folder.data_path(number), _table(whole, features))
+            folder.write_parquet(directory / folder.data_path(number), _table(record, features))
             row = folder.EpisodeRow(number, first, first + count, (targets.task,), number, number)
-            folder.write_row(out, row, stats, {})
+            folder.write_row(directory, row, stats, {})
             first += count
-        folder.write_tasks(out, tasks)
-        folder.write_stats(out, {key: statistics.merge([part[key] for part in parts]) for key in features})
+        folder.write_tasks(directory, tasks)
+        folder.write_stats(directory, {key: statistics.merge([part[key] for part in parts]) for key in features})
         entries = [targets.header(features) for targets in episodes]
         for entry in entries:
-            documents.check(entry, "fingertip_targets", str(out / META))
-        documents.write_text(out / META, json.dumps(entries, indent=1))
+            documents.check(entry, "fingertip_targets", str(directory / META))
+        documents.write_text(directory / META, json.dumps(entries, indent=1))
         info |= {"total_episodes": len(episodes), "total_frames": first, "total_tasks": len(tasks)}
         info["splits"] = {"train": f"0:{len(episodes)}"}
-        documents.write_text(out / folder.INFO, json.dumps(info, indent=4))
+        documents.write_text(directory / folder.INFO, json.dumps(info, indent=4))
         note = f"fps is {info['fps']} where the grid has {rate:g} Hz: LeRobot wants whole numbers"
         return [] if info["fps"] == rate else [note]
 
-    def read(self, out: Path) -> list[FingertipTargets]:
+    def read(self, directory: Path) -> list[FingertipTargets]:
         """Return the targets of a dataset, to float32."""
-        info = folder.read_info(Path(out))
+        info = folder.read_info(Path(directory))
         try:
-            entries = json.loads((Path(out) / META).read_text())
+            entries = json.loads((Path(directory) / META).read_text())
         except (OSError, ValueError) as error:
-            given = f"{out}: {META} is missing or damaged: {error}"
-            raise FormatError(given, "a folder that tacdata export wrote", "export again") from None
-        rows = folder.read_rows(Path(out), info)
+            fault = f"{directory}: {META} is missing or damaged: {error}"
+            raise FormatError(fault, "a folder that tacdata export wrote", "export again") from None
+        rows = folder.read_rows(Path(directory), info)
         if len(entries) != len(rows):
-            given = f"{out}: {len(rows)} episodes, {META} describes {len(entries)}"
-            raise FormatError(given, "one entry per episode", "export again")
-        return [_read(Path(out), row, entry) for row, entry in zip(rows, entries, strict=True)]
+            fault = f"{directory}: {len(rows)} episodes, {META} describes {len(entries)}"
+            raise FormatError(fault, "one entry per episode", "export again")
+        return [_read(Path(directory), row, entry) for row, entry in zip(rows, entries, strict=True)]
 
 
 def _same(values: Sequence[Any], what: str) -> Any:
@@ -101,7 +101,7 @@ def _same(values: Sequence[Any], what: str) -> Any:
 
 
 def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
-    count, made = len(targets.time_ns), targets.source
+    count, demonstration = len(targets.time_ns), targets.source
     columns = {
         ACTION: np.concatenate([targets.position, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
         STATE: np.concatenate([targets.seen, targets.quaternion], -1).reshape(count, -1).astype(np.float32),
@@ -113,7 +113,9 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
     }
     if len(targets.fingers) == 1:  # LeRobot stores a vector of length one as a number
         columns = {key: values[:, 0] if values.shape[1:] == (1,) else values for key, values in columns.items()}
-    for name, track in () if made is None else ((name, made.tracks[name]) for name in targets.fingers):
+    for name, track in (
+        () if demonstration is None else ((name, demonstration.tracks[name]) for name in targets.fingers)
+    ):
         if track.signals is not None:
             columns[f"observation.tactile.{name}"] = np.nan_to_num(track.signals[targets.rows])
         if track.depth is not None:
@@ -126,7 +128,7 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
 
 def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict[str, dict[str, Any]]:
     pose = [f"{name}.{part}" for name in targets.fingers for part in (*AXES, *TURNS)]
-    made: dict[str, dict[str, Any]] = {}
+    features: dict[str, dict[str, Any]] = {}
     for key, values in columns.items():
         shape, names = list(values.shape[1:]) or [1], None
         info: dict[str, Any] = {}
@@ -142,14 +144,14 @@ def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict
             info = {"unit": "1" if "novelty" in key else "counts"}
         if "predicted" in key:
             info |= {"prediction": True, "checkpoint": (targets.network or {}).get("hash", "")}  # ty: ignore[unsupported-operator]
-        made[key] = {"dtype": dtype, "shape": shape, "names": names, "info": info}
-    return made | {k: {"dtype": dtype, "shape": [1], "names": None} for k, dtype in INDEX_COLUMNS.items()}
+        features[key] = {"dtype": dtype, "shape": shape, "names": names, "info": info}
+    return features | {k: {"dtype": dtype, "shape": [1], "names": None} for k, dtype in INDEX_COLUMNS.items()}
 
 
-def _table(whole: dict[str, np.ndarray], features: dict[str, Any]) -> pa.Table:
+def _table(record: dict[str, np.ndarray], features: dict[str, Any]) -> pa.Table:
     arrays: dict[str, Any] = {}
     for key, feature in features.items():
-        values = whole[key]
+        values = record[key]
         if feature["dtype"] == "image":
             arrays[key] = tiff.encode(values)
         elif values.ndim == 2:
@@ -159,10 +161,10 @@ def _table(whole: dict[str, np.ndarray], features: dict[str, Any]) -> pa.Table:
     return pa.table(arrays).replace_schema_metadata({b"huggingface": folder.huggingface_metadata(features)})
 
 
-def _read(out: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> FingertipTargets:
-    documents.check(header, "fingertip_targets", str(out / META))
-    wanted = [ACTION, STATE, DEPTH, FELT, GAP, TIME]
-    table = folder.read_parquet(out / folder.data_path(row.data_file), wanted)
+def _read(directory: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> FingertipTargets:
+    documents.check(header, "fingertip_targets", str(directory / META))
+    keys = [ACTION, STATE, DEPTH, FELT, GAP, TIME]
+    table = folder.read_parquet(directory / folder.data_path(row.data_file), keys)
     fingers, count = tuple(header["fingers"]), table.num_rows
 
     def column(key: str, *shape: int) -> np.ndarray:

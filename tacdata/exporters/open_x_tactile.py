@@ -51,7 +51,7 @@ class OpenXTactile(Exporter):
     - ``timestamps``: numbers of frames, as in the published stores. Times in ns: ``tacdata/time_ns``.
     """
 
-    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], directory: Path) -> list[str]:
         """Write a new folder of stores."""
         if not episodes:
             raise UsageError("no demonstrations", "one or more", "track demonstrations first")
@@ -61,25 +61,25 @@ class OpenXTactile(Exporter):
                 raise UsageError(
                     f"demonstrations of {task!r} with other fingers or boards", "the same in all", "export them apart"
                 )
-        new_folder(out)
+        new_folder(directory)
         remarks: list[str] = []
         for task, listed in tasks.items():
             name = re.sub(r"\W+", "_", task).strip("_") or "task"
-            remarks += _store(out / f"{name}.zarr", listed, self.recordings)
+            remarks += _store(directory / f"{name}.zarr", listed, self.recordings)
         return list(dict.fromkeys(remarks))
 
-    def read(self, out: Path) -> list[FingertipTargets]:
+    def read(self, directory: Path) -> list[FingertipTargets]:
         """Return the exact targets of a folder."""
-        stores = sorted(Path(out).glob("*.zarr"))
+        stores = sorted(Path(directory).glob("*.zarr"))
         if not stores:
-            raise UsageError(f"no store in {out}", "a folder that tacdata export wrote", "check the path")
+            raise UsageError(f"no store in {directory}", "a folder that tacdata export wrote", "check the path")
         return [targets for store in stores for targets in _targets(store)]
 
 
 def _layout(targets: FingertipTargets) -> list[tuple[str, bool, bool]]:
     """Return which fingers have readings and predicted depth."""
-    made = targets.source
-    tracks = [] if made is None else [(name, made.tracks[name]) for name in targets.fingers]
+    demonstration = targets.source
+    tracks = [] if demonstration is None else [(name, demonstration.tracks[name]) for name in targets.fingers]
     return [(name, track.signals is not None, track.depth is not None) for name, track in tracks]
 
 
@@ -114,41 +114,41 @@ def _store(store: Path, listed: list[FingertipTargets], recordings: Path | None)
 def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
     count = len(targets.time_ns)
     columns = {"timestamps": np.arange(count), "sub_task_instruction": np.full(count, targets.task.ljust(100))}
-    made = targets.source
-    hands = {name: made.tracks[name].hand if made else "" for name in targets.fingers}
+    demonstration = targets.source
+    hands = {name: demonstration.tracks[name].hand if demonstration else "" for name in targets.fingers}
     for side in ("left", "right"):
         # A hand that is not known counts as right, as a gripper does in the published stores.
-        own = [k for k, n in enumerate(targets.fingers) if (hands[n] if hands[n] == "left" else "right") == side]
-        if not own:
+        indices = [k for k, n in enumerate(targets.fingers) if (hands[n] if hands[n] == "left" else "right") == side]
+        if not indices:
             continue
-        place = targets.position[:, own]
-        turn = Rotation.from_quat(targets.quaternion[:, own[0]]).as_rotvec()
+        place = targets.position[:, indices]
+        turn = Rotation.from_quat(targets.quaternion[:, indices[0]]).as_rotvec()
         columns[f"{side}_wrist_pose"] = np.concatenate([place.mean(axis=1), turn], axis=1).astype(np.float32)
-        if len(own) > 1:
+        if len(indices) > 1:
             opening = np.linalg.norm(place[:, 0] - place[:, 1:].mean(axis=1), axis=1)
             columns[f"{side}_hand_joints"] = opening[:, None].astype(np.float32)
             columns[f"{side}_hand_joints_idx"] = np.full((count, 1), GRIPPER, np.int32)
-        columns |= _felt(targets, side, [targets.fingers[k] for k in own])
+        columns |= _felt(targets, side, [targets.fingers[k] for k in indices])
     return columns
 
 
 def _felt(targets: FingertipTargets, side: str, names: list[str]) -> dict[str, np.ndarray]:
     """Return the tactile groups of a hand: readings, and predicted depth if there is any."""
-    made, columns = targets.source, {}
-    if made is None:
+    demonstration, columns = targets.source, {}
+    if demonstration is None:
         return {}
     for group, unit, of in (("fingertips", "counts", _readings), ("predicteddepth", "predicted mm", _depth)):
         shapes: dict[tuple[int, ...], dict[str, np.ndarray]] = {}
         for name in names:
             if (values := of(targets, name)) is not None:
                 shapes.setdefault(values.shape[1:], {})[name] = values
-        for number, found in enumerate(shapes.values()):
+        for number, members in enumerate(shapes.values()):
             key = group + (str(number) if len(shapes) > 1 else "")
-            kinds = [made.tracks[name].kind for name in found]
+            kinds = [demonstration.tracks[name].kind for name in members]
             area = [AREAS.get(kind, len(AREAS) + k) for k, kind in enumerate(kinds)]
-            count, sensor = len(targets.time_ns), made.sensors[next(iter(found))].name
+            count, sensor = len(targets.time_ns), demonstration.sensors[next(iter(members))].name
             columns |= {
-                f"{side}_tactile_data_{key}": np.stack(list(found.values()), axis=1),
+                f"{side}_tactile_data_{key}": np.stack(list(members.values()), axis=1),
                 f"{side}_tactile_area_{key}": np.tile(np.array([area], np.int64), (count, 1)),
                 f"{side}_tactile_sensor_{key}": np.full(count, f"{sensor} {unit}"),
                 f"{side}_tactile_type_{key}": np.full(count, "state"),
@@ -157,17 +157,17 @@ def _felt(targets: FingertipTargets, side: str, names: list[str]) -> dict[str, n
 
 
 def _readings(targets: FingertipTargets, name: str) -> np.ndarray | None:
-    made = targets.source
-    if made is None or (signals := made.tracks[name].signals) is None:
+    demonstration = targets.source
+    if demonstration is None or (signals := demonstration.tracks[name].signals) is None:
         return None
-    taxels = made.sensors[name].taxels
+    taxels = demonstration.sensors[name].taxels
     shape = (taxels.rows, taxels.columns) if taxels.rows * taxels.columns == signals.shape[1] else signals.shape[1:]
     return np.nan_to_num(signals[targets.rows]).astype(np.float32).reshape(-1, *shape)
 
 
 def _depth(targets: FingertipTargets, name: str) -> np.ndarray | None:
-    made = targets.source
-    if made is None or (depth := made.tracks[name].depth) is None:
+    demonstration = targets.source
+    if demonstration is None or (depth := demonstration.tracks[name].depth) is None:
         return None
     return np.nan_to_num(depth[targets.rows]).astype(np.float32)
 
@@ -212,8 +212,8 @@ def _blocks(folder: Path, shape: tuple[int, ...], dtype: np.dtype, rows: Callabl
     documents.write_text(folder / ".zarray", json.dumps(described))
     for number, begin in enumerate(range(0, shape[0], chunks[0])):
         block = np.zeros(chunks, dtype)
-        found = rows(begin, min(begin + chunks[0], shape[0]))
-        block[: len(found)] = found
+        part = rows(begin, min(begin + chunks[0], shape[0]))
+        block[: len(part)] = part
         name = ".".join([str(number), *["0"] * (len(shape) - 1)])
         (folder / name).write_bytes(zlib.compress(block.tobytes(), 1))
 
@@ -224,8 +224,8 @@ def _targets(store: Path) -> Iterator[FingertipTargets]:
         columns = {key: _values(store / OWN / key) for key in EXACT}
         ends = _values(store / "meta" / "episode_ends")
     except (OSError, ValueError, KeyError, TypeError, zlib.error) as error:
-        given = f"{store}: the exact targets are missing or damaged: {error}"
-        raise FormatError(given, "a store that tacdata export wrote", "export again") from None
+        fault = f"{store}: the exact targets are missing or damaged: {error}"
+        raise FormatError(fault, "a store that tacdata export wrote", "export again") from None
     named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
     for header, begin, end in zip(headers, [0, *ends[:-1]], ends, strict=True):
         documents.check(header, "fingertip_targets", str(store))

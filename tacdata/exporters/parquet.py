@@ -22,24 +22,24 @@ HEADER = b"tacdata.fingertip_targets"
 class Parquet(Exporter):
     """``NAME.parquet``; the header is the document of `schemas/fingertip_targets.schema.json`."""
 
-    def write(self, episodes: Sequence[FingertipTargets], out: Path) -> list[str]:
+    def write(self, episodes: Sequence[FingertipTargets], directory: Path) -> list[str]:
         """Write a new folder."""
-        new_folder(out)
+        new_folder(directory)
         for targets in episodes:
             columns = to_columns(targets)
             header = {HEADER: json.dumps(targets.header(columns))}
-            with replacement(out / f"{Path(targets.recording).stem}.parquet") as stream:
+            with replacement(directory / f"{Path(targets.recording).stem}.parquet") as stream:
                 table = pa.table(columns).replace_schema_metadata(header)
                 pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
         return []
 
-    def read(self, out: Path) -> list[FingertipTargets]:
+    def read(self, directory: Path) -> list[FingertipTargets]:
         """Return the targets of a folder."""
-        found = sorted(Path(out).glob("*.parquet"))
-        if not found:
+        paths = sorted(Path(directory).glob("*.parquet"))
+        if not paths:
             allowed = "a folder that tacdata export --format parquet wrote"
-            raise UsageError(f"no Parquet file in {out}", allowed, "check the path")
-        return [_read(path) for path in found]
+            raise UsageError(f"no Parquet file in {directory}", allowed, "check the path")
+        return [_read(path) for path in paths]
 
 
 def _read(path: Path) -> FingertipTargets:

@@ -66,9 +66,9 @@ def _accepted(true: np.ndarray, values: list[float | None], band: float) -> floa
 def _solved(touch: OrangeTouch, presses: PressSet, x: float, force: float) -> np.ndarray:
     """Return the solved map at y = 0, linear between positions and depths [mm]."""
     depth, places = touch.depth(x, 0.0, force), presses.place
-    own = np.flatnonzero(np.abs(places[:, 1]) < 1e-9)
-    at, levels = places[own, 0], presses.depths[own[0]]
-    maps = presses.surface[own].astype(float)
+    rows = np.flatnonzero(np.abs(places[:, 1]) < 1e-9)
+    at, levels = places[rows, 0], presses.depths[rows[0]]
+    maps = presses.surface[rows].astype(float)
     right = min(max(int(np.searchsorted(at, x)), 1), len(at) - 1)
     above = min(max(int(np.searchsorted(levels, depth)), 1), len(levels) - 1)
     a, b = (

@@ -37,7 +37,7 @@ def lessons(presses: PressSet, sensor: Sensor, spread: FingertipSpread, seed: in
 
     The training fingertip has the sensor file's gains; those of the study differ.
     """
-    rng, signals, found = np.random.default_rng([seed, 33]), presses.signals(sensor), []
+    rng, signals, examples = np.random.default_rng([seed, 33]), presses.signals(sensor), []
     for k in np.flatnonzero(presses.counts > 1).tolist():
         q = int(presses.counts[k])
         levels, document = presses.depths[k, :q], presses.indenters[k]
@@ -55,8 +55,8 @@ def lessons(presses: PressSet, sensor: Sensor, spread: FingertipSpread, seed: in
             tip = np.column_stack([np.full(len(depth), x), np.full(len(depth), y), depth])
             tared = noisy - noisy[:REST].mean(axis=0)
             taxels, depths, tips = (values.astype(np.float32) for values in (tared, maps, tip))
-            found.append(Lesson(taxels, depths, tips, name, document["shape"]))
-    return found
+            examples.append(Lesson(taxels, depths, tips, name, document["shape"]))
+    return examples
 
 
 def _course(deepest: float, rng: np.random.Generator) -> np.ndarray:

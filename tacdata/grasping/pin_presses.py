@@ -15,13 +15,13 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--capacity", type=int, default=1)
-    chosen = parser.parse_args()
+    options = parser.parse_args()
     sensor = fingertip_sensor()
-    model = SkinModel(sensor, ModelSettings(error_estimate=False), chosen.device)
-    for name, asked in (("orange", orange_presses()), ("training", training_presses(sensor, TRAINING))):
-        solved = solved_presses(model, asked, chosen.capacity)
+    model = SkinModel(sensor, ModelSettings(error_estimate=False), options.device)
+    for name, requests in (("orange", orange_presses()), ("training", training_presses(sensor, TRAINING))):
+        solved = solved_presses(model, requests, options.capacity)
         solved.write(FOLDER / f"{name}.npz")
-        print(f"{name}: {int((solved.counts > 0).sum())} of {len(asked)} presses")
+        print(f"{name}: {int((solved.counts > 0).sum())} of {len(requests)} presses")
 
 
 if __name__ == "__main__":

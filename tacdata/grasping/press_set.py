@@ -104,18 +104,18 @@ def read_presses(path: StrPath, sensor: Sensor) -> PressSet:
     return PressSet(tuple(indenters), **values, provenance=stamp)
 
 
-def solved_presses(model: SkinModel, asked: Sequence[PressRequest], capacity: int = 1) -> PressSet:
+def solved_presses(model: SkinModel, requests: Sequence[PressRequest], capacity: int = 1) -> PressSet:
     """Solve presses.
 
     One without equilibrium at its deepest state is tried less deep; if none is found, it has no states.
 
     Args:
         model: The skin.
-        asked: Presses with the same number of depths, loading only.
+        requests: Presses with the same number of depths, loading only.
         capacity: Presses solved at the same time.
     """
     answers: dict[int, PathSolution] = {}
-    todo = dict(enumerate(asked))
+    todo = dict(enumerate(requests))
     while todo:
         numbers, again = list(todo), {}
         for index, answer in model.solve_many([todo[k] for k in numbers], capacity):
@@ -125,11 +125,11 @@ def solved_presses(model: SkinModel, asked: Sequence[PressRequest], capacity: in
             elif len(todo[k].depths) > LEAST:
                 again[k] = replace(todo[k], depths=todo[k].depths[:-1])
         todo = again
-    return _collected(model, asked, answers)
+    return _collected(model, requests, answers)
 
 
-def _collected(model: SkinModel, asked: Sequence[PressRequest], answers: dict[int, PathSolution]) -> PressSet:
-    sensor, n, states = model.sensor, len(asked), max(len(p.depths) for p in asked)
+def _collected(model: SkinModel, requests: Sequence[PressRequest], answers: dict[int, PathSolution]) -> PressSet:
+    sensor, n, states = model.sensor, len(requests), max(len(p.depths) for p in requests)
     load = (n, states, sensor.taxels.count)
     counts, depths, normal = np.zeros(n, dtype=int), np.zeros((n, states)), np.zeros((n, states))
     surface, force, closure, area = np.zeros((n, states, *sensor.map.shape)), *(np.zeros(load) for _ in range(3))
@@ -137,8 +137,17 @@ def _collected(model: SkinModel, asked: Sequence[PressRequest], answers: dict[in
         q = counts[k] = len(answer.depth)
         depths[k, :q], surface[k, :q], normal[k, :q] = answer.depth, answer.surface, answer.force[:, 2]
         force[k, :q], closure[k, :q], area[k, :q] = answer.taxel_force, answer.taxel_closure, answer.taxel_area
-    place = np.array([(p.x, p.y, p.yaw) for p in asked])
+    place = np.array([(p.x, p.y, p.yaw) for p in requests])
     stamp = provenance.stamp("tacdata.grasping.pin_presses", dict(model.identity), {"presses": n})
     return PressSet(
-        tuple(p.indenter.document for p in asked), place, counts, depths, surface, force, closure, area, normal, stamp
+        tuple(p.indenter.document for p in requests),
+        place,
+        counts,
+        depths,
+        surface,
+        force,
+        closure,
+        area,
+        normal,
+        stamp,
     )

@@ -61,7 +61,7 @@ def training_presses(sensor: Sensor, count: int, seed: int = 0) -> list[PressReq
     """
     rng = np.random.default_rng([seed, 31])
     half = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2 - BEYOND
-    found = []
+    requests = []
     for _ in range(count):
         x, y = rng.uniform(-half, half).round(3).tolist()
         round_one, radii = rng.random() < ROUND, [_radius(rng) for _ in range(2)]
@@ -69,8 +69,8 @@ def training_presses(sensor: Sensor, count: int, seed: int = 0) -> list[PressReq
         deepest = float(rng.uniform(SHALLOWEST, SHARP_DEEPEST if sharp else DEEPEST))
         depths = tuple((deepest * np.linspace(0, 1, STATES) ** 2).round(6).tolist())
         yaw = 0.0 if round_one else float(rng.uniform(0.0, 180.0).__round__(1))
-        found.append(PressRequest(_shape(round_one, radii), x, y, yaw, depths))
-    return found
+        requests.append(PressRequest(_shape(round_one, radii), x, y, yaw, depths))
+    return requests
 
 
 def _radius(rng: np.random.Generator) -> float:

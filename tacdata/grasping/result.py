@@ -42,13 +42,13 @@ def result(
         network: Its identity.
         progress: Called with the number of trials done and in total.
     """
-    touch, own = OrangeTouch(presses, sensor), configured(setup)
-    found = trials(own, touch, maps, progress)
-    others = []
+    touch, base = OrangeTouch(presses, sensor), configured(setup)
+    outcomes = trials(base, touch, maps, progress)
+    variants = []
     for margin in OTHER_MARGINS:
-        other = configured(setup, margin)
-        again = [replace(trial, held=lifted(trial, other.grip)) for trial in found]
-        others.append({"margin": margin, **_lifting(other.grip), "rates": rates(again)})
+        variant = configured(setup, margin)
+        again = [replace(trial, held=lifted(trial, variant.grip)) for trial in outcomes]
+        variants.append({"margin": margin, **_lifting(variant.grip), "rates": rates(again)})
     parents = {
         "sensor": sensor.content_hash,
         "checkpoint": str(network["hash"]),
@@ -58,13 +58,13 @@ def result(
         "version": schemas.version("grasp_study"),
         "sensor": sensor.name,
         "network": network,
-        "setup": own.document,
-        "lifting": {"margin": MARGIN, **_lifting(own.grip)},
-        "rates": rates(found),
+        "setup": base.document,
+        "lifting": {"margin": MARGIN, **_lifting(base.grip)},
+        "rates": rates(outcomes),
         "published": PUBLISHED,
-        "other_lifting": others,
+        "other_lifting": variants,
         "bias": bias(touch, presses, maps, setup.protocol.force, setup.protocol.band),
-        "trials": [trial.document for trial in found],
+        "trials": [trial.document for trial in outcomes],
         "provenance": provenance.stamp("tacdata grasp-study", parents, {"repeats": setup.repeats, "seed": setup.seed}),
     }
 
@@ -73,47 +73,47 @@ def _lifting(grip: Grip) -> dict[str, float]:
     """Return the squeeze of a lifting configuration [mm], and the offset up to which it holds the undisturbed orange
     [mm].
     """
-    held = 0.0
+    limit = 0.0
     for offset in np.arange(0.0, 8.0, FINENESS).tolist():
         if not lift(grip, offset / 1000).held:
             break
-        held = offset
-    return {"squeeze": 1000 * grip.squeeze, "holds_to": held}
+        limit = offset
+    return {"squeeze": 1000 * grip.squeeze, "holds_to": limit}
 
 
-def lines(found: dict[str, Any]) -> list[str]:
+def lines(study: dict[str, Any]) -> list[str]:
     """Return a study's result as lines of text, with the paper's figures."""
     sentences = [
         f"{'':<13} {'held':>7}  {'Wilson 95 %':<14} {'paper':>6} | at the edge                   | moves where held"
     ]
-    for name, strategy_rates in found["rates"].items():
+    for name, strategy_rates in study["rates"].items():
         row = f"{name:<13}"
         for part in ("overall", "edge"):
             share, (low, high) = strategy_rates[part], strategy_rates[part]["wilson_95"]
-            held, of = found["published"][part].get(name, (0, 0))
-            paper = f"{held / of:.1%}" if of else "-"
+            successes, of = study["published"][part].get(name, (0, 0))
+            paper = f"{successes / of:.1%}" if of else "-"
             row += f" {share['held']:>3}/{share['of']:<3}  {f'{low:.0%} to {high:.0%}':<14} {paper:>6} |"
         sentences.append(
             row + f" {_moves(strategy_rates['adjustments'])}, edge {_moves(strategy_rates['edge_adjustments'])}"
         )
-    return [*sentences, *_gap_lines(found), *_bias_lines(found), *_lifting_lines(found)]
+    return [*sentences, *_gap_lines(study), *_bias_lines(study), *_lifting_lines(study)]
 
 
-def _gap_lines(found: dict[str, Any]) -> list[str]:
+def _gap_lines(study: dict[str, Any]) -> list[str]:
     """Return whether dense depth is worth more than raw taxels, as in the paper, by trials of the same oranges."""
-    held = {
-        name: {(t["position"], t["repeat"]): t["held"] for t in found["trials"] if t["strategy"] == name}
+    outcomes = {
+        name: {(t["position"], t["repeat"]): t["held"] for t in study["trials"] if t["strategy"] == name}
         for name in GAP
     }
-    raw, dense = (held[name] for name in GAP)
+    raw, dense = (outcomes[name] for name in GAP)
     if set(raw) != set(dense) or not raw:
         return []
     sentences = []
-    for where, places in (("overall", None), ("edge", found["setup"]["edge"])):
-        chosen = [key for key in raw if places is None or key[0] in places]
-        difference = paired([dense[key] for key in chosen], [raw[key] for key in chosen])
+    for where, places in (("overall", None), ("edge", study["setup"]["edge"])):
+        keys = [key for key in raw if places is None or key[0] in places]
+        difference = paired([dense[key] for key in keys], [raw[key] for key in keys])
         low, high = difference.interval
-        (raw_held, of), (dense_held, of_dense) = (found["published"][where][name] for name in GAP)
+        (raw_held, of), (dense_held, of_dense) = (study["published"][where][name] for name in GAP)
         paper = dense_held / of_dense - raw_held / of
         verdict = "reproduced" if low > 0 and low <= paper <= high else "not reproduced"
         sentences.append(
@@ -126,12 +126,12 @@ def _moves(moves: dict[str, Any]) -> str:
     return "none held" if moves["mean"] is None else f"{moves['mean']:.2f} +- {moves['sd']:.2f}"
 
 
-def _bias_lines(found: dict[str, Any]) -> list[str]:
-    measured, band = found["bias"], found["setup"]["protocol"]["band"]
+def _bias_lines(study: dict[str, Any]) -> list[str]:
+    measured, band = study["bias"], study["setup"]["protocol"]["band"]
     sentences = []
-    known = {"raw_taxel": "taxels", "dense_depth": "network's map", "solved_map": "solved map"}
+    labels = {"raw_taxel": "taxels", "dense_depth": "network's map", "solved_map": "solved map"}
     for name, inside in measured["toward_interior"].items():
-        words = known.get(name, name)
+        words = labels.get(name, name)
         deviation = ", ".join(
             f"{at} mm: {'none' if value is None else f'{value:+.2f}'}" for at, value in inside.items()
         )
@@ -142,13 +142,13 @@ def _bias_lines(found: dict[str, Any]) -> list[str]:
     return sentences
 
 
-def _lifting_lines(found: dict[str, Any]) -> list[str]:
-    lifting = found["lifting"]
+def _lifting_lines(study: dict[str, Any]) -> list[str]:
+    lifting = study["lifting"]
     sentences = [
         f"the lift (fingertips {lifting['squeeze']:.2f} mm closer than touching) holds to {lifting['holds_to']:g} mm"
     ]
-    for other in found["other_lifting"]:
-        shares = {name: lifting["overall"] for name, lifting in other["rates"].items()}
-        held = ", ".join(f"{name} {share['held']}/{share['of']}" for name, share in shares.items())
-        sentences.append(f"  one that holds to {other['holds_to']:g} mm: {held}")
+    for variant in study["other_lifting"]:
+        shares = {name: lifting["overall"] for name, lifting in variant["rates"].items()}
+        figures = ", ".join(f"{name} {share['held']}/{share['of']}" for name, share in shares.items())
+        sentences.append(f"  one that holds to {variant['holds_to']:g} mm: {figures}")
     return sentences

@@ -35,8 +35,8 @@ PUBLISHED = {
 
 def strategy_names() -> list[str]:
     """Return all strategies, those of the paper first, in its order."""
-    known, published = strategies.names(), list(PUBLISHED["overall"])
-    return [*(name for name in published if name in known), *(name for name in known if name not in published)]
+    available, published = strategies.names(), list(PUBLISHED["overall"])
+    return [*(name for name in published if name in available), *(name for name in available if name not in published)]
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def trials(
         maps: The trained network.
         progress: Called with the number of trials done and in total.
     """
-    found: list[GraspTrial] = []
+    outcomes: list[GraspTrial] = []
     names = strategy_names()
     total = len(names) * len(PLACES) * setup.repeats
     for name in names:
@@ -132,17 +132,17 @@ def trials(
                 ]
                 way = approach(fingers, place + aside, up, strategy, setup.protocol, touch.sensor.taxels.rate, world)
                 trial = GraspTrial(name, position, repeat, friction, mass, up, way, False)
-                found.append(replace(trial, held=lifted(trial, setup.grip)))
-                progress(len(found), total)
-    return found
+                outcomes.append(replace(trial, held=lifted(trial, setup.grip)))
+                progress(len(outcomes), total)
+    return outcomes
 
 
 def lifted(trial: GraspTrial, grip: Grip) -> bool:
     """Return whether a lifting configuration holds the orange of a trial."""
     if trial.approach.stopped:
         return False
-    own = replace(grip, friction=trial.friction, mass=trial.mass)
-    return lift(own, trial.approach.lateral / 1000, trial.vertical / 1000).held
+    configuration = replace(grip, friction=trial.friction, mass=trial.mass)
+    return lift(configuration, trial.approach.lateral / 1000, trial.vertical / 1000).held
 
 
 def configured(setup: Setup, margin: float = MARGIN) -> Setup:
@@ -150,33 +150,33 @@ def configured(setup: Setup, margin: float = MARGIN) -> Setup:
     return replace(setup, grip=lifting_grip(setup.grip, (setup.protocol.band + margin) / 1000))
 
 
-def rates(found: list[GraspTrial]) -> dict[str, Any]:
+def rates(outcomes: list[GraspTrial]) -> dict[str, Any]:
     """Return success and adjustments of every strategy: overall, at the edge and at each position."""
-    return {name: _rates([t for t in found if t.strategy == name]) for name in strategy_names()}
+    return {name: _rates([t for t in outcomes if t.strategy == name]) for name in strategy_names()}
 
 
-def _rates(found: list[GraspTrial]) -> dict[str, Any]:
-    edge = [t for t in found if t.position in EDGE]
-    positions = sorted({t.position for t in found})
+def _rates(outcomes: list[GraspTrial]) -> dict[str, Any]:
+    edge = [t for t in outcomes if t.position in EDGE]
+    positions = sorted({t.position for t in outcomes})
     return {
-        "overall": _share(found),
+        "overall": _share(outcomes),
         "edge": _share(edge),
-        "by_position": {str(p): _share([t for t in found if t.position == p]) for p in positions},
-        "adjustments": _moves(found),
+        "by_position": {str(p): _share([t for t in outcomes if t.position == p]) for p in positions},
+        "adjustments": _moves(outcomes),
         "edge_adjustments": _moves(edge),
-        "safety_stops": sum("safety" in t.approach.stopped for t in found),
+        "safety_stops": sum("safety" in t.approach.stopped for t in outcomes),
     }
 
 
-def _share(found: list[GraspTrial]) -> dict[str, Any]:
-    held = sum(t.held for t in found)
-    interval = binomtest(held, len(found)).proportion_ci(method="wilson")
-    return {"held": held, "of": len(found), "wilson_95": list(interval)}
+def _share(outcomes: list[GraspTrial]) -> dict[str, Any]:
+    successes = sum(t.held for t in outcomes)
+    interval = binomtest(successes, len(outcomes)).proportion_ci(method="wilson")
+    return {"held": successes, "of": len(outcomes), "wilson_95": list(interval)}
 
 
-def _moves(found: list[GraspTrial]) -> dict[str, Any]:
+def _moves(outcomes: list[GraspTrial]) -> dict[str, Any]:
     """Return mean and standard deviation of the adjustments where the orange was held, as in the paper."""
-    moves = [t.approach.adjustments for t in found if t.held]
+    moves = [t.approach.adjustments for t in outcomes if t.held]
     if not moves:
         return {"mean": None, "sd": None}
     return {"mean": float(np.mean(moves)), "sd": float(np.std(moves, ddof=1)) if len(moves) > 1 else 0.0}

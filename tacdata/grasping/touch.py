@@ -43,8 +43,8 @@ class OrangeTouch:
         """
         depth = self.depth(x, y, force)
         levels = self._signals((abs(x), abs(y)))
-        there = np.array([np.interp(depth, self._depths, levels[:, k]) for k in range(levels.shape[1])])
-        return mirrored(there, self.sensor, x < 0, y < 0)
+        readings = np.array([np.interp(depth, self._depths, levels[:, k]) for k in range(levels.shape[1])])
+        return mirrored(readings, self.sensor, x < 0, y < 0)
 
 
 def mirrored(values: np.ndarray, sensor: Sensor, over_x: bool, over_y: bool) -> np.ndarray:

@@ -49,8 +49,8 @@ class Approach:
 
 def fused(fingers: Sequence[Fingertip], centres: Sequence[np.ndarray | None]) -> float | None:
     """Return the lateral offset in the gripper's frame [mm], averaged over the fingertips with an estimate."""
-    known = [finger.side * float(c[0]) for finger, c in zip(fingers, centres, strict=True) if c is not None]
-    return float(np.mean(known)) if known else None
+    offsets = [finger.side * float(c[0]) for finger, c in zip(fingers, centres, strict=True) if c is not None]
+    return float(np.mean(offsets)) if offsets else None
 
 
 def approach(

@@ -86,8 +86,8 @@ def _wiring(history: History, faults: Wiring) -> list[Advice]:
     elif faults.dead:
         why = f"{named(faults.dead)} {'do' if len(faults.dead) > 1 else 'does'} not answer to presses close by"
         number = len(history.visits) - 2
-        before = history.wiring_at(number).dead if number >= 0 else ()
-        if old := sorted(set(before) & set(faults.dead)):
+        previous = history.wiring_at(number).dead if number >= 0 else ()
+        if old := sorted(set(previous) & set(faults.dead)):
             again = "the same" if len(old) == len(faults.dead) else named(old)
             why += f", {again} as at {history.visits[number].name}: if the wires are sound, replace the unit"
         advices.append(Advice(WIRING, faults.dead, why))

@@ -72,43 +72,45 @@ class VisitComparison:
     changes: tuple[Change, ...]
 
 
-def matched(now: Visit, before: Visit) -> list[tuple[int, int]]:
+def matched(later: Visit, earlier: Visit) -> list[tuple[int, int]]:
     """Return the presses that both visits hold: same indenter, place, depth and speed, the nth time with the nth."""
     places: dict[Any, list[int]] = defaultdict(list)
-    for k, press in enumerate(before.responses):
+    for k, press in enumerate(earlier.responses):
         places[press.key].append(k)
     pairs = []
-    for k, press in enumerate(now.responses):
+    for k, press in enumerate(later.responses):
         if places[press.key]:
             pairs.append((k, places[press.key].pop(0)))
     return pairs
 
 
 def compare(
-    now: Visit, before: Visit, against: int, network: tuple[NetworkError, NetworkError] | None = None
+    later: Visit, earlier: Visit, against: int, network: tuple[NetworkError, NetworkError] | None = None
 ) -> VisitComparison:
     """Compare a visit with an earlier one.
 
     Args:
-        now: The visit.
-        before: The earlier one.
+        later: The visit.
+        earlier: The earlier one.
         against: Its number.
         network: Errors of one network at both.
     """
-    pairs = matched(now, before)
+    pairs = matched(later, earlier)
     # Different presses with labels can be compared, too: both gains are relative to the model.
     enough = len(pairs) >= FEWEST
-    measured = [now.responses[a] for a, _ in pairs]
-    reference = [before.responses[b] for _, b in pairs]
-    faults = wiring([now.entries[a] for a, _ in pairs], measured, reference) if enough else wiring_alone(now)
-    order = _order(faults, len(now.noise))
-    gains = _gains(measured, reference, now, before, faults, order) if enough else _by_labels(now, before, faults)
-    changes = [*_gain_changes(gains), *_channel_changes(now, before, faults, order)]
+    measured = [later.responses[a] for a, _ in pairs]
+    reference = [earlier.responses[b] for _, b in pairs]
+    faults = wiring([later.entries[a] for a, _ in pairs], measured, reference) if enough else wiring_alone(later)
+    order = _order(faults, len(later.noise))
+    gains = _gains(measured, reference, later, earlier, faults, order) if enough else _by_labels(later, earlier, faults)
+    changes = [*_gain_changes(gains), *_channel_changes(later, earlier, faults, order)]
     if enough:
         loops = np.array([a.loop - b.loop for a, b in zip(measured, reference, strict=True)])
         changes.append(_change("loop", None, mean(loops), "1", LOOP))
     if network and (
-        grown := growth(*network, [(now.responses[a].press.index, before.responses[b].press.index) for a, b in pairs])
+        grown := growth(
+            *network, [(later.responses[a].press.index, earlier.responses[b].press.index) for a, b in pairs]
+        )
     ):
         change = _change("network error", None, grown, "1", float(np.log1p(NETWORK)))
         value, low, high = (float(np.expm1(v)) for v in (change.value, change.low, change.high))
@@ -148,24 +150,32 @@ def _order(faults: Wiring, count: int) -> np.ndarray:
 def _gains(
     measured: Sequence[PressResponse],
     reference: Sequence[PressResponse],
-    now: Visit,
-    before: Visit,
+    later: Visit,
+    earlier: Visit,
     faults: Wiring,
     order: np.ndarray,
 ) -> GainFit | None:
-    noise = np.array([max(now.noise[order[k]].value, spread.value) for k, spread in before.noise.items()])
+    noise = np.array([max(later.noise[order[k]].value, spread.value) for k, spread in earlier.noise.items()])
     sorted_back = [replace(p, levels=p.levels[:, order], slope=p.slope[:, order]) for p in measured]
-    return fit_gains(reference, sorted_back, noise, now.sensor, faults.unfit)
+    return fit_gains(reference, sorted_back, noise, later.sensor, faults.unfit)
 
 
-def _by_labels(now: Visit, before: Visit, faults: Wiring) -> GainFit | None:
+def _by_labels(later: Visit, earlier: Visit, faults: Wiring) -> GainFit | None:
     """Return the ratio of both visits' gains relative to the model; None unless both are labelled."""
-    after, ahead = model_gains(now, faults), model_gains(before, wiring_alone(before))
-    if after is None or ahead is None:
+    later_gains, earlier_gains = model_gains(later, faults), model_gains(earlier, wiring_alone(earlier))
+    if later_gains is None or earlier_gains is None:
         return None
-    ratio = {k: _ratio(e, ahead.channels[k]) for k, e in after.channels.items() if k in ahead.channels}
-    ratios = {k: _ratio(e, ahead.own[k]) for k, e in after.own.items() if k in ahead.own}
-    return GainFit(ratio, _ratio(after.common, ahead.common), ratios, {}, min(after.presses, ahead.presses))
+    ratio = {
+        k: _ratio(e, earlier_gains.channels[k]) for k, e in later_gains.channels.items() if k in earlier_gains.channels
+    }
+    ratios = {k: _ratio(e, earlier_gains.own[k]) for k, e in later_gains.own.items() if k in earlier_gains.own}
+    return GainFit(
+        ratio,
+        _ratio(later_gains.common, earlier_gains.common),
+        ratios,
+        {},
+        min(later_gains.presses, earlier_gains.presses),
+    )
 
 
 def model_gains(visit: Visit, faults: Wiring) -> GainFit | None:
@@ -197,35 +207,39 @@ def _less_one(gain: UncertainValue) -> UncertainValue:
     return replace(gain, value=gain.value - 1.0)
 
 
-def _channel_changes(now: Visit, before: Visit, faults: Wiring, order: np.ndarray) -> list[Change]:
+def _channel_changes(later: Visit, earlier: Visit, faults: Wiring, order: np.ndarray) -> list[Change]:
     """Return the changes of noise, zero and drift of each channel, and of the repeatability of a press."""
-    strongest = np.max([np.abs(press.hold) for press in before.responses], axis=0)
-    zero, noise, drift, ahead, noisy = now.zero, now.noise, now.drift, before.zero, before.noise
+    strongest = np.max([np.abs(press.hold) for press in earlier.responses], axis=0)
+    zero, noise, drift, earlier_zero, noisy = later.zero, later.noise, later.drift, earlier.zero, earlier.noise
     changes = []
     for taxel, channel in enumerate(order.tolist()):
         if channel in faults.unfit or not strongest[taxel] > 0:
             continue
         shift = UncertainValue(
-            zero[channel].value - ahead[taxel].value,
-            float(np.hypot(zero[channel].error, ahead[taxel].error)),
-            min(zero[channel].freedom, ahead[taxel].freedom),
+            zero[channel].value - earlier_zero[taxel].value,
+            float(np.hypot(zero[channel].error, earlier_zero[taxel].error)),
+            min(zero[channel].freedom, earlier_zero[taxel].freedom),
         )
-        changes.append(_change("zero", channel, shift, now.unit, ZERO * float(strongest[taxel])))
-        changes.append(_change("drift", channel, drift[channel], f"{now.unit}/min", DRIFT * float(strongest[taxel])))
+        changes.append(_change("zero", channel, shift, later.unit, ZERO * float(strongest[taxel])))
+        changes.append(_change("drift", channel, drift[channel], f"{later.unit}/min", DRIFT * float(strongest[taxel])))
         changes.append(_louder(channel, noise[channel], noisy[taxel]))
-    if repeated := now.repeatability:
+    if repeated := later.repeatability:
         low, high = repeated.interval
         p = repeated.p_above(REPEATABLE)
         changes.append(Change("repeatability", None, repeated.value, low, high, "1", REPEATABLE, p))
     return changes
 
 
-def _louder(channel: int, now: Spread, before: Spread) -> Change:
+def _louder(channel: int, later: Spread, earlier: Spread) -> Change:
     """Return the ratio of two noises, with the bounds of F."""
-    ratio = now.value / max(before.value, 1e-9)
-    (low, high), (least, most) = now.interval, before.interval
-    half = np.hypot(np.log(high / low), np.log(most / least)) / 2 if before.value > 0 and now.value > 0 else 0.0
-    p = now.p_louder(before, NOISE)
+    ratio = later.value / max(earlier.value, 1e-9)
+    (low, high), (earlier_low, earlier_high) = later.interval, earlier.interval
+    half = (
+        np.hypot(np.log(high / low), np.log(earlier_high / earlier_low)) / 2
+        if earlier.value > 0 and later.value > 0
+        else 0.0
+    )
+    p = later.p_louder(earlier, NOISE)
     return Change("noise", channel, ratio, ratio * float(np.exp(-half)), ratio * float(np.exp(half)), "1", NOISE, p)
 
 

@@ -108,11 +108,11 @@ def not_assessed(history: History) -> list[str]:
     last, lines = history.last, []
     if len(history.visits) > 1:
         fit = history.comparisons[-1][0].gains
-        before = history.visits[history.comparisons[-1][0].against]
+        prior = history.visits[history.comparisons[-1][0].against]
         if fit is None:
             pairs = len(history.comparisons[-1][0].pairs)
             lines.append(
-                f"gains: {last.name} and {before.name} share {pairs} presses of one indenter, place, depth and speed, "
+                f"gains: {last.name} and {prior.name} share {pairs} presses of one indenter, place, depth and speed, "
                 "at three sites or more they are needed; record the same plan, or label both"
             )
         else:

@@ -53,10 +53,10 @@ class Spread:
         """Return the p-value of "it is at most the limit" (chi-squared)."""
         return float(stats.chi2.sf(self.freedom * (self.value / limit) ** 2, self.freedom))
 
-    def p_louder(self, before: Spread, factor: float) -> float:
+    def p_louder(self, earlier: Spread, factor: float) -> float:
         """Return the p-value of "its ratio to the value before is at most the tolerance" (F test)."""
-        ratio = (self.value / max(before.value * factor, 1e-12)) ** 2
-        return float(stats.f.sf(ratio, self.freedom, before.freedom))
+        ratio = (self.value / max(earlier.value * factor, 1e-12)) ** 2
+        return float(stats.f.sf(ratio, self.freedom, earlier.freedom))
 
 
 def mean(values: np.ndarray) -> UncertainValue:

@@ -37,11 +37,11 @@ class FallOff:
             Factor of each answer [1], shape (levels, taxels); its derivatives over itself [1/mm], shape (levels,
             taxels, 2).
         """
-        powers, now = np.arange(1, DEGREE + 1), away - shift
-        before, after = ((np.square(a).sum(axis=1) / self.unit)[:, None] for a in (away, now))
-        grown = (after**powers - before**powers) @ self.terms.T
-        steep = -2 / self.unit * (after ** (powers - 1)) @ (powers * self.terms).T
-        return np.exp(np.clip(grown, -STEEPEST, STEEPEST)).T, steep.T[:, :, None] * now
+        powers, relative = np.arange(1, DEGREE + 1), away - shift
+        initial, final = ((np.square(a).sum(axis=1) / self.unit)[:, None] for a in (away, relative))
+        grown = (final**powers - initial**powers) @ self.terms.T
+        steep = -2 / self.unit * (final ** (powers - 1)) @ (powers * self.terms).T
+        return np.exp(np.clip(grown, -STEEPEST, STEEPEST)).T, steep.T[:, :, None] * relative
 
 
 def fall_off(presses: Sequence[PressResponse], near: Sequence[Sequence[int]], centers: np.ndarray) -> FallOff:
@@ -54,14 +54,16 @@ def fall_off(presses: Sequence[PressResponse], near: Sequence[Sequence[int]], ce
     """
     powers, taxels = np.arange(1, DEGREE + 1), len(centers)
     squared = [np.square(centers - (p.press.x, p.press.y)).sum(axis=1) for p in presses]
-    unit = max(float(np.mean(np.concatenate([s[list(found)] for s, found in zip(squared, near, strict=True)]))), 1e-9)
-    held = np.hstack([np.zeros((taxels, DEGREE + len(presses))), HELD * np.eye(taxels)])
+    unit = max(
+        float(np.mean(np.concatenate([s[list(channels)] for s, channels in zip(squared, near, strict=True)]))), 1e-9
+    )
+    prior = np.hstack([np.zeros((taxels, DEGREE + len(presses))), HELD * np.eye(taxels)])
     terms = []
     for level in range(len(LEVELS) + 1):
-        rows, heights = [held], [0.0] * taxels
-        for k, (press, found, distances) in enumerate(zip(presses, near, squared, strict=True)):
-            use = [c for c in found if press.levels[level, c] * press.hold[c] > 0]
-            row = np.zeros((len(use), held.shape[1]))
+        rows, heights = [prior], [0.0] * taxels
+        for k, (press, channels, distances) in enumerate(zip(presses, near, squared, strict=True)):
+            use = [c for c in channels if press.levels[level, c] * press.hold[c] > 0]
+            row = np.zeros((len(use), prior.shape[1]))
             row[:, :DEGREE] = (distances[use, None] / unit) ** powers
             row[:, DEGREE + k] = 1.0
             row[np.arange(len(use)), DEGREE + len(presses) + np.array(use, int)] = 1.0

@@ -92,10 +92,10 @@ def fit_gains(
     sites: dict[Any, list[int]] = {}
     for k, press in enumerate(reference):
         sites.setdefault(press.key[:4], []).append(k)
-    before = [_averaged([reference[k] for k in rows]) for rows in sites.values()]
-    after = [_averaged([measured[k] for k in rows]) for rows in sites.values()]
-    near = [[k for k in pressed(press, noise) if k not in left_out] for press in before]
-    pairs = [_Pair(*pair) for pair in zip(before, after, near, strict=True) if pair[2]]
+    reference_sites = [_averaged([reference[k] for k in rows]) for rows in sites.values()]
+    measured_sites = [_averaged([measured[k] for k in rows]) for rows in sites.values()]
+    near = [[k for k in pressed(press, noise) if k not in left_out] for press in reference_sites]
+    pairs = [_Pair(*pair) for pair in zip(reference_sites, measured_sites, near, strict=True) if pair[2]]
     channels = sorted({k for pair in pairs for k in pair.channels})
     if len(pairs) < FEWEST:
         return None
@@ -141,29 +141,29 @@ def _rows(
     pair: _Pair, channels: list[int], value: np.ndarray, fall: FallOff, noise: np.ndarray, visits: float, sensor: Sensor
 ) -> SiteRows:
     """Return the observations of a site, linear about gains and shift as they are known."""
-    found, count, levels = pair.channels, len(pair.channels), len(pair.before.spread)
-    place, shift = [channels.index(k) for k in found], value[-2:]
+    members, count, levels = pair.channels, len(pair.channels), len(pair.before.spread)
+    place, shift = [channels.index(k) for k in members], value[-2:]
     gain = np.maximum(value[place], WEAKEST * float(np.median(value[: len(channels)])))[:, None]
     away = sensor.taxels.centers - (pair.before.press.x, pair.before.press.y)
-    factor, sides = (np.moveaxis(part[:, found], 0, 1) for part in fall.shifted(away, shift))
-    predicted = factor * pair.before.levels[:, found].T  # (channels, levels)
+    factor, sides = (np.moveaxis(part[:, members], 0, 1) for part in fall.shifted(away, shift))
+    predicted = factor * pair.before.levels[:, members].T  # (channels, levels)
     # The mean of both slopes is right to second order in the shift of depth.
-    slope = 0.5 * (gain * factor * pair.before.slope[:, found].T + pair.after.slope[:, found].T)
+    slope = 0.5 * (gain * factor * pair.before.slope[:, members].T + pair.after.slope[:, members].T)
     design = np.zeros((count, levels, len(value)))
     design[np.arange(count), :, place] = predicted
     design[:, :, -3] = slope
     design[:, :, -2:] = (gain * predicted)[:, :, None] * sides
-    answer = pair.after.levels[:, found].T + design[:, :, -2:] @ shift
+    answer = pair.after.levels[:, members].T + design[:, :, -2:] @ shift
     felt, faint = gain * predicted, FAINT * gain * np.abs(pair.before.hold).max() * np.ones_like(predicted)
     timing = TIMING * pair.before.press.speed * slope
     timing[:, -1] = 0.0  # a hold does not depend on when it began
     reading = visits * (np.diag(pair.after.spread) + pair.after.spread[-1])  # the reading at rest is shared
-    known = np.kron(np.diag(np.maximum(noise[found], 1.0) ** 2), reading) + visits * np.outer(timing, timing)
-    known += np.diag((LEVEL * (np.abs(felt) + faint) + STEEPER * np.abs(slope * value[-3])).ravel() ** 2)
-    known += _each(MISFIT * design[:, :, -2:] @ shift)
+    covariance = np.kron(np.diag(np.maximum(noise[members], 1.0) ** 2), reading) + visits * np.outer(timing, timing)
+    covariance += np.diag((LEVEL * (np.abs(felt) + faint) + STEEPER * np.abs(slope * value[-3])).ravel() ** 2)
+    covariance += _each(MISFIT * design[:, :, -2:] @ shift)
     # A relative error is like another gain, at all levels; else the levels of one press would tell gains.
     loading = _each(felt) + _each(faint)
-    return SiteRows(design.reshape(count * levels, -1), answer.ravel(), known, loading, np.outer(felt, felt))
+    return SiteRows(design.reshape(count * levels, -1), answer.ravel(), covariance, loading, np.outer(felt, felt))
 
 
 def _each(size: np.ndarray) -> np.ndarray:
@@ -172,7 +172,7 @@ def _each(size: np.ndarray) -> np.ndarray:
     Args:
         size: Effect of the error on the answer [counts], shape (channels, levels).
     """
-    return np.asarray(block_diag(*(np.outer(one, one) for one in size)))
+    return np.asarray(block_diag(*(np.outer(errors, errors) for errors in size)))
 
 
 def _fit(value: np.ndarray, covariance: np.ndarray, channels: list[int], sites: int, freedom: float) -> GainFit:
@@ -180,10 +180,10 @@ def _fit(value: np.ndarray, covariance: np.ndarray, channels: list[int], sites: 
     gain, error = value[:count], np.sqrt(np.maximum(np.diag(covariance), 0.0))
     middle = float(np.median(gain))
     # The errors of gains are correlated: they share the shift and the sites.
-    mean, apart = np.full(count, 1 / count), np.eye(count) - 1 / count
+    mean, centring = np.full(count, 1 / count), np.eye(count) - 1 / count
     remains = middle * np.hypot(REMAINS, DEEPER * value[count])
     shared = float(np.hypot(np.sqrt(max(mean @ covariance[:count, :count] @ mean, 0.0)), remains))
-    errors = np.sqrt(np.maximum(np.diag(apart @ covariance[:count, :count] @ apart.T), 0.0))
+    errors = np.sqrt(np.maximum(np.diag(centring @ covariance[:count, :count] @ centring.T), 0.0))
     pairs = list(enumerate(channels))
     return GainFit(
         {k: UncertainValue(float(gain[i]), float(error[i]), freedom) for i, k in pairs},

@@ -52,12 +52,12 @@ class History:
 
         A change against both the visit before and the first is listed once, against the visit before.
         """
-        found: dict[tuple[str, int | None], tuple[int, Change]] = {}
+        latest: dict[tuple[str, int | None], tuple[int, Change]] = {}
         for comparison in self.comparisons[-1]:
             for change in comparison.changes:
                 if change.changed:
-                    found.setdefault((change.quantity, change.channel), (comparison.against, change))
-        return tuple(found.values())
+                    latest.setdefault((change.quantity, change.channel), (comparison.against, change))
+        return tuple(latest.values())
 
 
 def history(visits: Sequence[Visit], network: Mapping[str, NetworkError] | None = None) -> History:
@@ -76,14 +76,14 @@ def history(visits: Sequence[Visit], network: Mapping[str, NetworkError] | None 
     }
     comparisons: list[tuple[VisitComparison, ...]] = [()]
     for number in range(1, len(ordered)):
-        found = []
+        group = []
         for against in dict.fromkeys((number - 1, 0)):
             pair = (errors[number], errors[against]) if number in errors and against in errors else None
-            found.append(compare(ordered[number], ordered[against], against, pair))
-        comparisons.append(corrected(found))
+            group.append(compare(ordered[number], ordered[against], against, pair))
+        comparisons.append(corrected(group))
     model = tuple(
-        model_gains(visit, found[-1].wiring if found else wiring_alone(visit)) if visit.predicted else None
-        for visit, found in zip(ordered, comparisons, strict=True)
+        model_gains(visit, group[-1].wiring if group else wiring_alone(visit)) if visit.predicted else None
+        for visit, group in zip(ordered, comparisons, strict=True)
     )
     return History(tuple(ordered), tuple(comparisons), model, errors)
 

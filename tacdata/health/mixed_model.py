@@ -50,9 +50,9 @@ def relative_errors(rows: Sequence[SiteRows], precision: np.ndarray) -> np.ndarr
     """Return the relative errors of a channel at a site, and of a site [1], shape (2,), by REML."""
 
     def loss(logs: np.ndarray) -> float:
-        information, score, rest = _sums(rows, precision, np.maximum(np.exp(logs), SMALLEST))
+        information, score, residual = _sums(rows, precision, np.maximum(np.exp(logs), SMALLEST))
         fitted = float(score @ np.linalg.pinv(information, hermitian=True) @ score)
-        return rest - fitted + float(np.linalg.slogdet(information + 1e-12 * np.eye(len(score)))[1])
+        return residual - fitted + float(np.linalg.slogdet(information + 1e-12 * np.eye(len(score)))[1])
 
     options = {"xatol": STEP, "fatol": STEP, "maxfev": MOST}
     optimum = minimize(loss, np.log(START), method="Nelder-Mead", options=options)

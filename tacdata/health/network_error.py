@@ -24,17 +24,17 @@ class NetworkError:
         return mean(np.array(list(self.presses.values()), float))
 
 
-def growth(now: NetworkError, before: NetworkError, pairs: list[tuple[int, int]]) -> UncertainValue | None:
+def growth(later: NetworkError, earlier: NetworkError, pairs: list[tuple[int, int]]) -> UncertainValue | None:
     """Return the logarithm of the ratio of both errors, paired by press; None with fewer than two pairs.
 
     Args:
-        now: At the later visit.
-        before: At the earlier one.
+        later: At the later visit.
+        earlier: At the earlier one.
         pairs: Numbers of the same press, now and before.
     """
     ratios = [
-        np.log(now.presses[a] / before.presses[b])
+        np.log(later.presses[a] / earlier.presses[b])
         for a, b in pairs
-        if now.presses.get(a, 0.0) > 0 and before.presses.get(b, 0.0) > 0
+        if later.presses.get(a, 0.0) > 0 and earlier.presses.get(b, 0.0) > 0
     ]
     return mean(np.array(ratios)) if len(ratios) > 1 else None

@@ -16,7 +16,7 @@ from tacdata.health.history import History
 GOOD, BAD, GREY = "#1f77b4", "#d62728", "0.75"
 
 
-def draw(history: History, out: Path | BinaryIO) -> None:
+def draw(history: History, target: Path | BinaryIO) -> None:
     """Write the picture as PNG; an older one is replaced."""
     import matplotlib
 
@@ -37,7 +37,7 @@ def draw(history: History, out: Path | BinaryIO) -> None:
     )
     _series(axes[1, 1], history, "zero", lambda k: _moved(history, k), f"zero less the first [{history.last.unit}]")
     _loop(axes[1, 2], history)
-    figure.savefig(out, dpi=100, format="png")
+    figure.savefig(target, dpi=100, format="png")
 
 
 def reference(history: History) -> tuple[str, list[GainFit | None]]:

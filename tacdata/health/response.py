@@ -82,8 +82,8 @@ def press_response(episode: Episode, counts: np.ndarray | None = None) -> PressR
     measured = episode.taxels.counts
     counts = measured if counts is None else counts
     phase, depth = episode.phase_at(episode.taxels.sample_ns), episode.tip_at(episode.taxels.sample_ns)[:, 2]
-    rest, held = phase == PHASES.index("rest"), phase == PHASES.index("hold")
-    above = np.nan_to_num(counts - (idle_reading(episode) if counts is measured else np.median(counts[rest], axis=0)))
+    idle, plateau = phase == PHASES.index("rest"), phase == PHASES.index("hold")
+    above = np.nan_to_num(counts - (idle_reading(episode) if counts is measured else np.median(counts[idle], axis=0)))
     share = depth / episode.press.deepest
     way = (phase == PHASES.index("press")) & (share > LOWEST)
     powers = np.arange(DEGREE + 1)
@@ -91,9 +91,9 @@ def press_response(episode: Episode, counts: np.ndarray | None = None) -> PressR
     fitted = inverse @ above[way]
     at = np.array(LEVELS)[:, None] ** powers
     rising = powers[1:] * np.array(LEVELS)[:, None] ** powers[:-1]
-    hold = np.median(above[held], axis=0)
+    hold = np.median(above[plateau], axis=0)
     levels, slope = at @ fitted, rising @ fitted[1:] / episode.press.deepest
-    spread = np.concatenate([((at @ inverse) ** 2).sum(axis=1), [np.pi / 2 / held.sum()]])
+    spread = np.concatenate([((at @ inverse) ** 2).sum(axis=1), [np.pi / 2 / plateau.sum()]])
     return PressResponse(
         episode.press,
         episode.path.name,

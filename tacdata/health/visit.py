@@ -84,9 +84,9 @@ class Visit:
     @property
     def zero(self) -> dict[int, UncertainValue]:
         """Reading of each channel at rest before the first press [counts]."""
-        rest = in_phase(self.entries[0].recording.episode, "rest")
-        parts = np.array([part.mean(axis=0) for part in np.array_split(rest, min(BATCHES, len(rest)))])
-        return {k: mean(parts[:, k]) for k in range(rest.shape[1])}
+        readings = in_phase(self.entries[0].recording.episode, "rest")
+        parts = np.array([part.mean(axis=0) for part in np.array_split(readings, min(BATCHES, len(readings)))])
+        return {k: mean(parts[:, k]) for k in range(readings.shape[1])}
 
     @property
     def drift(self) -> dict[int, UncertainValue]:
@@ -108,8 +108,8 @@ class Visit:
         groups: dict[Any, list[np.ndarray]] = defaultdict(list)
         for press in self.responses:
             groups[press.key].append(np.abs(press.hold))
-        held = [np.array(group) for group in groups.values() if len(group) > 1]
-        strong = [group[:, group.mean(axis=0) > STRONG * group.mean(axis=0).max()].sum(axis=1) for group in held]
+        repeats = [np.array(group) for group in groups.values() if len(group) > 1]
+        strong = [group[:, group.mean(axis=0) > STRONG * group.mean(axis=0).max()].sum(axis=1) for group in repeats]
         repeated = [np.log(group) for group in strong if len(group) and group.min() > 0]
         freedom = sum(len(group) - 1 for group in repeated)
         if not freedom:
@@ -118,11 +118,11 @@ class Visit:
 
 
 def _slope(time: np.ndarray, values: np.ndarray) -> UncertainValue:
-    known = np.isfinite(values)
-    if known.sum() < 3 or not np.ptp(time[known]):
+    valid = np.isfinite(values)
+    if valid.sum() < 3 or not np.ptp(time[valid]):
         return UncertainValue(float("nan"), float("nan"), 1.0)
-    fit: Any = stats.linregress(time[known], values[known])
-    return UncertainValue(float(fit.slope), float(fit.stderr), float(known.sum() - 2))
+    fit: Any = stats.linregress(time[valid], values[valid])
+    return UncertainValue(float(fit.slope), float(fit.stderr), float(valid.sum() - 2))
 
 
 def read_visit(folder: StrPath, done: Callable[[str], None] = lambda name: None) -> Visit:
@@ -171,7 +171,7 @@ def _predicted(
     present = file_names.present(file_names.folder(session.folder))
     if not present:
         return (), {}, ""
-    found, labels = [], {}
+    predictions, labels = [], {}
     for entry in entries:
         episode = entry.recording.episode
         path = present.get(episode.number)
@@ -184,6 +184,6 @@ def _predicted(
             return (), {}, f"its labels are not used: {error.given}"
         if label.taxel_counts is None:
             return (), {}, "its labels predict no readings: the sensor file describes no transduction"
-        found.append(press_response(episode, label.taxel_counts.astype(float)))
+        predictions.append(press_response(episode, label.taxel_counts.astype(float)))
         labels[path.name] = provenance.file_hash(path)
-    return tuple(found), labels, ""
+    return tuple(predictions), labels, ""

@@ -59,38 +59,38 @@ def wiring(
         measured: Answers of the channels to each.
         reference: Their earlier or predicted answers; None to compare with a round pattern alone.
     """
-    found = answers(entries)
-    if found is None:
+    sample = answers(entries)
+    if sample is None:
         return Wiring()
     stuck, undefined, saturated = (_lasting(entries, name) for name in ("stuck", "undefined", "saturated"))
     pairs = Counter((k, j) for entry in entries for k, j in entry.document["taxels"]["tied"])
     tied = tuple(sorted(pair for pair, n in pairs.items() if n >= MOST * len(entries)))
-    found = replace(found, response=np.nan_to_num(np.array([p.hold for p in measured])))
-    expected = fit_answers(found).pattern if reference is None else _scaled(reference, found)
-    silent = _silent(found, expected)
+    sample = replace(sample, response=np.nan_to_num(np.array([p.hold for p in measured])))
+    expected = fit_answers(sample).pattern if reference is None else _scaled(reference, sample)
+    silent = _silent(sample, expected)
     dead = tuple(sorted({*stuck, *silent} - set(undefined)))
-    moved = misplaced(found) if reference is None else exchanged(likelihood(found, expected))
-    swapped = tuple((k, j) for k, j in moved.items() if k not in dead and j not in dead)
+    swaps = misplaced(sample) if reference is None else exchanged(likelihood(sample, expected))
+    swapped = tuple((k, j) for k, j in swaps.items() if k not in dead and j not in dead)
     return Wiring(dead, swapped, tied, undefined, saturated)
 
 
 def _lasting(entries: list[RecordingFigures], name: str) -> tuple[int, ...]:
     """Return the channels that most recordings list under a name."""
-    seen = Counter(k for entry in entries for k in entry.document["taxels"][name])
-    return tuple(sorted(k for k, n in seen.items() if n >= MOST * len(entries)))
+    counts = Counter(k for entry in entries for k in entry.document["taxels"][name])
+    return tuple(sorted(k for k, n in counts.items() if n >= MOST * len(entries)))
 
 
-def _scaled(reference: Sequence[PressResponse], found: Answers) -> np.ndarray:
+def _scaled(reference: Sequence[PressResponse], sample: Answers) -> np.ndarray:
     """Return the reference's answers [counts], shape (presses, taxels), as strong as those found."""
     expected = np.array([press.hold for press in reference])
     strong = expected > 0.2 * expected.max(axis=1, keepdims=True)
-    ratio = found.response[strong] / expected[strong]
+    ratio = sample.response[strong] / expected[strong]
     alive = ratio[ratio > SHARE]
     return expected * (float(np.median(alive)) if len(alive) else 1.0)
 
 
-def _silent(found: Answers, expected: np.ndarray) -> list[int]:
+def _silent(sample: Answers, expected: np.ndarray) -> list[int]:
     """Return the channels that answer nowhere, although plain answers are expected; a swapped one answers elsewhere."""
-    due, answer = expected.max(axis=0), np.abs(found.response).max(axis=0)
-    silent = (due > EXPECTED * found.noise) & (answer < np.maximum(SILENT * found.noise, SHARE * due))
+    due, answer = expected.max(axis=0), np.abs(sample.response).max(axis=0)
+    silent = (due > EXPECTED * sample.noise) & (answer < np.maximum(SILENT * sample.noise, SHARE * due))
     return np.flatnonzero(silent).tolist()

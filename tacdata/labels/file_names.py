@@ -32,8 +32,8 @@ def failure(labels: Path, episode: int | Path) -> Path:
 
 def present(labels: Path, ending: str = LABEL) -> dict[int, Path]:
     """Return the files of an ending that lie there, by the number of their episode, in order."""
-    found = ((EPISODE.fullmatch(path.name), path) for path in labels.glob(f"episode-*{ending}"))
-    return dict(sorted((int(match[1]), path) for match, path in found if match and match[2] == ending))
+    matches = ((EPISODE.fullmatch(path.name), path) for path in labels.glob(f"episode-*{ending}"))
+    return dict(sorted((int(match[1]), path) for match, path in matches if match and match[2] == ending))
 
 
 def _stem(episode: int | Path) -> str:

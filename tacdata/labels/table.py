@@ -190,11 +190,11 @@ def _header(schema: pa.Schema, path: Path) -> dict[str, Any]:
 
 
 def _check_version(header: Any, path: Path) -> None:
-    found, known = str(dict(header).get("version", "")), schemas.version("label")
-    if found.split(".")[0] != known.split(".")[0]:
+    version, supported = str(dict(header).get("version", "")), schemas.version("label")
+    if version.split(".")[0] != supported.split(".")[0]:
         raise LabelVersionError(
-            f"{path}: label format version {found}",
-            f"version {known}",
+            f"{path}: label format version {version}",
+            f"version {supported}",
             "run `tacdata label --redo`: labels can always be made anew; or use the tacdata release that wrote it",
         )
 

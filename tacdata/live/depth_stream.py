@@ -106,12 +106,12 @@ class DepthStream:
         self._recent.clear()
         self._frames.clear()
 
-    def push(self, frame: TaxelFrame, wanted: bool = True) -> Estimate | None:
+    def push(self, frame: TaxelFrame, is_needed: bool = True) -> Estimate | None:
         """Take a frame; return the estimate that it completes, or None while taring and at the beginning.
 
         Args:
             frame: The next frame.
-            wanted: Whether the estimate is wanted; without it the frame only enters the window.
+            is_needed: Whether the estimate is wanted; without it the frame only enters the window.
         """
         counter = frame.device_ns if self._clock.axis == "device_ns" else frame.counter
         sample_ns = self._clock.take(frame.arrival_ns, counter)
@@ -130,7 +130,7 @@ class DepthStream:
         if target < 0:
             return None
         self._sequence += 1
-        if not wanted:
+        if not is_needed:
             return None
         # Frames before the first and behind the newest are replaced by those, as in training.
         rows = np.clip(target + np.array(self._offsets), 0, newest)
@@ -172,7 +172,7 @@ def _at_rest(counts: np.ndarray) -> tuple[np.ndarray, str]:
         return np.ones(counts.shape[1]), ""
     noise = np.median(np.abs(np.diff(counts, axis=0)), axis=0) + 1.0
     part = max(len(counts) // 4, 1)
-    moved = np.abs(counts[-part:].mean(axis=0) - counts[:part].mean(axis=0))
-    if (moved > STILL * noise).any():
-        return noise, f"taxel {int(np.argmax(moved / noise))} changed by {moved.max():.0f} counts while it was tared"
+    drift = np.abs(counts[-part:].mean(axis=0) - counts[:part].mean(axis=0))
+    if (drift > STILL * noise).any():
+        return noise, f"taxel {int(np.argmax(drift / noise))} changed by {drift.max():.0f} counts while it was tared"
     return noise, ""

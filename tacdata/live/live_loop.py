@@ -81,32 +81,38 @@ class LiveLoop:
             frames = self._source.board.read(PATIENCE)
             for frame in frames:
                 # When late, only the newest estimate helps a controller; the others would make it later still.
-                late = self._source.clock.now_ns() - frame.arrival_ns > LATE * 1e9 / self._source.rate
-                wanted = not late or frame is frames[-1]
-                self.skipped += not wanted and self._stream.baseline is not None
-                made = self._stream.push(frame, wanted)
-                if made is not None:
-                    self._hand_out(made)
+                is_late = self._source.clock.now_ns() - frame.arrival_ns > LATE * 1e9 / self._source.rate
+                is_needed = not is_late or frame is frames[-1]
+                self.skipped += not is_needed and self._stream.baseline is not None
+                estimate = self._stream.push(frame, is_needed)
+                if estimate is not None:
+                    self._hand_out(estimate)
                 is_time = time.monotonic() - sentences >= SAID_EVERY
-                if is_time and (words := self._words(made) if made else self._stream.waiting_for_rest):
+                if is_time and (words := self._words(estimate) if estimate else self._stream.waiting_for_rest):
                     sentences = time.monotonic()
-                    say(words if made else f"{self._source.name}: {words}; waiting until nothing moves the skin")
+                    say(words if estimate else f"{self._source.name}: {words}; waiting until nothing moves the skin")
 
-    def _hand_out(self, made: Estimate) -> None:
+    def _hand_out(self, estimate: Estimate) -> None:
         sent = self._source.clock.now_ns()
         if self._server:
-            self._server.send(message(made, self._about, sent, self._maps))
-        self.meter.take(made.sample_ns, made.arrival_ns, sent)
+            self._server.send(message(estimate, self._about, sent, self._maps))
+        self.meter.take(estimate.sample_ns, estimate.arrival_ns, sent)
         if self._watch:
-            self._watch(f"depth {self._source.name}", made.sample_ns, (made.depth, made.largest, made.centre))
+            self._watch(
+                f"depth {self._source.name}", estimate.sample_ns, (estimate.depth, estimate.largest, estimate.centre)
+            )
 
-    def _words(self, made: Estimate) -> str:
+    def _words(self, estimate: Estimate) -> str:
         figures = self.meter.figures
-        where = "no contact" if made.centre is None else f"centre {made.centre[0]:+.2f}, {made.centre[1]:+.2f} mm"
-        if made.novelty is not None and made.novelty > 1:
-            word = "a guess" if made.novelty > ALIEN else "may be off"
-            where += f" ({word}: {made.novelty:.1f} times as far from what was learnt as validation presses)"
-        if made.below_tare:
-            where += f"; readings lie {made.below_tare:.0f} counts below the tare: {TOUCHED}"
+        where = (
+            "no contact"
+            if estimate.centre is None
+            else f"centre {estimate.centre[0]:+.2f}, {estimate.centre[1]:+.2f} mm"
+        )
+        if estimate.novelty is not None and estimate.novelty > 1:
+            word = "a guess" if estimate.novelty > ALIEN else "may be off"
+            where += f" ({word}: {estimate.novelty:.1f} times as far from what was learnt as validation presses)"
+        if estimate.below_tare:
+            where += f"; readings lie {estimate.below_tare:.0f} counts below the tare: {TOUCHED}"
         pace = f"; {figures.rate:.1f} Hz, age {figures.age[0]:.0f} ms (95 %: {figures.age[1]:.0f})" if figures else ""
-        return f"{self._source.name}: depth {made.largest:.2f} mm, {where}{pace}"
+        return f"{self._source.name}: depth {estimate.largest:.2f} mm, {where}{pace}"

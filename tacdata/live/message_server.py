@@ -23,33 +23,33 @@ WAITING = 4
 """Messages that wait for a slow reader; beyond that the oldest are dropped [count]."""
 
 
-def message(made: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = True) -> dict[str, Any]:
+def message(estimate: Estimate, source: dict[str, Any], sent_ns: int, maps: bool = True) -> dict[str, Any]:
     """Return an estimate as a message.
 
     Args:
-        made: The estimate.
+        estimate: The estimate.
         source: Its source: ``finger``, ``network`` (hash), ``causal``, ``lookahead``.
         sent_ns: Now [ns].
         maps: Whether to include the whole map.
     """
     values: dict[str, Any] = {
         "version": schemas.version("live_message"),
-        "sequence": made.sequence,
+        "sequence": estimate.sequence,
         **source,
-        "sample_ns": made.sample_ns,
-        "arrival_ns": made.arrival_ns,
+        "sample_ns": estimate.sample_ns,
+        "arrival_ns": estimate.arrival_ns,
         "sent_ns": sent_ns,
-        "age_ms": round((sent_ns - made.sample_ns) * 1e-6, 3),
-        "depth": round(made.largest, 4),
-        "contact": made.centre is not None,
-        "centre": None if made.centre is None else [round(value, 4) for value in made.centre],
+        "age_ms": round((sent_ns - estimate.sample_ns) * 1e-6, 3),
+        "depth": round(estimate.largest, 4),
+        "contact": estimate.centre is not None,
+        "centre": None if estimate.centre is None else [round(value, 4) for value in estimate.centre],
     }
-    if made.novelty is not None:
-        values["novelty"] = round(made.novelty, 3)
-    if made.below_tare:
-        values["below_tare"] = round(made.below_tare, 1)
+    if estimate.novelty is not None:
+        values["novelty"] = round(estimate.novelty, 3)
+    if estimate.below_tare:
+        values["below_tare"] = round(estimate.below_tare, 1)
     if maps:
-        values["map"] = [[round(float(value), 4) for value in row] for row in made.depth]
+        values["map"] = [[round(float(value), 4) for value in row] for row in estimate.depth]
     return values
 
 

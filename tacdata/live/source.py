@@ -47,14 +47,14 @@ def touched_board(path: Path, finger: str | None, assumed: Sensor) -> Source:
         demo = read_demo_rig(path)
         name = finger or next(iter(demo.boards), "")
         if name not in demo.boards:
-            known = ", ".join(demo.boards) or "a demo rig with boards"
-            raise UsageError(f"no board for finger {name!r} in {path}", known, "name it with --finger")
+            fingers = ", ".join(demo.boards) or "a demo rig with boards"
+            raise UsageError(f"no board for finger {name!r} in {path}", fingers, "name it with --finger")
         entry, clock, sensor = demo.boards[name], demo.clock, demo.sensors[name]
     else:
         rig = read_rig(path)
         if finger is not None:
-            given = f"finger {finger} of rig {rig.name}"
-            raise UsageError(given, "a demo rig, which has fingers", "leave it out: a rig has one board")
+            fault = f"finger {finger} of rig {rig.name}"
+            raise UsageError(fault, "a demo rig, which has fingers", "leave it out: a rig has one board")
         name, entry, clock, sensor = assumed.name, rig.board, rig.clock, assumed
     board = create(entry, TaxelBoard, clock)
     return Source(name, board, clock, sensor, board.describe()["rate"]["nominal"] or sensor.taxels.rate)

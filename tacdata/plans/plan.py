@@ -172,7 +172,7 @@ class Plan:
             for name, values in document["indenters"].items()
         }
         # From here on, a shape from a file is identified by its content.
-        document = {**document, "indenters": {name: found.document for name, found in indenters.items()}}
+        document = {**document, "indenters": {name: indenter.document for name, indenter in indenters.items()}}
         motion = MotionSettings(**document["motion"])
         presses = []
         for index, entry in enumerate(document["presses"]):
@@ -191,8 +191,8 @@ class Plan:
                     "fly lower, or enlarge motion/clearance",
                 )
             presses.append(_press(index, entry, indenters[name], motion))
-        purpose, wanted = document.get("purpose", ""), document.get("on_bad_readings", "stop")
-        return cls(document["name"], motion, tuple(presses), purpose, wanted, document)
+        purpose, reaction = document.get("purpose", ""), document.get("on_bad_readings", "stop")
+        return cls(document["name"], motion, tuple(presses), purpose, reaction, document)
 
     def check_against(self, sensor: Sensor) -> None:
         """Refuse presses that would miss the skin or pierce it.

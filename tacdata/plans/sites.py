@@ -110,9 +110,9 @@ def _edge(sensor: Sensor, rng: np.random.Generator, count: int, beyond: float = 
     """Equally spaced along the array's box, widened by ``beyond`` [mm]."""
     a, b = half_box(sensor) + beyond
     corners = np.array([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    place = np.arange(count) / count * along[-1]
-    return np.stack([np.interp(place, along, corners[:, axis]) for axis in range(2)], axis=-1)
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    place = np.arange(count) / count * arc[-1]
+    return np.stack([np.interp(place, arc, corners[:, axis]) for axis in range(2)], axis=-1)
 
 
 KINDS: dict[str, Callable[..., Any]] = {

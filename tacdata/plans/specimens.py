@@ -28,10 +28,12 @@ def specimens(names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
     Raises:
         UsageError: If one is unknown, or none is named.
     """
-    known = [name for name, shape in STANDARD.items() if shape["shape"] in registry.names(ROOM, BASE)]
-    unknown = [name for name in names if name not in known]
+    available = [name for name, shape in STANDARD.items() if shape["shape"] in registry.names(ROOM, BASE)]
+    unknown = [name for name in names if name not in available]
     if unknown or not names:
         raise UsageError(
-            f"indenter {', '.join(unknown) or 'none'}", ", ".join(known), "choose among them, or write a plan by hand"
+            f"indenter {', '.join(unknown) or 'none'}",
+            ", ".join(available),
+            "choose among them, or write a plan by hand",
         )
     return {name: dict(STANDARD[name]) for name in names}

@@ -82,12 +82,12 @@ def matched(course: Course, names: Sequence[str], measured: np.ndarray) -> Match
         groups.append([e]) if same is None else same.append(e)
     conditions, count = [], 0
     for group in groups:
-        chosen = np.array(group)
-        enough = min(measured[chosen].sum(), (~measured[chosen]).sum()) >= FEWEST
+        members = np.array(group)
+        enough = min(measured[members].sum(), (~measured[members]).sum()) >= FEWEST
         if not enough:
             count += len(group)
             continue
-        conditions.append(_on_one_clock(course, rows, spans, chosen, measured, names))
+        conditions.append(_on_one_clock(course, rows, spans, members, measured, names))
     return Matched(_distinct(conditions), count, course.channel_names)
 
 
@@ -116,15 +116,15 @@ def _span(course: Course, rows: np.ndarray) -> _Span:
 
 
 def _same(course: Course, names: Sequence[str], spans: list[_Span], a: int, b: int) -> bool:
-    one, other = spans[a], spans[b]
+    first, second = spans[a], spans[b]
     place = np.array([course.tip[course.episode == e][0, :2] for e in (a, b)])
     tool = [course.tool[np.searchsorted(course.episode, e)] for e in (a, b)]
     return (
         names[a] == names[b]
         and tool[0] == tool[1]
         and float(np.linalg.norm(place[0] - place[1])) < PLACE
-        and abs(one.depth - other.depth) <= SAME_DEPTH * max(one.depth, other.depth)
-        and abs(one.pace - other.pace) <= SAME_PACE * max(one.pace, other.pace)
+        and abs(first.depth - second.depth) <= SAME_DEPTH * max(first.depth, second.depth)
+        and abs(first.pace - second.pace) <= SAME_PACE * max(first.pace, second.pace)
     )
 
 
@@ -141,10 +141,10 @@ def _on_one_clock(
     names: Sequence[str],
 ) -> PressKind:
     """Return presses resampled to common times; each point is the mean of the readings around it."""
-    before = min(spans[e].start - course.time[rows[e][0]] for e in group)
-    after = min(course.time[rows[e][-1]] - spans[e].start for e in group)
+    lead = min(spans[e].start - course.time[rows[e][0]] for e in group)
+    tail = min(course.time[rows[e][-1]] - spans[e].start for e in group)
     count = int(min(POINTS, np.median([len(rows[e]) for e in group])))
-    edges = np.linspace(-before, after, count + 1)
+    edges = np.linspace(-lead, tail, count + 1)
     values = {e: _means(course.time[rows[e]] - spans[e].start, course.readings[rows[e]], edges) for e in group}
     depths = [
         _means(course.time[rows[e]] - spans[e].start, course.tip[rows[e], 2:], edges)[:, 0]
@@ -155,24 +155,24 @@ def _on_one_clock(
     speed = np.abs(np.diff(np.mean(depths, axis=0)) / np.diff(edges[:-1]))
     at = course.tip[rows[group[0]][0], :2]
     name = names[group[0]] or f"x {at[0]:.2g}, y {at[1]:.2g} mm"
-    told = f"{name}, {spans[group[0]].depth:.3g} mm deep at {np.quantile(speed, 0.75):.2g} mm/s"
-    return PressKind(told, 0.5 * (edges[1:] + edges[:-1]) + before, np.mean(depths, axis=0), *sides)
+    label = f"{name}, {spans[group[0]].depth:.3g} mm deep at {np.quantile(speed, 0.75):.2g} mm/s"
+    return PressKind(label, 0.5 * (edges[1:] + edges[:-1]) + lead, np.mean(depths, axis=0), *sides)
 
 
 def _means(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Return the mean of the line through values between edges, shape (edges - 1, columns)."""
-    found = []
+    means = []
     for column in values.T:
-        seen = np.isfinite(column)
-        if seen.sum() < 2:
-            found.append(np.full(len(edges) - 1, np.nan))
+        finite = np.isfinite(column)
+        if finite.sum() < 2:
+            means.append(np.full(len(edges) - 1, np.nan))
             continue
-        at, value = time[seen], column[seen]
+        at, value = time[finite], column[finite]
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(at))])
         # Between its points the integral is a parabola; readings are dense enough for straight pieces.
         fine = np.interp(edges, at, integral)
-        found.append(np.diff(fine) / np.diff(edges))
-    return np.column_stack(found)
+        means.append(np.diff(fine) / np.diff(edges))
+    return np.column_stack(means)
 
 
 def _distinct(conditions: list[PressKind]) -> tuple[PressKind, ...]:

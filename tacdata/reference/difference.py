@@ -151,20 +151,20 @@ def difference(course: Course, names: Sequence[str], measured: np.ndarray) -> Di
             "record the same plan on both, each press several times",
         )
     columns = [shapes(c) for c in pairs.conditions]
-    found = posterior(pairs.conditions, columns)
-    chosen = _chosen(columns[0], found)
-    controls, most = [], {}
+    belief = posterior(pairs.conditions, columns)
+    selection = _chosen(columns[0], belief)
+    controls, bounds = [], {}
     for split, first in (("first half and second half", _first), ("odd and even presses", _odd)):
         if min(len(c.healthy) for c in pairs.conditions) < 2 * FEWEST:
             continue
         halves = tuple(c.split(first(len(c.healthy))) for c in pairs.conditions)
-        sizes = _mechanisms(halves, [shapes(c) for c in halves], found, chosen, {})
+        sizes = _mechanisms(halves, [shapes(c) for c in halves], belief, selection, {})
         peaks = {(m.name, s.condition, s.channel): abs(s.peak) for m in sizes for s in m.sizes}
-        most = {key: max(most.get(key, 0.0), peaks.get(key, 0.0)) for key in {*most, *peaks}}
+        bounds = {key: max(bounds.get(key, 0.0), peaks.get(key, 0.0)) for key in {*bounds, *peaks}}
         quiet = _compared(replace(pairs, conditions=halves)).status == "none"
         controls.append(Control(split, quiet, max(peaks.values(), default=0.0)))
     # A change within the healthy machine is no change of the other one.
-    answer = _compared(pairs, most)
+    answer = _compared(pairs, bounds)
     if answer.named and not all(c.quiet for c in controls):
         answer = replace(answer, status="unknown")
     return replace(answer, controls=tuple(controls))
@@ -178,40 +178,40 @@ def _odd(count: int) -> np.ndarray:
     return np.arange(count) % 2 == 0
 
 
-def _chosen(columns: list[Shape], found: Posterior) -> tuple[int, ...]:
+def _chosen(columns: list[Shape], belief: Posterior) -> tuple[int, ...]:
     """Return the shapes that are sized: the best form of each probable mechanism, or else the most probable set."""
-    probable = {m for m, p in found.mechanisms.items() if p >= NAMED}
+    probable = {m for m, p in belief.mechanisms.items() if p >= NAMED}
     for pair in EXCLUSIVE:
-        if not pair & probable and sum(found.mechanisms.get(m, 0.0) for m in pair) >= NAMED:
-            probable.add(max(pair, key=lambda m: found.mechanisms.get(m, 0.0)))
+        if not pair & probable and sum(belief.mechanisms.get(m, 0.0) for m in pair) >= NAMED:
+            probable.add(max(pair, key=lambda m: belief.mechanisms.get(m, 0.0)))
     forms = [
-        max((k for k, s in enumerate(columns) if s.mechanism == m), key=lambda k: found.of_shape[k]) for m in probable
+        max((k for k, s in enumerate(columns) if s.mechanism == m), key=lambda k: belief.of_shape[k]) for m in probable
     ]
-    return tuple(sorted(forms)) or found.best
+    return tuple(sorted(forms)) or belief.best
 
 
-def _with_rival(mechanism: str, found: Posterior) -> tuple[float, str]:
+def _with_rival(mechanism: str, belief: Posterior) -> tuple[float, str]:
     """Return a mechanism's probability, and the rival that shares it; alone where it needs none."""
-    probability = found.mechanisms[mechanism]
+    probability = belief.mechanisms[mechanism]
     pair = next((p for p in EXCLUSIVE if mechanism in p), frozenset({mechanism}))
-    both = sum(found.mechanisms.get(m, 0.0) for m in pair)
-    if probability >= NAMED or both < NAMED:
+    joint = sum(belief.mechanisms.get(m, 0.0) for m in pair)
+    if probability >= NAMED or joint < NAMED:
         return probability, ""
-    return both, next(iter(pair - {mechanism}))
+    return joint, next(iter(pair - {mechanism}))
 
 
 def _compared(pairs: Matched, control: dict[tuple[str, str, int], float] | None = None) -> Difference:
     conditions = pairs.conditions
     columns = [shapes(c) for c in conditions]
-    found = posterior(conditions, columns)
-    chosen = _chosen(columns[0], found)
-    mechanisms = _mechanisms(conditions, columns, found, chosen, control or {})
-    changed = tuple(k for k, m in zip(chosen, mechanisms, strict=False) if m.changed)
+    belief = posterior(conditions, columns)
+    selection = _chosen(columns[0], belief)
+    mechanisms = _mechanisms(conditions, columns, belief, selection, control or {})
+    changed = tuple(k for k, m in zip(selection, mechanisms, strict=False) if m.changed)
     needed = _needed(conditions, columns, changed, mechanisms)
-    if needed and needed != chosen:  # sizes are fitted without the shapes that are too small to count
-        chosen = needed
-        mechanisms = _mechanisms(conditions, columns, found, chosen, control or {})
-    explained = _explained(conditions, columns, chosen, mechanisms)
+    if needed and needed != selection:  # sizes are fitted without the shapes that are too small to count
+        selection = needed
+        mechanisms = _mechanisms(conditions, columns, belief, selection, control or {})
+    explained = _explained(conditions, columns, selection, mechanisms)
     differs, largest, where = _beyond_scatter(conditions)
     named = [m for m in mechanisms if m.probability >= NAMED and m.changed]
     if not differs and not any(m.changed for m in mechanisms):
@@ -223,14 +223,14 @@ def _compared(pairs: Matched, control: dict[tuple[str, str, int], float] | None 
     return Difference(
         status,
         mechanisms,
-        found.mechanisms,
+        belief.mechanisms,
         explained,
         differs,
         largest,
         where,
         (),
         conditions,
-        tuple(tuple(s[k] for k in chosen) for s in columns),
+        tuple(tuple(s[k] for k in selection) for s in columns),
         pairs.unmatched,
         pairs.channels,
     )
@@ -246,11 +246,11 @@ def _solved(condition: PressKind, columns: list[Shape], of: tuple[int, ...], cha
     matrix = np.column_stack([*(columns[k].curves[:, channel] for k in of), ones]) * scales
     steady = ~changing(condition)
     # A delay shows where the speed changes and nowhere else.
-    every = np.square(matrix - matrix.mean(axis=0)).sum(axis=0)[:-1]
-    kept = np.square(matrix[steady] - matrix[steady].mean(axis=0)).sum(axis=0)[:-1]
-    visible = bool((kept >= VISIBLE * every).all())
-    shown = np.linalg.matrix_rank(matrix[steady], tol=FAINT * np.abs(matrix).max()) == matrix.shape[1]
-    rows = steady if shown and visible else np.ones(len(matrix), dtype=bool)
+    energy = np.square(matrix - matrix.mean(axis=0)).sum(axis=0)[:-1]
+    steady_energy = np.square(matrix[steady] - matrix[steady].mean(axis=0)).sum(axis=0)[:-1]
+    visible = bool((steady_energy >= VISIBLE * energy).all())
+    is_determined = np.linalg.matrix_rank(matrix[steady], tol=FAINT * np.abs(matrix).max()) == matrix.shape[1]
+    rows = steady if is_determined and visible else np.ones(len(matrix), dtype=bool)
     gram = matrix[rows].T @ matrix[rows]
     solver = scales[:, None] * np.linalg.solve(gram + FAINT**2 * np.trace(gram) * np.eye(len(gram)), matrix[rows].T)
     sides = [(blocks(side) - condition.base)[:, rows, channel].T for side in (condition.healthy, condition.measured)]
@@ -260,22 +260,22 @@ def _solved(condition: PressKind, columns: list[Shape], of: tuple[int, ...], cha
 def _mechanisms(
     conditions: tuple[PressKind, ...],
     columns: list[list[Shape]],
-    found: Posterior,
-    chosen: tuple[int, ...],
+    belief: Posterior,
+    selection: tuple[int, ...],
     control: dict[tuple[str, str, int], float],
 ) -> tuple[Mechanism, ...]:
-    sizes: list[list[Size]] = [[] for _ in range(len(chosen) + 1)]
+    sizes: list[list[Size]] = [[] for _ in range(len(selection) + 1)]
     for condition, shapes_of in zip(conditions, columns, strict=True):
         for channel in range(condition.base.shape[1]):
-            value, healthy, other = _solved(condition, shapes_of, chosen, channel)
-            freedom = healthy.shape[1] + other.shape[1] - 2
+            value, healthy, measured = _solved(condition, shapes_of, selection, channel)
+            freedom = healthy.shape[1] + measured.shape[1] - 2
             # A session is one draw of the effect that varies from block to block: averaging does not make it smaller.
             spread = np.square(healthy - healthy.mean(axis=1, keepdims=True)).sum(axis=1)
-            spread += np.square(other - other.mean(axis=1, keepdims=True)).sum(axis=1)
+            spread += np.square(measured - measured.mean(axis=1, keepdims=True)).sum(axis=1)
             error = np.sqrt(2 * spread / freedom)
-            for j in range(len(chosen) + 1):
-                zero = j == len(chosen)
-                curve = np.ones(len(condition.time)) if zero else shapes_of[chosen[j]].curves[:, channel]
+            for j in range(len(selection) + 1):
+                zero = j == len(selection)
+                curve = np.ones(len(condition.time)) if zero else shapes_of[selection[j]].curves[:, channel]
                 if not curve.any():
                     continue
                 at = int(np.argmax(np.abs(curve)))
@@ -299,7 +299,7 @@ def _mechanisms(
                 )
     ranges = {c.name: c.range for c in conditions}
     tests = max(len({s.mechanism for s in columns[0]}) * len(conditions) * conditions[0].base.shape[1], 1)
-    probable = [(columns[0][k], *_with_rival(columns[0][k].mechanism, found)) for k in chosen]
+    probable = [(columns[0][k], *_with_rival(columns[0][k].mechanism, belief)) for k in selection]
     answer = []
     for j, name in enumerate([*(shape.mechanism for shape, _, _ in probable), ZERO]):
         judged = tuple(
@@ -322,43 +322,43 @@ def _mechanisms(
 def _needed(
     conditions: tuple[PressKind, ...],
     columns: list[list[Shape]],
-    chosen: tuple[int, ...],
+    selection: tuple[int, ...],
     mechanisms: tuple[Mechanism, ...],
 ) -> tuple[int, ...]:
     """Return the shapes without which clearly less of the difference would be explained; a lone one is needed."""
-    if len(chosen) < 2:
-        return chosen
-    every = _explained(conditions, columns, chosen, mechanisms)
+    if len(selection) < 2:
+        return selection
+    total = _explained(conditions, columns, selection, mechanisms)
     losses = {}
-    for k in chosen:
-        others = tuple(j for j in chosen if j != k)
-        losses[k] = every - _explained(conditions, columns, others, mechanisms)
-    return tuple(k for k in chosen if losses[k] >= NEEDED) or (max(chosen, key=lambda k: losses[k]),)
+    for k in selection:
+        remainder = tuple(j for j in selection if j != k)
+        losses[k] = total - _explained(conditions, columns, remainder, mechanisms)
+    return tuple(k for k in selection if losses[k] >= NEEDED) or (max(selection, key=lambda k: losses[k]),)
 
 
 def _explained(
     conditions: tuple[PressKind, ...],
     columns: list[list[Shape]],
-    chosen: tuple[int, ...],
+    selection: tuple[int, ...],
     mechanisms: tuple[Mechanism, ...],
 ) -> float:
     """Return the share of the difference, offsets apart, that the mechanisms explain where they are a change."""
     places = {(s.condition, s.channel) for m in mechanisms for s in m.changed}
     zeros = {(s.condition, s.channel) for m in mechanisms if m.name == ZERO for s in m.changed}
-    before = after = 0.0
+    initial = final = 0.0
     for condition, shapes_of in zip(conditions, columns, strict=True):
         for channel in range(condition.base.shape[1]):
             if (condition.name, channel) not in places:
                 continue
-            value, *_ = _solved(condition, shapes_of, chosen, channel)
-            curves = [shapes_of[k].curves[:, channel] for k in chosen]
+            value, *_ = _solved(condition, shapes_of, selection, channel)
+            curves = [shapes_of[k].curves[:, channel] for k in selection]
             fitted = value[-1, 0] + (np.array(curves).T @ value[:-1, 0] if curves else 0.0)
-            left = condition.difference[:, channel] - fitted
+            residual = condition.difference[:, channel] - fitted
             level = condition.difference[:, channel] - (0.0 if (condition.name, channel) in zeros else value[-1, 0])
             scale = condition.range[channel] ** 2
-            before += float(np.sum(np.square(level))) / scale
-            after += float(np.sum(np.square(left))) / scale
-    return 1 - after / before if before > 0 else 0.0
+            initial += float(np.sum(np.square(level))) / scale
+            final += float(np.sum(np.square(residual))) / scale
+    return 1 - final / initial if initial > 0 else 0.0
 
 
 def _beyond_scatter(conditions: tuple[PressKind, ...]) -> tuple[bool, float, str]:
@@ -366,13 +366,13 @@ def _beyond_scatter(conditions: tuple[PressKind, ...]) -> tuple[bool, float, str
     largest, where, beyond = 0.0, "", []
     for c in conditions:
         sides = [_windows(blocks(side)) for side in (c.healthy, c.measured)]
-        apart = sides[1].mean(axis=0) - sides[0].mean(axis=0)
+        shift = sides[1].mean(axis=0) - sides[0].mean(axis=0)
         freedom = sum(len(s) for s in sides) - 2
         spread = sum(np.square(s - s.mean(axis=0)).sum(axis=0) for s in sides) / freedom
-        t = np.abs(apart) / np.sqrt(np.maximum(2 * spread, 1e-300))
-        tests = len(conditions) * apart.size
-        beyond.append(bool(((2 * stats.t.sf(t, freedom) * tests < LEVEL) & (np.abs(apart) > LEAST * c.range)).any()))
-        at = float(np.abs(apart).max())
+        t = np.abs(shift) / np.sqrt(np.maximum(2 * spread, 1e-300))
+        tests = len(conditions) * shift.size
+        beyond.append(bool(((2 * stats.t.sf(t, freedom) * tests < LEVEL) & (np.abs(shift) > LEAST * c.range)).any()))
+        at = float(np.abs(shift).max())
         if at > largest:
             largest, where = at, c.name
     return any(beyond), largest, where

@@ -71,7 +71,7 @@ def posterior(conditions: tuple[PressKind, ...], columns: list[list[Shape]]) -> 
         columns: The shapes of each condition, in the same order for all.
     """
     sets = _sets(columns[0])
-    mass = np.array([_prior(columns[0], chosen) for chosen in sets])
+    mass = np.array([_prior(columns[0], members) for members in sets])
     evidence = np.zeros((len(sets), DRAWS + 1))
     for condition, shapes_of in zip(conditions, columns, strict=True):
         for channel in range(condition.base.shape[1]):
@@ -81,9 +81,11 @@ def posterior(conditions: tuple[PressKind, ...], columns: list[list[Shape]]) -> 
     weights = softmax(evidence + np.log(mass)[:, None], axis=0)
     of_set = weights[:, 1:].mean(axis=1)
     names = [s.mechanism for s in columns[0]]
-    found = {n: float(sum(p for p, s in zip(of_set, sets, strict=True) if n in {names[i] for i in s})) for n in names}
+    probabilities = {
+        n: float(sum(p for p, s in zip(of_set, sets, strict=True) if n in {names[i] for i in s})) for n in names
+    }
     each = tuple(float(sum(p for p, s in zip(of_set, sets, strict=True) if k in s)) for k in range(len(names)))
-    return Posterior(found, sets[int(np.argmax(of_set))], each)
+    return Posterior(probabilities, sets[int(np.argmax(of_set))], each)
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ class System:
 
     def evidence(self, sets: list[tuple[int, ...]]) -> np.ndarray:
         """Return the log evidence of sets, shape (sets, draws + 1)."""
-        found = np.empty((len(sets), self.target.shape[1]))
+        log_evidence = np.empty((len(sets), self.target.shape[1]))
         counts = np.array([len(s) for s in sets])
         for count in np.unique(counts).tolist():
             rows = np.flatnonzero(counts == count)
@@ -108,17 +110,17 @@ class System:
             lower = np.linalg.cholesky(matrix)
             half = np.linalg.solve(lower, self.target[columns])
             size = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-            found[rows] = self.constant + 0.5 * np.square(half).sum(axis=1) - size[:, None]
-        return found
+            log_evidence[rows] = self.constant + 0.5 * np.square(half).sum(axis=1) - size[:, None]
+        return log_evidence
 
 
 def whitener(condition: PressKind, channel: int, remainder: float) -> np.ndarray:
     """Return the lower factor of the covariance of remainder and noise, shape (t, t) [the source's unit]."""
     share = np.linspace(0.0, 1.0, len(condition.time))
-    apart = np.square(share[:, None] - share[None])
+    separation = np.square(share[:, None] - share[None])
     rms = float(np.sqrt(np.mean(np.square(condition.difference[:, channel]))))
     size = np.where(changing(condition), CHANGING, STEADY)
-    kernel = np.exp(-0.5 * apart / LONG**2) + size[:, None] * np.exp(-0.5 * apart / SHORT**2) * size
+    kernel = np.exp(-0.5 * separation / LONG**2) + size[:, None] * np.exp(-0.5 * separation / SHORT**2) * size
     noise = sum(
         np.var(side[:, :, channel], axis=0, ddof=1).mean() / len(side)
         for side in (condition.healthy, condition.measured)
@@ -147,14 +149,14 @@ def _systems(condition: PressKind, columns: list[Shape], channel: int) -> list[S
         draws.append(means[1] - means[0])
     matrix = [s.curves[:, channel] * s.typical[channel] for s in columns]
     matrix.append(np.full(len(condition.time), OFFSET * condition.range[channel]))
-    found = []
+    systems = []
     for remainder in REMAINDERS:
         lower = whitener(condition, channel, remainder)
         white = solve_triangular(lower, np.column_stack(matrix), lower=True)
         target = solve_triangular(lower, np.column_stack(draws), lower=True)
         constant = -0.5 * np.square(target).sum(axis=0) - np.log(np.diag(lower)).sum()
-        found.append(System(white.T @ white, white.T @ target, constant))
-    return found
+        systems.append(System(white.T @ white, white.T @ target, constant))
+    return systems
 
 
 def _sets(columns: list[Shape]) -> list[tuple[int, ...]]:
@@ -171,9 +173,9 @@ def _sets(columns: list[Shape]) -> list[tuple[int, ...]]:
     return sets
 
 
-def _prior(columns: list[Shape], chosen: tuple[int, ...]) -> float:
+def _prior(columns: list[Shape], members: tuple[int, ...]) -> float:
     """Return a set's prior mass: forms share that of their mechanism."""
     mass = 1.0
-    for k in chosen:
+    for k in members:
         mass *= PRIOR / sum(s.mechanism == columns[k].mechanism for s in columns)
     return mass

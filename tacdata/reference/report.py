@@ -37,40 +37,40 @@ def word(mechanism: str) -> str:
     return "zero of the readings" if mechanism == ZERO else load(mechanism).spoken
 
 
-def sentence(found: Difference, unit: str) -> str:
+def sentence(result: Difference, unit: str) -> str:
     """Return the answer in one sentence, with sizes, units and the conditions without a change."""
-    if found.status == "none":
-        least = max((s.bound for m in found.mechanisms for s in m.sizes), default=0.0)
-        bound = f": no named effect above {least:.2g} {unit}" if least else ""
+    if result.status == "none":
+        threshold = max((s.bound for m in result.mechanisms for s in m.sizes), default=0.0)
+        bound = f": no named effect above {threshold:.2g} {unit}" if threshold else ""
         return f"The readings do not differ from the healthy machine beyond its own scatter{bound}."
-    if not found.named:
+    if not result.named:
         return (
-            f"The readings differ from the healthy machine by up to {found.largest:.2g} {unit} ({found.where}), and no "
-            "known effect explains it."
+            f"The readings differ from the healthy machine by up to {result.largest:.2g} {unit} ({result.where}), and "
+            "no known effect explains it."
         )
-    parts = "; ".join(_sized(found, m, unit) for m in found.named)
-    more = "; something else differs, too" if found.status == "named, incomplete" else ""
+    parts = "; ".join(_sized(result, m, unit) for m in result.named)
+    more = "; something else differs, too" if result.status == "named, incomplete" else ""
     return f"Compared with the healthy machine: {parts}{more}."
 
 
-def _sized(found: Difference, mechanism: Mechanism, unit: str) -> str:
+def _sized(result: Difference, mechanism: Mechanism, unit: str) -> str:
     """Return one mechanism with its sizes where it is a change, and the bounds where it is none."""
     changed = mechanism.changed
     channels = {s.channel for s in changed}
     rival = f" (or {word(mechanism.rival)})" if mechanism.rival else ""
     sizes = f"{word(mechanism.name)}{rival} {_amount(changed, unit)}"
-    if len(found.channels) > 1:
-        sizes += f" in {len(channels)} of {len(found.channels)} channels"
-    if len(found.conditions) == 1:
+    if len(result.channels) > 1:
+        sizes += f" in {len(channels)} of {len(result.channels)} channels"
+    if len(result.conditions) == 1:
         return sizes
     places = list(dict.fromkeys(s.condition for s in changed))
     sizes += (
-        f" at {_listed(places)}" if len(places) <= LISTED else f" in {len(places)} of {len(found.conditions)} kinds"
+        f" at {_listed(places)}" if len(places) <= LISTED else f" in {len(places)} of {len(result.conditions)} kinds"
     )
     typical = sum(abs(s.peak) for s in changed) / len(changed)
-    others = [s for s in mechanism.sizes if s.condition not in places and s.channel in channels]
-    nothing = [s for s in others if s.bound < NEGLIGIBLE * typical]
-    unsure = [s for s in others if s.bound >= NEGLIGIBLE * typical]
+    remainder = [s for s in mechanism.sizes if s.condition not in places and s.channel in channels]
+    nothing = [s for s in remainder if s.bound < NEGLIGIBLE * typical]
+    unsure = [s for s in remainder if s.bound >= NEGLIGIBLE * typical]
     if nothing:
         at = list(dict.fromkeys(s.condition for s in nothing))
         sizes += f", nothing at {_listed(at)} (less than {max(s.bound for s in nothing):.2g} {unit})"
@@ -93,57 +93,59 @@ def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def table(found: Difference, unit: str) -> list[tuple[str, ...]]:
+def table(result: Difference, unit: str) -> list[tuple[str, ...]]:
     """Return a row for each size: mechanism, condition, channel, size with its 90 % interval, share, change or not."""
     rows = []
-    for m in found.mechanisms:
+    for m in result.mechanisms:
         for s in m.sizes:
             low, high = s.peak - 1.645 * s.peak_error, s.peak + 1.645 * s.peak_error
-            shown = f"{s.peak:+.3g} {unit} ({low:+.3g} to {high:+.3g})"
+            size_text = f"{s.peak:+.3g} {unit} ({low:+.3g} to {high:+.3g})"
             if m.unit != "reading":
-                shown += f", from {s.value:.3g} {'' if m.unit == '1' else m.unit}".rstrip()
-            told = "yes" if s.changed else "no"
-            rows.append((word(m.name), s.condition, found.channels[s.channel], shown, f"{100 * s.share:+.1f} %", told))
+                size_text += f", from {s.value:.3g} {'' if m.unit == '1' else m.unit}".rstrip()
+            verdict = "yes" if s.changed else "no"
+            rows.append(
+                (word(m.name), s.condition, result.channels[s.channel], size_text, f"{100 * s.share:+.1f} %", verdict)
+            )
     return rows
 
 
-def controls(found: Difference, unit: str) -> list[str]:
+def controls(result: Difference, unit: str) -> list[str]:
     """Return the control in words: the healthy machine compared with itself."""
-    if not found.controls:
+    if not result.controls:
         return ["control: too few healthy presses to compare the machine with itself; record six or more of each kind"]
     return [
         f"control, {c.split} of the healthy machine: "
         + ("quiet" if c.quiet else "NOT QUIET, so no name is given")
         + (f", largest size {c.largest:.2g} {unit}" if c.largest else "")
-        for c in found.controls
+        for c in result.controls
     ]
 
 
-def remarks(found: Difference) -> list[str]:
+def remarks(result: Difference) -> list[str]:
     """Return the limits of the answer."""
     lines = []
-    if any(m.name == "dry_friction" for m in found.named):
+    if any(m.name == "dry_friction" for m in result.named):
         lines.append("friction: presses of one speed do not distinguish dry from viscous friction")
-    if found.named:
-        lines.append(f"the named effects explain {100 * found.explained:.0f} % of the difference where they act")
-    sized = {m.name for m in found.mechanisms}
-    if small := [word(n) for n, p in found.probabilities.items() if p >= NAMED and n not in sized]:
+    if result.named:
+        lines.append(f"the named effects explain {100 * result.explained:.0f} % of the difference where they act")
+    sized = {m.name for m in result.mechanisms}
+    if small := [word(n) for n, p in result.probabilities.items() if p >= NAMED and n not in sized]:
         lines.append(f"{', '.join(small)}: probable where the speed changes, too small to count")
-    if found.unmatched:
-        lines.append(f"{found.unmatched} presses have too few counterparts in the other session and were left out")
+    if result.unmatched:
+        lines.append(f"{result.unmatched} presses have too few counterparts in the other session and were left out")
     return lines
 
 
-def text(found: Difference, heading: Machines) -> str:
+def text(result: Difference, heading: Machines) -> str:
     """Return everything for reading in a terminal."""
-    lines = [f"{found.status.upper()}: {sentence(found, heading.unit)}", ""]
+    lines = [f"{result.status.upper()}: {sentence(result, heading.unit)}", ""]
     lines.append(
         f"machine: {', '.join(heading.measured)}{f', recorded {heading.recorded}' if heading.recorded else ''}"
     )
     lines.append(f"healthy: {', '.join(heading.healthy)}")
     lines.append(f"version: tacdata {provenance.code_version()}")
-    lines += ["", *controls(found, heading.unit)]
-    rows = table(found, heading.unit)
+    lines += ["", *controls(result, heading.unit)]
+    rows = table(result, heading.unit)
     if rows:
         lines += [
             "",
@@ -151,29 +153,29 @@ def text(found: Difference, heading: Machines) -> str:
         ]
         widths = [max(len(r[k]) for r in rows) for k in range(6)]
         lines += ["  " + "  ".join(v.ljust(w) for v, w in zip(r, widths, strict=True)).rstrip() for r in rows]
-    likely = [(m.name, m.probability) for m in found.mechanisms if m.name != ZERO]
+    likely = [(m.name, m.probability) for m in result.mechanisms if m.name != ZERO]
     if likely:
         lines += ["", "probability: " + ", ".join(f"{word(n)} {p:.2f}" for n, p in likely)]
-    return "\n".join([*lines, *(f"- {line}" for line in remarks(found))]) + "\n"
+    return "\n".join([*lines, *(f"- {line}" for line in remarks(result))]) + "\n"
 
 
-def document(found: Difference, heading: Machines, parents: dict[str, str]) -> dict[str, Any]:
+def document(result: Difference, heading: Machines, parents: dict[str, str]) -> dict[str, Any]:
     """Return the difference (`schemas/difference.schema.json`).
 
     Args:
-        found: The difference.
+        result: The difference.
         heading: Names of the compared machines.
         parents: Name to content hash of the sessions.
     """
     return {
         "version": schemas.version("difference"),
-        "status": found.status,
-        "sentence": sentence(found, heading.unit),
+        "status": result.status,
+        "sentence": sentence(result, heading.unit),
         "heading": {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(heading).items()},
-        "differs": found.differs,
-        "largest": found.largest,
-        "explained": found.explained,
-        "probabilities": found.probabilities,
+        "differs": result.differs,
+        "largest": result.largest,
+        "explained": result.explained,
+        "probabilities": result.probabilities,
         "mechanisms": [
             {
                 "mechanism": m.name,
@@ -181,19 +183,19 @@ def document(found: Difference, heading: Machines, parents: dict[str, str]) -> d
                 "unit": heading.unit if m.unit == "reading" else m.unit,
                 "probability": m.probability,
                 "rival": m.rival,
-                "named": m in found.named,
+                "named": m in result.named,
                 "sizes": [
-                    {**asdict(s), "channel": found.channels[s.channel], "interval": _interval(s)} for s in m.sizes
+                    {**asdict(s), "channel": result.channels[s.channel], "interval": _interval(s)} for s in m.sizes
                 ],
             }
-            for m in found.mechanisms
+            for m in result.mechanisms
         ],
-        "controls": [asdict(c) for c in found.controls],
+        "controls": [asdict(c) for c in result.controls],
         "conditions": [
-            {"name": c.name, "healthy": len(c.healthy), "measured": len(c.measured)} for c in found.conditions
+            {"name": c.name, "healthy": len(c.healthy), "measured": len(c.measured)} for c in result.conditions
         ],
-        "unmatched": found.unmatched,
-        "remarks": remarks(found),
+        "unmatched": result.unmatched,
+        "remarks": remarks(result),
         "provenance": provenance.stamp("tacdata discrepancy --reference", parents, {}),
     }
 

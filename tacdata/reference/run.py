@@ -48,23 +48,23 @@ def compare(measured: list[Path], healthy: list[Path]) -> Compared:
     sessions = read_sessions(healthy, measured)
     unit, recorded = unit_of(measured[0])
     heading = Machines(tuple(map(str, measured)), tuple(map(str, healthy)), recorded, unit)
-    found = difference(sessions.course, sessions.names, sessions.measured)
+    result = difference(sessions.course, sessions.names, sessions.measured)
     sides = (("recording", measured), ("reference", healthy))
     parents = {f"{side} {path}": recording_hash(path) for side, paths in sides for path in paths}
-    return Compared(found, heading, document(found, heading, parents))
+    return Compared(result, heading, document(result, heading, parents))
 
 
-def write(compared: Compared, out: Path) -> None:
+def write(compared: Compared, target: Path) -> None:
     """Write document, text and picture to a new folder.
 
     Raises:
         UsageError: If it exists.
     """
-    if out.exists():
-        raise UsageError(f"{out} exists", "a new folder", "choose another --out")
-    out.mkdir(parents=True)
-    documents.write(out / DOCUMENT, compared.document, "difference")
-    documents.write_text(out / TEXT, compared.text)
+    if target.exists():
+        raise UsageError(f"{target} exists", "a new folder", "choose another --out")
+    target.mkdir(parents=True)
+    documents.write(target / DOCUMENT, compared.document, "difference")
+    documents.write_text(target / TEXT, compared.text)
     title = f"{', '.join(Path(p).name for p in compared.heading.measured)} compared with "
     title += ", ".join(Path(p).name for p in compared.heading.healthy)
-    picture.draw(compared.found, compared.heading.unit, title, out / PICTURE)
+    picture.draw(compared.found, compared.heading.unit, title, target / PICTURE)

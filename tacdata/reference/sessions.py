@@ -37,10 +37,10 @@ def read_sessions(healthy: list[Path], measured: list[Path]) -> Sessions:
         UsageError: If one recording is given as both, or a session holds no readings.
         FormatError: If their channels differ.
     """
-    both = {p.resolve() for p in healthy} & {p.resolve() for p in measured}
-    if both:
+    overlap = {p.resolve() for p in healthy} & {p.resolve() for p in measured}
+    if overlap:
         raise UsageError(
-            f"{', '.join(map(str, sorted(both)))} as the machine and as its reference",
+            f"{', '.join(map(str, sorted(overlap)))} as the machine and as its reference",
             "two sessions",
             "name the healthy session in --reference, the other one before it",
         )

@@ -49,7 +49,7 @@ def shapes(condition: PressKind) -> list[Shape]:
     # A press begins where the one before ended.
     ones = np.ones(base.shape[1])
     slope = _slope(condition.depth, base, speed / fastest)
-    rest = base[np.argsort(condition.depth, kind="stable")[: max(len(time) // 20, 1)]].mean(axis=0)
+    baseline = base[np.argsort(condition.depth, kind="stable")[: max(len(time) // 20, 1)]].mean(axis=0)
     span, size = float(time[-1] - time[0]), condition.range
     typical = {
         "reading": TYPICAL * size,
@@ -57,29 +57,29 @@ def shapes(condition: PressKind) -> list[Shape]:
         "s": TYPICAL_LAG * span * ones,
         "mm": TYPICAL_SHIFT * float(np.ptp(condition.depth)) * ones,
     }
-    found: list[tuple[str, str, str, np.ndarray]] = [
+    entries: list[tuple[str, str, str, np.ndarray]] = [
         ("dry_friction", "held at rest", "reading", last[:, None] * ones),
         ("dry_friction", "while it moves, against the motion", "reading", way[:, None] * ones),
         ("dry_friction", "while it moves, either way", "reading", moving[:, None] * ones),
-        ("gain", "of the readings", "1", base - rest),
+        ("gain", "of the readings", "1", base - baseline),
         ("z_offset", "of the depth", "mm", slope),
         ("backlash", "of the drive", "mm", slope * (last < 0)[:, None]),
     ]
     for share in MEMORIES:
-        found.append(("relaxation", f"over {share * span:.2g} s", "1", base - _lagged(base, time, share * span)))
+        entries.append(("relaxation", f"over {share * span:.2g} s", "1", base - _lagged(base, time, share * span)))
     for share in FILTERS:
-        late = (_lagged(base, time, share * span) - base) / (share * span)
-        found.append(("low_pass_filter", f"near {share * span:.2g} s", "s", late))
+        lag_shape = (_lagged(base, time, share * span) - base) / (share * span)
+        entries.append(("low_pass_filter", f"near {share * span:.2g} s", "s", lag_shape))
     for share in DELAYS:
-        late = np.stack([np.interp(time - share * span, time, column) for column in base.T], axis=1)
-        found.append(("latency", f"near {share * span:.2g} s", "s", (late - base) / (share * span)))
-    return [_excited(Shape(*entry, typical[entry[2]]), size) for entry in found]
+        lag_shape = np.stack([np.interp(time - share * span, time, column) for column in base.T], axis=1)
+        entries.append(("latency", f"near {share * span:.2g} s", "s", (lag_shape - base) / (share * span)))
+    return [_excited(Shape(*entry, typical[entry[2]]), size) for entry in entries]
 
 
 def _excited(shape: Shape, size: np.ndarray) -> Shape:
     """Return a shape without the channels in which a typical size would not show."""
-    seen = np.ptp(shape.curves, axis=0) * shape.typical > FLAT * size
-    return replace(shape, curves=np.where(seen, shape.curves, 0.0))
+    is_visible = np.ptp(shape.curves, axis=0) * shape.typical > FLAT * size
+    return replace(shape, curves=np.where(is_visible, shape.curves, 0.0))
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
@@ -90,12 +90,12 @@ def _smooth(values: np.ndarray) -> np.ndarray:
 
 def _last_way(speed: np.ndarray) -> np.ndarray:
     """Return the direction of the last motion, 1 on the way in, shape (t,); at first that of the press before."""
-    found, last = np.empty(len(speed)), -1.0
+    ways, last = np.empty(len(speed)), -1.0
     for k, value in enumerate(speed.tolist()):
         if abs(value) > STILL:
             last = float(np.sign(value))
-        found[k] = last
-    return found
+        ways[k] = last
+    return ways
 
 
 def _slope(depth: np.ndarray, base: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -103,7 +103,7 @@ def _slope(depth: np.ndarray, base: np.ndarray, speed: np.ndarray) -> np.ndarray
 
     At rest it is the mean of both ways there; a parabola for each way follows no overshoot of the speed's changes.
     """
-    found, depths = np.zeros_like(base), depth - depth.min()
+    slopes, depths = np.zeros_like(base), depth - depth.min()
     for side in (speed > STILL, speed < -STILL):
         rows = np.flatnonzero(side)
         if len(rows) < 6:
@@ -112,18 +112,18 @@ def _slope(depth: np.ndarray, base: np.ndarray, speed: np.ndarray) -> np.ndarray
         for k in range(base.shape[1]):
             fit = np.polynomial.Polynomial.fit(depths[inner], base[inner, k], 3)
             slope = fit.deriv()(np.clip(depths, depths[inner].min(), depths[inner].max()))
-            found[side, k] = slope[side]
+            slopes[side, k] = slope[side]
             still = np.abs(speed) <= STILL
-            found[still, k] += 0.5 * slope[still]
-    return found
+            slopes[still, k] += 0.5 * slope[still]
+    return slopes
 
 
 def _lagged(base: np.ndarray, time: np.ndarray, constant: float) -> np.ndarray:
     """Return the base through a first-order lag; the press repeats, so it begins with its own end."""
     step = np.diff(time, prepend=2 * time[0] - time[1])
-    value, found = base[0].copy(), np.empty_like(base)
+    value, response = base[0].copy(), np.empty_like(base)
     for _ in range(2):
         for k in range(len(base)):
             value = value + (base[k] - value) * (1 - np.exp(-step[k] / constant))
-            found[k] = value
-    return found
+            response[k] = value
+    return response

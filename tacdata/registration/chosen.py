@@ -46,8 +46,8 @@ def chosen_registration(rig: Rig, rig_path: Path, path: Path | None, sensor: Sen
         UsageError: If the file does not exist, or belongs to another rig or sensor.
         FormatError: If it is damaged.
     """
-    beside = rig_path.with_name(FILE)
-    path = path or (beside if beside.is_file() else None)
+    default_path = rig_path.with_name(FILE)
+    path = path or (default_path if default_path.is_file() else None)
     if path is None:
         return Chosen(rig, None, (_unmeasured(rig, rig_path),))
     document = documents.read(path, "registration")
@@ -65,12 +65,12 @@ def chosen_registration(rig: Rig, rig_path: Path, path: Path | None, sensor: Sen
 
 
 def _unmeasured(rig: Rig, rig_path: Path) -> str:
-    own = rig.document["registration"]
+    entry = rig.document["registration"]
     remedy = f"next: tacdata register --rig {rig_path}"
-    if own.get("method") and own.get("date"):
+    if entry.get("method") and entry.get("date"):
         return (
             f"WARNING: no registration was measured; places and depths rest on the rig file's own "
-            f"({own['method']}, {own['date']}), whose errors are not known\n  {remedy}"
+            f"({entry['method']}, {entry['date']}), whose errors are not known\n  {remedy}"
         )
     return (
         "WARNING: THE SENSOR IS NOT REGISTERED to the guide: places and depths rest on a guess in the rig file, and "

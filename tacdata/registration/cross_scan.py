@@ -75,13 +75,13 @@ def cross_scan(
             place = center + offsets[k] * axis
             answer[k] = _press(probe, place, surface(*place.tolist()), depth)[taxel]
         # An answer is the difference of two means of `FRAMES` readings each.
-        found = symmetric_center(offsets, answer, float(noise[taxel]) * np.sqrt(2 / FRAMES))
-        if found is None:
+        fit = symmetric_center(offsets, answer, float(noise[taxel]) * np.sqrt(2 / FRAMES))
+        if fit is None:
             raise _silent(taxel, answer, float(noise[taxel]))
         # The second line crosses the centre that the first line found.
-        center = center + found.place * axis
+        center = center + fit.place * axis
         lines.append((offsets, answer))
-        spread.append(found.uncertainty)
+        spread.append(fit.uncertainty)
     # Variances along the two lines, as variances along the machine's axes.
     ux, uy = np.sqrt((axes.T**2) @ np.array(spread) ** 2).tolist()
     return Cross(taxel, float(center[0]), float(center[1]), (ux, uy), tuple(lines))
@@ -92,11 +92,11 @@ def _press(probe: Probe, place: np.ndarray, surface: float, depth: float) -> np.
     x, y = place.tolist()
     probe.go((x, y, surface + CLEARANCE), LIFT_SPEED)
     probe.wait(RECOVERY)
-    rest = probe.read(FRAMES).mean
+    baseline = probe.read(FRAMES).mean
     probe.go((x, y, surface - depth), SPEED)
     pressed = probe.read(FRAMES).mean
     probe.go((x, y, surface + CLEARANCE), LIFT_SPEED)
-    return pressed - rest
+    return pressed - baseline
 
 
 def _silent(taxel: int, answer: np.ndarray, noise: float) -> DeviceError:

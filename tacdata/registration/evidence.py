@@ -121,8 +121,8 @@ def touch_evidence(
     sigma = float(np.hypot(touch.onset.uncertainty, touch.onset.model))
     evidence = Evidence(expected, touch.onset.height, sigma, limit)
     if abs(evidence.difference) > limit + 2.0 * sigma:
-        given = f"the skin is first touched at machine height {evidence.height:.3f} +- {sigma:.3f} mm"
-        raise _contradiction(given, expected, limit)
+        observation = f"the skin is first touched at machine height {evidence.height:.3f} +- {sigma:.3f} mm"
+        raise _contradiction(observation, expected, limit)
     return evidence
 
 
@@ -167,21 +167,21 @@ def prove_zero(
 
 
 def _first_answer(
-    probe: Probe, place: tuple[float, float], heights: list[float], rest: np.ndarray, noise: np.ndarray
+    probe: Probe, place: tuple[float, float], heights: list[float], baseline: np.ndarray, noise: np.ndarray
 ) -> float | None:
     """Go down to each height in turn; return the first at which a channel answers twice, or None."""
     frames = FRAMES // 2 + 1
     threshold = ANSWER * noise / np.sqrt(frames)
     for height in heights:
         probe.go((*place, height), SPEED if height < heights[0] else LIFT_SPEED)
-        if all(bool((np.abs(probe.read(frames).mean - rest) > threshold).any()) for _ in range(2)):
+        if all(bool((np.abs(probe.read(frames).mean - baseline) > threshold).any()) for _ in range(2)):
             return height
     return None
 
 
-def _contradiction(given: str, expected: float, limit: float) -> DeviceError:
+def _contradiction(observation: str, expected: float, limit: float) -> DeviceError:
     return DeviceError(
-        f"{given}, and depth zero is at {expected:.3f} mm by the registration: nothing goes deeper",
+        f"{observation}, and depth zero is at {expected:.3f} mm by the registration: nothing goes deeper",
         f"a first contact within {limit:.3f} mm of depth zero",
         "see that the indenter sits as at the registration and the board answers; find the machine's zero again (home "
         "it, or touch off), or register again",

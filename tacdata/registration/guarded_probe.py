@@ -167,10 +167,10 @@ class GuardedProbe(Probe):
                     f"{len(rows)} of {frames} frames within the time", "a board that keeps its rate", "check the board"
                 )
             self._rig.clock.host.sleep(LOOK)
-        taken = np.array(rows[:frames])
+        sample = np.array(rows[:frames])
         self._sink.frames.clear()
-        spread = taken.std(axis=0, ddof=1) if frames > 1 else np.zeros(taken.shape[1])
-        return StillReading(taken.mean(axis=0), spread, frames)
+        spread = sample.std(axis=0, ddof=1) if frames > 1 else np.zeros(sample.shape[1])
+        return StillReading(sample.mean(axis=0), spread, frames)
 
     def wait(self, seconds: float) -> None:
         """Wait on the rig's clock, watching for faults; see the base."""

@@ -146,8 +146,8 @@ def _with_one_power(touches: list[Touch]) -> list[Touch]:
     power, doubt = shared_power([(t.height, t.answer) for t in touches])
     powers = np.clip([power, power - doubt, power + doubt], POWERS[0], POWERS[-1]).tolist()
     fits = [[onset(t.height, t.answer, p) for p in powers] for t in touches]
-    moved = [abs(a.height - b.height) / 2 for _, a, b in fits if a and b]
-    common = float(np.median(moved)) if moved else 0.0
+    shifts = [abs(a.height - b.height) / 2 for _, a, b in fits if a and b]
+    common = float(np.median(shifts)) if shifts else 0.0
     return [
         replace(t, onset=replace(fit[0], model=float(np.hypot(fit[0].model, common)))) if fit[0] else t
         for t, fit in zip(touches, fits, strict=True)
@@ -199,8 +199,8 @@ def _crosses(
         x, y, _ = guess.to_machine(*centers[taxel], 0.0)
         # The other taxels are expected to be off by about as much as the first.
         if crosses:
-            known = guess.to_machine(*centers[crosses[0].taxel], 0.0)
-            x, y = x + crosses[0].x - known[0], y + crosses[0].y - known[1]
+            centre = guess.to_machine(*centers[crosses[0].taxel], 0.0)
+            x, y = x + crosses[0].x - centre[0], y + crosses[0].y - centre[1]
         crosses.append(cross_scan(probe, taxel, (x, y), axes, pitch, plane.at, settings.depth, noise))
         say(f"taxel {taxel}: centre at machine ({crosses[-1].x:.3f}, {crosses[-1].y:.3f}) mm")
     return crosses

@@ -73,10 +73,10 @@ class Found:
 
 
 def document_of(
-    found: Found, rig: Rig, sensor: Sensor, indenter: dict[str, Any], controller: dict[str, str]
+    measurement: Found, rig: Rig, sensor: Sensor, indenter: dict[str, Any], controller: dict[str, str]
 ) -> dict[str, Any]:
     """Return the registration's document (`schemas/registration.schema.json`)."""
-    place = found.registration
+    place = measurement.registration
     return {
         "version": schemas.version("registration"),
         "method": "touch-off and cross scan",
@@ -88,17 +88,17 @@ def document_of(
         "sensor_hash": sensor.content_hash,
         "indenter": indenter,
         "controller": {key: controller[key] for key in ("banner", "$20", "$22") if key in controller},
-        "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in vars(found.settings).items()},
+        "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in vars(measurement.settings).items()},
         "origin": [round(value, 5) for value in place.origin],
         "yaw": round(place.yaw, 5),
         "tilt": [round(value, 7) for value in place.tilt],
-        "uncertainty": found.uncertainty,
+        "uncertainty": measurement.uncertainty,
         "residuals": {
-            "touches": _numbers(found.plane.residual, 5),
-            "taxels": _numbers(found.motion.residual, 5),
-            "scale": round(found.motion.scale, 5),
+            "touches": _numbers(measurement.plane.residual, 5),
+            "taxels": _numbers(measurement.motion.residual, 5),
+            "scale": round(measurement.motion.scale, 5),
         },
-        "noise": _numbers(found.noise, 3),
+        "noise": _numbers(measurement.noise, 3),
         "touches": [
             {
                 "site": t.site,
@@ -111,7 +111,7 @@ def document_of(
                 "height": _numbers(t.height, 4),
                 "answer": _numbers(t.answer, 3),
             }
-            for t in found.touches
+            for t in measurement.touches
         ],
         "crosses": [
             {
@@ -121,7 +121,7 @@ def document_of(
                 "uncertainty": list(c.uncertainty),
                 "lines": [{"place": _numbers(p, 4), "answer": _numbers(a, 3)} for p, a in c.lines],
             }
-            for c in found.crosses
+            for c in measurement.crosses
         ],
     }
 

@@ -61,8 +61,8 @@ def symmetric_center(place: np.ndarray, answer: np.ndarray, noise: float) -> Cen
     center = float(fit.x[0])
     if not place.min() + 0.1 * span < center < place.max() - 0.1 * span:
         return None
-    off = residual(fit.x)
-    scale = max(float((off**2).sum()) / max(len(place) - 5, 1), 1.0)
+    residuals = residual(fit.x)
+    scale = max(float((residuals**2).sum()) / max(len(place) - 5, 1), 1.0)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * scale
-    spread = float(np.sqrt(np.mean(off**2))) * noise / abs(height)
+    spread = float(np.sqrt(np.mean(residuals**2))) * noise / abs(height)
     return Center(center, max(float(np.sqrt(covariance[0, 0])), FLOOR), strength, spread)

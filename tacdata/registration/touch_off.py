@@ -63,14 +63,14 @@ def touch_off(
         DeviceError: If nothing answers down to the limit, or something does already at the top, or the
             answer shows no clear onset.
     """
-    found = search(probe, site, place, top, lowest, noise)
-    touches = [approach(probe, site, place, found, lowest, noise) for _ in range(repeats)]
-    probe.go((*place, found + HIGHER), LIFT_SPEED)
+    contact = search(probe, site, place, top, lowest, noise)
+    touches = [approach(probe, site, place, contact, lowest, noise) for _ in range(repeats)]
+    probe.go((*place, contact + HIGHER), LIFT_SPEED)
     return touches
 
 
 def approach(
-    probe: Probe, site: str, place: tuple[float, float], found: float, lowest: float, noise: np.ndarray
+    probe: Probe, site: str, place: tuple[float, float], contact: float, lowest: float, noise: np.ndarray
 ) -> Touch:
     """Approach slowly around the height at which the search was answered; from higher where that began in contact.
 
@@ -78,7 +78,7 @@ def approach(
         probe: The indenter.
         site: Name of the place, for errors.
         place: x and y [mm, machine].
-        found: Height of the search's first answer [mm, machine].
+        contact: Height of the search's first answer [mm, machine].
         lowest: Height below which the approach never goes [mm, machine].
         noise: Standard deviation of a reading [counts], shape (channels,).
 
@@ -86,9 +86,9 @@ def approach(
         DeviceError: If the answer shows no clear onset.
     """
     for above in ABOVE:
-        probe.go((*place, found + max(above, HIGHER)), LIFT_SPEED)
+        probe.go((*place, contact + max(above, HIGHER)), LIFT_SPEED)
         probe.wait(RECOVERY)
-        heights = np.arange(found + above, max(found - BELOW, lowest) - 1e-9, -FINE)
+        heights = np.arange(contact + above, max(contact - BELOW, lowest) - 1e-9, -FINE)
         readings = []
         for height in heights.tolist():
             probe.go((*place, height), SPEED)
@@ -96,7 +96,7 @@ def approach(
         answer = combined(np.array(readings), noise / np.sqrt(FRAMES))
         if first := onset(heights, answer):
             return Touch(site, *place, first, heights, answer)
-    probe.go((*place, found + HIGHER), LIFT_SPEED)
+    probe.go((*place, contact + HIGHER), LIFT_SPEED)
     raise DeviceError(
         f"{site}: the answer between {heights[0]:.2f} and {heights[-1]:.2f} mm shows no clear onset "
         f"({answer[-1]:.0f} standard deviations at the lowest point)",
@@ -109,13 +109,13 @@ def search(probe: Probe, site: str, place: tuple[float, float], top: float, lowe
     """Go down in steps until a channel answers twice in a row; return the height of the first answer [mm]."""
     probe.go((*place, top), LIFT_SPEED)
     probe.wait(RECOVERY / 2)
-    rest = probe.read(2 * FRAMES).mean
+    baseline = probe.read(2 * FRAMES).mean
     limit = ANSWER * noise / np.sqrt(FRAMES / 2)
     height, first = top, None
     while height - COARSE >= lowest:
         height -= COARSE
         probe.go((*place, height), SPEED)
-        answers = bool((np.abs(probe.read(FRAMES // 2 + 1).mean - rest) > limit).any())
+        answers = bool((np.abs(probe.read(FRAMES // 2 + 1).mean - baseline) > limit).any())
         # Two answers in a row: a single one may be noise.
         if answers and first is not None:
             if first >= top - 1.5 * COARSE:

@@ -64,20 +64,20 @@ class Comparison:
 
     def covered(self, episodes: np.ndarray) -> bool:
         """Return whether the other episodes hold every place and tool of some episodes."""
-        others = np.setdiff1d(np.arange(self.course.episodes), episodes)
-        return set(self._contexts[episodes]) <= set(self._contexts[others])
+        remainder = np.setdiff1d(np.arange(self.course.episodes), episodes)
+        return set(self._contexts[episodes]) <= set(self._contexts[remainder])
 
     def fitted_without(self, placed: Sequence[Placed], episodes: np.ndarray) -> tuple[Placed, ...]:
         """Return effects with parameters fitted to all episodes except some.
 
         If a place or tool occurs in no other episode, the episodes are removed altogether.
         """
-        others = np.setdiff1d(np.arange(self.course.episodes), episodes)
+        remainder = np.setdiff1d(np.arange(self.course.episodes), episodes)
         covered = self.covered(episodes)
-        course = without_readings(self.course, episodes) if covered else part(self.course, others)
+        course = without_readings(self.course, episodes) if covered else part(self.course, remainder)
         setting = Comparison(course, self.spec).setting
         rows = ~np.isin(self.course.reduced.episode, episodes)
-        return refine(setting, placed, _frame_of(self.null, course, rows, None if covered else others), STEPS).placed
+        return refine(setting, placed, _frame_of(self.null, course, rows, None if covered else remainder), STEPS).placed
 
     @cached_property
     def _contexts(self) -> np.ndarray:

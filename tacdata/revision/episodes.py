@@ -52,8 +52,8 @@ def _replaceable(course: Course, order: list[int], count: int) -> list[int]:
     depth = np.array([course.tip[course.episode == k, 2].max() for k in range(course.episodes)])
     picked: list[int] = []
     for k in order:
-        others = [j for j in np.flatnonzero(context == context[k]).tolist() if j != k and j not in picked]
-        if others and depth[others].max() >= (1 - DEEPER) * depth[k]:
+        peers = [j for j in np.flatnonzero(context == context[k]).tolist() if j != k and j not in picked]
+        if peers and depth[peers].max() >= (1 - DEEPER) * depth[k]:
             picked.append(k)
         if len(picked) == count:
             break

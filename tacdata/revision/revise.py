@@ -91,7 +91,7 @@ def revise(
     judged: Path,
     recordings: list[Path],
     spec: Spec,
-    out: Path,
+    target: Path,
     wishes: RevisionOptions | None = None,
     note: Note = lambda text: None,
 ) -> Revised:
@@ -101,47 +101,51 @@ def revise(
         judged: Folder that `tacdata discrepancy` wrote.
         recordings: The recordings of the verdict.
         spec: The model spec of the verdict.
-        out: Folder to create.
+        target: Folder to create.
         wishes: Steps besides the card.
         note: Called with a line of progress.
 
     Raises:
-        UsageError: If ``out`` exists, or the verdict was reached from other recordings or another model.
+        UsageError: If ``target`` exists, or the verdict was reached from other recordings or another model.
         FormatError: If the file is no verdict.
     """
-    asked = wishes or RevisionOptions()
-    if out.exists():
-        raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")
+    options = wishes or RevisionOptions()
+    if target.exists():
+        raise UsageError(f"{target} exists", "a new folder; nothing is overwritten", "choose another --out")
     verdict = documents.read(judged / VERDICT, "verdict")
     _same(verdict, spec, judged, recordings)
     status, moving = verdict["status"], moves_labels(placed_of(additions(verdict)))
-    if asked.retrain is not None and asked.relabel is None and moving:
+    if options.retrain is not None and options.relabel is None and moving:
         raise UsageError(
             "--retrain without --relabel: the effect moves labels, and a network needs the new ones",
             "both",
             "add --relabel",
         )
     note("reading")
-    added = of_verdict(verdict) if asked.suspected else additions(verdict)
+    added = of_verdict(verdict) if options.suspected else additions(verdict)
     answer = placed_of(added or of_verdict(verdict))
-    held = Comparison(course_of(recordings), spec, tuple(answer))
-    out.mkdir(parents=True)
+    comparison = Comparison(course_of(recordings), spec, tuple(answer))
+    target.mkdir(parents=True)
     note("gap, with the parameters fitted without the sealed episodes")
     # The gap uses parameters fitted without the sealed episodes; the model that is written has the verdict's own.
-    chosen = sealed(held.course, verdict)
-    change = gap(held, answer, chosen, noise_of(verdict, held), note) if answer else None
-    slices = sealed_slices(held, change, chosen.numbers) if change else []
-    after = _added(verdict, judged, spec, added, out) if added else None
-    corrected = write_corrected(held, held.after(answer), out / CORRECTED) if asked.corrected and added else None
+    seal = sealed(comparison.course, verdict)
+    change = gap(comparison, answer, seal, noise_of(verdict, comparison), note) if answer else None
+    slices = sealed_slices(comparison, change, seal.numbers) if change else []
+    new_hash = _added(verdict, judged, spec, added, target) if added else None
+    corrected = (
+        write_corrected(comparison, comparison.after(answer), target / CORRECTED)
+        if options.corrected and added
+        else None
+    )
     parents = {"verdict": provenance.content_hash(verdict), "spec": spec.content_hash}
     document = {
         "version": schemas.version("revision"),
         "verdict": parents["verdict"],
         "status": status,
         "added": [a.placed.effect.name for a in added],
-        "suspected": [] if asked.suspected else [a.placed.effect.name for a in suspects(verdict)],
+        "suspected": [] if options.suspected else [a.placed.effect.name for a in suspects(verdict)],
         "remarks": [a.remark for a in added if a.remark],
-        "spec": {"before": spec.content_hash, "after": after},
+        "spec": {"before": spec.content_hash, "after": new_hash},
         "gap": _gap(change, slices),
         "labels": [],
         "tips": [],
@@ -149,31 +153,36 @@ def revise(
         "confirmed": [],
         "corrected": None if corrected is None else {"file": CORRECTED, **corrected},
         "next": {"plan": None, "presses": [], "remark": ""},
-        "provenance": provenance.stamp("tacdata revise", parents, {"confirm": asked.confirm}),
+        "provenance": provenance.stamp("tacdata revise", parents, {"confirm": options.confirm}),
     }
-    shown = _pictures(document, verdict, held, answer, change, chosen, out, note)
-    _write(document, verdict, out)
+    pictures = _pictures(document, verdict, comparison, answer, change, seal, target, note)
+    _write(document, verdict, target)
     if added:
-        document |= _about_labels(recordings, held, answer, out, asked, note)
-    document["tips"] = [{"session": s, **asdict(t)} for s, t in _tips(recordings, answer, asked, note)]
-    _write(document, verdict, out)
-    document["next"] = recommend(recordings, held, verdict, out, asked.presses, note)
+        document |= _about_labels(recordings, comparison, answer, target, options, note)
+    document["tips"] = [{"session": s, **asdict(t)} for s, t in _tips(recordings, answer, options, note)]
+    _write(document, verdict, target)
+    document["next"] = recommend(recordings, comparison, verdict, target, options.presses, note)
     if document["retrained"]:  # the picture shows the networks, too
-        shown = _pictures(document, verdict, held, answer, change, chosen, out, note)
-    _write(document, verdict, out)
-    return Revised(document, out, shown)
+        pictures = _pictures(document, verdict, comparison, answer, change, seal, target, note)
+    _write(document, verdict, target)
+    return Revised(document, target, pictures)
 
 
 def _about_labels(
-    recordings: list[Path], held: Comparison, answer: list[Placed], out: Path, asked: RevisionOptions, note: Note
+    recordings: list[Path],
+    comparison: Comparison,
+    answer: list[Placed],
+    target: Path,
+    options: RevisionOptions,
+    note: Note,
 ) -> dict[str, Any]:
     """Return the effects' influence on labels and networks, and their comparison with finite elements."""
-    moved = _labels(recordings, answer, out, asked, note)
-    confirmed = _confirmed(recordings, held, answer, asked, note)
-    trained = _retrained(recordings, held, answer, out, asked, note)
+    shifts = _labels(recordings, answer, target, options, note)
+    confirmed = _confirmed(recordings, comparison, answer, options, note)
+    trained = _retrained(recordings, comparison, answer, target, options, note)
     return {
         "labels": [
-            {"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}} for s, m in moved
+            {"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}} for s, m in shifts
         ],
         "retrained": None if trained is None else {**asdict(trained), "metrics": list(trained.metrics)},
         "confirmed": [{**_finite(asdict(c)), "place": list(c.place)} for c in confirmed],
@@ -182,22 +191,22 @@ def _about_labels(
 
 def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Path]) -> None:
     parents = verdict["provenance"].get("parents", {})
-    told = {name.removeprefix(KIND): digest for name, digest in parents.items() if name.startswith(KIND)}
-    given = {recording_hash(path): path for path in recordings if path.exists()}
-    if told and set(told.values()) != set(given):
-        other = [str(path) for digest, path in given.items() if digest not in told.values()]
+    parent_digests = {name.removeprefix(KIND): digest for name, digest in parents.items() if name.startswith(KIND)}
+    digests = {recording_hash(path): path for path in recordings if path.exists()}
+    if parent_digests and set(parent_digests.values()) != set(digests):
+        strangers = [str(path) for digest, path in digests.items() if digest not in parent_digests.values()]
         raise UsageError(
-            f"{judged} was reached from other recordings than {', '.join(other or map(str, recordings))}",
-            f"those that it was reached from, unchanged: {', '.join(told)}",
+            f"{judged} was reached from other recordings than {', '.join(strangers or map(str, recordings))}",
+            f"those that it was reached from, unchanged: {', '.join(parent_digests)}",
             "name them, or run `tacdata discrepancy` with the ones that there are",
         )
-    known = verdict["provenance"].get("parents", {}).get("spec")
+    spec_hash = verdict["provenance"].get("parents", {}).get("spec")
     major, minor = schemas.version("model_spec").split(".")
     versions = [f"{major}.{k}" for k in range(int(minor) + 1)]
     same = {provenance.content_hash({**spec.document, "version": version}) for version in versions}
-    if known is not None and known not in same | {spec.content_hash}:
+    if spec_hash is not None and spec_hash not in same | {spec.content_hash}:
         raise UsageError(
-            f"{judged} was reached from another model ({known[:12]}… instead of {spec.content_hash[:12]}…)",
+            f"{judged} was reached from another model ({spec_hash[:12]}… instead of {spec.content_hash[:12]}…)",
             "the model spec that `tacdata discrepancy` was given",
             "name it with --spec, or leave --spec out as then",
         )
@@ -208,40 +217,47 @@ def _sessions(recordings: list[Path]) -> list[Path]:
 
 
 def _labels(
-    recordings: list[Path], answer: list[Placed], out: Path, asked: RevisionOptions, note: Note
+    recordings: list[Path], answer: list[Placed], target: Path, options: RevisionOptions, note: Note
 ) -> list[tuple[str, Moved]]:
     if not moves_labels(answer):
         return []
-    found = []
+    shifts = []
     for session in _sessions(recordings):
         note(f"labels of {session.name}")
-        if asked.relabel is None:
-            found.append((session.name, paths_moved(session, answer)))
+        if options.relabel is None:
+            shifts.append((session.name, paths_moved(session, answer)))
         else:
-            folder = out / LABELS / session.name
-            told = relabelled(session, answer, folder, asked.relabel, asked.store, _told(note, session.name))
-            found.append((session.name, told))
-    return found
+            folder = target / LABELS / session.name
+            shift = relabelled(session, answer, folder, options.relabel, options.store, _told(note, session.name))
+            shifts.append((session.name, shift))
+    return shifts
 
 
 def _tips(
-    recordings: list[Path], answer: list[Placed], asked: RevisionOptions, note: Note
+    recordings: list[Path], answer: list[Placed], options: RevisionOptions, note: Note
 ) -> list[tuple[str, TipError]]:
     if not answer or not any(p.stage == "kinematics" for p in answer):
         return []
     note("where the tip truly was")
-    told = [(session.name, tip_error(session, answer, asked.truth)) for session in _sessions(recordings)]
-    return [(name, error) for name, error in told if error is not None]
+    tips = [(session.name, tip_error(session, answer, options.truth)) for session in _sessions(recordings)]
+    return [(name, error) for name, error in tips if error is not None]
 
 
 def _retrained(
-    recordings: list[Path], held: Comparison, answer: list[Placed], out: Path, asked: RevisionOptions, note: Note
+    recordings: list[Path],
+    comparison: Comparison,
+    answer: list[Placed],
+    target: Path,
+    options: RevisionOptions,
+    note: Note,
 ) -> Retrained | None:
-    if asked.retrain is None:
+    if options.retrain is None:
         return None
     sessions = _sessions(recordings)
-    labels = {s: out / LABELS / s.name for s in sessions} if moves_labels(answer) else {}
-    return retrained(sessions, labels, held, answer, out / NETWORKS, asked.retrain, lambda t: note(f"networks, {t}"))
+    labels = {s: target / LABELS / s.name for s in sessions} if moves_labels(answer) else {}
+    return retrained(
+        sessions, labels, comparison, answer, target / NETWORKS, options.retrain, lambda t: note(f"networks, {t}")
+    )
 
 
 def _told(note: Note, name: str) -> Callable[[str, int, int], None]:
@@ -249,19 +265,19 @@ def _told(note: Note, name: str) -> Callable[[str, int, int], None]:
 
 
 def _confirmed(
-    recordings: list[Path], held: Comparison, answer: list[Placed], asked: RevisionOptions, note: Note
+    recordings: list[Path], comparison: Comparison, answer: list[Placed], options: RevisionOptions, note: Note
 ) -> list[Confirmed]:
-    given = held.spec.document["response"]
-    if asked.confirm < 1 or given["kind"] != "table" or not touches_fem(answer):
+    response = comparison.spec.document["response"]
+    if options.confirm < 1 or response["kind"] != "table" or not touches_fem(answer):
         return []
     note("finite elements, where the revision moves the loads most")
-    mesh = _mesh(held.spec.folder / given["file"])
+    mesh = _mesh(comparison.spec.folder / response["file"])
     what = pressed(recordings)
 
-    def progress(done: int, of: int, left: float) -> None:
-        note(f"finite elements: {done} of {of}, about {left:.0f} s left")
+    def progress(done: int, of: int, remaining: float) -> None:
+        note(f"finite elements: {done} of {of}, about {remaining:.0f} s left")
 
-    return confirm(held, answer, what.sensor, what.reaches, asked.confirm, mesh, progress)
+    return confirm(comparison, answer, what.sensor, what.reaches, options.confirm, mesh, progress)
 
 
 def _mesh(path: Path) -> MeshSettings:
@@ -269,14 +285,14 @@ def _mesh(path: Path) -> MeshSettings:
     import numpy as np
 
     with np.load(path, allow_pickle=False) as data:
-        told = json.loads(str(data["provenance"])) if "provenance" in data else {}
-    values: dict[str, Any] = told.get("parameters", {}).get("mesh") or {}
+        stamp = json.loads(str(data["provenance"])) if "provenance" in data else {}
+    values: dict[str, Any] = stamp.get("parameters", {}).get("mesh") or {}
     if values:
         values["focus"] = tuple(values["focus"]) if values["focus"] else None
     return MeshSettings(**values)
 
 
-def _added(verdict: dict[str, Any], judged: Path, spec: Spec, added: list[Addition], out: Path) -> str:
+def _added(verdict: dict[str, Any], judged: Path, spec: Spec, added: list[Addition], target: Path) -> str:
     """Write the new version of the model, with its evidence; return its hash."""
     errors = [
         {name: float(p["error"]) for name, p in a.entry["parameters"].items() if p["error"] is not None} for a in added
@@ -284,12 +300,15 @@ def _added(verdict: dict[str, Any], judged: Path, spec: Spec, added: list[Additi
     names = [n for n in verdict["provenance"].get("parents", {}) if n != "spec"]
     evidence = f"{judged.name}/{VERDICT} sha256 {provenance.content_hash(verdict)}, from {', '.join(names)}"
     document = spec.with_effects(placed_of(added), errors, evidence)
-    given = document["response"]
-    if "file" in given:
+    response = document["response"]
+    if "file" in response:
         import os
 
-        document = {**document, "response": {**given, "file": os.path.relpath(spec.folder / given["file"], out)}}
-    documents.write(out / SPEC, document, "model_spec")
+        document = {
+            **document,
+            "response": {**response, "file": os.path.relpath(spec.folder / response["file"], target)},
+        }
+    documents.write(target / SPEC, document, "model_spec")
     return provenance.content_hash(document)
 
 
@@ -320,28 +339,28 @@ def _finite(values: dict[str, Any]) -> dict[str, Any]:
 def _pictures(
     document: dict[str, Any],
     verdict: dict[str, Any],
-    held: Comparison,
+    comparison: Comparison,
     answer: list[Placed],
     change: GapReduction | None,
-    chosen: Sealed,
-    out: Path,
+    seal: Sealed,
+    target: Path,
     note: Note,
 ) -> tuple[EpisodeCurves, ...]:
     if change is None:
         return ()
     note("picture, table")
-    shown = curves(held, change, chosen.numbers)
+    episode_curves = curves(comparison, change, seal.numbers)
     names = " and ".join(p.effect.title.lower() for p in answer)
     networks = (document["retrained"] or {}).get("metrics", ())
-    draw(f"{verdict['status']}: {names}", shown, change, out / PICTURE, networks)
-    return tuple(shown)
+    draw(f"{verdict['status']}: {names}", episode_curves, change, target / PICTURE, networks)
+    return tuple(episode_curves)
 
 
-def _write(document: dict[str, Any], verdict: dict[str, Any], out: Path) -> None:
+def _write(document: dict[str, Any], verdict: dict[str, Any], target: Path) -> None:
     """Write the document, the tables and the card."""
-    documents.write(out / REVISION, document, "revision")
+    documents.write(target / REVISION, document, "revision")
     if document["gap"]:
-        documents.write_text(out / TABLE, table.markdown(document))
-        documents.write_text(out / CSV, table.as_csv(document))
-    picture = out / PICTURE
-    documents.write_text(out / CARD, card(document, verdict, picture if picture.is_file() else None))
+        documents.write_text(target / TABLE, table.markdown(document))
+        documents.write_text(target / CSV, table.as_csv(document))
+    picture = target / PICTURE
+    documents.write_text(target / CARD, card(document, verdict, picture if picture.is_file() else None))

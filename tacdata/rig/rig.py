@@ -46,7 +46,7 @@ class Registration:
         """Return the registration for an indenter whose lowest point is at ``offset`` from the registered one's [mm,
         machine axes].
         """
-        x, y, z = (own - moved for own, moved in zip(self.origin, offset, strict=True))
+        x, y, z = (coordinate - shift for coordinate, shift in zip(self.origin, offset, strict=True))
         return replace(self, origin=(x, y, z))
 
     def to_machine(self, x: float, y: float, depth: float) -> tuple[float, float, float]:
@@ -133,27 +133,30 @@ class Rig:
             UsageError: If it belongs to another rig or sensor.
         """
         documents.check(document, "registration", origin)
-        for what, given, own in (("rig", document["rig"], self.name), ("sensor", document["sensor_hash"], sensor_hash)):
-            if given != own:
+        for what, stated, present in (
+            ("rig", document["rig"], self.name),
+            ("sensor", document["sensor_hash"], sensor_hash),
+        ):
+            if stated != present:
                 raise UsageError(
                     f"{origin} was measured with another {what} ({document[what]})",
                     f"this {what}",
                     "run tacdata register again, or name the registration that belongs to it",
                 )
-        kept = {k: document[k] for k in ("origin", "yaw", "tilt", "method", "date", "uncertainty", "sensor_hash")}
+        fields = {k: document[k] for k in ("origin", "yaw", "tilt", "method", "date", "uncertainty", "sensor_hash")}
         residuals = document["residuals"]
-        kept["residual"] = max(map(abs, [*residuals["touches"], *residuals["taxels"]]))
-        kept["document_hash"] = provenance.content_hash(document)
+        fields["residual"] = max(map(abs, [*residuals["touches"], *residuals["taxels"]]))
+        fields["document_hash"] = provenance.content_hash(document)
         return replace(
-            self, registration=Registration.from_document(kept), document={**self.document, "registration": kept}
+            self, registration=Registration.from_document(fields), document={**self.document, "registration": fields}
         )
 
 
 def registration_for(document: dict[str, Any], indenter: str) -> Registration:
     """Return the registration of a rig file's document with the tool offset of an indenter, if it has one."""
-    found = Registration.from_document(document["registration"])
+    registration = Registration.from_document(document["registration"])
     tool = document.get("tools", {}).get(indenter)
-    return found.with_tool(tuple(tool["offset"])) if tool else found
+    return registration.with_tool(tuple(tool["offset"])) if tool else registration
 
 
 def from_document(document: dict[str, Any], origin: str) -> Rig:

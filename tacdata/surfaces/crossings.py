@@ -77,6 +77,6 @@ def crossing_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         inputs=[mesh.id, exact, wp.array(indices, dtype=wp.int32, device="cpu"), partner],
         device="cpu",
     )
-    found = partner.numpy()
-    first = np.flatnonzero(found >= 0)
-    return np.stack([first, found[first]], axis=-1)
+    partners = partner.numpy()
+    first = np.flatnonzero(partners >= 0)
+    return np.stack([first, partners[first]], axis=-1)

@@ -89,23 +89,23 @@ def stamped_stream(url: str, timeout: float) -> ImageStream | None:
 
 def _head(stream: BinaryIO, mark: bytes) -> dict[str, str]:
     """Return the lines before the next image, by their names in lower case; none at the stream's end."""
-    found: dict[str, str] = {}
+    fields: dict[str, str] = {}
     inside = False
     while line := stream.readline(HEADER):
         line = line.strip()
         if line.startswith(mark) or (not inside and line.startswith(b"--")):
-            inside, found = True, {}
-        elif inside and not line and found:
-            return found
+            inside, fields = True, {}
+        elif inside and not line and fields:
+            return fields
         elif inside and b":" in line:
             name, _, value = line.decode("latin-1").partition(":")
-            found[name.strip().lower()] = value.strip()
+            fields[name.strip().lower()] = value.strip()
     return {}
 
 
 def _stamp(head: dict[str, str]) -> int:
     for name in STAMPS:
-        whole, _, part = head.get(name, "").partition(".")
-        if whole.isdigit() and (part.isdigit() or not part):
-            return int(whole) * 1_000_000_000 + int(part.ljust(9, "0")[:9] or 0)
+        seconds, _, part = head.get(name, "").partition(".")
+        if seconds.isdigit() and (part.isdigit() or not part):
+            return int(seconds) * 1_000_000_000 + int(part.ljust(9, "0")[:9] or 0)
     return -1

@@ -37,7 +37,7 @@ class Patience:
 
     def over(self) -> bool:
         """Check the clock; return whether the time is up."""
-        now = self._host.monotonic()
-        self._waited += min(now - self._looked, self._step)
-        self._looked = now
+        instant = self._host.monotonic()
+        self._waited += min(instant - self._looked, self._step)
+        self._looked = instant
         return self._waited > self._limit

@@ -23,8 +23,8 @@ WRITE = 2.0
 
 def ports() -> str:
     """Return the serial ports of this machine, as text."""
-    found = [f"{p.device} ({p.description})" if p.description != "n/a" else p.device for p in list_ports.comports()]
-    return ", ".join(found) or "this machine shows none"
+    names = [f"{p.device} ({p.description})" if p.description != "n/a" else p.device for p in list_ports.comports()]
+    return ", ".join(names) or "this machine shows none"
 
 
 def usb_identity(port: str) -> str:

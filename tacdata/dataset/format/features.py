@@ -120,14 +120,14 @@ def shapes(sensor: Sensor, extra: Iterable[str] = ()) -> dict[str, tuple[int, ..
     """Return the shape of one frame of every own column and of some of `EXTRA`; scalars are ``()``."""
     taxels = (sensor.taxels.count,)
     vectors = {STATE: taxels, RAW: taxels, DEPTH: sensor.map.shape, TIP: (3,), FORCE: (3,), TAXEL_FORCE: taxels}
-    given = {key: columns.ALL[EXTRA[key]].shape(1, sensor.map.shape, sensor.taxels.count)[1:] for key in extra}
-    flat = {key: (int(np.prod(shape)),) if shape else () for key, shape in given.items()}
+    named_shapes = {key: columns.ALL[EXTRA[key]].shape(1, sensor.map.shape, sensor.taxels.count)[1:] for key in extra}
+    flat = {key: (int(np.prod(shape)),) if shape else () for key, shape in named_shapes.items()}
     return {key: vectors.get(key, ()) for key in DTYPES} | flat
 
 
 def _names(key: str, sensor: Sensor) -> list[str] | None:
-    across = sensor.taxels.columns
-    taxels = [f"taxel_{k % across}_{k // across}" for k in range(sensor.taxels.count)]
+    width = sensor.taxels.columns
+    taxels = [f"taxel_{k % width}_{k // width}" for k in range(sensor.taxels.count)]
     if key in EXTRA:
         return taxels if columns.ALL[EXTRA[key]].kind == "taxels" else None
     return {

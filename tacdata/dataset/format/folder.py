@@ -133,8 +133,8 @@ def write_parquet(path: Path, table: pa.Table) -> None:
         pq.write_table(table, stream, compression="snappy", write_page_checksum=True)
 
 
-def write_row(root: Path, row: EpisodeRow, stats: dict[str, Statistics], own: dict[str, Any]) -> None:
-    """Write a file of meta/episodes with one row: LeRobot's columns, the statistics, and ``own`` columns."""
+def write_row(root: Path, row: EpisodeRow, stats: dict[str, Statistics], extra: dict[str, Any]) -> None:
+    """Write a file of meta/episodes with one row: LeRobot's columns, the statistics, and ``extra`` columns."""
     columns = {
         "episode_index": row.index,
         "tasks": list(row.tasks),
@@ -146,7 +146,7 @@ def write_row(root: Path, row: EpisodeRow, stats: dict[str, Statistics], own: di
         **{f"stats/{key}/{name}": value.tolist() for key, values in stats.items() for name, value in values.items()},
         "meta/episodes/chunk_index": row.row_file // FILES_PER_CHUNK,
         "meta/episodes/file_index": row.row_file % FILES_PER_CHUNK,
-        **own,
+        **extra,
     }
     write_parquet(root / row_path(row.row_file), pa.Table.from_pydict({key: [value] for key, value in columns.items()}))
 
@@ -167,7 +167,7 @@ def rows_in(path: Path) -> dict[int, EpisodeRow]:
     Raises:
         FormatError: If it is damaged.
     """
-    wanted = [
+    fields = [
         "episode_index",
         "tasks",
         "data/chunk_index",
@@ -186,7 +186,7 @@ def rows_in(path: Path) -> dict[int, EpisodeRow]:
             entry["data/chunk_index"] * FILES_PER_CHUNK + entry["data/file_index"],
             entry["meta/episodes/chunk_index"] * FILES_PER_CHUNK + entry["meta/episodes/file_index"],
         )
-        for entry in read_parquet(path, wanted).to_pylist()
+        for entry in read_parquet(path, fields).to_pylist()
     }
 
 

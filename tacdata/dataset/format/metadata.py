@@ -94,12 +94,12 @@ class EpisodeRecord:
 
 def write_main(root: Path, sensors: dict[str, dict[str, Any]], rate: float) -> None:
     """Write meta/tacdata.json for sensor documents by content hash; ``rate`` in Hz."""
-    made = provenance.stamp("tacdata.dataset", {}, {})
+    stamp = provenance.stamp("tacdata.dataset", {}, {})
     documents.write(
         root / MAIN,
         {
             "version": schemas.version("dataset"),
-            **{k: made[k] for k in ("made_by", "code_version", "made_at")},
+            **{k: stamp[k] for k in ("made_by", "code_version", "made_at")},
             "rate": rate,
             "units": UNITS,
             "tare": TARE,
@@ -168,7 +168,7 @@ def read_records(root: Path) -> dict[int, EpisodeRecord]:
 def read_record(root: Path, key: int) -> EpisodeRecord | None:
     """Return the record of a key, checked; None if there is none. The others are not looked at closely."""
     path = root / RECORDS
-    found = None
+    record = None
     for number, line in enumerate(path.read_text(errors="replace").splitlines() if path.is_file() else (), start=1):
         try:
             document = json.loads(line)
@@ -176,8 +176,8 @@ def read_record(root: Path, key: int) -> EpisodeRecord | None:
         except (ValueError, KeyError, TypeError):
             continue
         if short_hash(provenance.content_hash(identity)) == key:
-            found = EpisodeRecord.from_document(document, f"{path}: line {number}")
-    return found
+            record = EpisodeRecord.from_document(document, f"{path}: line {number}")
+    return record
 
 
 def shard_metadata(sensor: Sensor, record: EpisodeRecord) -> bytes:

@@ -94,8 +94,8 @@ def _strip_start(blob: bytes, shape: tuple[int, int]) -> int | None:
             starts = tags.get(273, ())
     except OSError as error:
         raise ValueError(f"a depth image is unreadable: {error}") from None
-    whole = plain and len(starts) == 1 and starts[0] + shape[0] * shape[1] * 4 <= len(blob)
-    return int(starts[0]) if whole else None
+    is_complete = plain and len(starts) == 1 and starts[0] + shape[0] * shape[1] * 4 <= len(blob)
+    return int(starts[0]) if is_complete else None
 
 
 def _decode_one(blob: bytes, shape: tuple[int, int]) -> np.ndarray:

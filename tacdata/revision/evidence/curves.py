@@ -57,8 +57,8 @@ def curves(comparison: Comparison, change: GapReduction, episodes: np.ndarray, c
         count: Number of episodes at most.
     """
     course, scale = comparison.course, change.scale
-    before, after = (comparison.predicted(model.response, model.placed) for model in (change.before, change.after))
-    size = np.square((after - before) / scale).mean(axis=1)
+    initial, revised = (comparison.predicted(model.response, model.placed) for model in (change.before, change.after))
+    size = np.square((revised - initial) / scale).mean(axis=1)
     order = sorted(episodes.tolist(), key=lambda e: -float(size[course.episode == e].mean()))[:count]
     episode_curves = []
     for e in order:
@@ -76,8 +76,8 @@ def curves(comparison: Comparison, change: GapReduction, episodes: np.ndarray, c
                 time,
                 course.tip[rows, 2],
                 measured,
-                level(before),
-                level(after),
+                level(initial),
+                level(revised),
                 scale,
                 course.channel_names,
             )

@@ -80,18 +80,20 @@ def gap(
     predicted = comparison.covered(numbers)
     response_base = comparison.without(numbers) if predicted else comparison
     fitted = tuple(placed) if sealed.unseen else comparison.fitted_without(placed, numbers)
-    before, after = response_base.before, response_base.after(fitted)
-    pair = np.array([comparison.mean_squares(model, numbers, scale) for model in (before, after)])
+    initial, revised = response_base.before, response_base.after(fitted)
+    pair = np.array([comparison.mean_squares(model, numbers, scale) for model in (initial, revised)])
     at = int(np.argmax(pair[1]))
     total = ResidualChange("sealed episodes", len(numbers), *(float(v) for v in pair.mean(axis=1)))
     worst = ResidualChange(comparison.course.names[numbers[at]], 1, *(float(v) for v in pair[:, at]))
     elsewhere = []
     for name, group in groups(comparison.course):
         note(f"gap, fitted without: {name}")
-        there = comparison.after(comparison.fitted_without(placed, group))
-        sizes = (float(comparison.mean_squares(model, group, scale).mean()) for model in (comparison.before, there))
+        held_out = comparison.after(comparison.fitted_without(placed, group))
+        sizes = (float(comparison.mean_squares(model, group, scale).mean()) for model in (comparison.before, held_out))
         elsewhere.append(ResidualChange(name, len(group), *sizes))
-    return GapReduction(total, _interval(pair), sealed.unseen, predicted, worst, tuple(elsewhere), before, after, scale)
+    return GapReduction(
+        total, _interval(pair), sealed.unseen, predicted, worst, tuple(elsewhere), initial, revised, scale
+    )
 
 
 def noise_of(verdict: dict[str, Any], comparison: Comparison) -> np.ndarray:

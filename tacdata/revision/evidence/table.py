@@ -28,8 +28,10 @@ def _closed(change: dict[str, Any]) -> float | None:
 def markdown(revision: dict[str, Any]) -> str:
     """Return the table in Markdown; mean squares in units of the noise floor."""
     lines = [f"| {' | '.join(HEAD)} |", "|---|---:|---:|---:|---:|"]
-    for name, count, before, after, closed in rows(revision):
-        lines.append(f"| {name} | {count} | {before:.4g} | {after:.4g} | {'' if closed is None else f'{closed:.3f}'} |")
+    for name, count, initial, final, closed in rows(revision):
+        lines.append(
+            f"| {name} | {count} | {initial:.4g} | {final:.4g} | {'' if closed is None else f'{closed:.3f}'} |"
+        )
     return "\n".join([*lines, *_tips(revision), *_networks(revision)]) + "\n"
 
 
@@ -76,6 +78,6 @@ def as_csv(revision: dict[str, Any]) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(HEAD)
-    for name, count, before, after, closed in rows(revision):
-        writer.writerow((name, count, f"{before:.6g}", f"{after:.6g}", "" if closed is None else f"{closed:.6g}"))
+    for name, count, initial, final, closed in rows(revision):
+        writer.writerow((name, count, f"{initial:.6g}", f"{final:.6g}", "" if closed is None else f"{closed:.6g}"))
     return buffer.getvalue()

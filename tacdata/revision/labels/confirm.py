@@ -74,25 +74,25 @@ def confirm(
     if not isinstance(response, TableResponse) or not touches_fem(placed) or count < 1:
         return []
     course = comparison.course
-    before = predict(course, response, comparison.setting.given).pose
-    after = predict(course, response, [*comparison.setting.given, *placed]).pose
+    nominal = predict(course, response, comparison.setting.given).pose
+    revised = predict(course, response, [*comparison.setting.given, *placed]).pose
     mechanical = [p for p in placed if p.effect.changes_skin]
     # Two changes of the loads: the tip is elsewhere, and effects of the skin multiply them.
-    loads, revised_loads = response.load(before, course.tool), response.load(after, course.tool)
+    loads, revised_loads = response.load(nominal, course.tool), response.load(revised, course.tool)
     for effect in mechanical:
-        revised_loads = revised_loads * _factor(comparison, effect, after)[:, None]
+        revised_loads = revised_loads * _factor(comparison, effect, revised)[:, None]
     # Both the change and the difference are given over the largest load, so that they can be compared.
     top = max(float(np.abs(loads).max()), 1e-12)
     change = np.abs(revised_loads - loads).max(axis=1) / top
     rows = _spread(change, course.row_site, course.tool, count)
     skin = changed_skin(sensor, placed) or sensor
     model = SkinModel(skin, ModelSettings(mesh=mesh, error_estimate=False))
-    requests = [_press(reaches[course.tools[int(course.tool[r])].name], after[r]) for r in rows]
+    requests = [_press(reaches[course.tools[int(course.tool[r])].name], revised[r]) for r in rows]
     answers = PressStore.of(model).solve(requests, 1, progress)
     confirmed = []
     for r, press, answer in zip(rows, requests, answers, strict=True):
         name = course.tools[int(course.tool[r])].name
-        at, depth = (float(after[r, 0]), float(after[r, 1])), float(press.depths[-1])
+        at, depth = (float(revised[r, 0]), float(revised[r, 1])), float(press.depths[-1])
         if isinstance(answer, SolveError) or len(answer.depths) < len(press.depths):
             confirmed.append(Confirmed(name, at, depth, float(change[r]), float("nan"), float("nan"), False))
             continue

@@ -93,11 +93,11 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
     )
 
 
-def _apart(before: Episode, after: Episode, time_ns: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _apart(original: Episode, update: Episode, time_ns: np.ndarray, view: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the tip error before and after while it touches [mm], each of shape (n, 3)."""
-    nominal, revised = before.tip_at(time_ns), after.tip_at(time_ns)
+    nominal, revised = original.tip_at(time_ns), update.tip_at(time_ns)
     good = (nominal[:, 2] > 0) & np.isfinite(view[:, 2])
-    good &= (time_ns >= before.tip_ns[0] - NEAR_NS) & (time_ns <= before.tip_ns[-1] + NEAR_NS)
+    good &= (time_ns >= original.tip_ns[0] - NEAR_NS) & (time_ns <= original.tip_ns[-1] + NEAR_NS)
     return view[good] - nominal[good], view[good] - revised[good]
 
 

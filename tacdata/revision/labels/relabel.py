@@ -57,14 +57,14 @@ def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
     old = [read_episode(path) for path in read_session(session).episodes]
     new = {e.number: e for e in moved_episodes(old, placed)}
     squares, largest, paths, touching = [], 0.0, 0, 0
-    for before in old:
-        inside = before.tip[:, 2] > 0
+    for episode in old:
+        inside = episode.tip[:, 2] > 0
         if not inside.any():
             continue
         touching += 1
-        after = new[before.number]
-        nominal = before.tip_at(after.tip_ns)
-        way = np.linalg.norm(after.tip - nominal, axis=1)[(nominal[:, 2] > 0) | (after.tip[:, 2] > 0)]
+        counterpart = new[episode.number]
+        nominal = episode.tip_at(counterpart.tip_ns)
+        way = np.linalg.norm(counterpart.tip - nominal, axis=1)[(nominal[:, 2] > 0) | (counterpart.tip[:, 2] > 0)]
         squares.append(np.mean(way**2))
         largest = max(largest, float(way.max()))
         paths += bool(way.max() > LEAST)
@@ -108,12 +108,12 @@ def changed_skin(sensor: Sensor, placed: Sequence[Placed]) -> Sensor | None:
     return replace(sensor, skin=replace(sensor.skin, thickness=sensor.skin.thickness * factor))
 
 
-def _compared(shift: Moved, before: Path, after: Path, summary: LabellingSummary) -> Moved:
+def _compared(shift: Moved, old_folder: Path, new_folder: Path, summary: LabellingSummary) -> Moved:
     squares, count, largest, labels = 0.0, 0, 0.0, 0
-    for path in file_names.present(after).values():
-        if not (before / path.name).is_file():
+    for path in file_names.present(new_folder).values():
+        if not (old_folder / path.name).is_file():
             continue
-        old, new = read_label(before / path.name), read_label(path)
+        old, new = read_label(old_folder / path.name), read_label(path)
         if old.depth.shape != new.depth.shape:
             continue
         labels += 1

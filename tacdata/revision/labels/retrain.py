@@ -191,10 +191,10 @@ def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
     """Return a dataset of some episodes, marked as another one than the training data."""
     spans, rows, at = [], [], 0
     for span in frames.spans(numbers):
-        own = np.arange(span.start, span.stop)
-        rows.append(own)
-        spans.append(replace(span, start=at, stop=at + len(own)))
-        at += len(own)
+        indices = np.arange(span.start, span.stop)
+        rows.append(indices)
+        spans.append(replace(span, start=at, stop=at + len(indices)))
+        at += len(indices)
     index = np.concatenate(rows)
     names = ("taxels", "depth", "tip", "phase", "time_ns", "valid")
     digest = hashlib.sha256(f"{frames.dataset_hash} {sorted(numbers)}".encode()).hexdigest()
@@ -202,7 +202,7 @@ def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
     return replace(frames, **values, episodes=tuple(spans), dataset_hash=digest)
 
 
-def _told(by: str, recipe: Recipe, before: dict[str, Any], after: dict[str, Any]) -> Retrained:
+def _told(by: str, recipe: Recipe, initial: dict[str, Any], final: dict[str, Any]) -> Retrained:
     from tacdata.training.scoring.evaluate import METRICS
 
     rows = [
@@ -210,13 +210,13 @@ def _told(by: str, recipe: Recipe, before: dict[str, Any], after: dict[str, Any]
             "name": name,
             "title": f"{METRICS[name][1]}, frames in contact",
             "unit": METRICS[name][2],
-            "before": before["contact_frames"][name]["mean"],
-            "after": after["contact_frames"][name]["mean"],
+            "before": initial["contact_frames"][name]["mean"],
+            "after": final["contact_frames"][name]["mean"],
         }
         for name in METRICS
     ]
     for name, title in (("centre_depth", "Depth at the contact's centre"), ("position", "Place of the contact")):
-        pair = [d["prescribed"]["prediction"][name]["mean"] for d in (before, after)]
+        pair = [d["prescribed"]["prediction"][name]["mean"] for d in (initial, final)]
         rows.append(
             {
                 "name": name,
@@ -226,5 +226,5 @@ def _told(by: str, recipe: Recipe, before: dict[str, Any], after: dict[str, Any]
                 "after": pair[1],
             }
         )
-    frames = after["frames"]["in_contact"]
-    return Retrained(by, len(after["split"]["episodes"]), frames, recipe.epochs, tuple(rows))
+    frames = final["frames"]["in_contact"]
+    return Retrained(by, len(final["split"]["episodes"]), frames, recipe.epochs, tuple(rows))

@@ -54,7 +54,7 @@ def _pace(course: Course, episode: int) -> float:
     """Return the faster of a stroke's ways in and out [mm/s]; 0 if it holds no way."""
     rows = np.flatnonzero(course.episode == episode)
     time, depth = course.time[rows], course.tip[rows, 2]
-    top, found = int(np.argmax(depth)), 0.0
+    top, pace = int(np.argmax(depth)), 0.0
     # Above the skin a path may wait; in contact it moves.
     for bottom in {float(depth.min()), max(float(depth.min()), 0.0)}:
         low, high = (bottom + share * (float(depth[top]) - bottom) for share in INNER)
@@ -62,5 +62,5 @@ def _pace(course: Course, episode: int) -> float:
             inside = np.flatnonzero((depth[way] >= low) & (depth[way] <= high))
             if len(inside) > 2:
                 span = float(np.ptp(time[way][inside]))
-                found = max(found, float(np.ptp(depth[way][inside])) / max(span, 1e-9))
-    return found
+                pace = max(pace, float(np.ptp(depth[way][inside])) / max(span, 1e-9))
+    return pace

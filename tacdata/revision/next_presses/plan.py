@@ -59,25 +59,27 @@ class Choice:
         return max(self.nats, key=lambda pair: self.nats[pair])
 
 
-def choose(held: Comparison, found: list[Rival], machine: MachineLimits, presses: int = PRESSES) -> list[Choice]:
+def choose(
+    comparison: Comparison, candidates: list[Rival], machine: MachineLimits, presses: int = PRESSES
+) -> list[Choice]:
     """Return the most informative presses, the best first; fewer if no press separates the rivals.
 
     Pairs that `PLANS` plans of the best press would leave open earn nothing.
 
     Args:
-        held: Recordings and model.
-        found: The rivals, fitted.
+        comparison: Recordings and model.
+        candidates: The rivals, fitted.
         machine: Limits of the machine that pressed.
         presses: Number of different presses.
     """
-    scored = [Choice(t, _distances(held, found, t, machine)) for t in trials(held.course, machine)]
-    weight = _probabilities(found)
-    pairs = [(a, b) for i, a in enumerate(found) for b in found[i + 1 :]]
+    scored = [Choice(t, _distances(comparison, candidates, t, machine)) for t in trials(comparison.course, machine)]
+    weight = _probabilities(candidates)
+    pairs = [(a, b) for i, a in enumerate(candidates) for b in candidates[i + 1 :]]
     have = {(a.mechanism, b.mechanism): 0.0 for a, b in pairs}
-    most = {pair: max((c.nats[pair] for c in scored), default=0.0) for pair in have}
-    have = {pair: 0.0 for pair in have if standard_errors(PLANS * presses * REPEATS * most[pair]) >= SETTLES}
-    chosen: list[Choice] = []
-    while scored and len(chosen) < presses:
+    peaks = {pair: max((c.nats[pair] for c in scored), default=0.0) for pair in have}
+    have = {pair: 0.0 for pair in have if standard_errors(PLANS * presses * REPEATS * peaks[pair]) >= SETTLES}
+    choices: list[Choice] = []
+    while scored and len(choices) < presses:
 
         def worth(choice: Choice) -> float:
             gain = [weight[i] * weight[j] * np.log1p(choice.nats[i, j] / (1.0 + have[i, j])) for i, j in have]
@@ -86,11 +88,11 @@ def choose(held: Comparison, found: list[Rival], machine: MachineLimits, presses
         best = max(scored, key=worth)
         if REPEATS * max((best.nats[pair] for pair in have), default=0.0) < NOISY:
             break
-        chosen.append(best)
+        choices.append(best)
         scored.remove(best)
         for pair in have:
             have[pair] += best.nats[pair]
-    return chosen
+    return choices
 
 
 def standard_errors(nats: float) -> float:
@@ -98,48 +100,50 @@ def standard_errors(nats: float) -> float:
     return float(np.sqrt(2 * nats))
 
 
-def left_open(chosen: list[Choice], repeats: int = REPEATS) -> str:
+def left_open(choices: list[Choice], repeats: int = REPEATS) -> str:
     """Return the pairs that a plan will not settle, as a sentence; empty if it settles every pair.
 
     Args:
-        chosen: Its presses.
+        choices: Its presses.
         repeats: Repeats of each.
     """
-    told, beyond = [], []
-    for pair in chosen[0].nats:
-        z = standard_errors(repeats * sum(c.nats[pair] for c in chosen))
+    sentences, beyond = [], []
+    for pair in choices[0].nats:
+        z = standard_errors(repeats * sum(c.nats[pair] for c in choices))
         plans = int(np.ceil((SETTLES / max(z, 1e-9)) ** 2))
         if plans > PLANS:
             beyond.append(f"{pair[0]} from {pair[1]}")
         elif plans > 1:
-            told.append(f"record it {plans} times to tell {pair[0]} from {pair[1]}")
+            sentences.append(f"record it {plans} times to tell {pair[0]} from {pair[1]}")
     if beyond:
-        told.append(f"no press of this guide tells {', '.join(beyond)}: another kind of measurement is needed")
-    return "; ".join(told)
+        sentences.append(f"no press of this guide tells {', '.join(beyond)}: another kind of measurement is needed")
+    return "; ".join(sentences)
 
 
-def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repeats: int = REPEATS) -> dict[str, Any]:
+def plan_of(
+    choices: list[Choice], comparison: Comparison, plan: Plan, name: str, repeats: int = REPEATS
+) -> dict[str, Any]:
     """Return the plan's document (`schemas/plan.schema.json`): every press done several times, presses in turn.
 
     Args:
-        chosen: The presses.
-        held: Recordings and model.
+        choices: The presses.
+        comparison: Recordings and model.
         plan: The plan of one of the sessions: indenters and motion are taken over.
         name: Name of the new plan.
         repeats: Repeats of each press.
     """
     document = plan.document or {}
-    used = {held.course.tools[c.trial.tool].name for c in chosen}
+    used = {comparison.course.tools[c.trial.tool].name for c in choices}
     entries = []
     for turn in range(repeats):
-        for c in chosen:
-            tool = held.course.tools[c.trial.tool].name
+        for c in choices:
+            tool = comparison.course.tools[c.trial.tool].name
             angles = next((p.angles for p in plan.presses if p.indenter_name == tool), {"yaw": 0.0})
             purpose = f"tells {c.best[0]} from {c.best[1]}"
             entries.append({**c.trial.entry(tool, angles["yaw"]), **angles, "repeat": turn, "purpose": purpose})
     tools = list(dict.fromkeys(e["indenter"] for e in entries))
     entries.sort(key=lambda e: tools.index(e["indenter"]))
-    mechanisms = list(dict.fromkeys(m for c in chosen for pair in c.nats for m in pair))
+    mechanisms = list(dict.fromkeys(m for c in choices for pair in c.nats for m in pair))
     return {
         "version": schemas.version("plan"),
         "name": name,
@@ -150,12 +154,12 @@ def plan_of(chosen: list[Choice], held: Comparison, plan: Plan, name: str, repea
     }
 
 
-def table_of(chosen: list[Choice], held: Comparison, repeats: int = REPEATS) -> str:
+def table_of(choices: list[Choice], comparison: Comparison, repeats: int = REPEATS) -> str:
     """Return presses of a foreign machine as CSV, a row each: place, depth, speed, hold, strokes, purpose.
 
     Args:
-        chosen: The presses.
-        held: Recordings and model.
+        choices: The presses.
+        comparison: Recordings and model.
         repeats: Repeats of each press.
     """
     buffer = io.StringIO()
@@ -163,50 +167,51 @@ def table_of(chosen: list[Choice], held: Comparison, repeats: int = REPEATS) -> 
     head = "x_mm y_mm depth_mm speed_mm_s hold_s recovery_s overshoot_mm strokes stroke_mm".split()
     writer.writerow(["press", "repeat", "specimen", *head, "purpose"])
     for repeat in range(repeats):
-        for k, c in enumerate(chosen):
+        for k, c in enumerate(choices):
             t = c.trial
-            first = int(np.flatnonzero(held.course.site == t.site)[0])
-            like = f"as in {held.course.names[first]}"
+            first = int(np.flatnonzero(comparison.course.site == t.site)[0])
+            reference = f"as in {comparison.course.names[first]}"
             values = (t.x, t.y, t.depth, t.speed, t.hold, t.recovery, t.overshoot, t.strokes, t.stroke)
             purpose = f"distinguishes {c.best[0]} from {c.best[1]}"
-            writer.writerow([k, repeat, like, *(f"{v:.4g}" for v in values), purpose])
+            writer.writerow([k, repeat, reference, *(f"{v:.4g}" for v in values), purpose])
     return buffer.getvalue()
 
 
-def _probabilities(found: list[Rival]) -> dict[str, float]:
+def _probabilities(candidates: list[Rival]) -> dict[str, float]:
     """Return each rival's probability, flattened so that none is excluded: they are rivals because none is."""
-    energy = np.array([r.model.energy.sum() for r in found])
+    energy = np.array([r.model.energy.sum() for r in candidates])
     weight = np.exp(-np.minimum(energy - energy.min(), 3.0))
-    return {r.mechanism: float(w) for r, w in zip(found, weight / weight.sum(), strict=True)}
+    return {r.mechanism: float(w) for r, w in zip(candidates, weight / weight.sum(), strict=True)}
 
 
 def _distances(
-    held: Comparison, found: list[Rival], trial: CandidatePress, machine: MachineLimits
+    comparison: Comparison, candidates: list[Rival], trial: CandidatePress, machine: MachineLimits
 ) -> dict[Pair, float]:
-    course, noise = held.course, held.null.noise
-    given, own = list(held.setting.given), laid_out(course, trial, machine)
+    course, noise = comparison.course, comparison.null.noise
+    effects, layout = list(comparison.setting.given), laid_out(course, trial, machine)
     predicted = [
-        predicted_readings(course, r.model.response, [*given, *r.placed], trial, own) / noise.scale[: course.channels]
-        for r in found
+        predicted_readings(course, r.model.response, [*effects, *r.placed], trial, layout)
+        / noise.scale[: course.channels]
+        for r in candidates
     ]
-    slope = _slope(held, found[0], trial, own) / noise.scale[: course.channels]
+    slope = _slope(comparison, candidates[0], trial, layout) / noise.scale[: course.channels]
     # Correlated noise is less informative: AR(1) noise of correlation m has (1 - m) / (1 + m) of the information on
     # slow differences.
     worth = (1 - noise.memory) / (1 + noise.memory)
     nats = {}
-    for i, a in enumerate(found):
-        for j in range(i + 1, len(found)):
-            apart = predicted[i] - predicted[j]
-            apart = apart - apart.mean(axis=0)
-            share = (apart * slope).sum() / ((slope**2).sum() + JITTER**-2)
-            left = apart - share * slope
-            nats[a.mechanism, found[j].mechanism] = float(0.5 * worth * np.square(left).sum())
+    for i, a in enumerate(candidates):
+        for j in range(i + 1, len(candidates)):
+            difference = predicted[i] - predicted[j]
+            difference = difference - difference.mean(axis=0)
+            share = (difference * slope).sum() / ((slope**2).sum() + JITTER**-2)
+            residual = difference - share * slope
+            nats[a.mechanism, candidates[j].mechanism] = float(0.5 * worth * np.square(residual).sum())
     return nats
 
 
-def _slope(held: Comparison, rival: Rival, trial: CandidatePress, own: Course) -> np.ndarray:
+def _slope(comparison: Comparison, rival: Rival, trial: CandidatePress, layout: Course) -> np.ndarray:
     """Return the derivative of readings by the press's depth [counts/mm], each channel's mean subtracted."""
-    response = elsewhere(rival.model.response, held.course, own, trial)
-    deeper = replace(own, tip=np.where(own.tip[:, 2:] > 0, own.tip + np.array([0.0, 0.0, STEP]), own.tip))
-    slope = (predict(deeper, response, []).signal - predict(own, response, []).signal)[own.read] / STEP
+    response = elsewhere(rival.model.response, comparison.course, layout, trial)
+    deeper = replace(layout, tip=np.where(layout.tip[:, 2:] > 0, layout.tip + np.array([0.0, 0.0, STEP]), layout.tip))
+    slope = (predict(deeper, response, []).signal - predict(layout, response, []).signal)[layout.read] / STEP
     return slope - slope.mean(axis=0)

@@ -29,9 +29,9 @@ class NoPlan(Exception):
 
 def recommend(
     recordings: list[Path],
-    held: Comparison,
+    comparison: Comparison,
     verdict: dict[str, Any],
-    out: Path,
+    target: Path,
     presses: int,
     note: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
@@ -39,31 +39,31 @@ def recommend(
 
     Args:
         recordings: The recordings of the verdict.
-        held: Recordings and model.
+        comparison: Recordings and model.
         verdict: The verdict.
-        out: Folder of the plan.
+        target: Folder of the plan.
         presses: Different presses of the plan.
         note: Called with a line of progress.
     """
     # Without a plan the verdict's own words hold, but those that send one here.
-    others = [words for words in verdict["next"] if "`tacdata revise " not in words]
+    steps = [words for words in verdict["next"] if "`tacdata revise " not in words]
     if verdict["status"] in ("named", "none"):
         return {"plan": None, "presses": [], "remark": ""}
     try:
-        return _planned(recordings, held, verdict, out, presses, note)
+        return _planned(recordings, comparison, verdict, target, presses, note)
     except NoPlan as reason:
-        return {"plan": None, "presses": others, "remark": str(reason)}
+        return {"plan": None, "presses": steps, "remark": str(reason)}
     except TacdataError as error:
-        return {"plan": None, "presses": others, "remark": f"no plan: {error.given}"}
+        return {"plan": None, "presses": steps, "remark": f"no plan: {error.given}"}
     except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-        return {"plan": None, "presses": others, "remark": f"no plan: the presses could not be predicted ({error})"}
+        return {"plan": None, "presses": steps, "remark": f"no plan: the presses could not be predicted ({error})"}
 
 
 def _planned(
     recordings: list[Path],
-    held: Comparison,
+    comparison: Comparison,
     verdict: dict[str, Any],
-    out: Path,
+    target: Path,
     presses: int,
     note: Callable[[str], None],
 ) -> dict[str, Any]:
@@ -73,31 +73,31 @@ def _planned(
         NoPlan: If there are no rivals, or no press distinguishes them.
     """
     sessions = [p for p in recordings if (p / FILE).is_file()]
-    found = rivals(held, verdict, note=note)
-    if len(found) < 2:
+    candidates = rivals(comparison, verdict, note=note)
+    if len(candidates) < 2:
         raise NoPlan("no plan: the rivals do not differ in these recordings")
     note("next presses")
     session = read_session(sessions[-1]) if sessions else None
     rig_of_ours = session is not None and not is_imported(read_episode(session.episodes[0]))
     plan = session.plan if session is not None and rig_of_ours else None
-    machine = MachineLimits.of_course(held.course) if plan is None else MachineLimits.of_plan(plan)
-    chosen = choose(held, found, machine, presses)
-    if not chosen:
-        names = ", ".join(r.mechanism for r in found)
+    machine = MachineLimits.of_course(comparison.course) if plan is None else MachineLimits.of_plan(plan)
+    choices = choose(comparison, candidates, machine, presses)
+    if not choices:
+        names = ", ".join(r.mechanism for r in candidates)
         raise NoPlan(f"no press at these places distinguishes {names} beyond the noise: another measurement is needed")
     if plan is not None and session is not None:
-        file, document = PLAN, plan_of(chosen, held, plan, f"{plan.name}, next")
+        file, document = PLAN, plan_of(choices, comparison, plan, f"{plan.name}, next")
         Plan.from_document(document, PLAN).check_against(session.sensor)
-        documents.write(out / PLAN, document, "plan")
+        documents.write(target / PLAN, document, "plan")
     else:
         file = TABLE
-        documents.write_text(out / TABLE, table_of(chosen, held))
+        documents.write_text(target / TABLE, table_of(choices, comparison))
     words = []
-    for c in chosen:
-        apart = standard_errors(c.nats[c.best])
+    for c in choices:
+        separation = standard_errors(c.nats[c.best])
         words.append(
-            f"{c.trial.in_words(held.course.tools[c.trial.tool].name)}: one press distinguishes {c.best[0]} from "
-            f"{c.best[1]} by {apart:.1f} standard errors"
+            f"{c.trial.in_words(comparison.course.tools[c.trial.tool].name)}: one press distinguishes {c.best[0]} from "
+            f"{c.best[1]} by {separation:.1f} standard errors"
         )
-    remarks = ["judge the new session together with the earlier ones", left_open(chosen)]
+    remarks = ["judge the new session together with the earlier ones", left_open(choices)]
     return {"plan": file, "presses": words, "remark": "; ".join(r for r in remarks if r)}

@@ -30,14 +30,14 @@ class Rival:
 
 
 def rivals(
-    held: Comparison, verdict: dict[str, Any], count: int = 6, note: Callable[[str], None] = lambda text: None
+    comparison: Comparison, verdict: dict[str, Any], count: int = 6, note: Callable[[str], None] = lambda text: None
 ) -> list[Rival]:
     """Return the verdict's own answer, and the alternatives to its first undecided effect.
 
     An answer without alternatives is compared with its nearest rivals: the next presses make it surer.
 
     Args:
-        held: Recordings and model.
+        comparison: Recordings and model.
         verdict: The verdict.
         count: Largest number of rivals.
         note: Called with the rival that is fitted.
@@ -47,25 +47,31 @@ def rivals(
         return []
     at = next((k for k, a in enumerate(effects) if a.entry["alternatives"]), 0)
     undecided = effects[at].entry
-    wanted = (list(undecided["alternatives"]) or _nearest(undecided))[: count - 1]
-    library_of = [e for e in library() if e.called in wanted and e.called != undecided["mechanism"]]
+    names = (list(undecided["alternatives"]) or _nearest(undecided))[: count - 1]
+    library_of = [e for e in library() if e.called in names and e.called != undecided["mechanism"]]
     if not library_of:
         return []
     placed = placed_of(effects)
-    others = [p for k, p in enumerate(placed) if k != at]
-    answer = Rival(undecided["mechanism"], tuple(placed), refine(held.setting, placed, held.null))
-    setting = Setting(held.course, held.setting.response, library_of, held.setting.nuisance, held.setting.given)
-    bare = prepare(setting, held.null, others)
+    remainder = [p for k, p in enumerate(placed) if k != at]
+    answer = Rival(undecided["mechanism"], tuple(placed), refine(comparison.setting, placed, comparison.null))
+    setting = Setting(
+        comparison.course,
+        comparison.setting.response,
+        library_of,
+        comparison.setting.nuisance,
+        comparison.setting.given,
+    )
+    bare = prepare(setting, comparison.null, remainder)
     everything = np.arange(len(bare.folds))
     best: dict[str, Rival] = {}
     for candidate in best_shapes(bare).values():
         note(f"next presses: {candidate.effect.name} fitted")
         _, values = fitted(bare, [candidate], everything)
-        first = candidate.placed(values[: len(candidate.columns)], held.course.channels)
-        model = refine(setting, [*others, first], held.null)
-        called = candidate.effect.called
-        if called not in best or model.energy.sum() < best[called].model.energy.sum():
-            best[called] = Rival(called, model.placed, model)
+        first = candidate.placed(values[: len(candidate.columns)], comparison.course.channels)
+        model = refine(setting, [*remainder, first], comparison.null)
+        name = candidate.effect.called
+        if name not in best or model.energy.sum() < best[name].model.energy.sum():
+            best[name] = Rival(name, model.placed, model)
     return [answer, *best.values()]
 
 

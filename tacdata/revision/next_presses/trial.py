@@ -70,15 +70,15 @@ class CandidatePress:
 
     def in_words(self, indenter: str) -> str:
         """Describe it."""
-        told = f"{indenter} at ({self.x:.2f}, {self.y:.2f}) mm, {self.depth:.2f} mm deep at {self.speed:g} mm/s"
-        told += f", from {self.overshoot:.2f} mm below" if self.overshoot else ""
-        told += f", {self.strokes} times up by {self.stroke:.2f} mm and back" if self.strokes else ""
-        told += f", hold {self.hold:g} s" if self.hold else ""
-        return told + (f", {self.recovery:g} s after the release" if self.recovery else "")
+        text = f"{indenter} at ({self.x:.2f}, {self.y:.2f}) mm, {self.depth:.2f} mm deep at {self.speed:g} mm/s"
+        text += f", from {self.overshoot:.2f} mm below" if self.overshoot else ""
+        text += f", {self.strokes} times up by {self.stroke:.2f} mm and back" if self.strokes else ""
+        text += f", hold {self.hold:g} s" if self.hold else ""
+        return text + (f", {self.recovery:g} s after the release" if self.recovery else "")
 
     def entry(self, indenter: str, yaw: float) -> dict[str, Any]:
         """Return it as an entry of a plan."""
-        found: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "indenter": indenter,
             "x": round(self.x, 3),
             "y": round(self.y, 3),
@@ -88,12 +88,12 @@ class CandidatePress:
             "hold": self.hold,
         }
         if self.recovery:
-            found["recovery"] = self.recovery
+            fields["recovery"] = self.recovery
         if self.overshoot:
-            found["overshoot"] = round(self.overshoot, 3)
+            fields["overshoot"] = round(self.overshoot, 3)
         if self.strokes:
-            found |= {"strokes": self.strokes, "stroke": round(self.stroke, 3)}
-        return found
+            fields |= {"strokes": self.strokes, "stroke": round(self.stroke, 3)}
+        return fields
 
 
 def trials(course: Course, machine: MachineLimits) -> list[CandidatePress]:
@@ -103,29 +103,29 @@ def trials(course: Course, machine: MachineLimits) -> list[CandidatePress]:
         course: The recordings.
         machine: Its limits.
     """
-    found = []
+    presses = []
     for tool in range(len(course.tools)):
-        own = np.unique(course.episode[course.tool == tool])
-        for site in _most_variable(course, own)[:PLACES]:
-            here = [e for e in own if course.site[e] == site]
-            rows = np.isin(course.episode, here)
+        episodes = np.unique(course.episode[course.tool == tool])
+        for site in _most_variable(course, episodes)[:PLACES]:
+            local_episodes = [e for e in episodes if course.site[e] == site]
+            rows = np.isin(course.episode, local_episodes)
             at = course.tip[rows][np.argmax(course.tip[rows, 2])]
             deepest = float(at[2])
             if deepest <= 0:
                 continue
             for share, speed, hold in product(DEPTHS, machine.rates, HOLDS):
                 common = (tool, int(site), float(at[0]), float(at[1]))
-                found.append(CandidatePress(*common, share * deepest, speed, hold, 0.0, 0.0))
+                presses.append(CandidatePress(*common, share * deepest, speed, hold, 0.0, 0.0))
                 if share == DEPTHS[-1] and hold == HOLDS[-1]:
-                    found.append(CandidatePress(*common, deepest, speed, hold, RECOVERY, 0.0))
+                    presses.append(CandidatePress(*common, deepest, speed, hold, RECOVERY, 0.0))
                 if share == DEPTHS[-1] and hold != HOLDS[-1]:
-                    over = (1 - OVERSHOOT) * deepest
-                    found.append(CandidatePress(*common, OVERSHOOT * deepest, speed, hold, 0.0, over))
+                    overshoot = (1 - OVERSHOOT) * deepest
+                    presses.append(CandidatePress(*common, OVERSHOOT * deepest, speed, hold, 0.0, overshoot))
                 if share == DEPTHS[-1] and hold == HOLDS[0]:
-                    found += [
+                    presses += [
                         CandidatePress(*common, deepest, speed, hold, 0.0, 0.0, STROKES, s * deepest) for s in STROKE
                     ]
-    return found
+    return presses
 
 
 def _most_variable(course: Course, episodes: np.ndarray) -> list[int]:
@@ -211,7 +211,7 @@ def _path(trial: CandidatePress, machine: MachineLimits) -> tuple[np.ndarray, np
 
 
 def predicted_readings(
-    course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress, own: Course
+    course: Course, response: Response, placed: Sequence[Placed], trial: CandidatePress, layout: Course
 ) -> np.ndarray:
     """Return the predicted readings of a trial, shape (readings, channels).
 
@@ -220,14 +220,14 @@ def predicted_readings(
         response: A model's response.
         placed: Its effects.
         trial: The press.
-        own: Its course (`laid_out`).
+        layout: Its course (`laid_out`).
     """
-    return predict(own, elsewhere(response, course, own, trial), placed).signal[own.read]
+    return predict(layout, elsewhere(response, course, layout, trial), placed).signal[layout.read]
 
 
-def elsewhere(response: Response, course: Course, own: Course, trial: CandidatePress) -> Response:
+def elsewhere(response: Response, course: Course, layout: Course, trial: CandidatePress) -> Response:
     """Return a response for another course, at a known place and tool."""
     if not isinstance(response, FittedResponse):
         return response
     alike = np.flatnonzero((course.row_site == trial.site) & (course.tool == trial.tool))
-    return response.of_place(int(response.context[alike[0]]), own)
+    return response.of_place(int(response.context[alike[0]]), layout)

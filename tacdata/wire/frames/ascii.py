@@ -32,20 +32,20 @@ class AsciiLines:
 
     def push(self, data: bytes) -> list[tuple[Fields, int]]:
         """Take bytes; return each complete frame's fields and the offset of its end in the stream [bytes]."""
-        found = []
+        frames = []
         self.buffer += data
         while (end := self.buffer.find(b"\n")) >= 0:
             line = bytes(self.buffer[:end])
             del self.buffer[: end + 1]
             self.offset += end + 1
             if (fields := self._line(line)) is not None:
-                found.append((fields, self.offset))
+                frames.append((fields, self.offset))
         if len(self.buffer) > self.longest:
             self.counts.garbage_bytes += len(self.buffer)
             self.offset += len(self.buffer)
             self.buffer.clear()
             self.unproven = not self.layout.sync and self.layout.checksum == "none"
-        return found
+        return frames
 
     def _line(self, line: bytes) -> Fields | None:
         layout, text = self.layout, line.strip(b"\r \t")

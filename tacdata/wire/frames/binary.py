@@ -18,10 +18,10 @@ def widen(values: np.ndarray, kind: str, endianness: str) -> np.ndarray:
         return values.astype(np.float64)
     parts = values.astype(np.int64)
     low, middle, high = (parts[:, i] for i in ((0, 1, 2) if endianness == "little" else (2, 1, 0)))
-    whole = low + (middle << 8) + (high << 16)
+    integer = low + (middle << 8) + (high << 16)
     if kind == "int24":
-        whole = np.where(whole >= 1 << 23, whole - (1 << 24), whole)
-    return whole.astype(np.float64)
+        integer = np.where(integer >= 1 << 23, integer - (1 << 24), integer)
+    return integer.astype(np.float64)
 
 
 def intact(layout: FrameFormat, frame: bytes) -> bool:
@@ -57,7 +57,7 @@ class BinaryFrames:
 
     def push(self, data: bytes) -> list[tuple[Fields, int]]:
         """Take bytes; return each complete frame's fields and the offset of its end in the stream [bytes]."""
-        layout, found = self.layout, []
+        layout, frames = self.layout, []
         proof = len(layout.sync) if layout.checksum == "none" else 0
         self.buffer += data
         while True:
@@ -73,10 +73,10 @@ class BinaryFrames:
                 del self.buffer[: layout.size]
                 self.offset += layout.size
                 self.expected = self.offset
-                found.append((fields(layout, frame), self.offset))
+                frames.append((fields(layout, frame), self.offset))
             else:
                 self._reject()
-        return found
+        return frames
 
     def _reject(self) -> None:
         # A sync inside garbage is no frame: only one where a frame is due counts as corrupt.

@@ -76,7 +76,7 @@ class PacketFrames:
 
     def push(self, data: bytes) -> list[tuple[Fields, int]]:
         """Take bytes; return each complete frame's fields and the offset of its end in the stream [bytes]."""
-        found, layout = [], self.layout
+        frames, layout = [], self.layout
         self.buffer += data
         while (end := self.buffer.find(ENDS[layout.framing])) >= 0:
             packet = bytes(self.buffer[:end])
@@ -87,7 +87,7 @@ class PacketFrames:
                 continue
             frame = unpacked(layout.framing, packet)
             if self._good(frame) and frame is not None:
-                found.append((fields(layout, frame), self.offset))
+                frames.append((fields(layout, frame), self.offset))
             elif self.begun and len(packet) <= self.longest:
                 self.counts.corrupt += 1
             else:
@@ -98,7 +98,7 @@ class PacketFrames:
             self.offset += len(self.buffer)
             self.buffer.clear()
             self.begun = False
-        return found
+        return frames
 
     def _good(self, frame: bytes | None) -> bool:
         layout = self.layout

@@ -269,13 +269,13 @@ class GrblLink:
     def _break(self, error: Exception) -> None:
         self._fail(*self._broken(error), lost=True)
 
-    def _fail(self, given: str, allowed: str, remedy: str, lost: bool = False) -> None:
+    def _fail(self, cause: str, allowed: str, remedy: str, lost: bool = False) -> None:
         """Keep the first fault; ``lost``: the position is unknown after it."""
         with self._changed:
             if self.fault is None:
-                self.fault = DeviceError(given, allowed, remedy)
+                self.fault = DeviceError(cause, allowed, remedy)
             if lost and not self._stopped.is_set():
-                self.lost = self.lost or given
+                self.lost = self.lost or cause
             self._changed.notify_all()
 
     def _ask_regularly(self) -> None:
@@ -293,11 +293,11 @@ class GrblLink:
 
     def _take_silence(self) -> None:
         if self.unread:  # it is there, and a report that can be read may come again
-            given = UNREADABLE[0].format(self.port.port, self.unread)
-            self.interruption = self.interruption or DeviceError(given, *UNREADABLE[1:])
+            cause = UNREADABLE[0].format(self.port.port, self.unread)
+            self.interruption = self.interruption or DeviceError(cause, *UNREADABLE[1:])
             return
-        given, allowed, remedy = SILENT
-        self._fail(given.format(self.port.port, SILENCE), allowed.format(SILENCE), remedy, lost=True)
+        cause, allowed, remedy = SILENT
+        self._fail(cause.format(self.port.port, SILENCE), allowed.format(SILENCE), remedy, lost=True)
 
     def _listen(self) -> None:
         buffer = bytearray()
@@ -363,8 +363,8 @@ class GrblLink:
         if not self._unanswered:
             self.notes.append(f"unasked {line}")
             if self.polled and not self._welcome_expected and not self._unasked:
-                self._unasked, given = True, UNASKED_ANSWER[0].format(line)  # once: the lift must go through
-                self.interruption = self.interruption or DeviceError(given, *UNASKED_ANSWER[1:])
+                self._unasked, cause = True, UNASKED_ANSWER[0].format(line)  # once: the lift must go through
+                self.interruption = self.interruption or DeviceError(cause, *UNASKED_ANSWER[1:])
         elif line == READ_FAILED and self._unanswered[0].text.startswith("$"):
             self._unanswered[0].pushed.append(line)
         else:
@@ -377,21 +377,21 @@ class GrblLink:
         while self._unanswered:
             self._unanswered.popleft().answer = "reset"
         if not self._welcome_expected:
-            given, allowed, remedy = WELCOME_IN_MID_STREAM
+            cause, allowed, remedy = WELCOME_IN_MID_STREAM
             self.halted = True
-            self._fail(given.format(line), allowed, remedy, lost=True)
+            self._fail(cause.format(line), allowed, remedy, lost=True)
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
         self._silence.restart()
         self.unread = ""
         self.pendant = self.pendant if report.pendant is None else report.pendant
         again = self.last is not None and self.last.state == report.state
-        before = self.last.position if again and self.last else None
+        place = self.last.position if again and self.last else None
         number = report.state.partition(":")[2]
         self.alarm = None if report.state[:5] != "Alarm" else int(number) if number else self.alarm
         self.statuses.take(report, arrival_ns)
         if self.polled and not self._welcome_expected:
-            still = bool(before is not None and self.last and (before == self.last.position).all())
+            still = bool(place is not None and self.last and (place == self.last.position).all())
             wrong, for_good = what_is_wrong(report, self._held, self.homing, again, still)
             if wrong and for_good:
                 self.halted = True

@@ -79,15 +79,15 @@ def straighten(link: GrblLink) -> tuple[str, ...]:
     Raises:
         DeviceError: If it cannot be ended.
     """
-    now = GrblSettings.read(link, ANSWER, STATE)
-    bent = now.bent_by
-    for word in dict.fromkeys(UNDONE_BY[found][0] for found in bent):
+    settings = GrblSettings.read(link, ANSWER, STATE)
+    bent = settings.bent_by
+    for word in dict.fromkeys(UNDONE_BY[change][0] for change in bent):
         link.command(word, ANSWER)
-    now = GrblSettings.read(link, ANSWER, STATE) if bent else now
-    link.statuses.place(now.work_offset)
-    if left := now.bent_by:
+    settings = GrblSettings.read(link, ANSWER, STATE) if bent else settings
+    link.statuses.place(settings.work_offset)
+    if residue := settings.bent_by:
         raise DeviceError(
-            f"the controller on {link.port.port} does not leave a state that spoils every move: {_named(left)}",
+            f"the controller on {link.port.port} does not leave a state that spoils every move: {_named(residue)}",
             "machine coordinates as they are, and a spindle at rest",
             "end it in a terminal; see its start-up lines ($N) and macros",
         )
@@ -104,8 +104,8 @@ def clear(link: GrblLink) -> str:
     Raises:
         DeviceError: If the machine is moving, or in another state that only a person should end.
     """
-    found = _state(link)
-    if found in OPENED_AGAIN or (found.startswith("Alarm") and link.alarm in DEAF):
+    initial = _state(link)
+    if initial in OPENED_AGAIN or (initial.startswith("Alarm") and link.alarm in DEAF):
         link.soft_reset(ANSWER)
     state = _state(link)
     if link.pendant:
@@ -124,7 +124,7 @@ def clear(link: GrblLink) -> str:
     _place(link)
     for override in FULL_SPEED:
         link.realtime(override)
-    return found
+    return initial
 
 
 def attune(link: GrblLink) -> None:
@@ -181,16 +181,16 @@ def _reset(link: GrblLink) -> None:
 def locked(link: GrblLink, settings: GrblSettings) -> DeviceError:
     """Return the error for a controller in alarm."""
     why = codes.alarm_in_words(link.alarm) if link.alarm else "state Alarm"
-    kept = link.alarm in codes.POSITION_KEPT
+    is_kept = link.alarm in codes.POSITION_KEPT
     home = (
         codes.UNLOCK
-        if kept
+        if is_kept
         else "home it ($H), or set home: true under cnc in the rig file (every axis moves at opening)"
         if settings.homing
         else "unlock it ($X) in a terminal and touch off again; homing is switched off ($22=0)"
     )
     return DeviceError(
-        f"the controller on {link.port.port} is locked ({why})" + ("" if kept else ": its position is not known"),
+        f"the controller on {link.port.port} is locked ({why})" + ("" if is_kept else ": its position is not known"),
         "a homed controller in state Idle",
         home,
     )
@@ -207,13 +207,13 @@ def _refuse_old(link: GrblLink) -> None:
 
 
 def _silent(link: GrblLink, baud: int) -> DeviceError:
-    seen = bytes(link.seen)
+    sample = bytes(link.seen)
     return DeviceError(
         f"nothing on {link.port.port} at {baud} baud speaks GRBL: "
-        + (f"it sent {len(seen)} bytes or more, beginning {seen[:24].hex(' ')}" if seen else "it sent no byte"),
+        + (f"it sent {len(sample)} bytes or more, beginning {sample[:24].hex(' ')}" if sample else "it sent no byte"),
         "a GRBL 1.1 or grblHAL controller that says its welcome or answers ?",
         "check the baud rate (GRBL: 115200) and that this is the controller's port"
-        if seen
+        if sample
         else "check power, cable and port; Grbl says nothing while it homes or after a limit alarm (press its reset); "
         "some boards need dtr: false under cnc",
     )

@@ -41,13 +41,13 @@ def come_to_rest(link: GrblLink) -> CncStatus:
     place = np.full(3, np.nan)
     while True:
         status = link.fresh_status(ANSWER)
-        moved, place = not np.array_equal(status.position, place), status.position
+        is_moving, place = not np.array_equal(status.position, place), status.position
         state = status.state.split(":")[0]
         if state not in MOVING and status.state not in BRAKING:
-            if not moved or status.state in AT_REST or state in AT_REST:
+            if not is_moving or status.state in AT_REST or state in AT_REST:
                 return status  # a hold with another substate, or with none, may still brake
             clock.host.sleep(LOOK)
-        if moved:
+        if is_moving:
             standing.restart()
         elif standing.over() and state != "Door":
             raise StandsStill(

@@ -64,8 +64,8 @@ class GrblSettings:
                     answers[setting[1]] = setting[2]
                 elif message := MESSAGE.match(pushed):
                     again = message[1] in answers and message[1] != "GC"  # grblHAL also sends it when it changes
-                    before = f"{answers[message[1]]}; " if again else ""
-                    answers[message[1]] = before + message[2]
+                    prefix = f"{answers[message[1]]}; " if again else ""
+                    answers[message[1]] = prefix + message[2]
         return cls(answers)
 
     @property
@@ -135,17 +135,17 @@ class GrblSettings:
     @property
     def cautions(self) -> tuple[str, ...]:
         """Remarks before the first move."""
-        found = []
+        remarks = []
         if not self.number("$20"):
-            found.append("soft limits are off ($20=0): only the rig file's envelope keeps the guide in bounds")
+            remarks.append("soft limits are off ($20=0): only the rig file's envelope keeps the guide in bounds")
         if not self.homing:
-            found.append("homing is off ($22=0): machine zero is where the controller was switched on or reset")
+            remarks.append("homing is off ($22=0): machine zero is where the controller was switched on or reset")
         if (delay := self.number("$1")) != ALWAYS_ON:
-            found.append(
+            remarks.append(
                 f"motors are switched off {delay:g} ms after each move ($1={delay:g}): the tip can give way while it "
                 "holds; $1=255 keeps them on"
             )
-        return tuple(found)
+        return tuple(remarks)
 
     def refuse_moves_at_start(self, port: str) -> None:
         """Refuse start-up lines that move: they would run at every reset, and a fault is answered by a reset.

@@ -54,13 +54,13 @@ class Statuses:
 
     def ask(self) -> bool:
         """Return whether to send a query now, and count it as sent."""
-        now = self._clock.host.monotonic()
-        if self._queries and now - max(self._asked_at, self._answered_at) <= REPEAT:
+        instant = self._clock.host.monotonic()
+        if self._queries and instant - max(self._asked_at, self._answered_at) <= REPEAT:
             return False
         if self._answered:
             self._queries.clear()  # repeated queries without an answer by now were answered together
         self._queries.append(self._clock.now_ns())
-        self._asked_at, self._answered = now, False
+        self._asked_at, self._answered = instant, False
         return True
 
     def forget(self) -> None:
@@ -100,5 +100,5 @@ class Statuses:
 
     def collect(self) -> list[CncStatus]:
         """Return the reports taken since the last call."""
-        taken, self._waiting = self._waiting, []
-        return taken
+        reports, self._waiting = self._waiting, []
+        return reports

@@ -54,22 +54,22 @@ KNOWN = {"Idle", "Run", "Dwell", "Alarm", *UNASKED}
 
 def stopped_by(number: int | None, line: str) -> Words:
     """Return the error for an alarm in motion."""
-    kept = number in codes.POSITION_KEPT
+    is_kept = number in codes.POSITION_KEPT
     return (
         f"the controller stopped with {codes.alarm_in_words(number) if number else line}",
         "motion without an alarm",
-        codes.UNLOCK if kept else "free the machine by hand if need be, then home it and start again",
+        codes.UNLOCK if is_kept else "free the machine by hand if need be, then home it and start again",
     )
 
 
 def what_is_wrong(
-    report: StatusReport, held: bool, homing: bool, again: bool = False, still: bool = False
+    report: StatusReport, is_held: bool, homing: bool, again: bool = False, still: bool = False
 ) -> tuple[Words | None, bool]:
     """Return the fault that a report shows, or None, and whether that is permanent.
 
     Args:
         report: A report of a machine that was opened and made ready.
-        held: Whether we sent the hold.
+        is_held: Whether we sent the hold.
         homing: Whether we started the homing.
         again: Whether the report before named the same state; one that nobody knows may be damaged.
         still: Whether it named the same state and place.
@@ -84,7 +84,7 @@ def what_is_wrong(
         )
         return words, True
     # A machine that still brakes (Hold:1) may be about to send an alarm with the reason.
-    ours = (state == "Hold" and (held or (substate == "1" and not still))) or (state == "Home" and homing)
+    ours = (state == "Hold" and (is_held or (substate == "1" and not still))) or (state == "Home" and homing)
     if state in UNASKED and not ours:
         return UNASKED[state], state in LOST
     if state not in KNOWN and again:
