@@ -154,7 +154,7 @@ def late_stretches(sightings: Mapping[str, Sightings], begin_ns: int) -> tuple[d
             judged[name] = replace(series, timing=timing, covariance=series.covariance + _more(series, timing))
         ends = (
             (min(span[0] for span in stretches) - begin_ns) * 1e-9,
-            (max(span[1] for span in laggard) - begin_ns) * 1e-9,
+            (max(span[1] for span in stretches) - begin_ns) * 1e-9,
         )
         words.append(
             f"the images of camera {camera} are up to {max(span[2] for span in stretches):.2f} s later than those of "
