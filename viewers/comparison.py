@@ -29,10 +29,10 @@ def labels_at(path: Path, folders: Sequence[Path], episode: int | None) -> Scene
     from tacdata.recording.files.reader import read_episode
 
     if path.is_file():
-        recording, own = path, file_names.folder(path.parent)
+        recording, session_labels = path, file_names.folder(path.parent)
     else:
-        recording, own = episode_of(path, episode), file_names.folder(path)
-    folders = _two([own, *folders] if len(folders) == 1 else folders, "labels")
+        recording, session_labels = episode_of(path, episode), file_names.folder(path)
+    folders = _two([session_labels, *folders] if len(folders) == 1 else folders, "labels")
     recorded, sides = read_episode(recording), []
     for name, folder in zip(telling_names(folders), folders, strict=True):
         file = file_names.label(folder, recording)
@@ -56,14 +56,14 @@ def predictions_at(path: Path, folders: Sequence[Path], episode: int | None) -> 
     title, sensor, time, label, phases = _labelled(path, episode, folders)
     sides = []
     for name, folder in zip(telling_names(folders), folders, strict=True):
-        found = find_prediction(folder, time)
-        if found is None:
+        prediction = find_prediction(folder, time)
+        if prediction is None:
             raise UsageError(
                 f"{folder} holds no prediction of {title}",
                 "two networks that predicted the same episode",
                 "choose another --episode, or run `tacdata evaluate` on this dataset",
             )
-        sides.append(Side(name, found.time_ns, found.depth))
+        sides.append(Side(name, prediction.time_ns, prediction.depth))
     _same_grid(sides, sensor)
     return maps_comparison(f"{title}: two networks", sensor, sides, label, phases)
 
@@ -96,8 +96,8 @@ def _labelled(
     file = file_names.label(file_names.folder(recording.parent), recording)
     label = None
     if file.is_file():
-        own = shown_label(file)
-        label = Side("label", own.time_ns, np.maximum(own.signed, 0.0))
+        label_maps = shown_label(file)
+        label = Side("label", label_maps.time_ns, np.maximum(label_maps.signed, 0.0))
     title = f"{recording.resolve().parent.name}/{recording.stem}"
     return title, recorded.sensor, recorded.taxels.sample_ns, label, signals.spans(recorded.phases)
 
@@ -136,7 +136,7 @@ def telling_names(paths: Sequence[Path]) -> list[str]:
     """Return the shortest names that tell paths apart, from their ends; equal paths get numbers."""
     parts = [path.resolve().with_suffix("").parts for path in paths]
     for count in range(1, max(map(len, parts)) + 1):
-        names = ["/".join(own[-count:]) for own in parts]
+        names = ["/".join(pieces[-count:]) for pieces in parts]
         if len(set(names)) == len(names):
             return names
     return [f"{path.name} {k + 1}" for k, path in enumerate(paths)]

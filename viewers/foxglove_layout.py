@@ -14,12 +14,12 @@ from tacdata.viewers.scene.color_scale import HUES
 ENDING = ".json"
 
 
-def write_foxglove_layout(recording: Path, out: Path) -> None:
+def write_foxglove_layout(recording: Path, target: Path) -> None:
     """Write a layout that fits a recording's boards and cameras; in Foxglove: Layouts, Import from file.
 
     Args:
         recording: The recording (.mcap).
-        out: New file (.json).
+        target: New file (.json).
 
     Raises:
         UsageError: If there is no recording, or the file exists or does not end in .json.
@@ -27,10 +27,10 @@ def write_foxglove_layout(recording: Path, out: Path) -> None:
     """
     import json
 
-    new_file(out, ENDING)
+    new_file(target, ENDING)
     records = read_records(recording, images=False)
     documents.write_text(
-        out, json.dumps(foxglove_layout({c.topic for c in records.channels.values()}), indent=1) + "\n"
+        target, json.dumps(foxglove_layout({c.topic for c in records.channels.values()}), indent=1) + "\n"
     )
 
 
@@ -51,7 +51,7 @@ def foxglove_layout(recorded: set[str]) -> dict[str, Any]:
     for topic in sorted(t for t in recorded if t.endswith("/image")):
         camera = topic.split("/")[2]
         poses = {t: {"visible": True, "type": "axis"} for t in sorted(recorded) if t.startswith(f"/camera/{camera}/")}
-        poses = {t: own for t, own in poses.items() if t.endswith("/pose")}
+        poses = {t: entry for t, entry in poses.items() if t.endswith("/pose")}
         if poses:  # where the camera sees the cube, in the camera's own frame
             panels[f"3D!{_name(topic)}"] = {"followTf": camera, "followMode": "follow-none", "topics": poses}
     for topic in sorted(t for t in recorded if t.endswith("/cube") or t.endswith("/view")):
@@ -89,16 +89,16 @@ def _plot(title: str, paths: list[str]) -> dict[str, Any]:
     }
 
 
-def _split(names: list[str], across: bool = True) -> Any:
+def _split(names: list[str], is_row: bool = True) -> Any:
     """Return a mosaic that halves the space again and again."""
     if len(names) == 1:
         return names[0]
     half = (len(names) + 1) // 2
     return {
-        "direction": "row" if across else "column",
+        "direction": "row" if is_row else "column",
         "splitPercentage": 50,
-        "first": _split(names[:half], not across),
-        "second": _split(names[half:], not across),
+        "first": _split(names[:half], not is_row),
+        "second": _split(names[half:], not is_row),
     }
 
 

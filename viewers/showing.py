@@ -112,8 +112,8 @@ def show_saved(path: Path, output: Output) -> None:
         UsageError: If it is to be saved or drawn again.
     """
     if output.files:
-        given = f"{path} with --save, --picture or --video"
-        raise UsageError(given, "a recording, session, dataset, ...", "leave them out")
+        fault = f"{path} with --save, --picture or --video"
+        raise UsageError(fault, "a recording, session, dataset, ...", "leave them out")
     show_file(path, output.web)
 
 

@@ -53,8 +53,8 @@ class Catalogue:
         if not self.dataset:
             return ""
         # A datetime holds microseconds, the moment is in nanoseconds.
-        second, rest = divmod(self.deepest[number], _SECOND)
-        moment = f"{datetime.fromtimestamp(second, UTC):%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
+        second, remainder = divmod(self.deepest[number], _SECOND)
+        moment = f"{datetime.fromtimestamp(second, UTC):%Y-%m-%dT%H:%M:%S}.{remainder:09d}Z"
         return self._page_of(f"{self.dataset}?segment_id={_name(number)}#when={HOST}@{moment}")
 
     def _page_of(self, address: str) -> str:
@@ -111,15 +111,15 @@ def _draw(
     from tacdata.viewers.rerun.blueprint import episode_blueprint
     from tacdata.viewers.source import scene_at
 
-    found = {}
+    deepest = {}
     for count, entry in enumerate(listed.entries, start=1):
         scene = scene_at(listed.root, labels, predictions, entry.number)
         RerunBackend(folder / f"{_name(entry.number)}.rrd", _name(entry.number)).draw(scene)
         if count == 1:
             episode_blueprint(scene, stands=True).save(APPLICATION, str(layout))
-        found[entry.number] = dict(moments(scene))["deepest"]
+        deepest[entry.number] = dict(moments(scene))["deepest"]
         drawn(count, len(listed.entries))
-    return found
+    return deepest
 
 
 def _name(number: int) -> str:

@@ -88,10 +88,10 @@ class EpisodeList:
         Raises:
             UsageError: If it cannot be understood.
         """
-        key, sign, wanted = _parsed(condition)
+        key, sign, value = _parsed(condition)
         test = OPERATORS[sign]
-        kept = tuple(e for e in self.entries if getattr(e, key) is not None and test(getattr(e, key), wanted))
-        return replace(self, entries=kept)
+        entries = tuple(e for e in self.entries if getattr(e, key) is not None and test(getattr(e, key), value))
+        return replace(self, entries=entries)
 
     def by(self, key: str) -> EpisodeList:
         """Return them sorted by a column; ``-key`` or an error sorts the greatest first, unknown values last.
@@ -102,9 +102,9 @@ class EpisodeList:
         name = key.lstrip("-")
         _known(name)
         falling = key.startswith("-") or name == "error"
-        known = [e for e in self.entries if getattr(e, name) is not None]
+        entries = [e for e in self.entries if getattr(e, name) is not None]
         unknown = tuple(e for e in self.entries if getattr(e, name) is None)
-        ordered = sorted(known, key=lambda e: getattr(e, name), reverse=falling)
+        ordered = sorted(entries, key=lambda e: getattr(e, name), reverse=falling)
         return replace(self, entries=(*ordered, *unknown))
 
     def numbered(self, number: int) -> Entry:
@@ -113,12 +113,12 @@ class EpisodeList:
         Raises:
             UsageError: If there is none.
         """
-        found = next((e for e in self.entries if e.number == number), None)
-        if found is None:
+        entry = next((e for e in self.entries if e.number == number), None)
+        if entry is None:
             numbers = sorted(e.number for e in self.entries)
             allowed = f"{numbers[0]} to {numbers[-1]}" if numbers else "none is there"
             raise UsageError(f"episode {number}: not in {self.root}", allowed, "choose one of them")
-        return found
+        return entry
 
 
 def with_flags(entries: tuple[Entry, ...], flags: dict[str, Flag]) -> tuple[Entry, ...]:
@@ -181,8 +181,8 @@ def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, pre
 
 
 def _mean(values: np.ndarray) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else None
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else None
 
 
 def _parsed(condition: str) -> tuple[str, str, Any]:

@@ -51,10 +51,10 @@ def _session(root: Path, labels: Path, predictions: Path | None) -> EpisodeList:
     for number, path in file_names.finished(root).items():
         entry = of_press(number, path.name, presses.get(number))
         entries.append(replace(entry, label=_label_state(labels, path), quality=checked.get(path.name)))
-    found = with_notes(with_flags(tuple(entries), read_flags(root)), read_notes(root))
+    listing = with_notes(with_flags(tuple(entries), read_flags(root)), read_notes(root))
     if predictions is not None:
-        found = _with_session_errors(found, labels, predictions)
-    return EpisodeList(root, "session", found, tuple(remarks))
+        listing = _with_session_errors(listing, labels, predictions)
+    return EpisodeList(root, "session", listing, tuple(remarks))
 
 
 def _checked(root: Path) -> tuple[dict[str, float], list[str]]:
@@ -68,8 +68,8 @@ def _checked(root: Path) -> tuple[dict[str, float], list[str]]:
     shares = {}
     for entry in document["episodes"]:
         taxels = entry["taxels"]
-        whole = taxels["frames"] + taxels["lost"]
-        shares[entry["file"]] = taxels["frames"] / whole if whole else 0.0
+        total = taxels["frames"] + taxels["lost"]
+        shares[entry["file"]] = taxels["frames"] / total if total else 0.0
     for finding in document["findings"]:
         if finding["severity"] == "unusable" and finding["file"] in shares:
             shares[finding["file"]] = 0.0
@@ -83,29 +83,29 @@ def _label_state(labels: Path, recording: Path) -> str:
 
 
 def _with_session_errors(entries: tuple[Entry, ...], labels: Path, predictions: Path) -> tuple[Entry, ...]:
-    known = {int(p.time_ns[0]): p for p in map(read_prediction, prediction_paths(predictions))}
+    by_start = {int(p.time_ns[0]): p for p in map(read_prediction, prediction_paths(predictions))}
     result = []
     for entry in entries:
         path = label_names.label(labels, Path(entry.file))
         label = shown_label(path) if entry.label == "complete" else None
-        own = next((p for t, p in known.items() if label is not None and t in label.time_ns), None)
+        prediction = next((p for t, p in by_start.items() if label is not None and t in label.time_ns), None)
         errors = None
-        if label is not None and own is not None:
-            errors = errors_of(np.maximum(label.signed, 0), label.time_ns, own.depth, own.time_ns)
-        result.append(_with_errors(entry, errors, own))
+        if label is not None and prediction is not None:
+            errors = errors_of(np.maximum(label.signed, 0), label.time_ns, prediction.depth, prediction.time_ns)
+        result.append(_with_errors(entry, errors, prediction))
     return tuple(result)
 
 
-def _with_errors(entry: Entry, errors: Errors | None, own: PredictedMaps | None) -> Entry:
-    told = asdict(errors) if errors else dict.fromkeys(("error", "centroid", "iou"))
-    return replace(entry, **told, part=own.part if own else "")
+def _with_errors(entry: Entry, errors: Errors | None, prediction: PredictedMaps | None) -> Entry:
+    figures = asdict(errors) if errors else dict.fromkeys(("error", "centroid", "iou"))
+    return replace(entry, **figures, part=prediction.part if prediction else "")
 
 
 def _dataset(root: Path, predictions: Path | None) -> EpisodeList:
     rows = folder.read_rows(root, folder.read_info(root))
     records = metadata.read_records(root)
     keys = _record_keys(root, rows)
-    known = label_states.read(root)
+    states = label_states.read(root)
     entries = []
     for row in rows:
         record = records.get(keys.get(row.index, -1))
@@ -114,25 +114,25 @@ def _dataset(root: Path, predictions: Path | None) -> EpisodeList:
             continue
         entry = of_press(row.index, record.recording_file, record.configuration)
         model = record.label_provenance.get("parents", {}).get("model", "")
-        label = "complete" if known["models"].get(record.sensor, model) == model else "stale"
+        label = "complete" if states["models"].get(record.sensor, model) == model else "stale"
         entries.append(replace(entry, quality=record.quality, label=label, recording=record.recording))
-    found = with_notes(with_flags(tuple(entries), read_flags(root)), read_notes(root))
+    listing = with_notes(with_flags(tuple(entries), read_flags(root)), read_notes(root))
     if predictions is not None:
-        found = _with_dataset_errors(root, found, predictions)
-    absent = sum(len(set(own["episodes"]) - set(own["packed"])) for own in known["sessions"].values())
+        listing = _with_dataset_errors(root, listing, predictions)
+    absent = sum(len(set(session["episodes"]) - set(session["packed"])) for session in states["sessions"].values())
     drawn = sum(record.simulated is not None for record in records.values())
     remarks = (
         f"{drawn} simulated presses, nobody recorded them" if drawn else "",
         f"{absent} more are waiting for labels, or failed" if absent else "",
     )
-    return EpisodeList(root, "dataset", found, tuple(filter(None, remarks)))
+    return EpisodeList(root, "dataset", listing, tuple(filter(None, remarks)))
 
 
 def _record_keys(root: Path, rows: list[folder.EpisodeRow]) -> dict[int, int]:
     """Return which record each episode has, from the first frame of its file; episodes may share a file."""
     keys: dict[int, int] = {}
     for number in sorted({row.data_file for row in rows}):
-        own = [row for row in rows if row.data_file == number]
+        members = [row for row in rows if row.data_file == number]
         try:
             table = pq.ParquetFile(root / folder.data_path(number)).read([features.RECORD], use_threads=False)
         except (pa.ArrowException, OSError, KeyError) as error:
@@ -143,8 +143,8 @@ def _record_keys(root: Path, rows: list[folder.EpisodeRow]) -> dict[int, int]:
                 "take it from a copy, or pack the session again",
             ) from None
         # Row numbers count over all files, and each file begins with the first of its episodes.
-        values, first = table.column(0), min(row.start for row in own)
-        keys |= {row.index: int(values[row.start - first].as_py()) for row in own}
+        values, first = table.column(0), min(row.start for row in members)
+        keys |= {row.index: int(values[row.start - first].as_py()) for row in members}
     return keys
 
 
@@ -153,15 +153,17 @@ def _with_dataset_errors(root: Path, entries: tuple[Entry, ...], predictions: Pa
 
     dataset = read_dataset(root)
     time, depth = dataset[features.TIME], dataset[features.DEPTH]
-    known: dict[int, PredictedMaps] = {}
+    by_start: dict[int, PredictedMaps] = {}
     for path in prediction_paths(predictions):
-        own = read_prediction(path)
-        known[int(own.time_ns[0])] = own
+        prediction = read_prediction(path)
+        by_start[int(prediction.time_ns[0])] = prediction
     result = []
     for entry, place in zip(entries, dataset.episodes, strict=True):
         part = slice(place.start, place.stop)
         own_time = np.asarray(time[part])
-        own = next((p for t, p in known.items() if own_time[0] <= t <= own_time[-1]), None)
-        errors = errors_of(np.asarray(depth[part]), own_time, own.depth, own.time_ns) if own else None
-        result.append(_with_errors(entry, errors, own))
+        prediction = next((p for t, p in by_start.items() if own_time[0] <= t <= own_time[-1]), None)
+        errors = (
+            errors_of(np.asarray(depth[part]), own_time, prediction.depth, prediction.time_ns) if prediction else None
+        )
+        result.append(_with_errors(entry, errors, prediction))
     return tuple(result)

@@ -143,17 +143,17 @@ class Pages:
     def note(self, asked: NoteRequest) -> str:
         """Add a note on an interval of an episode; return a confirmation."""
         with self._drawing:
-            said = note_stretch(self.listed, asked.number, asked.begin, asked.end, asked.text)
+            text = note_stretch(self.listed, asked.number, asked.begin, asked.end, asked.text)
             # Drawn again, with the note, when it is asked for next.
             (self._folder / f"{asked.number}.rrd").unlink(missing_ok=True)
-        return f"noted: {said}"
+        return f"noted: {text}"
 
     def unnote(self, number: int, place: int) -> str:
         """Delete an episode's note by its place among them; return a confirmation."""
         with self._drawing:
-            said = unnote_stretch(self.listed, number, place)
+            text = unnote_stretch(self.listed, number, place)
             (self._folder / f"{number}.rrd").unlink(missing_ok=True)
-        return f"taken away: {said}"
+        return f"taken away: {text}"
 
 
 class NoteRequest(BaseModel):
@@ -187,9 +187,9 @@ def application(pages: Pages) -> FastAPI:
             token.encode(), pages.token.encode()
         ):
             return JSONResponse({"error": "no such page"}, HTTPStatus.NOT_FOUND)
-        found = await answer(request)
-        found.headers.update({"Cache-Control": "no-store", "Access-Control-Allow-Origin": pages.viewer})
-        return found
+        response = await answer(request)
+        response.headers.update({"Cache-Control": "no-store", "Access-Control-Allow-Origin": pages.viewer})
+        return response
 
     @api.exception_handler(TacdataError)
     async def in_words(_: Request, error: TacdataError) -> JSONResponse:

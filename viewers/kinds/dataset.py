@@ -23,7 +23,7 @@ class DatasetKind(Kind):
         """A LeRobot folder."""
         return (path / MARK).is_file()
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return one episode, the first if none is named."""
         from tacdata.dataset.format import features
         from tacdata.viewers.parts.stretch_notes import with_stretch_notes
@@ -31,17 +31,17 @@ class DatasetKind(Kind):
         from tacdata.viewers.scenes.recording import prediction_for
         from tacdata.viewers.scenes.single_episode import read_single
 
-        if asked.labels is not None:
+        if options.labels is not None:
             raise UsageError("--labels with a dataset", "a dataset holds its labels", "leave it out")
-        number = asked.episode or 0
-        if asked.episode is None and asked.predictions is not None:
-            number = _predicted(path, asked.predictions)
+        number = options.episode or 0
+        if options.episode is None and options.predictions is not None:
+            number = _predicted(path, options.predictions)
         dataset, count = read_single(path, number)
         prediction, remarks = None, []
-        entry = next((own for own in dataset.episodes if own.index == number), None)
-        if asked.predictions is not None and entry is not None:
+        entry = next((candidate for candidate in dataset.episodes if candidate.index == number), None)
+        if options.predictions is not None and entry is not None:
             time = np.asarray(dataset[features.TIME][entry.start : entry.stop])
-            prediction, remarks = prediction_for(asked.predictions, time, entry.sensor)
+            prediction, remarks = prediction_for(options.predictions, time, entry.sensor)
         scene = dataset_scene(dataset, number, prediction, tuple(remarks), count)
         record = entry.record if entry is not None else None
         return scene if record is None else with_stretch_notes(scene, path, lambda: record.recording)
@@ -56,7 +56,7 @@ def _predicted(path: Path, predictions: Path) -> int:
     for file in prediction_paths(predictions):  # named by the episode of the dataset that was predicted
         number = int(file.stem.rsplit("-", 1)[-1])
         dataset, _ = read_single(path, number)
-        for entry in (own for own in dataset.episodes if own.index == number):
+        for entry in (candidate for candidate in dataset.episodes if candidate.index == number):
             time = np.asarray(dataset[features.TIME][entry.start : entry.stop])
             if first_predicted(predictions, [(number, int(time[0]), int(time[-1]))]) is not None:
                 return number

@@ -34,20 +34,20 @@ class DemonstrationKind(Kind):
         with path.open("rb") as stream:
             return b"demo_rig.json" in stream.read(HEAD)
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return one demonstration, the first of a folder if none is named."""
         from tacdata.demonstrations.paths.tracks_file import ENDING, path_of, read_tracks
         from tacdata.viewers.parts.recorded_images import recorded_images
         from tacdata.viewers.scenes.hand import demonstration_scene
 
-        refuse(asked, "a demonstration", *(("episode",) if path.is_dir() else ()))
-        recording = _recording(path, asked.episode)
+        refuse(options, "a demonstration", *(("episode",) if path.is_dir() else ()))
+        recording = _recording(path, options.episode)
         tracks = path if path.name.endswith(ENDING) else path_of(recording)
-        made = read_tracks(tracks) if tracks.is_file() else None
-        recorded, remarks = _read(recording, made is not None)
+        demonstration = read_tracks(tracks) if tracks.is_file() else None
+        recorded, remarks = _read(recording, demonstration is not None)
         images = recorded_images(recording, tuple(recorded.rig.cameras)) if recorded else ()
         title = f"{recording.resolve().parent.name}/{recording.stem}"
-        return demonstration_scene(title, made, recorded, images, remarks)
+        return demonstration_scene(title, demonstration, recorded, images, remarks)
 
 
 def _recording(path: Path, episode: int | None) -> Path:

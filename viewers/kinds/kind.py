@@ -35,7 +35,7 @@ class Kind(ABC):
         return path.exists()
 
     @abstractmethod
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return the scene.
 
         Raises:
@@ -47,8 +47,8 @@ class Kind(ABC):
 def kinds() -> list[Kind]:
     """Return one of every kind, the narrowest first."""
     members: list[Any] = [registry.load(ROOM, BASE, name, Kind) for name in registry.names(ROOM, BASE)]
-    found: list[Kind] = [member() for member in members]
-    return sorted(found, key=lambda kind: kind.ORDER)
+    instances: list[Kind] = [member() for member in members]
+    return sorted(instances, key=lambda kind: kind.ORDER)
 
 
 def kind_of(path: Path) -> Kind:
@@ -57,13 +57,13 @@ def kind_of(path: Path) -> Kind:
     Raises:
         UsageError: If there is nothing, or nothing that can be viewed.
     """
-    known = kinds()
-    for kind in known if path.exists() else ():
+    members = kinds()
+    for kind in members if path.exists() else ():
         if kind.claims(path):
             return kind
-    given = f"{path} is no recording, nor anything else that can be viewed" if path.exists() else ""
+    fault = f"{path} is no recording, nor anything else that can be viewed" if path.exists() else ""
     raise UsageError(
-        given or f"no file or folder {path}", "; ".join(dict.fromkeys(k.NOUN for k in known)), "check the path"
+        fault or f"no file or folder {path}", "; ".join(dict.fromkeys(k.NOUN for k in members)), "check the path"
     )
 
 
@@ -84,14 +84,14 @@ def contents(folder: Path) -> dict[Path, Kind]:
     return entries
 
 
-def refuse(asked: Asked, noun: str, *allowed: str) -> None:
+def refuse(options: Asked, noun: str, *allowed: str) -> None:
     """Refuse options that mean nothing for a kind.
 
     Raises:
         UsageError: Naming the first of them.
     """
     for name in ("labels", "predictions", "episode"):
-        value = getattr(asked, name)
+        value = getattr(options, name)
         if value is not None and name not in allowed:
             raise UsageError(
                 f"--{name} {value} with {noun}",

@@ -35,28 +35,28 @@ class PredictionsKind(Kind):
         except Exception:  # a damaged file is of no kind; its reader raises the error
             return False
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return one episode's predicted maps, the first if none is named."""
         from tacdata.training.inference.prediction import file_name, read_prediction
         from tacdata.viewers.parts.prediction_files import prediction_paths
         from tacdata.viewers.scenes.prediction import prediction_scene
 
-        refuse(asked, "predictions", "episode")
+        refuse(options, "predictions", "episode")
         files = [path] if path.is_file() else prediction_paths(path)
-        wanted = files[0]
-        if asked.episode is not None:
+        source = files[0]
+        if options.episode is not None:
             named = {file.name: file for file in files}
-            if file_name(asked.episode) not in named:
-                known = ", ".join(str(int(file.stem.rsplit("-", 1)[-1])) for file in files[:20])
-                raise UsageError(f"--episode {asked.episode}: no prediction in {path}", known, "choose one of them")
-            wanted = named[file_name(asked.episode)]
-        prediction = read_prediction(wanted)
+            if file_name(options.episode) not in named:
+                numbers = ", ".join(str(int(file.stem.rsplit("-", 1)[-1])) for file in files[:20])
+                raise UsageError(f"--episode {options.episode}: no prediction in {path}", numbers, "choose one of them")
+            source = named[file_name(options.episode)]
+        prediction = read_prediction(source)
         sensor = _sensor(path, prediction.sensor)
-        title = f"{wanted.resolve().parents[1].name}/{wanted.stem}"
+        title = f"{source.resolve().parents[1].name}/{source.stem}"
         return prediction_scene(title, prediction, sensor, len(files))
 
 
-def _sensor(path: Path, wanted: str) -> Sensor | None:
+def _sensor(path: Path, digest: str) -> Sensor | None:
     """Return the sensor that the network was trained for, if its checkpoint is in the folder of its predictions."""
     for folder in (path, *path.resolve().parents[:2]):
         if (folder / CHECKPOINT).is_file():
@@ -66,5 +66,5 @@ def _sensor(path: Path, wanted: str) -> Sensor | None:
                 sensor = load(folder).sensor
             except TacdataError:
                 return None
-            return sensor if sensor.content_hash == wanted else None
+            return sensor if sensor.content_hash == digest else None
     return None

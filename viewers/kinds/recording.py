@@ -18,9 +18,9 @@ class RecordingKind(Kind):
         """An MCAP file."""
         return path.is_file() and path.suffix == ".mcap"
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return the press; of a file that is still being written, its part on the disk."""
         from tacdata.viewers.scenes.recording import recording_scene
 
-        refuse(asked, "one recording", "labels", "predictions")
-        return recording_scene(path, asked)
+        refuse(options, "one recording", "labels", "predictions")
+        return recording_scene(path, options)

@@ -20,13 +20,13 @@ class RevisionKind(Kind):
         """A folder with a revision in it."""
         return (path / FILE).is_file()
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return the gap before and after, with the readings of telling episodes."""
         from tacdata import documents
         from tacdata.viewers.rerun.gap_curves import read_gap_curves
         from tacdata.viewers.scenes.verdict import revision_scene
 
-        refuse(asked, "a revision")
+        refuse(options, "a revision")
         document = documents.read(path / FILE, "revision")
         table = (path / TABLE).read_text() if (path / TABLE).is_file() else "No gap was computed."
         curves = read_gap_curves(path / CURVES) if (path / CURVES).is_file() else ()

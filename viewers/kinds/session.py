@@ -30,15 +30,15 @@ class SessionKind(Kind):
         """A folder with a recording in it."""
         return bool(file_names.finished(path) or file_names.unfinished(path))
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return one episode; if none is named the first, or the first that the predictions are of."""
         from tacdata.viewers.parts.prediction_files import first_predicted
         from tacdata.viewers.scenes.recording import recording_scene
 
-        number = asked.episode
-        if number is None and asked.predictions is not None:
-            number = first_predicted(asked.predictions, spans(path))
-        return recording_scene(episode_of(path, number), asked)
+        number = options.episode
+        if number is None and options.predictions is not None:
+            number = first_predicted(options.predictions, spans(path))
+        return recording_scene(episode_of(path, number), options)
 
 
 def spans(folder: Path) -> Iterator[tuple[int, int, int]]:
@@ -73,6 +73,6 @@ def episode_of(folder: Path, episode: int | None) -> Path:
         return next(iter(finished.values()))
     if episode not in finished:
         numbers = sorted(finished)
-        known = ", ".join(map(str, numbers)) if len(numbers) <= 20 else f"{numbers[0]} to {numbers[-1]}"
-        raise UsageError(f"--episode {episode}: not in {folder}", known, "choose one of them")
+        allowed = ", ".join(map(str, numbers)) if len(numbers) <= 20 else f"{numbers[0]} to {numbers[-1]}"
+        raise UsageError(f"--episode {episode}: not in {folder}", allowed, "choose one of them")
     return finished[episode]

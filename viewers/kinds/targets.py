@@ -29,23 +29,23 @@ class TargetsKind(Kind):
         """A folder with the files of one of the formats, and no recordings."""
         return path.is_dir() and _format(path) is not None
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return the targets of one demonstration, the first if none is named."""
         from tacdata.exporters.exporter import exporter
         from tacdata.exporters.joints import read_joints
         from tacdata.viewers.scenes.hand import targets_scene
 
-        refuse(asked, "targets", "episode")
-        name, number = _format(path) or "", asked.episode or 0
+        refuse(options, "targets", "episode")
+        name, number = _format(path) or "", options.episode or 0
         if name == "joints":
-            found = [(targets, joints) for targets, joints, _ in read_joints(path)]
+            entries = [(targets, joints) for targets, joints, _ in read_joints(path)]
         else:
-            found = [(targets, None) for targets in exporter(name).read(path)]
-        if number >= len(found):
-            raise UsageError(f"--episode {number}: not in {path}", f"0 to {len(found) - 1}", "choose one of them")
-        targets, joints = found[number]
+            entries = [(targets, None) for targets in exporter(name).read(path)]
+        if number >= len(entries):
+            raise UsageError(f"--episode {number}: not in {path}", f"0 to {len(entries) - 1}", "choose one of them")
+        targets, joints = entries[number]
         title = f"{path.resolve().name}/{Path(targets.recording).stem}"
-        return targets_scene(title, targets, len(found) - 1, joints)
+        return targets_scene(title, targets, len(entries) - 1, joints)
 
 
 def _format(path: Path) -> str | None:

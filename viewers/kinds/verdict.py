@@ -20,14 +20,14 @@ class VerdictKind(Kind):
         """A folder with a verdict in it, or a file of that name."""
         return (path / FILE).is_file() or (path.is_file() and path.name == FILE)
 
-    def scene(self, path: Path, asked: Asked) -> Scene:
+    def scene(self, path: Path, options: Asked) -> Scene:
         """Return it as text and bars, with readings and model before and after."""
         from tacdata import documents
         from tacdata.discrepancy.verdict.residual_table import read
         from tacdata.viewers.parts.residual_curves import residual_curves
         from tacdata.viewers.scenes.verdict import verdict_scene
 
-        refuse(asked, "a verdict")
+        refuse(options, "a verdict")
         file = path if path.is_file() else path / FILE
         picture = file.with_suffix(".png")
         document = documents.read(file, "verdict")

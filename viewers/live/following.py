@@ -104,9 +104,13 @@ def meant(path: Path) -> Path:
     Any other path is itself.
     """
     if path.is_dir() and not file_names.finished(path):
-        return next((own for own in file_names.unfinished(path) if is_growing(own)), path)
-    whole = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
-    return whole if path.name.endswith(file_names.PARTIAL) and not path.exists() and whole.is_file() else path
+        return next((part for part in file_names.unfinished(path) if is_growing(part)), path)
+    finished_path = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
+    return (
+        finished_path
+        if path.name.endswith(file_names.PARTIAL) and not path.exists() and finished_path.is_file()
+        else path
+    )
 
 
 def follow(path: Path, web: bool) -> None:
@@ -133,22 +137,22 @@ def follow(path: Path, web: bool) -> None:
                 if has_display():
                     webbrowser.open(viewer.address)
             print(f"following {path.name}; Ctrl-C ends the viewer, never the recording", flush=True)
-            left = set(file_names.unfinished(path.parent))  # remains of crashes are not waited for
-            shown, following = left, path
+            remains = set(file_names.unfinished(path.parent))  # remains of crashes are not waited for
+            visited, following = remains, path
             while viewer.process.poll() is None:
                 if following is None:
                     time.sleep(PAUSE)
                 else:
                     _follow_one(following, viewer)
-                    shown.add(following)
-                following = next((p for p in file_names.unfinished(path.parent) if _is_next(p, shown)), None)
+                    visited.add(following)
+                following = next((p for p in file_names.unfinished(path.parent) if _is_next(p, visited)), None)
     except TimeoutError as error:
-        given = f"the viewer does not start: {error}"
-        raise DeviceError(given, "a viewer that listens on the loopback", "use --save FILE.rrd, or --web") from None
+        fault = f"the viewer does not start: {error}"
+        raise DeviceError(fault, "a viewer that listens on the loopback", "use --save FILE.rrd, or --web") from None
 
 
-def _is_next(path: Path, shown: set[Path]) -> bool:
-    return is_growing(path) and path not in shown
+def _is_next(path: Path, visited: set[Path]) -> bool:
+    return is_growing(path) and path not in visited
 
 
 def _follow_one(path: Path, viewer: FedViewer) -> None:
@@ -163,13 +167,13 @@ def _follow_one(path: Path, viewer: FedViewer) -> None:
         follower = Follower(path, recording)
     except UsageError:  # it ended, and has its own name by now
         return
-    told = False
+    is_noted = False
     try:
         while not follower.finished and viewer.process.poll() is None:
             begun = time.monotonic()
-            if not (follower.step() or follower.frames or told):
+            if not (follower.step() or follower.frames or is_noted):
                 print(f"{path.name}: waiting for the first readings", flush=True)
-                told = True
+                is_noted = True
             if not follower.finished:
                 time.sleep(max(PAUSE, SHARE * (time.monotonic() - begun)))
         if follower.finished:

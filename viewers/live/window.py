@@ -51,13 +51,13 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
     process.start()
     try:
         try:
-            said = started.get(timeout=START)
+            reply = started.get(timeout=START)
         except Empty:
-            said = "error: the viewer did not start"
-        if said.startswith("error: "):
-            raise UsageError(said.removeprefix("error: "), "window, web or FILE.rrd", "name another, or leave it out")
-        if said:
-            print(f"live view: {said}", flush=True)
+            reply = "error: the viewer did not start"
+        if reply.startswith("error: "):
+            raise UsageError(reply.removeprefix("error: "), "window, web or FILE.rrd", "name another, or leave it out")
+        if reply:
+            print(f"live view: {reply}", flush=True)
 
         def watch(stream: str, arrival_ns: int, value: Any) -> None:
             with suppress(Full):

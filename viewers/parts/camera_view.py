@@ -27,16 +27,20 @@ def camera_views(episode: Episode, images: Iterable[tuple[str, int, bytes]]) -> 
         episode: Gives the intrinsics (rig file) and the cube's poses.
         images: Camera name, time of exposure [ns] and JPEG image, in any order.
     """
-    taken: dict[str, list[tuple[int, bytes]]] = {}
+    frames: dict[str, list[tuple[int, bytes]]] = {}
     for name, time_ns, data in images:
-        taken.setdefault(name, []).append((time_ns, data))
+        frames.setdefault(name, []).append((time_ns, data))
     tags = {stream.camera: stream for stream in episode.tags}
     cameras = episode.rig.get("cameras", {})
-    return tuple(_view(name, c, sorted(taken.get(name, [])), tags.get(name)) for name, c in cameras.items())
+    return tuple(_view(name, c, sorted(frames.get(name, [])), tags.get(name)) for name, c in cameras.items())
 
 
 def _view(
-    name: str, camera: dict[str, Any], taken: list[tuple[int, bytes]], tags: TagStream | None, axes: float | None = None
+    name: str,
+    camera: dict[str, Any],
+    frames: list[tuple[int, bytes]],
+    tags: TagStream | None,
+    axes: float | None = None,
 ) -> CameraView:
     lens = camera["intrinsics"]
     matrix = np.array([[lens["fx"], 0, lens["cx"]], [0, lens["fy"], lens["cy"]], [0, 0, 1]], dtype=float)
@@ -46,8 +50,8 @@ def _view(
         width=lens["width"],
         height=lens["height"],
         matrix=matrix,
-        image_ns=np.array([t for t, _ in taken], dtype=np.int64),
-        images=tuple(data for _, data in taken),
+        image_ns=np.array([t for t, _ in frames], dtype=np.int64),
+        images=tuple(data for _, data in frames),
         cube_ns=tags.sample_ns if tags else empty,
         cube_position=1000 * tags.position if tags else np.zeros((0, 3)),
         cube_quaternion=tags.quaternion if tags else np.zeros((0, 4)),
@@ -62,15 +66,15 @@ def hand_views(recorded: DemoRecording, images: Iterable[tuple[str, int, bytes]]
         recorded: Gives intrinsics and the fingertips' poses.
         images: Camera name, time of exposure [ns] and JPEG image, in any order.
     """
-    taken: dict[str, list[tuple[int, bytes]]] = {}
+    frames: dict[str, list[tuple[int, bytes]]] = {}
     for name, time_ns, data in images:
-        taken.setdefault(name, []).append((time_ns, data))
+        frames.setdefault(name, []).append((time_ns, data))
     views = []
     for name, camera in recorded.rig.cameras.items():
-        seen = [stream for stream in recorded.views if stream.camera == name]
-        fingers = tuple(_view(f"{s.finger}", camera, [], s, FINGER_AXES) for s in seen)
+        streams = [stream for stream in recorded.views if stream.camera == name]
+        fingers = tuple(_view(f"{s.finger}", camera, [], s, FINGER_AXES) for s in streams)
         pose = recorded.rig.camera_pose(name)
         if pose is not None:
             pose = np.block([[pose[:3, :3], 1000 * pose[:3, 3:]], [pose[3:]]])
-        views.append(replace(_view(name, camera, sorted(taken.get(name, [])), None), fingers=fingers, pose=pose))
+        views.append(replace(_view(name, camera, sorted(frames.get(name, [])), None), fingers=fingers, pose=pose))
     return tuple(views)

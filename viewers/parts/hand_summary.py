@@ -11,7 +11,7 @@ from tacdata.replay.targets import FingertipTargets
 
 
 def of_demonstration(
-    title: str, made: Demonstration | None, recorded: DemoRecording | None, remarks: tuple[str, ...] = ()
+    title: str, demonstration: Demonstration | None, recorded: DemoRecording | None, remarks: tuple[str, ...] = ()
 ) -> str:
     """Return a summary of the demonstration, finger by finger, and its missing parts."""
     lines = [f"# {title}", ""]
@@ -22,35 +22,35 @@ def of_demonstration(
         lines.append(
             f"- **Boards** {', '.join(recorded.taxels) or 'none'}; **cameras** {', '.join(recorded.rig.cameras)}"
         )
-    elif made is not None:
-        lines.append(f"- **Task** {made.task}, {made.seconds[-1]:.1f} s")
+    elif demonstration is not None:
+        lines.append(f"- **Task** {demonstration.task}, {demonstration.seconds[-1]:.1f} s")
     absent = []
-    if made is None:
+    if demonstration is None:
         absent.append("no tracks, so the fingers do not stand in space: run `tacdata track`")
     else:
-        lines += _tracks(made)
-        if made.network is None:
+        lines += _tracks(demonstration)
+        if demonstration.network is None:
             absent.append("no predicted depth: run `tacdata track --network RUN`")
     if recorded is None:
         absent.append("no recording beside the tracks, so no cameras and no boards")
     if absent:
         lines += ["", "Not shown: " + "; ".join(absent) + "."]
-    notes = (*remarks, *(recorded.notes if recorded else ()), *(made.remarks if made else ()))
+    notes = (*remarks, *(recorded.notes if recorded else ()), *(demonstration.remarks if demonstration else ()))
     return "\n".join([*lines, *(["", *(f"- {note}" for note in dict.fromkeys(notes))] if notes else [])])
 
 
-def _tracks(made: Demonstration) -> list[str]:
-    lines = [f"- **Frame** {made.frame}, grid of {made.rate:g} Hz"]
-    for name, track in made.tracks.items():
+def _tracks(demo: Demonstration) -> list[str]:
+    lines = [f"- **Frame** {demo.frame}, grid of {demo.rate:g} Hz"]
+    for name, track in demo.tracks.items():
         felt = ""
         if track.depth is not None:
             depth = contact_depth(track.depth)
             felt = f", predicted depth to {np.nanmax(depth, initial=0.0):.2f} mm"
         lines.append(
-            f"- **{name}** {track.sightings} sightings, {track.outliers} left out, {_bridged(track, made.rate)}{felt}"
+            f"- **{name}** {track.sightings} sightings, {track.outliers} left out, {_bridged(track, demo.rate)}{felt}"
         )
-    if made.network:
-        lines.append(f"- **Depth** is an estimate by {made.network['network']}, checkpoint {made.network['hash'][:12]}")
+    if demo.network:
+        lines.append(f"- **Depth** is an estimate by {demo.network['network']}, checkpoint {demo.network['hash'][:12]}")
     return lines
 
 
@@ -66,10 +66,10 @@ def _bridged(track: FingerTrack, rate: float) -> str:
     )
 
 
-def of_targets(title: str, targets: FingertipTargets, others: int, joints: dict[str, np.ndarray] | None) -> str:
+def of_targets(title: str, targets: FingertipTargets, count: int, joints: dict[str, np.ndarray] | None) -> str:
     """Return a summary of a robot's targets."""
     seconds = (targets.time_ns[-1] - targets.time_ns[0]) / 1e9
-    moved = 1000 * np.linalg.norm(targets.position - targets.seen, axis=-1)
+    shift = 1000 * np.linalg.norm(targets.position - targets.seen, axis=-1)
     lines = [
         f"# {title}",
         "",
@@ -79,11 +79,11 @@ def of_targets(title: str, targets: FingertipTargets, others: int, joints: dict[
     for k, name in enumerate(targets.fingers):
         gain = f", gain {1000 * targets.gains[name]:g} mm/mm" if name in targets.gains else ""
         lines.append(
-            f"- **{name}** moved by up to {moved[:, k].max():.1f} mm{gain}, {targets.gap[:, k].mean():.0%} bridged"
+            f"- **{name}** moved by up to {shift[:, k].max():.1f} mm{gain}, {targets.gap[:, k].mean():.0%} bridged"
         )
     if joints:
         lost = np.isnan(np.column_stack(list(joints.values()))).any(axis=1).sum()
         lines.append(f"- **Joints** {len(joints)}; {lost} of {len(targets.time_ns)} targets are not reached (gaps)")
-    if others:
-        lines += ["", f"{others} more beside it: --episode 0 to {others}."]
+    if count:
+        lines += ["", f"{count} more beside it: --episode 0 to {count}."]
     return "\n".join([*lines, *(["", *(f"- {note}" for note in targets.remarks)] if targets.remarks else [])])

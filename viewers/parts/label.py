@@ -40,8 +40,8 @@ class ShownLabel:
     @classmethod
     def of(cls, label: Label) -> ShownLabel:
         """Return all of a label's maps."""
-        every = np.arange(len(label.time_ns))
-        return cls(label.time_ns, label.force, label.error, every, label.signed, label.traction, label.taxel_pressure)
+        rows = np.arange(len(label.time_ns))
+        return cls(label.time_ns, label.force, label.error, rows, label.signed, label.traction, label.taxel_pressure)
 
     @property
     def map_ns(self) -> np.ndarray:
@@ -49,12 +49,12 @@ class ShownLabel:
         return self.time_ns[self.kept]
 
 
-def shown_label(path: Path, most: int | None = None) -> ShownLabel:
+def shown_label(path: Path, limit: int | None = None) -> ShownLabel:
     """Read the drawn parts of a label file.
 
     Args:
         path: The file.
-        most: Maps to keep, the deepest of each stretch (`thinning.strongest`); without it all.
+        limit: Maps to keep, the deepest of each stretch (`thinning.strongest`); without it all.
 
     Raises:
         UsageError: As `tacdata.labels.read_label`.
@@ -62,21 +62,25 @@ def shown_label(path: Path, most: int | None = None) -> ShownLabel:
     """
     small = read_label_columns(path, ("time_ns", "force", "error"))
     count = len(small["time_ns"])
-    if most is None or count <= most:
+    if limit is None or count <= limit:
         return ShownLabel(**small, kept=np.arange(count), **read_label_columns(path, ("signed", *CONTACT)))
-    starts = thinning.stretches(count, most)
-    best, row, shown = np.full(most, -np.inf), np.zeros(most, int), {}
+    starts = thinning.stretches(count, limit)
+    best, row, deepest_maps = np.full(limit, -np.inf), np.zeros(limit, int), {}
     begin = 0
     for maps in map_batches(path, "signed", BATCH):
         depth = maps.reshape(len(maps), -1).max(axis=1)
-        own = np.searchsorted(starts, begin + np.arange(len(maps)), side="right") - 1
-        for stretch in range(own[0], own[-1] + 1):
-            rows = np.flatnonzero(own == stretch)
+        owners = np.searchsorted(starts, begin + np.arange(len(maps)), side="right") - 1
+        for stretch in range(owners[0], owners[-1] + 1):
+            rows = np.flatnonzero(owners == stretch)
             deepest = rows[np.argmax(depth[rows])]
             if depth[deepest] > best[stretch]:
-                best[stretch], row[stretch], shown[stretch] = depth[deepest], begin + deepest, maps[deepest].copy()
+                best[stretch], row[stretch], deepest_maps[stretch] = (
+                    depth[deepest],
+                    begin + deepest,
+                    maps[deepest].copy(),
+                )
         begin += len(maps)
-    signed = np.stack([shown[k] for k in range(most)])
+    signed = np.stack([deepest_maps[k] for k in range(limit)])
     # One after the other: each is as large as all maps of the label.
     contact = {name: values[row] for only in CONTACT for name, values in read_label_columns(path, (only,)).items()}
     return ShownLabel(**small, kept=row, signed=signed, **contact)

@@ -34,12 +34,12 @@ def depth_maps(
         label: Times [ns], shape (n,), and depth [mm], shape (n, pixels_x, pixels_y); or None.
         prediction: The same of a network.
     """
-    given = {name: pair for name, pair in (("label", label), ("prediction", prediction)) if pair is not None}
-    if not given:
+    pairs = {name: pair for name, pair in (("label", label), ("prediction", prediction)) if pair is not None}
+    if not pairs:
         return ()
-    scale = scale_of(np.array([depth.max(initial=0.0) for _, depth in given.values()]), "mm", floor=DEPTH_FLOOR)
+    scale = scale_of(np.array([depth.max(initial=0.0) for _, depth in pairs.values()]), "mm", floor=DEPTH_FLOOR)
     x, y = sensor.map.x, sensor.map.y
-    maps = [DepthMaps(name, x, y, time, depth, scale) for name, (time, depth) in given.items()]
+    maps = [DepthMaps(name, x, y, time, depth, scale) for name, (time, depth) in pairs.items()]
     if label is not None and prediction is not None:
         time, ours, theirs = np.intersect1d(label[0], prediction[0], return_indices=True)
         if len(time):
@@ -76,8 +76,8 @@ def board_map(sensor: Sensor, time_ns: np.ndarray, pressure: np.ndarray) -> Dept
     shape = corner.max(axis=0) + PIXELS
     x, y = (pitch * (np.arange(count) - (count - 1) / 2) for count in shape)
     values = np.zeros((len(time_ns), *shape), np.float32)
-    for (i, j), own in zip(corner, np.moveaxis(pressure, 1, 0), strict=True):
-        values[:, i : i + PIXELS, j : j + PIXELS] += 1e3 * own.astype(np.float32)
+    for (i, j), series in zip(corner, np.moveaxis(pressure, 1, 0), strict=True):
+        values[:, i : i + PIXELS, j : j + PIXELS] += 1e3 * series.astype(np.float32)
     return DepthMaps("board", x, y, time_ns, values, scale_of(values, "kPa", floor=CONTACT_FLOOR))
 
 
@@ -92,18 +92,18 @@ def error_curves(maps: tuple[DepthMaps, ...]) -> tuple[Curves, ...]:
     return (Curves("error", "mm", ("root mean square", "largest"), error.time_ns, values),)
 
 
-def thinned(maps: tuple[DepthMaps, ...], most: int = thinning.MAPS) -> tuple[DepthMaps, ...]:
-    """Return maps of at most ``most`` times, about the same times for all of them: the deepest of each stretch."""
-    if not maps or max(len(m.time_ns) for m in maps) <= most:
+def thinned(maps: tuple[DepthMaps, ...], limit: int = thinning.MAPS) -> tuple[DepthMaps, ...]:
+    """Return maps of at most ``limit`` times, about the same times for all of them: the deepest of each stretch."""
+    if not maps or max(len(m.time_ns) for m in maps) <= limit:
         return maps
     first = max(maps, key=lambda m: len(m.time_ns))
     flat = first.values.reshape(len(first.values), -1)
     strength = np.maximum(flat.max(axis=1), -flat.min(axis=1))
-    times = first.time_ns[thinning.strongest(strength, most)]
+    times = first.time_ns[thinning.strongest(strength, limit)]
     result = []
     for m in maps:
         rows = np.flatnonzero(np.isin(m.time_ns, times))
         if not len(rows):
-            rows = thinning.evenly(len(m.time_ns), most)
+            rows = thinning.evenly(len(m.time_ns), limit)
         result.append(replace(m, time_ns=m.time_ns[rows], values=m.values[rows]))
     return tuple(result)

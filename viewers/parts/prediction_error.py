@@ -46,7 +46,7 @@ def press_error(maps: tuple[DepthMaps, ...]) -> str:
     Args:
         maps: Every map of the press, among them "label" and "prediction" at common times.
     """
-    named = {shown.name: shown for shown in maps}
+    named = {item.name: item for item in maps}
     if "error" not in named:
         return ""
     label, prediction = _at_common_times(named)

@@ -26,30 +26,30 @@ MESSAGE = 2 + 4 + 8 + 8
 class ImageSampler:
     """Keeps at most twice as many images of a camera as are drawn, at equal distance, while a file is read once."""
 
-    def __init__(self, most: int = IMAGES) -> None:
-        self._most, self._step, self._count = most, {}, {}
+    def __init__(self, limit: int = IMAGES) -> None:
+        self._most, self._step, self._count = limit, {}, {}
         self._kept: dict[str, list[bytes]] = {}
 
     def take(self, topic: str, message: memoryview) -> None:
         """Take the next image message of a topic."""
         number = self._count.get(topic, 0)
         self._count[topic] = number + 1
-        kept, step = self._kept.setdefault(topic, []), self._step.setdefault(topic, 1)
+        messages, step = self._kept.setdefault(topic, []), self._step.setdefault(topic, 1)
         if number % step:
             return
-        kept.append(bytes(message))
+        messages.append(bytes(message))
         # The number of images is known only at the end, so every other one is dropped whenever there are too many.
-        if len(kept) > 2 * self._most or len(kept) * len(message) > 2 * IMAGE_BYTES:
-            del kept[1::2]
+        if len(messages) > 2 * self._most or len(messages) * len(message) > 2 * IMAGE_BYTES:
+            del messages[1::2]
             self._step[topic] = 2 * step
 
     def images(self, cameras: tuple[str, ...]) -> Iterator[tuple[str, int, bytes]]:
         """Yield camera name, time of exposure [ns] and JPEG image of those that are drawn."""
         for camera in cameras:
-            kept = self._kept.get(topics.image(camera), [])
-            room = IMAGE_BYTES * len(kept) // max(sum(map(len, kept)), 1)
-            for k in evenly(len(kept), max(min(self._most, room), 2)):
-                image = CompressedImage.FromString(kept[k])
+            messages = self._kept.get(topics.image(camera), [])
+            room = IMAGE_BYTES * len(messages) // max(sum(map(len, messages)), 1)
+            for k in evenly(len(messages), max(min(self._most, room), 2)):
+                image = CompressedImage.FromString(messages[k])
                 yield camera, image.timestamp.ToNanoseconds(), image.data
 
 
@@ -71,37 +71,37 @@ def recorded_images(path: Path, cameras: tuple[str, ...], most: int = IMAGES) ->
     if not cameras:
         return
     try:
-        found = _indexed(path, cameras, most)
+        samples = _indexed(path, cameras, most)
     except Exception:  # a damaged index raises any error of the parser; the records show the content
-        found = None
-    if found is None:
-        found = _all(path, cameras, most)
-    for camera, data in found:
+        samples = None
+    if samples is None:
+        samples = _all(path, cameras, most)
+    for camera, data in samples:
         image = CompressedImage.FromString(data)
         yield camera, image.timestamp.ToNanoseconds(), image.data
 
 
-def _all(path: Path, cameras: tuple[str, ...], most: int) -> list[tuple[str, bytes]]:
-    records, found = read_records(path), []
+def _all(path: Path, cameras: tuple[str, ...], limit: int) -> list[tuple[str, bytes]]:
+    records, samples = read_records(path), []
     for camera in cameras:
         messages = records.of_topic(topics.image(camera))
-        found += [(camera, messages[k].data) for k in evenly(len(messages), most)]
-    return found
+        samples += [(camera, messages[k].data) for k in evenly(len(messages), limit)]
+    return samples
 
 
-def _indexed(path: Path, cameras: tuple[str, ...], most: int) -> list[tuple[str, bytes]] | None:
+def _indexed(path: Path, cameras: tuple[str, ...], limit: int) -> list[tuple[str, bytes]] | None:
     """Return the wanted images by the file's index, or None if it has none."""
     with path.open("rb") as stream:
         summary = SeekingReader(stream).get_summary()
         if summary is None or not summary.chunk_indexes:
             return None
         ids = {channel.topic: number for number, channel in summary.channels.items()}
-        found: list[tuple[str, bytes]] = []
+        samples: list[tuple[str, bytes]] = []
         for camera in cameras:
             number = ids.get(topics.image(camera))
             places = [] if number is None else _places(stream, summary.chunk_indexes, number)
-            found += [(camera, data) for data in _messages(stream, [places[k] for k in evenly(len(places), most)])]
-        return found
+            samples += [(camera, data) for data in _messages(stream, [places[k] for k in evenly(len(places), limit)])]
+        return samples
 
 
 def _places(stream: IO[bytes], chunks: list[ChunkIndex], channel: int) -> list[tuple[int, int]]:

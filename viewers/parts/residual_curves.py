@@ -15,26 +15,26 @@ MOST = 32
 READINGS, RESIDUALS = "readings", "residuals"
 
 
-def residual_curves(told: Residuals) -> tuple[Curves, ...]:
+def residual_curves(residuals: Residuals) -> tuple[Curves, ...]:
     """Return for each stream its readings measured, before and after, and the residual over the noise; then the depth.
 
     Args:
-        told: Document of `tacdata discrepancy`.
+        residuals: Document of `tacdata discrepancy`.
     """
-    time_ns = np.round(told.time * 1e9).astype(np.int64)
-    breaks = np.flatnonzero(np.diff(told.episode)) + 1
-    power = np.nanmean(np.square(told.standardized(told.before)), axis=0)
-    made = []
+    time_ns = np.round(residuals.time * 1e9).astype(np.int64)
+    breaks = np.flatnonzero(np.diff(residuals.episode)) + 1
+    power = np.nanmean(np.square(residuals.standardized(residuals.before)), axis=0)
+    curves = []
     for k in np.argsort(-np.nan_to_num(power))[:MOST].tolist():
-        name = told.streams[k].replace(" ", "_")
-        said = np.column_stack([told.measured[:, k], told.before[:, k], told.after[:, k]])
-        left = (said[:, :1] - said[:, 1:]) / told.noise[k]
-        made.append(
-            _curves(f"{READINGS}/{name}", "as recorded", ("measured", "before", "after"), time_ns, said, breaks)
+        name = residuals.streams[k].replace(" ", "_")
+        readings = np.column_stack([residuals.measured[:, k], residuals.before[:, k], residuals.after[:, k]])
+        remainder = (readings[:, :1] - readings[:, 1:]) / residuals.noise[k]
+        curves.append(
+            _curves(f"{READINGS}/{name}", "as recorded", ("measured", "before", "after"), time_ns, readings, breaks)
         )
-        made.append(_curves(f"{RESIDUALS}/{name}", "noise", ("before", "after"), time_ns, left, breaks))
-    depth = _curves("depth", "mm", ("commanded",), time_ns, told.depth[:, None], breaks)
-    return (*made, depth)
+        curves.append(_curves(f"{RESIDUALS}/{name}", "noise", ("before", "after"), time_ns, remainder, breaks))
+    depth = _curves("depth", "mm", ("commanded",), time_ns, residuals.depth[:, None], breaks)
+    return (*curves, depth)
 
 
 def _curves(

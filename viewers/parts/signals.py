@@ -72,8 +72,8 @@ def taxel_array(
 
 def _signal_scale(change: np.ndarray, unit: str) -> ColorScale:
     # A board whose readings fall under pressure, or fall as much as they rise, needs the scale with a middle.
-    known = change[np.isfinite(change)]
-    falls = -known.min(initial=0.0) > 0.2 * known.max(initial=0.0)
+    finite = change[np.isfinite(change)]
+    falls = -finite.min(initial=0.0) > 0.2 * finite.max(initial=0.0)
     return scale_of(change, unit, signed=bool(falls))
 
 
@@ -112,8 +112,8 @@ def tag_curves(tags: TagStream) -> list[Curves]:
     """Return the cube's position and the quality of its detection; nothing if there was no image."""
     if not len(tags.sample_ns):
         return []
-    seen = np.isfinite(tags.position).all(axis=1)
-    quality = np.where(seen, tags.reprojection, np.nan)
+    visible = np.isfinite(tags.position).all(axis=1)
+    quality = np.where(visible, tags.reprojection, np.nan)
     name = f"tags/{tags.camera}"
     return [
         Curves(f"{name}/position", "mm", ("x", "y", "z"), tags.sample_ns, 1000 * tags.position),

@@ -27,13 +27,13 @@ def surfaces(
     """
     top = np.float32(sensor.skin.thickness)
     result = []
-    for shown in (m for m in maps if m.name in ("label", "prediction")):
-        drop = shown.values
-        if shown.name == "label" and signed is not None:
-            drop = signed[1][np.searchsorted(signed[0], shown.time_ns)]
+    for layer in (m for m in maps if m.name in ("label", "prediction")):
+        drop = layer.values
+        if layer.name == "label" and signed is not None:
+            drop = signed[1][np.searchsorted(signed[0], layer.time_ns)]
         height = (top - drop).astype(np.float32)
-        depth = shown.values.astype(np.float32)
-        result.append(SkinSurface(shown.name, shown.x, shown.y, shown.time_ns, height, depth, shown.scale))
+        depth = layer.values.astype(np.float32)
+        result.append(SkinSurface(layer.name, layer.x, layer.y, layer.time_ns, height, depth, layer.scale))
     if not result:
         flat = np.full((1, *sensor.map.shape), top, dtype=np.float32)
         scale = scale_of(np.zeros(1), "mm", floor=DEPTH_FLOOR)

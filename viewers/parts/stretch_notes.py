@@ -25,6 +25,6 @@ def with_stretch_notes(scene: Scene, root: Path, recording: Callable[[], str]) -
     if not notes or not len(scene.taxels.time_ns):
         return scene
     digest, first = recording(), int(scene.taxels.time_ns[0])
-    own = sorted((note for note in notes if note.recording == digest), key=lambda note: note.begin)
-    spans = [Span(note.text, first + round(1e9 * note.begin), first + round(1e9 * note.end)) for note in own]
+    selection = sorted((note for note in notes if note.recording == digest), key=lambda note: note.begin)
+    spans = [Span(note.text, first + round(1e9 * note.begin), first + round(1e9 * note.end)) for note in selection]
     return replace(scene, notes=tuple(spans))

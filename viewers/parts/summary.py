@@ -24,9 +24,9 @@ def of_press(press: Press) -> str:
     """Return the nominal configuration in one line."""
     sizes = ", ".join(f"{k} {v:g}" for k, v in press.indenter.document.items() if k != "shape")
     names = {"yaw": "yaw", "tilt_x": "leaning about x", "tilt_y": "about y"}
-    turned = "".join(f", {names[name]} {angle:g}°" for name, angle in press.angles.items() if angle)
+    rotation = "".join(f", {names[name]} {angle:g}°" for name, angle in press.angles.items() if angle)
     return (
-        f"{press.indenter.shape} ({sizes}; mm, °) at x {press.x:g} mm, y {press.y:g} mm{turned}, "
+        f"{press.indenter.shape} ({sizes}; mm, °) at x {press.x:g} mm, y {press.y:g} mm{rotation}, "
         f"depth {press.depth:g} mm, {press.speed:g} mm/s, held {press.hold:g} s"
     )
 

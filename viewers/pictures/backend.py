@@ -53,8 +53,8 @@ class PictureBackend(Backend):
 
 def page(scene: Scene) -> Figure:
     """Return the page of one episode."""
-    chosen = moments(scene)
-    rows = max(len(chosen), 2) if scene.maps else 2
+    instants = moments(scene)
+    rows = max(len(instants), 2) if scene.maps else 2
     text = plain(scene.summary)
     heights = [TITLE + LINE * len(text.splitlines()), SIGNALS, ROW * rows]
     figure = Figure(figsize=(WIDTH, sum(heights)), layout="constrained")
@@ -63,12 +63,12 @@ def page(scene: Scene) -> Figure:
     head.text(0.012, 1 - 0.15 / heights[0], scene.title, fontsize=16, weight="bold", va="top")
     head.text(0.012, 1 - 0.55 / heights[0], text, va="top", linespacing=1.35)
     left, right = upper.subfigures(1, 2, width_ratios=[1.75, 1])
-    panels.signals(left, scene, chosen)
-    skin(right, scene, chosen)
+    panels.signals(left, scene, instants)
+    skin(right, scene, instants)
     if scene.maps:
         left, right = lower.subfigures(1, 2, width_ratios=[1.75, 1])
-        panels.maps(left, scene, chosen)
-        panels.taxels_and_tip(right, scene, chosen, stacked=True)
+        panels.maps(left, scene, instants)
+        panels.taxels_and_tip(right, scene, instants, stacked=True)
     else:
-        panels.taxels_and_tip(lower, scene, chosen, stacked=False)
+        panels.taxels_and_tip(lower, scene, instants, stacked=False)
     return figure

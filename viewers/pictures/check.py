@@ -79,19 +79,19 @@ def _sites(axes, episodes: list[Episode]) -> None:
 
 def _noise(axes, report: Report, unit: str) -> None:
     table = np.array([_numbers(entry.document["taxels"]["idle_noise"]) for entry in report.episodes])
-    known = ~np.isnan(table).all(axis=0)
-    channels = np.arange(table.shape[1])[known]
+    measured = ~np.isnan(table).all(axis=0)
+    channels = np.arange(table.shape[1])[measured]
     bad = {k for entry in report.episodes for key in ("stuck", "saturated") for k in entry.document["taxels"][key]}
     colors = ["tab:red" if k in bad else "tab:blue" for k in channels]
-    axes.bar(channels, np.nanmedian(table[:, known], axis=0), color=colors)
+    axes.bar(channels, np.nanmedian(table[:, measured], axis=0), color=colors)
     axes.set(xlabel="channel (red: stuck or at a limit)", ylabel=f"[{unit}]", title="noise without contact")
 
 
 def _lag(axes, report: Report) -> None:
     lag = np.concatenate([entry.lag for entry in report.episodes])
     if is_imported(report.episodes[0].recording.episode):  # a source has one time: that of its reading
-        every = [np.diff(entry.recording.episode.taxels.sample_ns) / 1e6 for entry in report.episodes]
-        spans = np.concatenate(every)
+        steps = [np.diff(entry.recording.episode.taxels.sample_ns) / 1e6 for entry in report.episodes]
+        spans = np.concatenate(steps)
         axes.hist(spans, bins=60, color="tab:blue")
         axes.set(xlabel="between two readings [ms]", ylabel="rows", title="times of the taxel stream")
         axes.set_yscale("log" if len(spans) else "linear")
@@ -107,8 +107,8 @@ def _lag(axes, report: Report) -> None:
 def _words(axes, report: Report) -> None:
     axes.axis("off")
     lines = report.text.encode("utf-8", "replace").decode().splitlines()  # a path may hold bytes that are no text
-    shown = lines if len(lines) <= 24 else [*lines[:23], f"... {len(lines) - 23} more, see check.json"]
-    axes.text(0.0, 1.0, "\n".join(_wrapped(shown)), va="top", fontsize=7, transform=axes.transAxes)
+    excerpt = lines if len(lines) <= 24 else [*lines[:23], f"... {len(lines) - 23} more, see check.json"]
+    axes.text(0.0, 1.0, "\n".join(_wrapped(excerpt)), va="top", fontsize=7, transform=axes.transAxes)
 
 
 def _wrapped(lines: list[str], width: int = 70) -> list[str]:

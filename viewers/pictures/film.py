@@ -54,9 +54,9 @@ class FilmBackend(Backend):
                 write_film(self._path, page_frames(HandPage(scene), hand_times(scene, RATE[kind], MOST[kind])))
             return
         if scene.kind != "episode":
-            given = f"a film of {scene.title}"
+            fault = f"a film of {scene.title}"
             allowed = "an episode of a recording, session or dataset, or a tracked demonstration"
-            raise UsageError(given, allowed, "use --picture or --save")
+            raise UsageError(fault, allowed, "use --picture or --save")
         times = film_times(scene, RATE[kind], MOST[kind])
         with rc_context(STYLE):
             write_film(self._path, self._frames(scene, times))
@@ -70,44 +70,44 @@ class FilmBackend(Backend):
             yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def film_times(scene: Scene, rate: float, most: int) -> np.ndarray:
+def film_times(scene: Scene, rate: float, limit: int) -> np.ndarray:
     """Return the times of a film's frames [ns]: from approach to release if they are marked, else all of the episode.
 
     Args:
         scene: The episode.
         rate: Frames a second [Hz].
-        most: Frames at most.
+        limit: Frames at most.
     """
     begin, end = int(scene.frame_ns[0]), int(scene.frame_ns[-1])
     marked = [span for span in scene.phases if span.name != "rest"]
     if marked:
         begin, end = max(begin, marked[0].start_ns), min(end, max(span.end_ns for span in marked))
-    count = int(np.clip((end - begin) / 1e9 * rate, 2, most))
+    count = int(np.clip((end - begin) / 1e9 * rate, 2, limit))
     return np.linspace(begin, end, count).astype(np.int64)
 
 
 def frame(scene: Scene, time_ns: int) -> Figure:
     """Return one frame: the skin, the maps, the taxels, and the signals with a line at the time."""
-    chosen = (("deepest", time_ns),)
+    instants = (("deepest", time_ns),)
     figure = Figure(figsize=SIZE)
     parts: Any = figure.subfigures(1, 2, width_ratios=[1.25, 1])
     left, right = parts
-    skin(left, scene, chosen, bar=False)
-    shown = [m for m in scene.maps if m.scale.unit == "mm" and not m.scale.signed][:2]
-    axes = right.subplots(1 + len(shown) + 1, 1, height_ratios=[1.0] * (1 + len(shown)) + [0.9])
+    skin(left, scene, instants, bar=False)
+    selection = [m for m in scene.maps if m.scale.unit == "mm" and not m.scale.signed][:2]
+    axes = right.subplots(1 + len(selection) + 1, 1, height_ratios=[1.0] * (1 + len(selection)) + [0.9])
     right.subplots_adjust(left=0.16, right=0.97, top=0.94, bottom=0.1, hspace=0.55)
     taxels = scene.taxels
     centers = taxels.centers.reshape(taxels.rows, taxels.columns, 3)
     values = taxels.grid[nearest(taxels.time_ns, time_ns)]
     panels.image(axes[0], values, (centers[0, :, 0], centers[:, 0, 1]), taxels.scale)
     axes[0].set_title(f"Taxels, {taxels.scale.low:g} to {taxels.scale.high:g} {taxels.scale.unit}", fontsize=9)
-    for own, maps in zip(axes[1:], shown, strict=False):
-        panels.image(own, maps.values[nearest(maps.time_ns, time_ns)].T, (maps.x, maps.y), maps.scale)
-        panels.tip_mark(own, scene, time_ns)
-        own.set_title(f"{maps.name.capitalize()}: depth, 0 to {maps.scale.high:g} mm", fontsize=9)
-    for own in axes[:-1]:
-        own.set_ylabel("y [mm]", fontsize=8)
-        own.tick_params(labelsize=7)
+    for panel, maps in zip(axes[1:], selection, strict=False):
+        panels.image(panel, maps.values[nearest(maps.time_ns, time_ns)].T, (maps.x, maps.y), maps.scale)
+        panels.tip_mark(panel, scene, time_ns)
+        panel.set_title(f"{maps.name.capitalize()}: depth, 0 to {maps.scale.high:g} mm", fontsize=9)
+    for panel in axes[:-1]:
+        panel.set_ylabel("y [mm]", fontsize=8)
+        panel.tick_params(labelsize=7)
     axes[-2].set_xlabel("x [mm]", fontsize=8)
     _signals(axes[-1], scene, time_ns)
     return figure

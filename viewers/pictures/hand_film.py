@@ -26,16 +26,16 @@ MARGIN = 20.0
 """Around all paths [mm]."""
 
 
-def hand_times(scene: Scene, rate: float, most: int) -> np.ndarray:
+def hand_times(scene: Scene, rate: float, limit: int) -> np.ndarray:
     """Return the times of a film's frames [ns]: from the first known fingertip to the last.
 
     Args:
         scene: A demonstration that was tracked.
         rate: Frames a second [Hz].
-        most: Frames at most; longer recordings are shown faster.
+        limit: Frames at most; longer recordings are shown faster.
     """
     begin, end = _begin(scene), max(int(body.time_ns[-1]) for body in scene.bodies)
-    return np.linspace(begin, end, int(np.clip((end - begin) / 1e9 * rate, 2, most))).astype(np.int64)
+    return np.linspace(begin, end, int(np.clip((end - begin) / 1e9 * rate, 2, limit))).astype(np.int64)
 
 
 class HandPage:
@@ -64,8 +64,8 @@ class HandPage:
         )
         low, high = _ends(scene)
         self._space = [
-            _Plane(axes, scene.bodies, (across, up), (low, high))
-            for axes, (across, up) in zip(rows[-2].subplots(1, 2), ((0, 2), (0, 1)), strict=True)
+            _Plane(axes, scene.bodies, (horizontal, up), (low, high))
+            for axes, (horizontal, up) in zip(rows[-2].subplots(1, 2), ((0, 2), (0, 1)), strict=True)
         ]
         self._line = _depth_curves(rows[-1].subplots(), scene, self._fingers)
         self._maps: list[tuple[Any, Any, str]] = []
@@ -75,9 +75,9 @@ class HandPage:
 
     def _draw_maps(self, figure: Any) -> None:
         axes = figure.subplots(len(self._scene.maps), 1, squeeze=False)[:, 0]
-        for own, maps in zip(axes, self._scene.maps, strict=True):
+        for panel, maps in zip(axes, self._scene.maps, strict=True):
             name = maps.name.removeprefix("predicted ")
-            image = own.imshow(
+            image = panel.imshow(
                 maps.values[0].T,
                 origin="lower",
                 cmap=maps.scale.colormap,
@@ -85,9 +85,9 @@ class HandPage:
                 vmax=maps.scale.high,
                 extent=(maps.x[0], maps.x[-1], maps.y[0], maps.y[-1]),
             )
-            own.tick_params(labelsize=7)
-            own.set_ylabel("y [mm]", fontsize=8)
-            self._maps.append((image, own.set_title(name, fontsize=9), name))
+            panel.tick_params(labelsize=7)
+            panel.set_ylabel("y [mm]", fontsize=8)
+            self._maps.append((image, panel.set_title(name, fontsize=9), name))
         axes[-1].set_xlabel("x [mm]", fontsize=8)
         bar = figure.colorbar(self._maps[0][0], ax=axes.tolist(), location="bottom", shrink=0.9)
         bar.set_label("predicted depth [mm]", fontsize=8)
@@ -127,8 +127,8 @@ class _CameraPicture:
         if len(view.image_ns):
             self._image.set_data(_opened(view.images[nearest(view.image_ns, time_ns)]))
         # A camera without a known place gets no dots.
-        found = [view.pixel(body.position[nearest(body.time_ns, time_ns)]) for body in self._bodies]
-        places = np.array([np.full(2, np.nan) if place is None else place for place in found])
+        pixels = [view.pixel(body.position[nearest(body.time_ns, time_ns)]) for body in self._bodies]
+        places = np.array([np.full(2, np.nan) if place is None else place for place in pixels])
         # Rows of an image count downwards.
         names = apart(places * [1, -1], 0.14 * view.width, 0.06 * view.height) * [1, -1]
         for (dot, name), body, place, at in zip(self._marks, self._bodies, places, names, strict=True):
@@ -142,16 +142,16 @@ class _Plane:
     """Fingertips in one plane of space: a plate along each finger, a name, and the path just behind it."""
 
     def __init__(
-        self, axes: Axes, bodies: tuple[Body, ...], shown: tuple[int, int], ends: tuple[np.ndarray, np.ndarray]
+        self, axes: Axes, bodies: tuple[Body, ...], dimensions: tuple[int, int], ends: tuple[np.ndarray, np.ndarray]
     ) -> None:
-        self._bodies, self._shown = bodies, list(shown)
-        across, up = shown
-        inch = float(ends[1][across] - ends[0][across]) / WIDE
+        self._bodies, self._shown = bodies, list(dimensions)
+        horizontal, up = dimensions
+        inch = float(ends[1][horizontal] - ends[0][horizontal]) / WIDE
         self._letters = NAME[0] * inch, NAME[1] * inch
-        axes.set(xlim=(ends[0][across], ends[1][across]), ylim=(ends[0][up], ends[1][up]))
+        axes.set(xlim=(ends[0][horizontal], ends[1][horizontal]), ylim=(ends[0][up], ends[1][up]))
         axes.set_aspect("equal", adjustable="box")
         axes.set_title("from the side" if up == 2 else "from above", fontsize=9)
-        axes.set_xlabel(f"{'xyz'[across]} [mm]", fontsize=8)
+        axes.set_xlabel(f"{'xyz'[horizontal]} [mm]", fontsize=8)
         axes.set_ylabel(f"{'xyz'[up]} [mm]", fontsize=8)
         axes.tick_params(labelsize=7)
         self._marks = [_mark(axes, body.name, k) for k, body in enumerate(bodies)]
@@ -165,14 +165,14 @@ class _Plane:
         tips = []
         for (dot, _), tail, plate, body in zip(self._marks, self._tails, self._plates, self._bodies, strict=True):
             row = nearest(body.time_ns, time_ns)
-            behind = (body.time_ns <= time_ns) & (body.time_ns >= time_ns - TAIL * 1e9)
+            recent = (body.time_ns <= time_ns) & (body.time_ns >= time_ns - TAIL * 1e9)
             place = body.position[row]
-            along = Rotation.from_quat(np.atleast_2d(body.quaternion)[row]).apply([PLATE / 2, 0.0, 0.0])
+            offset = Rotation.from_quat(np.atleast_2d(body.quaternion)[row]).apply([PLATE / 2, 0.0, 0.0])
             dot.set_data([place[self._shown[0]]], [place[self._shown[1]]])
             dot.set_markerfacecolor("white" if bridged.get(body.name) else dot.get_color())
-            tail.set_data(*body.position[behind][:, self._shown].T)
+            tail.set_data(*body.position[recent][:, self._shown].T)
             tail.set_linestyle(":" if bridged.get(body.name) else "-")
-            plate.set_data(*np.stack([place - along, place + along])[:, self._shown].T)
+            plate.set_data(*np.stack([place - offset, place + offset])[:, self._shown].T)
             tips.append(place[self._shown])
         for (_, name), place in zip(self._marks, apart(np.array(tips), *self._letters), strict=True):
             name.set_position(tuple(place))
@@ -192,19 +192,19 @@ def apart(places: np.ndarray, wide: float, high: float) -> np.ndarray:
         >>> apart(np.array([[0.0, 1.0], [5.0, 0.0]]), wide=26.0, high=8.0)[:, 1].round(1).tolist()
         [12.8, 4.8]
     """
-    made = np.full_like(places, np.nan)
+    result = np.full_like(places, np.nan)
     put: list[np.ndarray] = []
     for k in np.argsort(places[:, 1], kind="stable"):
         if not np.isfinite(places[k]).all():
             continue
         at = places[k] + np.array([0.0, 0.6 * high])
         # From below upwards, so that a name only ever moves up.
-        for other in sorted(put, key=lambda own: own[1]):
-            if abs(other[0] - at[0]) < wide and abs(other[1] - at[1]) < high:
-                at[1] = other[1] + high
+        for neighbour in sorted(put, key=lambda entry: entry[1]):
+            if abs(neighbour[0] - at[0]) < wide and abs(neighbour[1] - at[1]) < high:
+                at[1] = neighbour[1] + high
         put.append(at)
-        made[k] = at
-    return made
+        result[k] = at
+    return result
 
 
 def _begin(scene: Scene) -> int:

@@ -30,7 +30,7 @@ FULL = 6
 def other_page(scene: Scene) -> Figure:
     """Return the page: words, fingertips in space, maps at up to three moments, bars, curves."""
     text = plain(scene.summary.replace("## ", ""))
-    chosen = moments(scene) if scene.maps else ()
+    instants = moments(scene) if scene.maps else ()
     curves = [c for c in scene.curves if not c.name.startswith("clock/")]
     curves = curves if scene.kind == "hand" else curves[:FULL]  # of a hand every finger has its own
     rows = (len(curves) + 1) // 2
@@ -38,27 +38,27 @@ def other_page(scene: Scene) -> Figure:
     heights = {
         "head": TITLE + LINE * len(text.splitlines()),
         "space": SPACE if scene.trails else 0.0,
-        "maps": MAPS * len(chosen),
+        "maps": MAPS * len(instants),
         "bars": 0.9 + BAR * bars if bars else 0.0,
         "curves": CURVES * rows,
     }
     drawn = {name: height for name, height in heights.items() if height}
     figure = Figure(figsize=(WIDTH, sum(drawn.values())), layout="constrained")
-    made: Any = figure.subfigures(len(drawn), 1, height_ratios=list(drawn.values()), squeeze=False)
-    parts = dict(zip(drawn, made[:, 0], strict=True))
+    subfigures: Any = figure.subfigures(len(drawn), 1, height_ratios=list(drawn.values()), squeeze=False)
+    parts = dict(zip(drawn, subfigures[:, 0], strict=True))
     parts["head"].text(0.012, 1 - 0.15 / heights["head"], scene.title, fontsize=16, weight="bold", va="top")
     parts["head"].text(0.012, 1 - 0.55 / heights["head"], text, va="top", linespacing=1.35)
     if scene.trails:
         space(parts["space"], scene)
-    if chosen:
-        panels.maps(parts["maps"], scene, chosen)
+    if instants:
+        panels.maps(parts["maps"], scene, instants)
     if bars:
-        for axes, own in zip(parts["bars"].subplots(1, len(scene.bars), squeeze=False)[0], scene.bars, strict=True):
-            bar_chart(axes, own)
+        for axes, content in zip(parts["bars"].subplots(1, len(scene.bars), squeeze=False)[0], scene.bars, strict=True):
+            bar_chart(axes, content)
     if curves:
         grid = parts["curves"].subplots(rows, 2 if len(curves) > 1 else 1, squeeze=False).ravel()
-        for axes, own in zip(grid, curves, strict=False):
-            course(axes, own, scene)
+        for axes, content in zip(grid, curves, strict=False):
+            course(axes, content, scene)
         if scene.kind == "comparison":
             one_scale(grid, curves)
         for axes in grid[len(curves) :]:
@@ -69,8 +69,8 @@ def other_page(scene: Scene) -> Figure:
 def one_scale(grid: Iterable[Axes], curves: list[Curves]) -> None:
     """Give curves of one group, such as residuals of two models, the same axis, so that their heights compare."""
     groups: dict[str, list[Axes]] = {}
-    for axes, own in zip(grid, curves, strict=False):
-        groups.setdefault(own.name.split("/")[0], []).append(axes)
+    for axes, curve in zip(grid, curves, strict=False):
+        groups.setdefault(curve.name.split("/")[0], []).append(axes)
     for members in groups.values():
         low, high = zip(*(axes.get_ylim() for axes in members), strict=True)
         for axes in members:
@@ -79,7 +79,7 @@ def one_scale(grid: Iterable[Axes], curves: list[Curves]) -> None:
 
 def space(figure: SubFigure, scene: Scene) -> None:
     """Draw paths in space, from the side and from above, dotted where bridged, and where each finger touches most."""
-    for number, (across, up, name) in enumerate(((0, 2, "from the side"), (0, 1, "from above"))):
+    for number, (horizontal, up, name) in enumerate(((0, 2, "from the side"), (0, 1, "from above"))):
         axes = figure.add_subplot(1, 2, number + 1)
         for trail in scene.trails:
             color = COLORS[trail.hue % len(COLORS)]
@@ -87,7 +87,7 @@ def space(figure: SubFigure, scene: Scene) -> None:
                 for k, strip in enumerate(trail.strips(doubtful)):
                     label = trail.name if k == 0 and not doubtful else None
                     axes.plot(
-                        strip[:, across],
+                        strip[:, horizontal],
                         strip[:, up],
                         style,
                         color=color,
@@ -96,9 +96,9 @@ def space(figure: SubFigure, scene: Scene) -> None:
                         alpha=0.4 if trail.faint else 1.0,
                     )
         for cloud in scene.clouds:
-            own = cloud.position[_most(cloud)]
-            axes.plot(*own[:, [across, up]].T, ".", color="0.2", markersize=0.8)
-        axes.set(xlabel=f"{'xyz'[across]} [mm]", ylabel=f"{'xyz'[up]} [mm]", title=f"Fingertips {name}")
+            touches = cloud.position[_most(cloud)]
+            axes.plot(*touches[:, [horizontal, up]].T, ".", color="0.2", markersize=0.8)
+        axes.set(xlabel=f"{'xyz'[horizontal]} [mm]", ylabel=f"{'xyz'[up]} [mm]", title=f"Fingertips {name}")
         axes.set_aspect("equal", adjustable="datalim")
         if number == 0:
             axes.legend(loc="best", fontsize=8)
@@ -127,8 +127,8 @@ def bar_chart(axes: Axes, bars: Bars) -> None:
     for at, value in zip(place, values, strict=True):
         end = max(float(value), 0.0) if np.isfinite(value) else 0.0
         axes.text(end, float(at), f" {value:.3g}", va="center", fontsize=8)
-    left = len(bars.values) - len(values)
-    title = bars.title + (f" (first {len(values)} of {len(bars.values)})" if left else "")
+    remainder = len(bars.values) - len(values)
+    title = bars.title + (f" (first {len(values)} of {len(bars.values)})" if remainder else "")
     axes.set_title(fill(title, TITLE_LETTERS), fontsize=10)
     axes.margins(x=0.15)
 

@@ -38,7 +38,7 @@ def mappable(scale: ColorScale) -> ScalarMappable:
     return ScalarMappable(Normalize(scale.low, scale.high), scale.colormap)
 
 
-def signals(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
+def signals(figure: SubFigure, scene: Scene, instants: Moments) -> None:
     """Draw the taxels' change above the tip's depth, over the phases."""
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.3])
     change = next(c for c in scene.curves if c.name == "taxels/change")
@@ -71,7 +71,7 @@ def signals(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
     upper.set_xlim(time[0], max(time[-1], time[0] + 1e-3))
     for axes in (upper, lower):
         phases(axes, scene, named=axes is upper)
-        for _, moment in chosen:
+        for _, moment in instants:
             axes.axvline(seconds(scene, np.array(moment)), color=INK, linewidth=0.8, linestyle="--")
 
 
@@ -107,32 +107,34 @@ def key(axes: Axes, scene: Scene) -> None:
     inset.set_ylabel("row", fontsize=7, labelpad=1)
 
 
-def maps(figure: SubFigure, scene: Scene, chosen: Moments) -> None:
+def maps(figure: SubFigure, scene: Scene, instants: Moments) -> None:
     """Draw every map at every chosen moment: moments downwards, kinds across, one bar for each scale."""
-    grid = figure.subplots(len(chosen), len(scene.maps), squeeze=False, sharex=True, sharey=True)
-    for row, (name, moment) in zip(grid, chosen, strict=True):
+    grid = figure.subplots(len(instants), len(scene.maps), squeeze=False, sharex=True, sharey=True)
+    for row, (name, moment) in zip(grid, instants, strict=True):
         row[0].set_ylabel(f"{name}, {seconds(scene, np.array(moment)):.2f} s\ny [mm]")
-        for axes, shown in zip(row, scene.maps, strict=True):
-            image(axes, picture_at(shown, moment).T, (shown.x, shown.y), shown.scale)
+        for axes, layer in zip(row, scene.maps, strict=True):
+            image(axes, picture_at(layer, moment).T, (layer.x, layer.y), layer.scale)
             tip_mark(axes, scene, moment)
-            if shown.scale.signed:
+            if layer.scale.signed:
                 error = _frame_error(scene, moment)
                 axes.text(0.98, 0.03, error, transform=axes.transAxes, ha="right", fontsize=8, color=INK)
     first = scene.maps[0]
     for axis, centers in (("x", first.x), ("y", first.y)):
         # All share axes, and the protrusions' own map is smaller.
         grid[0, 0].set(**{f"{axis}lim": _ends(centers)})
-    for axes, shown in zip(grid[0], scene.maps, strict=True):
-        axes.set_title(TITLES.get(shown.name, shown.name))
+    for axes, layer in zip(grid[0], scene.maps, strict=True):
+        axes.set_title(TITLES.get(layer.name, layer.name))
     for axes in grid[-1]:
         axes.set_xlabel("x [mm]")
     # Neighbours on one scale share a bar; separate maps would share it across the panels between.
     for scale, group in groupby(range(len(scene.maps)), key=lambda k: scene.maps[k].scale):
-        own = list(group)
+        columns = list(group)
         # One map alone keeps its proportions, and is narrower than its column.
         part = 0.9 if len(scene.maps) > 1 else 0.3
-        bar = figure.colorbar(mappable(scale), ax=grid[:, own], location="bottom", shrink=part, aspect=20 * len(own))
-        bar.set_label(_bar_label(scale, [scene.maps[k].name for k in own]))
+        bar = figure.colorbar(
+            mappable(scale), ax=grid[:, columns], location="bottom", shrink=part, aspect=20 * len(columns)
+        )
+        bar.set_label(_bar_label(scale, [scene.maps[k].name for k in columns]))
 
 
 def _frame_error(scene: Scene, moment: int) -> str:
@@ -173,9 +175,9 @@ def tip_mark(axes: Axes, scene: Scene, moment: int) -> None:
         axes.plot(x, y, "+", color="black", markersize=8, markeredgewidth=1.0)
 
 
-def taxels_and_tip(figure: SubFigure, scene: Scene, chosen: Moments, stacked: bool) -> None:
+def taxels_and_tip(figure: SubFigure, scene: Scene, instants: Moments, stacked: bool) -> None:
     """Draw the taxels' signal at the deepest moment and the tip's path over the array."""
-    moment = dict(chosen)["deepest"]
+    moment = dict(instants)["deepest"]
     first, second = figure.subplots(*((2, 1) if stacked else (1, 2)))
     taxels = scene.taxels
     centers = taxels.centers.reshape(taxels.rows, taxels.columns, 3)

@@ -83,10 +83,10 @@ def _pad(axes, plan: Plan, sensor: Sensor, names: list[str]):
 def _course(axes, plan: Plan, press_seconds: tuple[float, ...], names: list[str]) -> None:
     begins = np.array([0.0, *accumulate(press_seconds)][:-1]) / 60
     for number, name in enumerate(names):
-        chosen = [k for k, press in enumerate(plan.presses) if press.indenter_name == name]
+        rows = [k for k, press in enumerate(plan.presses) if press.indenter_name == name]
         axes.plot(
-            begins[chosen],
-            [max(plan.presses[k].depth, HOVER) for k in chosen],
+            begins[rows],
+            [max(plan.presses[k].depth, HOVER) for k in rows],
             MARKS[number % len(MARKS)],
             ms=4,
             label=name,

@@ -41,13 +41,13 @@ NAMES = {"direct": "direct", "compensated": "compensated, gains as given", "chos
 """Kind of replay -> its heading."""
 
 
-def film_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
+def film_replays(path: Path, replays: Mapping[str, ReplayOutcome], targets: FingertipTargets) -> None:
     """Write a film of replays, by kind.
 
     Args:
         path: A new file that ends in .mp4 or .gif.
         replays: Kind -> its outcome.
-        seen: The targets that were replayed: the predicted maps are their demonstration's.
+        targets: The targets that were replayed: the predicted maps are their demonstration's.
 
     Raises:
         UsageError: If the file exists, has another ending, or films of its kind cannot be written here.
@@ -55,15 +55,15 @@ def film_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: Fingert
     new_file(path, *FILMS)
     rate, longest = RATE[path.suffix], max(float(replay.time[-1]) for replay in replays.values())
     times = np.linspace(0.0, longest, min(max(round(longest * rate), 2), MOST[path.suffix]))
-    write_film(path, page_frames(ReplayPage(replays, seen), times))
+    write_film(path, page_frames(ReplayPage(replays, targets), times))
 
 
 class ReplayPage:
     """All replays at one time: a column each, from the side and from above, forces and slip; the maps next to them."""
 
-    def __init__(self, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
+    def __init__(self, replays: Mapping[str, ReplayOutcome], targets: FingertipTargets) -> None:
         """Draw the beginning; arguments as in `film_replays`."""
-        self._replays, self._gap = replays, seen.gap
+        self._replays, self._gap = replays, targets.gap
         count = len(replays)
         self.figure = Figure(figsize=(WIDTH * count + MAPS, HEIGHT), dpi=RESOLUTION)
         self.figure.set_layout_engine("constrained", rect=(0.0, 0.0, 0.995, 1.0))  # a margin at the right
@@ -76,7 +76,7 @@ class ReplayPage:
         self._objects: dict[tuple[str, int], ReplayObjectShape] = {}
         self._pads: dict[tuple[str, int], list[tuple[Circle, Any]]] = {}
         self._curves: list[ReplayCurves] = []
-        most = 1.3 * max(_strongest(replay) for replay in replays.values()) + 0.1
+        force_limit = 1.3 * max(_strongest(replay) for replay in replays.values()) + 0.1
         for column, (kind, replay) in enumerate(replays.items()):
             for row, up in enumerate((2, 1)):
                 axes = self._axes[row, column]
@@ -86,7 +86,7 @@ class ReplayPage:
                 self._pads[kind, up] = [_pad(axes, name, k) for k, name in enumerate(replay.fingers)]
             self._axes[1, column].set_xlabel("x [mm]", fontsize=8)
             for row, name, values, top in (
-                (2, "normal force [N]", replay.path.force, most),
+                (2, "normal force [N]", replay.path.force, force_limit),
                 (3, "slip [mm]", 1000 * replay.path.slip, MOST_SLIP),
             ):
                 curves = ReplayCurves(self._axes[row, column], replay, name, values, top, self._gap)
@@ -95,7 +95,7 @@ class ReplayPage:
             self._axes[3, column].set_xlabel("time [s]", fontsize=8)
             for axes in self._axes[:, column]:
                 axes.tick_params(labelsize=7)
-        self._maps = FeltMaps(parts[1], seen)
+        self._maps = FeltMaps(parts[1], targets)
         self.show(0.0)
 
     def show(self, time: float) -> None:
@@ -150,7 +150,7 @@ class ReplayCurves:
     """A quantity of every pad over time, drawn up to now: the future must not show the end."""
 
     def __init__(
-        self, axes: Axes, replay: ReplayOutcome, name: str, values: np.ndarray, most: float, gap: np.ndarray
+        self, axes: Axes, replay: ReplayOutcome, name: str, values: np.ndarray, limit: float, gap: np.ndarray
     ) -> None:
         """Draw the axes, grey where a path is bridged."""
         self._replay, self._values = replay, values
@@ -170,12 +170,12 @@ class ReplayCurves:
                 zorder=0,
                 label="path bridged",
             )
-        axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, most))
+        axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, limit))
         axes.set_ylabel(name, fontsize=8)
         self._now = axes.axvline(0.0, color="black", linewidth=1)
         self._lost = axes.axvspan(replay.decided, replay.time[-1], color="crimson", alpha=0.12, visible=False)
         self._word = axes.text(
-            replay.decided, 0.8 * most, " lost", fontsize=8, color="crimson", visible=False, clip_on=True
+            replay.decided, 0.8 * limit, " lost", fontsize=8, color="crimson", visible=False, clip_on=True
         )
 
     def show(self, time: float) -> None:

@@ -14,10 +14,10 @@ from tacdata.viewers.scene.moments import nearest
 from tacdata.viewers.scene.scene import Body, Scene
 
 
-def skin(figure: SubFigure, scene: Scene, chosen: Moments, bar: bool = True) -> None:
+def skin(figure: SubFigure, scene: Scene, instants: Moments, bar: bool = True) -> None:
     """Draw the skin with the indenter at the deepest moment, with a bar of its colours."""
     surface = scene.surfaces[0]
-    moment = dict(chosen)["deepest"]
+    moment = dict(instants)["deepest"]
     index, shaded = nearest(surface.time_ns, moment), surface.name != "undeformed"
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
     x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
@@ -62,7 +62,7 @@ def _corners(low: np.ndarray, high: np.ndarray) -> list[tuple[float, float]]:
 
 def _wireframe(axes: Any, body: Body, moment: int) -> float:
     """Draw a body as thin lines and return the height of its top [mm]."""
-    turned = Rotation.from_quat(body.quaternion).apply(body.vertices)
-    placed = turned + body.position[nearest(body.time_ns, moment)]
+    vertices = Rotation.from_quat(body.quaternion).apply(body.vertices)
+    placed = vertices + body.position[nearest(body.time_ns, moment)]
     axes.plot_trisurf(*placed.T, triangles=body.faces, color=(0.55, 0.6, 0.68, 0.3), linewidth=0, shade=False, zorder=3)
     return float(placed[:, 2].max())

@@ -32,7 +32,7 @@ def small_film(scene: Scene, path: Path) -> Path:
     return path
 
 
-def _put(made: Path, path: Path) -> None:
+def _put(source: Path, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacement(path) as stream:
-        stream.write(made.read_bytes())
+        stream.write(source.read_bytes())

@@ -22,9 +22,9 @@ def portrait(noun: Session) -> Figure:
     done = noun.done
     depths = [press.depth for press in noun.plan.presses]
     for recorded, face in ((True, None), (False, "none")):
-        chosen = [press for press in noun.plan.presses if (press.index in done) == recorded]
-        if chosen:
-            x, y, depth = np.array([(press.x, press.y, press.depth) for press in chosen]).T
+        presses = [press for press in noun.plan.presses if (press.index in done) == recorded]
+        if presses:
+            x, y, depth = np.array([(press.x, press.y, press.depth) for press in presses]).T
             points = axes.scatter(x, y, c=depth, vmin=min(depths), vmax=max(depths), cmap="viridis", zorder=2)
             if face:
                 points.set_facecolor(face)

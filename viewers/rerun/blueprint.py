@@ -44,7 +44,7 @@ def episode_blueprint(scene: Scene, follows: bool = False, stands: bool = False)
     rows.append(_curves(scene))
     shares.append(5.0)
     if scene.phases or scene.notes:
-        name = " and ".join(word for word, own in (("Phases", scene.phases), ("notes", scene.notes)) if own)
+        name = " and ".join(word for word, content in (("Phases", scene.phases), ("notes", scene.notes)) if content)
         rows.append(rrb.StateTimelineView(origin="/", contents=["phase", "notes"], name=name))
         shares.append(3.8 if scene.phases and scene.notes else 2.2)
     main = rrb.Vertical(*rows, row_shares=shares)
@@ -66,10 +66,10 @@ def _time_panel(follows: bool, stands: bool) -> rrb.TimePanel:
 
 def skin_view(name: str, title: str, scene: Scene) -> rrb.Spatial3DView:
     """Return the view of one of a scene's skins, the others left out of it."""
-    others = [f"- /{entity('world/skin', s.name)}/**" for s in scene.surfaces if s.name != name]
+    exclusions = [f"- /{entity('world/skin', s.name)}/**" for s in scene.surfaces if s.name != name]
     return rrb.Spatial3DView(
         origin="world",
-        contents=["$origin/**", *others],
+        contents=["$origin/**", *exclusions],
         name=title,
         eye_controls=rrb.EyeControls3D(position=EYE, look_target=(0.0, 0.0, 2.6)),
         line_grid=rrb.LineGrid3D(visible=False),
@@ -97,8 +97,8 @@ def _side(scene: Scene) -> rrb.Container:
 
 
 def _map(name: str, high: float) -> rrb.Spatial2DView:
-    shown = [entity("maps", name), f"{marks_of(name)}/**"]
-    return rrb.Spatial2DView(origin="maps", contents=shown, name=MAP_TITLES[name].format(high=high))
+    contents = [entity("maps", name), f"{marks_of(name)}/**"]
+    return rrb.Spatial2DView(origin="maps", contents=contents, name=MAP_TITLES[name].format(high=high))
 
 
 def _heat_map(scene: Scene) -> rrb.Spatial2DView:

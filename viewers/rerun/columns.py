@@ -72,7 +72,7 @@ class RerunParts:
             self._maps(maps)
         if scene.maps and scene.footprint is not None:
             # Maps of one grid share their marks: the first of them wins, as it is written into the dictionary last.
-            for maps in {marks_of(own.name): own for own in reversed(scene.maps)}.values():
+            for maps in {marks_of(layer.name): layer for layer in reversed(scene.maps)}.values():
                 self._map_marks(maps)
         for surface in scene.surfaces:
             self._surface(surface)
@@ -206,10 +206,10 @@ class RerunParts:
     def _trail(self, trail: MotionTrail) -> None:
         color = HUES[trail.hue % len(HUES)]
         full, pale = (110, 50) if trail.faint else (255, 90)
-        for name, doubtful, own in (("seen", False, (*color, full)), ("bridged", True, (*color, pale))):
+        for name, doubtful, rgba in (("seen", False, (*color, full)), ("bridged", True, (*color, pale))):
             strips = trail.strips(doubtful)
             if strips:
-                self._static(f"world/paths/{trail.name}/{name}", rr.LineStrips3D(strips, colors=[own]))
+                self._static(f"world/paths/{trail.name}/{name}", rr.LineStrips3D(strips, colors=[rgba]))
 
     def _cloud(self, cloud: Cloud) -> None:
         path = f"contact/{cloud.name}"

@@ -18,7 +18,7 @@ def read_gap_curves(path: Path) -> tuple[Curves, ...]:
     Raises:
         FormatError: If the file is damaged.
     """
-    found: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
+    groups: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
     try:
         for chunk in RrdReader(path).stream():
             parts = str(chunk.entity_path).strip("/").split("/")
@@ -27,15 +27,15 @@ def read_gap_curves(path: Path) -> tuple[Curves, ...]:
             batch = chunk.to_record_batch()
             time = batch[TIMELINE].cast("int64").to_numpy()
             values = batch["Scalars:scalars"].flatten().to_numpy()
-            found.setdefault(parts[0], {})[parts[2]] = (time, values)
+            groups.setdefault(parts[0], {})[parts[2]] = (time, values)
     except Exception as error:  # any error of Rerun's reader for a damaged file
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FormatError(f"{path} cannot be read: {reason}", "a file of tacdata revise", "revise again") from None
     curves = []
-    for name, own in sorted(found.items()):
-        if set(own) == set(COLORS):
-            time = own["measured"][0]
+    for name, columns in sorted(groups.items()):
+        if set(columns) == set(COLORS):
+            time = columns["measured"][0]
             curves.append(
-                Curves(name, "as recorded", tuple(COLORS), time, np.column_stack([own[key][1] for key in COLORS]))
+                Curves(name, "as recorded", tuple(COLORS), time, np.column_stack([columns[key][1] for key in COLORS]))
             )
     return tuple(curves)

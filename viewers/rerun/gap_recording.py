@@ -74,28 +74,28 @@ def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
     """
     path = new_file(path, RERUN)
     views = []
-    for k, own in enumerate(episodes):
+    for k, episode in enumerate(episodes):
         root = f"episode_{k}"
-        views.append(rrb.TimeSeriesView(origin=f"{root}/reading", name=f"{own.name}, {own.channel_name}"))
-        views.append(rrb.TimeSeriesView(origin=f"{root}/depth", name=f"{own.name}, depth [mm]"))
+        views.append(rrb.TimeSeriesView(origin=f"{root}/reading", name=f"{episode.name}, {episode.channel_name}"))
+        views.append(rrb.TimeSeriesView(origin=f"{root}/depth", name=f"{episode.name}, depth [mm]"))
     blueprint = rrb.Blueprint(rrb.Grid(*views, grid_columns=2), collapse_panels=True)
     with written_beside(path) as temporary:
         recording = rr.RecordingStream("tacdata")
         recording.save(temporary, default_blueprint=blueprint)
         recording.send_recording_name(title)
-        for k, own in enumerate(episodes):
-            _episode(recording, f"episode_{k}", own)
+        for k, episode in enumerate(episodes):
+            _episode(recording, f"episode_{k}", episode)
         recording.flush()
         recording.disconnect()
 
 
-def _episode(recording: rr.RecordingStream, root: str, own: Shown) -> None:
-    index = [rr.TimeColumn(TIMELINE, duration=own.time)]
-    curves = {name: getattr(own, name)[:, own.channel] for name in COLORS}
+def _episode(recording: rr.RecordingStream, root: str, episode: Shown) -> None:
+    index = [rr.TimeColumn(TIMELINE, duration=episode.time)]
+    curves = {name: getattr(episode, name)[:, episode.channel] for name in COLORS}
     for name, values in curves.items():
         entity = f"{root}/reading/{name}"
         recording.log(entity, rr.SeriesLines(colors=[COLORS[name]], names=[name], widths=[1.5]), static=True)
         recording.send_columns(entity, index, columns=rr.Scalars.columns(scalars=values))
     entity = f"{root}/depth/commanded"
     recording.log(entity, rr.SeriesLines(colors=[HUES[2]], names=["depth [mm]"]), static=True)
-    recording.send_columns(entity, index, columns=rr.Scalars.columns(scalars=own.depth))
+    recording.send_columns(entity, index, columns=rr.Scalars.columns(scalars=episode.depth))

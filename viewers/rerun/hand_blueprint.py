@@ -67,12 +67,12 @@ def _curves(scene: Scene) -> rrb.Container:
     groups = dict.fromkeys(c.name.split("/")[0] for c in scene.curves)
     views = []
     for group in groups:
-        own = [c for c in scene.curves if c.name.split("/")[0] == group]
-        legend = hidden if group == "taxels" or len(own) * len(own[0].labels) > 12 else None
+        members = [c for c in scene.curves if c.name.split("/")[0] == group]
+        legend = hidden if group == "taxels" or len(members) * len(members[0].labels) > 12 else None
         title = {"clock": "clock: arrival after sample", "spread": "standard deviation of the position"}.get(
             group, group
         )
         views.append(
-            rrb.TimeSeriesView(origin=entity("curves", group), name=f"{title} [{own[0].unit}]", plot_legend=legend)
+            rrb.TimeSeriesView(origin=entity("curves", group), name=f"{title} [{members[0].unit}]", plot_legend=legend)
         )
     return rrb.Horizontal(views[0], rrb.Tabs(*views[1:])) if len(views) > 1 else rrb.Horizontal(views[0])

@@ -25,13 +25,13 @@ BOARD = (0.12, 0.12, 0.002)
 """Half the sizes of the piece of table or board that is drawn [m]."""
 
 
-def save_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: FingertipTargets) -> None:
+def save_replays(path: Path, replays: Mapping[str, ReplayOutcome], targets: FingertipTargets) -> None:
     """Write replays, by kind, side by side.
 
     Args:
         path: A new Rerun file.
         replays: Kind -> its outcome.
-        seen: The targets that were replayed: fingers whose path is bridged are marked.
+        targets: The targets that were replayed: fingers whose path is bridged are marked.
 
     Raises:
         UsageError: If the file exists or is no Rerun file by its ending.
@@ -57,7 +57,7 @@ def save_replays(path: Path, replays: Mapping[str, ReplayOutcome], seen: Fingert
             recording.log(f"{name}/verdict", rr.TextDocument(f"{name}: {verdict}"))
             place = replay.path.centre[row] + shift
             recording.log(f"{name}/object", _drawn(replay, place, f"{name}: {verdict.split(':')[0]}"))
-            bridged = seen.gap[row]
+            bridged = targets.gap[row]
             marked = [BRIDGED if gap else color for gap, color in zip(bridged, colors, strict=True)]
             labels = [f"{n}: path bridged" if gap else n for n, gap in zip(replay.fingers, bridged, strict=True)]
             tips = replay.path.tips[row] + shift

@@ -45,8 +45,8 @@ def deepest_moment(scene: Scene) -> Moment | None:
     """Return the deepest moment of a press; None for a scene that shows no press."""
     if not scene.maps and not scene.arrays:
         return None
-    found = dict(moments(scene)).get("deepest")
-    return None if found is None else Moment(HOST if scene.on_host_clock else ELAPSED, found)
+    time_ns = dict(moments(scene)).get("deepest")
+    return None if time_ns is None else Moment(HOST if scene.on_host_clock else ELAPSED, time_ns)
 
 
 def script() -> str:

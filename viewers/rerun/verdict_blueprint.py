@@ -39,8 +39,8 @@ def _streams(scene: Scene, streams: list[str]) -> rrb.Tabs:
     by_name = {c.name: c for c in scene.curves}
     tabs = []
     for name in streams:
-        own = [by_name[f"{READINGS}/{name}"], by_name[f"{RESIDUALS}/{name}"], by_name["depth"]]
-        tabs.append(rrb.Vertical(*map(_series, own), row_shares=[3, 2, 1], name=name.replace("_", " ")))
+        curves = [by_name[f"{READINGS}/{name}"], by_name[f"{RESIDUALS}/{name}"], by_name["depth"]]
+        tabs.append(rrb.Vertical(*map(_series, curves), row_shares=[3, 2, 1], name=name.replace("_", " ")))
     return rrb.Tabs(*tabs, name="Readings")
 
 

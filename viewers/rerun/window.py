@@ -173,9 +173,9 @@ def _ended_in_order() -> Iterator[None]:
     def end(number: int, _: object) -> None:
         raise SystemExit(_BY_SIGNAL + number)
 
-    asked = (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
+    signals = (signal.SIGTERM, *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []))
     main = threading.current_thread() is threading.main_thread()  # only there may handlers be set
-    ours = [number for number in asked if main and signal.getsignal(number) is signal.SIG_DFL]
+    ours = [number for number in signals if main and signal.getsignal(number) is signal.SIG_DFL]
     for number in ours:
         signal.signal(number, end)
     try:

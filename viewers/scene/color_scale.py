@@ -33,19 +33,19 @@ class ColorScale:
         """Return colours, shape (*values.shape, 3), uint8; values beyond the ends get the end's colour, NaN black."""
         span = self.high - self.low
         place = 256 * (np.asarray(values) - self.low) / span
-        known = ~np.isnan(place)
-        step = np.clip(np.where(known, place, 0.0), 0, 255).astype(np.uint8)
+        valid = ~np.isnan(place)
+        step = np.clip(np.where(valid, place, 0.0), 0, 255).astype(np.uint8)
         colors = _table(self.colormap)[step]
-        if not known.all():
-            colors[~known] = 0
+        if not valid.all():
+            colors[~valid] = 0
         return colors
 
 
 @cache
 def _table(colormap: str) -> np.ndarray:
     # matplotlib has the same tables, and takes a third of a second to import
-    both = np.loadtxt(Path(__file__).parent / "color_tables.csv", delimiter=",", dtype=np.uint8)
-    return both[:, :3] if colormap == "viridis" else both[:, 3:]
+    table = np.loadtxt(Path(__file__).parent / "color_tables.csv", delimiter=",", dtype=np.uint8)
+    return table[:, :3] if colormap == "viridis" else table[:, 3:]
 
 
 def scale_of(values: np.ndarray, unit: str, signed: bool = False, floor: float = 0.0) -> ColorScale:

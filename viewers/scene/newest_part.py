@@ -24,18 +24,18 @@ class ScenePart:
         return replace(
             scene,
             curves=self._known("curves", scene.curves),
-            arrays=tuple(self._rows("arrays", own) for own in scene.arrays),
+            arrays=tuple(self._rows("arrays", item) for item in scene.arrays),
             tip=None if scene.tip is None else self._rows("tip", scene.tip),
             maps=self._known("maps", scene.maps),
             surfaces=self._known("surfaces", scene.surfaces),
             bodies=self._known("bodies", scene.bodies),
-            clouds=tuple(self._cloud(own) for own in scene.clouds),
-            cameras=tuple(self._camera(own) for own in scene.cameras),
+            clouds=tuple(self._cloud(item) for item in scene.clouds),
+            cameras=tuple(self._camera(item) for item in scene.cameras),
         )
 
     def _known(self, group: str, parts: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return the parts of which there is anything new."""
-        return tuple(own for own in (self._rows(group, part) for part in parts) if len(own.time_ns))
+        return tuple(piece for piece in (self._rows(group, part) for part in parts) if len(piece.time_ns))
 
     def _later(self, key: str, time_ns: np.ndarray) -> np.ndarray:
         later = time_ns > self._shown.get(key, -1)
@@ -70,7 +70,7 @@ class ScenePart:
         return replace(
             camera,
             image_ns=camera.image_ns[images],
-            images=tuple(own for own, late in zip(camera.images, images.tolist(), strict=True) if late),
+            images=tuple(image for image, is_new in zip(camera.images, images.tolist(), strict=True) if is_new),
             cube_ns=camera.cube_ns[cubes],
             cube_position=camera.cube_position[cubes],
             cube_quaternion=camera.cube_quaternion[cubes],

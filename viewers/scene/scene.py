@@ -104,9 +104,9 @@ class DepthMaps:
 
         The upper left corner of the upper left pixel is (0, 0).
         """
-        across = (points[:, 0] - self.x[0]) / (self.x[1] - self.x[0]) + 0.5
-        down = len(self.y) - 0.5 - (points[:, 1] - self.y[0]) / (self.y[1] - self.y[0])
-        return np.stack([across, down], axis=-1)
+        columns = (points[:, 0] - self.x[0]) / (self.x[1] - self.x[0]) + 0.5
+        rows = len(self.y) - 0.5 - (points[:, 1] - self.y[0]) / (self.y[1] - self.y[0])
+        return np.stack([columns, rows], axis=-1)
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ def cube_axes(camera: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         Origins and vectors [mm, camera frame], shape (3 m, 3) for the m poses with a tag in view, and the
         number of arrows of each pose (3, or 0 without a tag), shape (p,).
     """
-    seen = np.isfinite(camera.cube_position).all(axis=1)
-    turns = Rotation.from_quat(camera.cube_quaternion[seen]).as_matrix() if seen.any() else np.zeros((0, 3, 3))
+    visible = np.isfinite(camera.cube_position).all(axis=1)
+    turns = Rotation.from_quat(camera.cube_quaternion[visible]).as_matrix() if visible.any() else np.zeros((0, 3, 3))
     vectors = camera.cube_side * turns.transpose(0, 2, 1).reshape(-1, 3)
-    return np.repeat(camera.cube_position[seen], 3, axis=0), vectors, np.where(seen, 3, 0)
+    return np.repeat(camera.cube_position[visible], 3, axis=0), vectors, np.where(visible, 3, 0)
 
 
 def normals(surface: SkinSurface) -> np.ndarray:

@@ -87,11 +87,11 @@ class MotionTrail:
 
     def strips(self, doubtful: bool) -> list[np.ndarray]:
         """Return the stretches that are doubtful, or those that are not [mm], each of shape (m, 3), m >= 2."""
-        known = np.isfinite(self.position).all(axis=1)
-        chosen = known & (self.doubtful == doubtful)
+        valid = np.isfinite(self.position).all(axis=1)
+        mask = valid & (self.doubtful == doubtful)
         if doubtful:  # a bridge begins and ends where the path is known
-            chosen = known & (chosen | np.roll(chosen, 1) | np.roll(chosen, -1))
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(np.int8), [0]])))
+            mask = valid & (mask | np.roll(mask, 1) | np.roll(mask, -1))
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
         return [self.position[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 2]
 
 

@@ -47,19 +47,19 @@ def maps_comparison(
     scale = scale_of(high, "mm", floor=DEPTH_FLOOR)
     x, y = sensor.map.x, sensor.map.y
     range_words = f"0 to {scale.high:g} mm"
-    shown = [DepthMaps(s.name, x, y, s.time_ns, s.depth, scale, f"{s.name}: depth, {range_words}") for s in all_sides]
+    layers = [DepthMaps(s.name, x, y, s.time_ns, s.depth, scale, f"{s.name}: depth, {range_words}") for s in all_sides]
     pairs = [(f"{second.name} − {first.name}", second.depth[theirs], first.depth[ours], time)]
     if truth is not None:
         for side in sides:
-            own, at, there = np.intersect1d(side.time_ns, truth.time_ns, return_indices=True)
-            pairs.append((f"{side.name} − {truth.name}", side.depth[at], truth.depth[there], own))
+            common, at, truth_rows = np.intersect1d(side.time_ns, truth.time_ns, return_indices=True)
+            pairs.append((f"{side.name} − {truth.name}", side.depth[at], truth.depth[truth_rows], common))
     differences = [(name, (a - b).astype(np.float32), t) for name, a, b, t in pairs if len(t)]
     signed = scale_of(
         np.array([float(np.abs(d).max(initial=0.0)) for _, d, _ in differences]), "mm", signed=True, floor=ERROR_FLOOR
     )
-    shown += [DepthMaps(n, x, y, t, d, signed, f"{n}, ±{signed.high:g} mm") for n, d, t in differences]
+    layers += [DepthMaps(n, x, y, t, d, signed, f"{n}, ±{signed.high:g} mm") for n, d, t in differences]
     curves = [_course(all_sides), *(_of_difference(name, d, t) for name, d, t in differences)]
-    drawn = depth_maps.thinned(tuple(shown))
+    drawn = depth_maps.thinned(tuple(layers))
     return Scene(
         title,
         _words(title, all_sides, differences),
@@ -80,7 +80,7 @@ def readings_comparison(
     shape: tuple[int, int],
     time_ns: np.ndarray,
     measured: np.ndarray,
-    said: Mapping[str, np.ndarray],
+    predictions: Mapping[str, np.ndarray],
     unit: str,
 ) -> Scene:
     """Return measurements, predictions of models, and residuals.
@@ -90,26 +90,28 @@ def readings_comparison(
         shape: Columns and rows of the array; (channels, 1) where they are not on a grid.
         time_ns: Times [ns], shape (n,).
         measured: Readings [unit], shape (n, channels).
-        said: Model -> its prediction [unit], shape (n, channels).
+        predictions: Model -> its prediction [unit], shape (n, channels).
         unit: Of the readings.
     """
     columns, rows = shape
     labels = tuple(f"{k} ({k % columns}, {k // columns})" for k in range(columns * rows))
-    rest = measured[:1]
-    left = {name: measured - values for name, values in said.items()}
+    start = measured[:1]
+    residuals = {name: measured - values for name, values in predictions.items()}
     curves, arrays = [], []
-    high = scale_of(np.concatenate([measured - rest, *(v - rest for v in said.values())]), unit, signed=True)
-    signed = scale_of(np.concatenate(list(left.values())), unit, signed=True)
-    for name, values in {"measured": measured, **said}.items():
-        curves.append(Curves(f"readings/{name}", unit, labels, time_ns, values - rest))
-        arrays.append(_heat(name, shape, time_ns, values - rest, high))
-    for name, values in left.items():
+    high = scale_of(np.concatenate([measured - start, *(v - start for v in predictions.values())]), unit, signed=True)
+    signed = scale_of(np.concatenate(list(residuals.values())), unit, signed=True)
+    for name, values in {"measured": measured, **predictions}.items():
+        curves.append(Curves(f"readings/{name}", unit, labels, time_ns, values - start))
+        arrays.append(_heat(name, shape, time_ns, values - start, high))
+    for name, values in residuals.items():
         curves.append(Curves(f"left/{name}", unit, labels, time_ns, values))
         arrays.append(_heat(f"measured − {name}", shape, time_ns, values, signed))
-    off = {name: np.sqrt(np.mean(np.square(values), axis=1)) for name, values in left.items()}
-    curves.insert(0, Curves("root mean square left", unit, tuple(off), time_ns, np.column_stack(list(off.values()))))
+    errors = {name: np.sqrt(np.mean(np.square(values), axis=1)) for name, values in residuals.items()}
+    curves.insert(
+        0, Curves("root mean square left", unit, tuple(errors), time_ns, np.column_stack(list(errors.values())))
+    )
     lines = [f"# {title}", "", "Readings since the first frame, measured and predicted by a model.", ""]
-    for name, values in left.items():
+    for name, values in residuals.items():
         worst = int(np.argmax(np.square(values).mean(axis=0)))
         lines.append(
             f"- **{name}** leaves {np.sqrt(np.mean(np.square(values))):.3g} {unit} (root mean square), "

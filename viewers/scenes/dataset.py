@@ -35,7 +35,7 @@ def dataset_scene(
         FormatError: If the prediction's maps have another grid than the sensor.
     """
     count = len(dataset.episodes) if total is None else total
-    entry = next((own for own in dataset.episodes if own.index == number), None)
+    entry = next((candidate for candidate in dataset.episodes if candidate.index == number), None)
     if entry is None:
         raise UsageError(f"--episode {number}", f"0 to {count - 1} in {dataset.root}", "choose one of them")
     sensor = dataset.sensors[entry.sensor]
@@ -60,7 +60,7 @@ def dataset_scene(
             "give the predictions made for this dataset",
         )
     pair = (prediction.time_ns, prediction.depth) if prediction else None
-    shown = maps.depth_maps(sensor, (time, depth), pair)
+    layers = maps.depth_maps(sensor, (time, depth), pair)
     labels = signals.taxel_labels(sensor)
     state = column[features.STATE].astype(float)
     curves = (
@@ -68,16 +68,16 @@ def dataset_scene(
         Curves("taxels/raw", "counts", labels, time, column[features.RAW]),
         Curves("force", "N", ("x", "y", "z"), time, column[features.FORCE]),
     )
-    press, drawn = entry.press, maps.thinned(shown)
+    press, drawn = entry.press, maps.thinned(layers)
     surfaces = skin_surface.surfaces(sensor, int(time[0]), drawn, None)
-    remarks += thinned_remark(len(shown[0].time_ns) if shown else 0, drawn)
+    remarks += thinned_remark(len(layers[0].time_ns) if layers else 0, drawn)
     return Scene(
         title=f"{dataset.root.resolve().name}/episode {number}",
-        summary=summary.of_dataset_episode(dataset, entry, prediction, shown, remarks, count),
+        summary=summary.of_dataset_episode(dataset, entry, prediction, layers, remarks, count),
         frame_ns=time,
         frame=np.arange(len(time)),
         footprint=skin_surface.footprint(sensor),
-        curves=tuple(map(signals.thinned, curves + maps.error_curves(shown))),
+        curves=tuple(map(signals.thinned, curves + maps.error_curves(layers))),
         arrays=(signals.taxel_array(sensor, time, state),),
         tip=signals.thinned(signals.tip_curves("nominal", time, tip)),
         maps=drawn,

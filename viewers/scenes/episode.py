@@ -54,22 +54,22 @@ def episode_scene(
             )
     resting = episode.phase_at(time) == PHASES.index("rest")
     change = signals.signal_change(episode.taxels.counts, resting)
-    shown = maps.depth_maps(sensor, label_pair, prediction_pair)
+    layers = maps.depth_maps(sensor, label_pair, prediction_pair)
     if label and label.traction is not None:
-        shown += maps.contact_maps(sensor, label.map_ns, label.traction)
+        layers += maps.contact_maps(sensor, label.map_ns, label.traction)
     if label and label.taxel_pressure is not None:
-        shown += (maps.board_map(sensor, label.map_ns, label.taxel_pressure),)
+        layers += (maps.board_map(sensor, label.map_ns, label.taxel_pressure),)
     tip = episode.tip_at(time) if len(episode.tip_ns) else None
     cameras = camera_view.camera_views(episode, images)
     curves = signals.episode_curves(episode, unit) + (signals.label_curves(label) if label else ())
     curves += tuple(signals.delays(f"camera {name}", *pair) for name, pair in (image_times or {}).items())
-    curves += maps.error_curves(shown)
-    drawn = maps.thinned(shown)
+    curves += maps.error_curves(layers)
+    drawn = maps.thinned(layers)
     surfaces = skin_surface.surfaces(sensor, int(time[0]), drawn, (label.map_ns, label.signed) if label else None)
-    remarks += thinned_remark(len(label.time_ns) if label else len(shown[0].time_ns) if shown else 0, drawn)
+    remarks += thinned_remark(len(label.time_ns) if label else len(layers[0].time_ns) if layers else 0, drawn)
     return Scene(
         title=f"{episode.path.resolve().parent.name}/{episode.path.stem}",
-        summary=summary.of_episode(episode, label, prediction, shown, cameras, remarks),
+        summary=summary.of_episode(episode, label, prediction, layers, cameras, remarks),
         frame_ns=time,
         frame=_counter(episode.taxels.counter),
         footprint=skin_surface.footprint(sensor),
@@ -93,7 +93,7 @@ def _without_taxels(episode: Episode) -> Episode:
         FormatError: If there is no other stream.
     """
     streams = [episode.cnc.sample_ns, episode.tip_ns, *(tags.sample_ns for tags in episode.tags)]
-    time = next((own for own in streams if len(own) > 1), None)
+    time = next((times for times in streams if len(times) > 1), None)
     if time is None:
         raise FormatError(
             f"{episode.path}: not one taxel frame, and no other stream",
@@ -112,8 +112,12 @@ def thinned_remark(count: int, drawn: tuple[DepthMaps, ...]) -> tuple[str, ...]:
 
 
 def _device_times(episode: Episode) -> np.ndarray:
-    own = episode.taxels.device_ns
-    return own if own is not None and len(own) and (own >= 0).all() else np.zeros(0, dtype=np.int64)
+    device_ns = episode.taxels.device_ns
+    return (
+        device_ns
+        if device_ns is not None and len(device_ns) and (device_ns >= 0).all()
+        else np.zeros(0, dtype=np.int64)
+    )
 
 
 def _counter(counter: np.ndarray) -> np.ndarray:

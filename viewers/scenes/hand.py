@@ -28,7 +28,7 @@ AXES = 12.0
 
 def demonstration_scene(
     title: str,
-    made: Demonstration | None,
+    demonstration: Demonstration | None,
     recorded: DemoRecording | None = None,
     images: Iterable[tuple[str, int, bytes]] = (),
     remarks: tuple[str, ...] = (),
@@ -37,7 +37,7 @@ def demonstration_scene(
 
     Args:
         title: Heading.
-        made: Its tracks, if it was worked up.
+        demonstration: Its tracks, if it was worked up.
         recorded: The recording, if it is there.
         images: Camera name, time of exposure [ns] and JPEG image.
         remarks: Further remarks.
@@ -45,39 +45,39 @@ def demonstration_scene(
     scene = Scene(title, "", np.zeros(0, np.int64), np.zeros(0, np.int64), kind="hand")
     if recorded is not None:
         scene = _with_recording(scene, recorded, images)
-    if made is not None:
-        scene = _with_tracks(scene, made)
-    return replace(scene, summary=hand_summary.of_demonstration(title, made, recorded, remarks))
+    if demonstration is not None:
+        scene = _with_tracks(scene, demonstration)
+    return replace(scene, summary=hand_summary.of_demonstration(title, demonstration, recorded, remarks))
 
 
 def targets_scene(
-    title: str, targets: FingertipTargets, others: int = 0, joints: dict[str, np.ndarray] | None = None
+    title: str, targets: FingertipTargets, count: int = 0, joints: dict[str, np.ndarray] | None = None
 ) -> Scene:
     """Return a robot's targets: observed and wanted places of the fingers.
 
     Args:
         title: Heading.
         targets: The targets of one demonstration.
-        others: Number of further demonstrations in its folder.
+        count: Number of further demonstrations in its folder.
         joints: Joint values by name [rad or m], shape (n,), NaN where a target cannot be reached.
     """
     time, trails, bodies, curves = targets.time_ns, [], [], []
     for k, name in enumerate(targets.fingers):
-        wanted, seen = 1000 * targets.position[:, k], 1000 * targets.seen[:, k]
-        trails.append(MotionTrail(f"{name}/seen", seen, targets.gap[:, k], k, faint=True))
-        trails.append(MotionTrail(f"{name}/target", wanted, targets.gap[:, k], k))
-        bodies.append(pad(name, time, wanted, targets.quaternion[:, k], None))
+        goal, observed = 1000 * targets.position[:, k], 1000 * targets.seen[:, k]
+        trails.append(MotionTrail(f"{name}/seen", observed, targets.gap[:, k], k, faint=True))
+        trails.append(MotionTrail(f"{name}/target", goal, targets.gap[:, k], k))
+        bodies.append(pad(name, time, goal, targets.quaternion[:, k], None))
         gap = _marked(targets.gap[:, k])
-        curves.append(Curves(f"target/{name}", "mm", ("x", "y", "z"), time, wanted, gap))
-        moved = np.linalg.norm(wanted - seen, axis=1)[:, None]
-        curves.append(Curves(f"moved/{name}", "mm", ("by touch",), time, moved, gap))
+        curves.append(Curves(f"target/{name}", "mm", ("x", "y", "z"), time, goal, gap))
+        shift = np.linalg.norm(goal - observed, axis=1)[:, None]
+        curves.append(Curves(f"moved/{name}", "mm", ("by touch",), time, shift, gap))
     if np.isfinite(targets.depth).any():
         curves.insert(0, Curves("predicted depth", "mm", targets.fingers, time, targets.depth))
     if joints:
         curves.append(Curves("joints", "rad or m", tuple(joints), time, np.column_stack(list(joints.values()))))
     return Scene(
         title,
-        hand_summary.of_targets(title, targets, others, joints),
+        hand_summary.of_targets(title, targets, count, joints),
         time,
         np.arange(len(time)),
         curves=tuple(map(signals.thinned, curves)),
@@ -111,23 +111,23 @@ def _with_recording(scene: Scene, recorded: DemoRecording, images: Iterable[tupl
     )
 
 
-def _with_tracks(scene: Scene, made: Demonstration) -> Scene:
-    time, curves, maps, clouds = made.time_ns, [], [], []
-    felt = {name: track for name, track in made.tracks.items() if track.depth is not None}
+def _with_tracks(scene: Scene, demonstration: Demonstration) -> Scene:
+    time, curves, maps, clouds = demonstration.time_ns, [], [], []
+    felt = {name: track for name, track in demonstration.tracks.items() if track.depth is not None}
     highest = max((float(np.nan_to_num(t.depth).max()) for t in felt.values() if t.depth is not None), default=0.0)
     scale = scale_of(np.array([highest]), "mm", floor=DEPTH_FLOOR)
     if felt:
         depth = np.column_stack([contact_depth(t.depth) for t in felt.values() if t.depth is not None])
         curves.append(Curves("predicted depth", "mm", tuple(felt), time, depth))
-    for name, track in made.tracks.items():
+    for name, track in demonstration.tracks.items():
         gap = _marked(track.gap)
         curves.append(Curves(f"fingertip/{name}", "mm", ("x", "y", "z"), time, 1000 * track.position, gap))
         curves.append(Curves(f"spread/{name}", "mm", ("position",), time, 1000 * spread(track)[:, None], gap))
-        sensor = made.sensors.get(name)
+        sensor = demonstration.sensors.get(name)
         if sensor is not None and name in felt:
-            own = depth_of(name, sensor, time, track, scale)
-            maps.append(own)
-            clouds.append(contact(own, track, time))
+            finger_maps = depth_of(name, sensor, time, track, scale)
+            maps.append(finger_maps)
+            clouds.append(contact(finger_maps, track, time))
     return replace(
         scene,
         frame_ns=scene.frame_ns if len(scene.frame_ns) else time,
@@ -135,9 +135,12 @@ def _with_tracks(scene: Scene, made: Demonstration) -> Scene:
         curves=tuple(map(signals.thinned, curves)) + scene.curves,
         maps=tuple(maps),
         clouds=tuple(clouds),
-        trails=tuple(MotionTrail(n, 1000 * t.position, t.gap, k) for k, (n, t) in enumerate(made.tracks.items())),
+        trails=tuple(
+            MotionTrail(n, 1000 * t.position, t.gap, k) for k, (n, t) in enumerate(demonstration.tracks.items())
+        ),
         bodies=tuple(
-            pad(n, time, 1000 * t.position, t.quaternion, made.sensors.get(n)) for n, t in made.tracks.items()
+            pad(n, time, 1000 * t.position, t.quaternion, demonstration.sensors.get(n))
+            for n, t in demonstration.tracks.items()
         ),
     )
 
@@ -155,7 +158,7 @@ def spread(track: FingerTrack) -> np.ndarray:
 def depth_of(name: str, sensor: Sensor, time_ns: np.ndarray, track: FingerTrack, scale: ColorScale) -> DepthMaps:
     """Return a finger's predicted maps, at most `thinning.MAPS` of them; without reading 0."""
     depth = np.nan_to_num(np.asarray(track.depth, np.float32))
-    whole = DepthMaps(
+    full = DepthMaps(
         f"predicted {name}",
         sensor.map.x,
         sensor.map.y,
@@ -164,7 +167,7 @@ def depth_of(name: str, sensor: Sensor, time_ns: np.ndarray, track: FingerTrack,
         scale,
         f"{name}: predicted depth, 0 to {scale.high:g} mm",
     )
-    return thinned((whole,))[0]
+    return thinned((full,))[0]
 
 
 def contact(maps: DepthMaps, track: FingerTrack, time_ns: np.ndarray) -> Cloud:
@@ -174,8 +177,8 @@ def contact(maps: DepthMaps, track: FingerTrack, time_ns: np.ndarray) -> Cloud:
     its outer face as the plane through the fingertip.
     """
     rows = np.searchsorted(time_ns, maps.time_ns)
-    known = np.isfinite(track.position[rows]).all(axis=1)
-    touched = (maps.values > DEPTH_FLOOR) & np.reshape(known, (-1, 1, 1))
+    valid = np.isfinite(track.position[rows]).all(axis=1)
+    touched = (maps.values > DEPTH_FLOOR) & np.reshape(valid, (-1, 1, 1))
     frame, i, j = np.nonzero(touched)
     depth = maps.values[touched]
     local = np.column_stack([maps.x[i], maps.y[j], -depth])

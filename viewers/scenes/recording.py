@@ -30,22 +30,22 @@ if TYPE_CHECKING:
     from tacdata.viewers.parts.recorded_images import ImageSampler
 
 
-def recording_scene(path: Path, asked: Asked) -> Scene:
+def recording_scene(path: Path, options: Asked) -> Scene:
     """Return the scene of a recording with the files of its folder. Raises as `viewers.source.scene_at`."""
     from tacdata.recording.files.reader import read_recording
     from tacdata.viewers.parts.recorded_images import ImageSampler
 
-    sampler, most = ImageSampler(), None if asked.predictions else thinning.MAPS
+    sampler, limit = ImageSampler(), None if options.predictions else thinning.MAPS
     # Files are decoded without Python's lock, which others hold in the meantime.
-    with _handing_over(), ThreadPoolExecutor(2) as beside:
-        label_read = beside.submit(find_label, path, asked.labels, most)
-        reading = beside.submit(read_recording, path, digests=False, seen=sampler.take)
-        asked.meanwhile()
+    with _handing_over(), ThreadPoolExecutor(2) as pool:
+        label_read = pool.submit(find_label, path, options.labels, limit)
+        reading = pool.submit(read_recording, path, digests=False, seen=sampler.take)
+        options.meanwhile()
         recording = reading.result()
         label, remarks = label_read.result()
     if path.name.endswith(file_names.PARTIAL):
         remarks.append("still being written, or left by a crash: this is what had reached the disk")
-    scene = scene_of(recording, sampler, label, remarks, asked.predictions)
+    scene = scene_of(recording, sampler, label, remarks, options.predictions)
     return with_stretch_notes(scene, path.parent, lambda: provenance.file_hash(path))
 
 
@@ -85,8 +85,8 @@ def scene_of(
     return episode_scene(episode, label, prediction, images, tuple(remarks), times, unit)
 
 
-def find_label(recording: Path, labels: Path | None, most: int | None = None) -> tuple[ShownLabel | None, list[str]]:
-    """Return a recording's label with ``most`` maps or all, or None and, where it is known, why there is none.
+def find_label(recording: Path, labels: Path | None, limit: int | None = None) -> tuple[ShownLabel | None, list[str]]:
+    """Return a recording's label with ``limit`` maps or all, or None and, where it is known, why there is none.
 
     Raises:
         UsageError: If the folder that was asked for does not exist.
@@ -97,7 +97,7 @@ def find_label(recording: Path, labels: Path | None, most: int | None = None) ->
     folder = labels or label_names.folder(recording.parent)
     path, failure = label_names.label(folder, recording), label_names.failure(folder, recording)
     if path.is_file():
-        return shown_label(path, most), []
+        return shown_label(path, limit), []
     if failure.is_file():
         return None, [f"labelling failed: {documents.read(failure, 'label_failure')['reason'].splitlines()[0]}"]
     return None, []

@@ -32,10 +32,10 @@ def read_single(root: Path, number: int) -> tuple[Dataset, int]:
     """
     info = folder.read_info(root)
     main = metadata.read_main(root)
-    known = {*SHOWN, features.SENSOR, features.RECORD, "index"} <= set(info["features"])
-    if main is None or not known:
-        whole = read_dataset(root)
-        return whole, len(whole.episodes)
+    is_standard = {*SHOWN, features.SENSOR, features.RECORD, "index"} <= set(info["features"])
+    if main is None or not is_standard:
+        dataset = read_dataset(root)
+        return dataset, len(dataset.episodes)
     count = info["total_episodes"]
     if not 0 <= number < count:
         return Dataset(root, {}, (), {}, info["fps"], ""), count
@@ -45,8 +45,8 @@ def read_single(root: Path, number: int) -> tuple[Dataset, int]:
     digest = by_key.get(int(columns[features.SENSOR][0]))
     record = metadata.read_record(root, int(columns[features.RECORD][0]))
     if digest is None or record is None:
-        whole = read_dataset(root)
-        return whole, len(whole.episodes)
+        dataset = read_dataset(root)
+        return dataset, len(dataset.episodes)
     sensor = metadata.Sensor.from_document(main["sensors"][digest], str(root))
     entry = DatasetEpisode(number, 0, row.stop - row.start, " / ".join(row.tasks), digest, record)
     return Dataset(root, columns, (entry,), {digest: sensor}, info["fps"], ""), count
@@ -55,14 +55,14 @@ def read_single(root: Path, number: int) -> tuple[Dataset, int]:
 def _row(root: Path, info: dict, number: int) -> folder.EpisodeRow:
     """Return an episode's row, from the file of its number where each has one, as we write them."""
     path = root / folder.row_path(number)
-    own = folder.rows_in(path).get(number) if path.is_file() else None
-    return own or folder.read_rows(root, info)[number]
+    entry = folder.rows_in(path).get(number) if path.is_file() else None
+    return entry or folder.read_rows(root, info)[number]
 
 
 def _columns(path: Path, info: dict, row: folder.EpisodeRow) -> dict[str, np.ndarray]:
     """Return an episode's columns, frames first, in the units of `features`."""
-    wanted = [*SHOWN, features.SENSOR, features.RECORD]
-    table = folder.read_parquet(path, [*wanted, "index"])
+    keys = [*SHOWN, features.SENSOR, features.RECORD]
+    table = folder.read_parquet(path, [*keys, "index"])
     index = table["index"].to_numpy()
     first, last = np.searchsorted(index, [row.start, row.stop])
     if not np.array_equal(index[first:last], np.arange(row.start, row.stop)):
@@ -71,9 +71,9 @@ def _columns(path: Path, info: dict, row: folder.EpisodeRow) -> dict[str, np.nda
             f"frames {row.start} to {row.stop - 1}",
             "put the original file back, or pack the session again",
         )
-    own = table.slice(int(first), int(last - first))
+    part = table.slice(int(first), int(last - first))
     try:
-        return {key: cache.column_values(own[key], info["features"][key]) for key in wanted}
+        return {key: cache.column_values(part[key], info["features"][key]) for key in keys}
     except (ValueError, TypeError, pa.ArrowException) as error:
-        given = f"{path}: {error}"
-        raise FormatError(given, "columns as meta/info.json says", "pack the session again") from None
+        fault = f"{path}: {error}"
+        raise FormatError(fault, "columns as meta/info.json says", "pack the session again") from None

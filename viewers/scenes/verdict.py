@@ -100,16 +100,18 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
         lines += [f"## {effect['title']} ({effect['mechanism']}, {effect['stage']}): {effect['status']}", ""]
         for name, p in effect["parameters"].items():
             value = np.ravel(p["value"])
-            shown = f"{value[0]:.4g}" if len(value) == 1 else f"{value.min():.3g} to {value.max():.3g}, one a channel"
+            value_text = (
+                f"{value[0]:.4g}" if len(value) == 1 else f"{value.min():.3g} to {value.max():.3g}, one a channel"
+            )
             spread = f" ± {p['error']:.2g}" if p["error"] is not None else ""
-            lines.append(f"- {name} = {shown}{spread}" + (f" {p['unit']}" if p["unit"] != "1" else ""))
+            lines.append(f"- {name} = {value_text}{spread}" + (f" {p['unit']}" if p["unit"] != "1" else ""))
         if effect["alternatives"]:
             lines.append(f"- could also be: {', '.join(effect['alternatives'])}")
         lines += _distinguished(effect)
         if effect.get("confidence") is not None:
             lines.append(f"- probability that the name is right: {effect['confidence']:.0%}")
-    gate, left = verdict["gate"], verdict["left"]
-    share = f" **Left** {left['share']:.1%} of what could be explained." if verdict["effects"] else ""
+    gate, remainder = verdict["gate"], verdict["left"]
+    share = f" **Left** {remainder['share']:.1%} of what could be explained." if verdict["effects"] else ""
     lines += [
         "",
         f"**Gap** p = {gate['p']:.3g} ({'a gap' if gate['gap'] else 'no gap'}; {GATE:g} or less is one).{share}",
@@ -130,30 +132,30 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
 
 
 def _left(verdict: dict[str, Any]) -> list[Bars]:
-    names, left = ("before", "after", "noise floor"), verdict["left"]
-    values = np.array([left["before"], left["after"], left["floor"]], float)
+    names, remainder = ("before", "after", "noise floor"), verdict["left"]
+    values = np.array([remainder["before"], remainder["after"], remainder["floor"]], float)
     wide = values[0] > WIDE * min(values[1:])
     return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0, bool(wide))]
 
 
 def _slices(verdict: dict[str, Any]) -> list[Bars]:
     """Return where the residual lives, before and after."""
-    told = [s for s in verdict.get("slices", ()) if s["by"] != "stream"]
-    if not told:
+    entries = [s for s in verdict.get("slices", ()) if s["by"] != "stream"]
+    if not entries:
         return []
-    names = tuple(f"{s['by']}: {s['name']}, {when}" for s in told for when in ("before", "after"))
-    values = np.array([s[when] for s in told for when in ("before", "after")], float)
+    names = tuple(f"{s['by']}: {s['name']}, {when}" for s in entries for when in ("before", "after"))
+    values = np.array([s[when] for s in entries for when in ("before", "after")], float)
     title = "Where it lives: mean square over the noise; 1 is the floor"
     return [Bars("slices", title, names, values, 1.0, bool(values.max() > WIDE * max(values.min(), 1e-9)))]
 
 
 def _margins(verdict: dict[str, Any]) -> list[Bars]:
-    found = []
+    charts = []
     for effect in verdict["effects"]:
         if effect["margins"]:
             rivals = sorted(effect["margins"].items(), key=lambda pair: pair[1])
             title = f"{effect['mechanism']}: by how many standard errors better than"
-            found.append(
+            charts.append(
                 Bars(
                     f"margins/{effect['effect']}",
                     title,
@@ -162,13 +164,13 @@ def _margins(verdict: dict[str, Any]) -> list[Bars]:
                     SURELY,
                 )
             )
-    return found
+    return charts
 
 
 def _limits(verdict: dict[str, Any]) -> list[Bars]:
     """Return how small an effect would have been seen, those that these recordings excite."""
-    known = sorted(((n, v) for n, v in verdict["limits"].items() if v), key=lambda pair: pair[1])
-    if not known:
+    limits = sorted(((n, v) for n, v in verdict["limits"].items() if v), key=lambda pair: pair[1])
+    if not limits:
         return []
     title = "Would be found half the time at this part of its usual size"
-    return [Bars("limits", title, tuple(n for n, _ in known), np.array([v for _, v in known], float), 1.0, True)]
+    return [Bars("limits", title, tuple(n for n, _ in limits), np.array([v for _, v in limits], float), 1.0, True)]
