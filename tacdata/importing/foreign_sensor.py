@@ -33,8 +33,8 @@ def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rat
                 "correct taxels/columns in the mapping, or the sensor file",
             )
         return sensor, []
-    known = dict(entry)
-    columns, rows = known.get("columns"), known.get("rows", 1)
+    contents = dict(entry)
+    columns, rows = contents.get("columns"), contents.get("rows", 1)
     if columns is not None and columns * rows != channels:
         raise FormatError(
             f"sensor of {columns} x {rows} channels, {channels} in the data",
@@ -44,9 +44,9 @@ def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rat
     stand_ins: dict[str, str] = {} if columns else {"taxels/columns": f"{UNKNOWN}: all channels in one row"}
 
     def value(field: str, path: str, otherwise: float) -> float:
-        if field not in known:
+        if field not in contents:
             stand_ins[path] = UNKNOWN
-        return float(known.get(field, otherwise))
+        return float(contents.get(field, otherwise))
 
     columns = columns or channels
     pitch_x, pitch_y = value("pitch_x", "taxels/pitch_x", 1.0), value("pitch_y", "taxels/pitch_y", 1.0)
@@ -54,7 +54,7 @@ def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rat
     size_y = value("size_y", "skin/size_y", (rows + 1) * pitch_y)
     document = {
         "version": schemas.version("sensor"),
-        "name": known["name"],
+        "name": contents["name"],
         "source": "imported",
         "taxels": {"columns": columns, "rows": rows, "pitch_x": pitch_x, "pitch_y": pitch_y, "rate": rate},
         "skin": {"size_x": size_x, "size_y": size_y, "thickness": value("thickness", "skin/thickness", 3.0)},
@@ -67,5 +67,5 @@ def foreign_sensor(entry: str | dict[str, Any], folder: Path, channels: int, rat
         "map": {"pixels_x": 32, "pixels_y": 32, "pixel_pitch": max(size_x, size_y) / 32, "depth_max": 3.0},
         "assumptions": {**stand_ins, "material/law": UNKNOWN, "contact": UNKNOWN, "map": UNKNOWN},
     }
-    sensor = Sensor.from_document(document, f"sensor {known['name']}")
+    sensor = Sensor.from_document(document, f"sensor {contents['name']}")
     return sensor, [f"{path}: {why}" for path, why in sensor.assumptions.items()]

@@ -41,18 +41,18 @@ class Imported:
 
 
 def import_session(
-    source: Path, mapping: Path, out: Path, progress: Callable[[str], None] = lambda text: None
+    source: Path, mapping: Path, target: Path, progress: Callable[[str], None] = lambda text: None
 ) -> Imported:
     """Import everything that a mapping finds in a source.
 
     Args:
         source: A folder or a file.
         mapping: The mapping's file (`schemas/import_mapping.schema.json`).
-        out: Session folder to create.
+        target: Session folder to create.
         progress: Called with a line for every recording.
 
     Raises:
-        UsageError: If ``out`` exists, or a file is missing.
+        UsageError: If ``target`` exists, or a file is missing.
         FormatError: If nothing could be imported, with the first reason.
 
     Example:
@@ -65,12 +65,12 @@ def import_session(
         ()
     """
     document = without_expressions(documents.read(mapping, "import_mapping"))
-    if out.exists():
-        raise UsageError(f"{out} exists", "a new session folder", "choose another --out")
+    if target.exists():
+        raise UsageError(f"{target} exists", "a new session folder", "choose another --out")
     sets = file_sets(source, document["files"])
-    out.parent.mkdir(parents=True, exist_ok=True)
+    target.parent.mkdir(parents=True, exist_ok=True)
     # On the same drive, so that the rename at the end is atomic.
-    work = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    work = Path(mkdtemp(dir=target.parent, prefix=f".{target.name}."))
     try:
         run = _Import(document, mapping.parent, source, work, progress)
         for files in sets:
@@ -80,20 +80,20 @@ def import_session(
         run.finish()
         with suppress(OSError):  # a drive without permissions
             work.chmod(0o755)
-        work.rename(out)
+        work.rename(target)
     finally:
         shutil.rmtree(work, ignore_errors=True)
     refused = tuple(f"{label}: {error.given}" for label, error in run.failures)
-    return Imported(out, len(run.presses), tuple(dict.fromkeys(run.notes)), refused)
+    return Imported(target, len(run.presses), tuple(dict.fromkeys(run.notes)), refused)
 
 
 class _Import:
     """An import in progress."""
 
     def __init__(
-        self, mapping: dict[str, Any], beside: Path, source: Path, work: Path, progress: Callable[[str], None]
+        self, mapping: dict[str, Any], folder: Path, source: Path, work: Path, progress: Callable[[str], None]
     ) -> None:
-        self.mapping, self.beside, self.source, self.work, self.progress = mapping, beside, source, work, progress
+        self.mapping, self.beside, self.source, self.work, self.progress = mapping, folder, source, work, progress
         self.hash = provenance.content_hash(mapping)
         self.presses: list[ImportedPress] = []
         self.failures: list[tuple[str, TacdataError]] = []
@@ -143,7 +143,7 @@ class _Import:
         return f"{name} is the same, byte by byte, as {first} and is left out" if first != name else ""
 
     def _presses(
-        self, files: FileSet, label: str, whole: dict[str, SourceTable], rows: dict[str, SourceTable]
+        self, files: FileSet, label: str, full_tables: dict[str, SourceTable], rows: dict[str, SourceTable]
     ) -> Iterator[ImportedPress | Refusal]:
         below = self.source.parent if is_one(self.source) else self.source
         record = {
@@ -152,7 +152,11 @@ class _Import:
             "source": self.mapping.get("source", ""),
             "trial": label,
             "files": [
-                {"path": path.relative_to(below).as_posix(), "sha256": source_hash(path), "rows": whole[name].rows}
+                {
+                    "path": path.relative_to(below).as_posix(),
+                    "sha256": source_hash(path),
+                    "rows": full_tables[name].rows,
+                }
                 for name, first in files.paths.items()
                 for path in (first, *files.more.get(name, ()))
             ],
@@ -161,7 +165,7 @@ class _Import:
             "code_version": provenance.code_version(),
         }
         if self.centre is None:
-            self.centre = centre_of(self.mapping, whole)
+            self.centre = centre_of(self.mapping, full_tables)
         yield from presses_of(self.mapping, self.beside, rows, files.parts, record, self.centre)
 
     def _write(self, imported: ImportedPress) -> None:

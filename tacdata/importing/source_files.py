@@ -105,10 +105,10 @@ def check_source(source: Path) -> None:
 
 def files_below(folder: Path) -> list[Path]:
     """Return the files below a folder, sorted; a folder that counts as one file replaces its contents."""
-    found = []
+    files = []
     for path in sorted(folder.iterdir()):
-        found += [path] if is_one(path) else files_below(path) if path.is_dir() else []
-    return sorted(found)
+        files += [path] if is_one(path) else files_below(path) if path.is_dir() else []
+    return sorted(files)
 
 
 def source_hash(path: Path) -> str:
@@ -147,16 +147,16 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
             if lacking := [path for path, fitting in each.items() if not fitting and len(each) > 1]:
                 matches[name] = []
                 files = {**files, name: {**entry, "path": lacking[0]}}
-    for name, found in matches.items():
-        if not found:
+    for name, hits in matches.items():
+        if not hits:
             raise UsageError(
                 f"no file fits {files[name]['path']} below {source}",
                 "one or more",
                 f"correct files/{name}/path in the mapping; there is {_listing(source)}",
             )
         if isinstance(table := files[name].get("table"), str) and "{" in table:
-            matches[name] = _in_tables(found, files[name])
-    keys = {name: tuple(found[0][0]) for name, found in matches.items()}
+            matches[name] = _in_tables(hits, files[name])
+    keys = {name: tuple(hits[0][0]) for name, hits in matches.items()}
     # The kind of file with the most parts defines the trials; others are shared by those whose parts agree.
     leading = max(keys, key=lambda name: len(keys[name]))
     sets = []
@@ -168,17 +168,17 @@ def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
         paths, more, titles, fault = {}, {}, {}, None
         for name in files:
             fitting = [
-                p for own, p in matches[name] if all(parts.get(key, value) == value for key, value in own.items())
+                p for values, p in matches[name] if all(parts.get(key, value) == value for key, value in values.items())
             ]
-            wanted = len(_patterns(files[name]))
-            if files[name].get("join") and len(fitting) >= wanted:
+            required = len(_patterns(files[name]))
+            if files[name].get("join") and len(fitting) >= required:
                 paths[name], more[name] = fitting[0], tuple(fitting[1:])
                 titles[name] = _titles(fitting, files[name])
                 continue
-            if len(fitting) != 1 or wanted > 1:
+            if len(fitting) != 1 or required > 1:
                 fault = FormatError(
                     f"{len(fitting)} files {' and '.join(_patterns(files[name]))} for {parts or 'the source'}",
-                    "exactly one" if wanted == 1 else "one of each, and join: rows, continued or columns",
+                    "exactly one" if required == 1 else "one of each, and join: rows, continued or columns",
                     "complete the source, or narrow the path with a {part} in the mapping",
                 )
                 break
@@ -217,8 +217,8 @@ def without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
             if not isinstance(axis, dict) or key == "time":
                 continue
             if ("column" in axis) == ("expression" in axis):
-                given = f"{section}: {key} with both or neither of column and expression"
-                raise FormatError(given, "one of them", "correct the mapping")
+                fault = f"{section}: {key} with both or neither of column and expression"
+                raise FormatError(fault, "one of them", "correct the mapping")
             if "expression" in axis:
                 entry, name = result["files"].get(axes.get("file", ""), {}), f"{section} {key}"
                 entry["derived"] = {**entry.get("derived", {}), name: axis["expression"]}
@@ -266,18 +266,18 @@ def _check_clocks(parts: list[SourceTable], time: str) -> None:
     """
     first = parts[0].column(time)
     for part in parts[1:]:
-        other = part.column(time) if time in part.columns else np.empty(0)
-        if len(first) == len(other):
-            if first.dtype == object or other.dtype == object:
-                equal = bool((first == other).all())
+        times = part.column(time) if time in part.columns else np.empty(0)
+        if len(first) == len(times):
+            if first.dtype == object or times.dtype == object:
+                equal = bool((first == times).all())
             else:
                 usual = float(np.median(np.abs(np.diff(first.astype(float))))) if len(first) > 1 else 0.0
                 # Two loggers round one clock differently. Half an interval apart, the rows still belong together.
-                equal = bool(np.nanmax(np.abs(first.astype(float) - other.astype(float)), initial=0.0) <= 0.5 * usual)
+                equal = bool(np.nanmax(np.abs(first.astype(float) - times.astype(float)), initial=0.0) <= 0.5 * usual)
             if equal:
                 continue
         raise FormatError(
-            f"{parts[0].path.name} has {len(first)} rows by {time}, {part.path.name} {len(other)} of other times",
+            f"{parts[0].path.name} has {len(first)} rows by {time}, {part.path.name} {len(times)} of other times",
             "one clock for tables that stand side by side",
             "give the second one a file of its own and bring its columns in under measured, with their own times",
         )
@@ -300,12 +300,12 @@ def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
         name = single(parts[0], clock, "files: time: column")
         if any(values.dtype == object for values in columns.get(name, [np.empty(0, object)])):
             raise FormatError(f"{name} is no number in all parts", "a clock of numbers", "write join: rows")
-        whole = [np.asarray(columns[name][0], float)]
+        pieces = [np.asarray(columns[name][0], float)]
         for values in columns[name][1:]:
             # The pause between parts is unknown: the clock goes on by one usual interval.
-            step = float(np.nanmedian(np.diff(whole[-1])))
-            whole.append(np.asarray(values, float) + whole[-1][-1] + step - float(values[0]))
-        columns[name] = whole
+            step = float(np.nanmedian(np.diff(pieces[-1])))
+            pieces.append(np.asarray(values, float) + pieces[-1][-1] + step - float(values[0]))
+        columns[name] = pieces
         notes.append(f"{parts[0].path.name}: {name} is continued from part to part")
     result = {
         name: np.concatenate([v.astype(object) for v in values] if any(v.dtype == object for v in values) else values)
@@ -318,32 +318,32 @@ def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
     return replace(parts[0], columns=result, notes=tuple(notes), doubts=doubts)
 
 
-def _in_tables(found: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) -> list[tuple[dict[str, str], Path]]:
+def _in_tables(files: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) -> list[tuple[dict[str, str], Path]]:
     """Return each table of the files that fits the entry's, as "Run {n}" does, with its parts added to the path's."""
     fitting = [
         ({**parts, **match.groupdict()}, path)
-        for parts, path in found
+        for parts, path in files
         for table in tables_in(path)
         if (match := re.fullmatch(_regex(entry["table"]), composed(table)))
     ]
     if not fitting:
-        tables = ", ".join(filter(None, tables_in(found[0][1]))) or "no table of its own: leave table out"
-        raise UsageError(f"{found[0][1]}: no table fits {entry['table']}", tables, "correct table in the mapping")
+        tables = ", ".join(filter(None, tables_in(files[0][1]))) or "no table of its own: leave table out"
+        raise UsageError(f"{files[0][1]}: no table fits {entry['table']}", tables, "correct table in the mapping")
     return fitting
 
 
 def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
     # Names are compared in composed form: macOS stores an accent as a character of its own.
-    regex, found = _regex(pattern), []
+    regex, hits = _regex(pattern), []
     for path in files_below(source):
         if match := re.fullmatch(regex, composed(path.relative_to(source).as_posix())):
-            found.append((match.groupdict(), path))
-    return sorted(found, key=lambda item: [_natural(value) for value in item[0].values()])
+            hits.append((match.groupdict(), path))
+    return sorted(hits, key=lambda item: [_natural(value) for value in item[0].values()])
 
 
 def _regex(pattern: str) -> str:
     """Return a pattern of a path or a table as a regular expression with a group for each {part}."""
-    seen: set[str] = set()
+    names: set[str] = set()
 
     def part(match: re.Match[str]) -> str:
         text = match[0]
@@ -352,9 +352,9 @@ def _regex(pattern: str) -> str:
         if text == "*":
             return "[^/]*"
         name = text[1:-1]
-        if name in seen:
+        if name in names:
             return f"(?P={name})"
-        seen.add(name)
+        names.add(name)
         return f"(?P<{name}>[^/]+?)"
 
     tokens = re.split(r"(\*\*/|\*|\{\w+\})", composed(pattern))

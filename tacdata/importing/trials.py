@@ -51,10 +51,10 @@ def _by_specimen(
 
 def _held(words: np.ndarray) -> np.ndarray:
     """Return words that hold until the next one: some write them only into the first row of a block."""
-    given = np.flatnonzero(words != "")
-    if not len(given):
+    rows = np.flatnonzero(words != "")
+    if not len(rows):
         return words
-    return words[given[np.maximum(np.searchsorted(given, np.arange(len(words)), side="right") - 1, 0)]]
+    return words[rows[np.maximum(np.searchsorted(rows, np.arange(len(words)), side="right") - 1, 0)]]
 
 
 def _kept(table: SourceTable, rows: np.ndarray) -> SourceTable:

@@ -26,8 +26,8 @@ class Json(SourceFormat):
         """Read the lists that have rows. See the base."""
         text = path.read_text(encoding="utf-8-sig")
         by_line = path.suffix.lower() in LINES
-        whole = _by_line(path, text) if by_line else json.loads(text)
-        arrays = {name: _array(values) for name, values in _lists(whole).items()}
+        content = _by_line(path, text) if by_line else json.loads(text)
+        arrays = {name: _array(values) for name, values in _lists(content).items()}
         table = rows_of(path, arrays, options)
         if table.rows < FEWEST:
             raise FormatError(
@@ -67,12 +67,12 @@ def _lists(value: Any, name: str = "") -> dict[str, list[Any]]:
     return {f"{name}.{key}" if name else key: [row.get(key) for row in rows] for key in names}
 
 
-def _flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
+def _flat(row: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     """Return the values of an object with those of objects inside it."""
-    found: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for key, value in row.items():
-        found |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
-    return found
+        fields |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return fields
 
 
 def _array(values: list[Any]) -> np.ndarray:

@@ -31,9 +31,9 @@ class Mat(SourceFormat):
         except NotImplementedError:
             return ("",)  # `read` raises the error with the remedy
         names = [name for name in loaded if not name.startswith("__")]
-        whole = all(isinstance(loaded[name], dict) or (np.ndim(loaded[name]) in (2, 3)) for name in names)
+        are_trials = all(isinstance(loaded[name], dict) or (np.ndim(loaded[name]) in (2, 3)) for name in names)
         alike = len({re.sub(r"\d+", "#", name) for name in names}) == 1
-        return tuple(names) if whole and alike and len(names) > 1 else ("",)
+        return tuple(names) if are_trials and alike and len(names) > 1 else ("",)
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read the variables; ``table`` in the options selects one. See the base class."""
@@ -52,10 +52,12 @@ class Mat(SourceFormat):
                 "numbers, texts and structures",
                 "in MATLAB: writetable(t, 'name.csv'), or s = table2struct(t, 'ToScalar', true); save('name.mat', 's')",
             )
-        if wanted := options.get("table"):
-            if wanted not in variables:
-                raise FormatError(f"{path}: no variable {wanted}", ", ".join(variables), "correct table in the mapping")
-            variables = {wanted: variables[wanted]}
+        if selection := options.get("table"):
+            if selection not in variables:
+                raise FormatError(
+                    f"{path}: no variable {selection}", ", ".join(variables), "correct table in the mapping"
+                )
+            variables = {selection: variables[selection]}
         arrays: dict[str, np.ndarray] = {}
         lost: list[str] = []
         for name, value in variables.items():
@@ -87,10 +89,10 @@ def _readable(variables: dict[str, Any]) -> bool:
 def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
     """Return the arrays of a variable by name; the names of other contents are added to ``lost``."""
     if isinstance(value, dict):
-        found: dict[str, np.ndarray] = {}
+        fields: dict[str, np.ndarray] = {}
         for key, inner in value.items():
-            found |= _flatten(f"{name}.{key}" if name else key, inner, lost)
-        return found
+            fields |= _flatten(f"{name}.{key}" if name else key, inner, lost)
+        return fields
     if isinstance(value, (list, np.ndarray)) and np.ndim(value) and len(value):
         if all(isinstance(entry, dict) for entry in value):
             return _stacked(name, list(value), lost)

@@ -52,7 +52,7 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
     Raises:
         FormatError: If no array has that axis.
     """
-    arrays, turned = _upright(path, arrays, options)
+    arrays, remarks = _upright(path, arrays, options)
     if (axis := options.get("trial_axis")) is not None:
         arrays = _below_each_other(path, arrays, axis)
     flat = _flat(arrays)
@@ -62,17 +62,17 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
     lengths = [len(values) for values in columns.values()]
     # Most arrays of a recording have a value a row. Settings and labels are of other lengths.
     rows = max(set(lengths), key=lambda length: (lengths.count(length), length))
-    notes = [*turned, *_shapes(path, arrays, options)]
+    notes = [*remarks, *_shapes(path, arrays, options)]
     for name, values in columns.items():
         if len(values) != rows and values.ndim == 2 and values.shape[1] == rows:
             columns[name] = values.T
             notes.append(f"{path.name}: {name} holds {values.shape[0]} x {rows} values; time is its second axis")
-    kept = {name: values for name, values in columns.items() if len(values) == rows}
-    dropped = [f"{name} ({len(values)} rows)" for name, values in columns.items() if name not in kept]
+    selection = {name: values for name, values in columns.items() if len(values) == rows}
+    dropped = [f"{name} ({len(values)} rows)" for name, values in columns.items() if name not in selection]
     if dropped:
         notes.append(f"{path.name}: not of {rows} rows, left out: {', '.join(dropped)}")
     units = {name: "ns" for name, array in flat.items() if array.dtype.kind in "mM"}
-    return SourceTable(path, kept, units, frozenset(units), tuple(notes))
+    return SourceTable(path, selection, units, frozenset(units), tuple(notes))
 
 
 def _upright(
@@ -94,10 +94,10 @@ def _upright(
 
 def _flat(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return plain arrays by name. Fields of structured ones lose their array's name unless another has the same."""
-    found = [(name, inner, array) for name, whole in arrays.items() for inner, array in _fields(whole)]
-    count = Counter(inner or name for name, inner, _ in found)
+    fields = [(name, inner, array) for name, outer in arrays.items() for inner, array in _fields(outer)]
+    count = Counter(inner or name for name, inner, _ in fields)
     return {
-        (inner if count[inner] == 1 else f"{name}.{inner}") if inner else name: array for name, inner, array in found
+        (inner if count[inner] == 1 else f"{name}.{inner}") if inner else name: array for name, inner, array in fields
     }
 
 
@@ -137,20 +137,20 @@ def _below_each_other(path: Path, arrays: dict[str, np.ndarray], axis: int) -> d
             "leave trial_axis out",
         )
     trials, rows = max(blocks.values(), key=np.size).shape[:2]
-    whole = {name: block for name, block in blocks.items() if block.shape[:2] == (trials, rows)}
-    made: dict[str, np.ndarray] = {name: block.reshape(trials * rows, -1) for name, block in whole.items()}
-    for name, array in ((name, np.squeeze(array)) for name, array in arrays.items() if name not in whole):
+    trial_blocks = {name: block for name, block in blocks.items() if block.shape[:2] == (trials, rows)}
+    result: dict[str, np.ndarray] = {name: block.reshape(trials * rows, -1) for name, block in trial_blocks.items()}
+    for name, array in ((name, np.squeeze(array)) for name, array in arrays.items() if name not in trial_blocks):
         if array.shape == (trials, rows):
-            made[name] = array.ravel()
+            result[name] = array.ravel()
         elif array.shape == (rows, trials):
-            made[name] = array.T.ravel()
+            result[name] = array.T.ravel()
         elif array.shape == (rows,):
-            made[name] = np.tile(array, trials)
+            result[name] = np.tile(array, trials)
         elif array.shape == (trials,):
-            made[name] = np.repeat(array, rows)
+            result[name] = np.repeat(array, rows)
         else:
-            made[name] = array  # of another number of rows: left out and named with the others
-    return {**made, "trial": np.repeat(np.arange(trials), rows)}
+            result[name] = array  # of another number of rows: left out and named with the others
+    return {**result, "trial": np.repeat(np.arange(trials), rows)}
 
 
 def _column(array: np.ndarray) -> np.ndarray:
@@ -158,8 +158,8 @@ def _column(array: np.ndarray) -> np.ndarray:
     if values.ndim > 2:
         values = values.reshape(len(values), -1)
     if values.dtype.kind == "m":
-        known = values.astype("timedelta64[ns]").astype(np.int64)
-        return np.where(np.isnat(values), np.nan, known) if np.isnat(values).any() else known
+        nanoseconds = values.astype("timedelta64[ns]").astype(np.int64)
+        return np.where(np.isnat(values), np.nan, nanoseconds) if np.isnat(values).any() else nanoseconds
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]").astype(np.int64)
     if values.dtype.kind in "bui" and values.dtype.itemsize < 8:

@@ -43,10 +43,10 @@ class Rosbag(SourceFormat):
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read one topic; without ``table`` in the options the only one with numbers. See the base class."""
         with _opened(path) as reader:
-            known = _topics(reader)
-            topic = options.get("table") or _only(path, self.tables(path), known)
-            if topic not in known:
-                raise FormatError(f"{path}: no topic {topic!r}", ", ".join(known) or "none", "correct table")
+            available = _topics(reader)
+            topic = options.get("table") or _only(path, self.tables(path), available)
+            if topic not in available:
+                raise FormatError(f"{path}: no topic {topic!r}", ", ".join(available) or "none", "correct table")
             longer: Counter[str] = Counter()
             rows = [
                 (time, dict(_flat(reader.deserialize(raw, connection.msgtype), longer)))
@@ -123,10 +123,10 @@ def _first(reader: Any, topic: str) -> list[tuple[str, Any]]:
     return []
 
 
-def _only(path: Path, numeric: tuple[str, ...], known: dict[str, int]) -> str:
+def _only(path: Path, numeric: tuple[str, ...], available: dict[str, int]) -> str:
     if len(numeric) == 1:
         return numeric[0]
-    listed = ", ".join(f"{topic} ({known[topic]} messages)" for topic in numeric)
+    listed = ", ".join(f"{topic} ({available[topic]} messages)" for topic in numeric)
     raise UsageError(
         f"{path} holds {len(numeric)} topics with numbers",
         listed or "topics with numbers",
@@ -170,8 +170,8 @@ def _columns(rows: list[tuple[int, dict[str, Any]]], topic: str, path: Path) -> 
             notes.append(f"{path.name}: {topic}/{name} of {width} values a message is left out")
             continue
         if lacking := len(rows) - sizes[width]:
-            others = f"other than {width} values in {name}: no value"
-            notes.append(f"{path.name}: {lacking} messages of {topic} have {others}")
+            fault = f"other than {width} values in {name}: no value"
+            notes.append(f"{path.name}: {lacking} messages of {topic} have {fault}")
         columns[name] = _column(values, width)
     # A stamp of the sender is nearer to the measurement than the time of receipt, unless nobody set it.
     stamped = [name for name, values in columns.items() if name.endswith("stamp") and len(np.unique(values)) > 1]
@@ -181,10 +181,10 @@ def _columns(rows: list[tuple[int, dict[str, Any]]], topic: str, path: Path) -> 
 def _column(values: list[Any], width: int) -> np.ndarray:
     if any(isinstance(value, str) for value in values):
         return np.array(values, dtype=object)
-    whole = [value is not None and np.size(value) == width for value in values]
-    if width == 1 and all(whole) and max(abs(int(np.ravel(v)[0])) if np.isfinite(v) else 0 for v in values) > 2**53:
+    is_full = [value is not None and np.size(value) == width for value in values]
+    if width == 1 and all(is_full) and max(abs(int(np.ravel(v)[0])) if np.isfinite(v) else 0 for v in values) > 2**53:
         return np.array([np.ravel(value)[0] for value in values], np.int64)
     table = np.array(
-        [np.ravel(v).astype(float) if ok else np.full(width, np.nan) for v, ok in zip(values, whole, strict=True)]
+        [np.ravel(v).astype(float) if ok else np.full(width, np.nan) for v, ok in zip(values, is_full, strict=True)]
     )
     return table[:, 0] if width == 1 and not any(np.ndim(value) for value in values) else table

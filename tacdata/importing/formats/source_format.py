@@ -219,11 +219,11 @@ def _really(path: Path, name: str) -> str:
 
 
 def _by_ending(path: Path) -> str:
-    known = {}
+    endings = {}
     for name in registry.names(ROOM, BASE):
         for ending in registry.load(ROOM, BASE, name, SourceFormat).endings:
-            known[ending] = name
-    found = [ending for ending in known if path.name.lower().endswith(ending)]
+            endings[ending] = name
+    matches = [ending for ending in endings if path.name.lower().endswith(ending)]
     ending = path.suffix.lower()
     if ending == ".xls" and path.is_file():
         with path.open("rb") as stream:
@@ -232,11 +232,11 @@ def _by_ending(path: Path) -> str:
             return "csv"  # instruments write tabs and give the file this ending
         raise UsageError(f"{path} is {kind}", "an Excel workbook (.xlsx)", CONVERSIONS[ending])
     if ending in CONVERSIONS:
-        raise UsageError(f"{path}: {ending} is not read", ", ".join(sorted(known)), CONVERSIONS[ending])
-    if not found:
+        raise UsageError(f"{path}: {ending} is not read", ", ".join(sorted(endings)), CONVERSIONS[ending])
+    if not matches:
         raise UsageError(
             f"{path}: the ending {path.suffix or '(none)'} is of no known format",
-            ", ".join(sorted(known)),
+            ", ".join(sorted(endings)),
             "name the format in the mapping (format: csv), or save the file as one of these",
         )
-    return known[max(found, key=len)]
+    return endings[max(matches, key=len)]

@@ -41,16 +41,16 @@ class Xlsx(SourceFormat):
         from openpyxl import load_workbook
 
         refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
-        book, found = load_workbook(path, read_only=True, data_only=True), []
+        book, titles = load_workbook(path, read_only=True, data_only=True), []
         try:
             for sheet in [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]:
                 sheet.reset_dimensions()
                 with suppress(FormatError):
                     table_of(path, _as_text(sheet, _Marks(), [], HEAD), TABS, [])
-                    found.append(sheet.title)
+                    titles.append(sheet.title)
         finally:
             book.close()
-        return tuple(found) if len(found) > 1 else ("",)
+        return tuple(titles) if len(titles) > 1 else ("",)
 
     def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
         """Read a sheet; dates come as ISO 8601. See the base."""
@@ -59,13 +59,16 @@ class Xlsx(SourceFormat):
         refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
         book = load_workbook(path, read_only=True, data_only=True)
         try:
-            if (wanted := options.get("table")) and wanted not in book.sheetnames:
+            if (sheet_name := options.get("table")) and sheet_name not in book.sheetnames:
                 allowed = ", ".join(book.sheetnames)
-                raise FormatError(f"{path}: no sheet {wanted}", allowed, "correct table in the mapping")
-            table, read, others = _first_table(path, book, options)
+                raise FormatError(f"{path}: no sheet {sheet_name}", allowed, "correct table in the mapping")
+            table, read, remainder = _first_table(path, book, options)
         finally:
             book.close()
-        notes = [*table.notes, *([f"{path.name}: sheet {read} is read, not {', '.join(others)}"] if others else [])]
+        notes = [
+            *table.notes,
+            *([f"{path.name}: sheet {read} is read, not {', '.join(remainder)}"] if remainder else []),
+        ]
         if any(values.dtype != object and not np.isfinite(values).any() for values in table.columns.values()):
             notes += _never_computed(path, read)
         return replace(table, notes=tuple(notes))
@@ -73,21 +76,21 @@ class Xlsx(SourceFormat):
 
 def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[SourceTable, str, list[str]]:
     """Return the sheet that is meant, else the first with rows of numbers; its name, and those of other full sheets."""
-    wanted, refused, sheets, notes = options.get("table"), None, {}, {}
+    sheet_name, refused, sheets, notes = options.get("table"), None, {}, {}
     visible = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
-    for sheet in [book[wanted]] if wanted else visible or book.worksheets:
+    for sheet in [book[sheet_name]] if sheet_name else visible or book.worksheets:
         sheet.reset_dimensions()  # programs other than Excel write wrong ones, by which rows would be cut off
         notes[sheet.title] = []
         if text := _as_text(sheet, _marks(path, sheet), notes[sheet.title]):
             sheets[sheet.title] = text
-    hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != wanted]
+    hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != sheet_name]
     for name, data in sheets.items():
         try:
             table = table_of(path, data, {**options, **TABS}, [f"{path.name}: {note}" for note in notes[name]])
         except FormatError as error:
             refused = refused or error
             continue
-        return table, name, [*(other for other in sheets if other != name), *(f"{other} (hidden)" for other in hidden)]
+        return table, name, [*(title for title in sheets if title != name), *(f"{title} (hidden)" for title in hidden)]
     raise FormatError(
         f"{path}: no sheet with rows of numbers ({', '.join(sheets)})" if refused else f"{path} holds no rows",
         "a sheet with a header and rows",
@@ -127,13 +130,13 @@ def _column_number(letters: str) -> int:
     return number - 1
 
 
-def _as_text(sheet: Any, marks: _Marks, notes: list[str], most: int | None = None) -> bytes:
+def _as_text(sheet: Any, marks: _Marks, notes: list[str], limit: int | None = None) -> bytes:
     """Return a sheet's rows as text with tabs between cells; empty if no cell is full.
 
     A merged cell fills its range. Hidden rows are left out and counted in ``notes``.
     """
     text = io.StringIO()
-    rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True, max_row=most)]
+    rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True, max_row=limit)]
     width = max(map(len, rows), default=0)
     rows = [[*row, *[""] * (width - len(row))] for row in rows]
     for top, bottom, left, right in marks.merged:
@@ -141,11 +144,13 @@ def _as_text(sheet: Any, marks: _Marks, notes: list[str], most: int | None = Non
             # The file holds a merged range's value in its top left cell only. That cell may be in a hidden row, so
             # ranges are filled before those are left out.
             row[left : right + 1] = [rows[top][left]] * len(row[left : right + 1])
-    shown = [row for number, row in enumerate(rows) if number not in marks.hidden]
-    if len(shown) < len(rows):
-        notes.append(f"{len(rows) - len(shown)} hidden rows are left out; show them and save it again to import them")
-    csv.writer(text, delimiter="\t", lineterminator="\n").writerows(shown)
-    return text.getvalue().encode() if any(map(any, shown)) else b""
+    visible_rows = [row for number, row in enumerate(rows) if number not in marks.hidden]
+    if len(visible_rows) < len(rows):
+        notes.append(
+            f"{len(rows) - len(visible_rows)} hidden rows are left out; show them and save it again to import them"
+        )
+    csv.writer(text, delimiter="\t", lineterminator="\n").writerows(visible_rows)
+    return text.getvalue().encode() if any(map(any, visible_rows)) else b""
 
 
 def _never_computed(path: Path, sheet: str) -> list[str]:

@@ -43,16 +43,16 @@ class Zarr(SourceFormat):
         notes: list[str] = []
         for folder in _arrays(path):
             name = folder.relative_to(path).as_posix()
-            found = zarr.open_array(str(folder), mode="r")
-            if int(np.prod(found.shape[1:])) > WIDEST:
-                shape = " x ".join(map(str, found.shape[1:]))
+            array = zarr.open_array(str(folder), mode="r")
+            if int(np.prod(array.shape[1:])) > WIDEST:
+                shape = " x ".join(map(str, array.shape[1:]))
                 notes.append(f"{path.name}: {name} of {shape} values a row is left out")
                 continue
-            refuse_growth(path, float(math.prod(found.shape)) * found.dtype.itemsize)
+            refuse_growth(path, float(math.prod(array.shape)) * array.dtype.itemsize)
             _refuse_cut_chunks(folder)
-            values = np.asarray(found[:])
-            if found.nchunks > found.nchunks_initialized:
-                values, words = _without_lost(found, folder, values)
+            values = np.asarray(array[:])
+            if array.nchunks > array.nchunks_initialized:
+                values, words = _without_lost(array, folder, values)
                 notes.append(f"{path.name}: {name}: {words}")
             arrays[name] = np.char.strip(values) if values.dtype.kind == "U" else values
         ends = arrays.pop(ENDS, None)
@@ -82,8 +82,8 @@ def _without_lost(array: Any, folder: Path, values: np.ndarray) -> tuple[np.ndar
             continue
         block = tuple(slice(k * n, (k + 1) * n) for k, n in zip(place, array.chunks, strict=True))
         ends = [block[0].start - 1, block[0].stop]
-        beside = np.array([values[(row, *block[1:])].ravel() for row in ends if 0 <= row < len(values)])
-        if beside.size and (np.abs(beside - array.fill_value) <= step).all():
+        neighbours = np.array([values[(row, *block[1:])].ravel() for row in ends if 0 <= row < len(values)])
+        if neighbours.size and (np.abs(neighbours - array.fill_value) <= step).all():
             empty += 1
             continue
         result[block], lost = np.nan, lost + 1
@@ -104,16 +104,16 @@ def _refuse_cut_chunks(folder: Path) -> None:
     for chunk in sorted(file for file in folder.rglob("*") if file.is_file() and file.name not in DESCRIBED):
         data = chunk.read_bytes()
         if len(data) < BLOSC_HEADER or int.from_bytes(data[12:16], "little") != len(data):
-            said = (
+            fault = (
                 f"{len(data)} bytes"
                 if len(data) < BLOSC_HEADER
                 else (f"{len(data)} bytes in place of {int.from_bytes(data[12:16], 'little')}")
             )
-            raise FormatError(f"{chunk}: a damaged chunk, {said}", "whole chunks", "copy the store again")
+            raise FormatError(f"{chunk}: a damaged chunk, {fault}", "whole chunks", "copy the store again")
 
 
 def _arrays(path: Path) -> list[Path]:
     """Return the folders of arrays; groups may lack a description of their own, so they are not asked."""
     second = {described.parent for described in path.rglob(".zarray")}
-    third = {found.parent for found in path.rglob("zarr.json") if '"array"' in found.read_text()}
+    third = {file.parent for file in path.rglob("zarr.json") if '"array"' in file.read_text()}
     return sorted(second | third)

@@ -55,8 +55,8 @@ def press_path(time_ns: np.ndarray, tip: np.ndarray) -> PressPath:
     contact = max(0.0, float(depth.min())) if deepest > 0 else float(depth.min())
     low = contact + LOW * stroke
     begin = int(np.flatnonzero(depth[: first + 1] <= low)[-1]) if (depth[: first + 1] <= low).any() else 0
-    after = np.flatnonzero(depth[last:] <= low)
-    end = last + int(after[0]) if len(after) else len(depth) - 1
+    returns = np.flatnonzero(depth[last:] <= low)
+    end = last + int(returns[0]) if len(returns) else len(depth) - 1
     loading = slice(begin, first + 1)
     seconds = np.diff(time_ns[loading]) / 1e9
     moving = seconds > 0
@@ -74,8 +74,8 @@ def press_path(time_ns: np.ndarray, tip: np.ndarray) -> PressPath:
 def _run(mask: np.ndarray, at: int) -> tuple[int, int]:
     """Return the first and last index of the run of True around an index."""
     outside = np.flatnonzero(~mask)
-    before, behind = outside[outside < at], outside[outside > at]
-    return (int(before[-1]) + 1 if len(before) else 0), (int(behind[0]) - 1 if len(behind) else len(mask) - 1)
+    earlier, later = outside[outside < at], outside[outside > at]
+    return (int(earlier[-1]) + 1 if len(earlier) else 0), (int(later[0]) - 1 if len(later) else len(mask) - 1)
 
 
 def strokes(depth: np.ndarray, low: float) -> int:

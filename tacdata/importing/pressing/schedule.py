@@ -65,10 +65,10 @@ def read_schedule(mapping: dict[str, Any], tables: dict[str, SourceTable], taxel
         return []
     presses = _listed(entry, taxels) if "presses" in entry else _tabled(mapping, entry, tables)
     presses.sort(key=lambda press: press.start_ns)
-    for before, after in pairwise(presses):
-        if before.knots[0][-1] > after.start_ns:
+    for previous, following in pairwise(presses):
+        if previous.knots[0][-1] > following.start_ns:
             raise FormatError(
-                f"schedule: the press at {after.start_ns / 1e9:.3f} s begins before the one before it ends",
+                f"schedule: the press at {following.start_ns / 1e9:.3f} s begins before the one before it ends",
                 "presses one after the other",
                 "correct start, speed or hold",
             )

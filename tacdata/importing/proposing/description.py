@@ -48,23 +48,23 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     """
     check_source(source)
     paths = [source] if is_one(source) else files_below(source)
-    found: dict[str, FoundKind] = {}
+    kinds: dict[str, FoundKind] = {}
     refused = []
     below = [path.relative_to(source) if path != source else Path(path.name) for path in paths]
     for path, name_below, kind in zip(paths, (p.as_posix() for p in below), kinds_of(list(below)), strict=True):
-        known = [entry for key, entry in found.items() if key.partition(INSIDE)[0] == kind]
-        for entry in known:
+        members = [entry for key, entry in kinds.items() if key.partition(INSIDE)[0] == kind]
+        for entry in members:
             entry.count += 1
-        if known or kind in refused:
+        if members or kind in refused:
             continue
         try:
             for name in tables_in(path):
                 key = f"{kind}{INSIDE}{numberless(name)}" if name else kind
-                if key in found:
-                    found[key].count += 1
+                if key in kinds:
+                    kinds[key].count += 1
                     continue
                 table, options = _read(path, {"table": name} if name else {})
-                found[key] = FoundKind(table, name_below, 1, options)
+                kinds[key] = FoundKind(table, name_below, 1, options)
         except ModuleNotFoundError:
             raise
         except Exception as error:  # a README among the data is no error
@@ -72,41 +72,41 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
                 raise
             words = error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}"
             refused.append(words.removeprefix(f"{source}/"))
-    if not found:
+    if not kinds:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
             "CSV, Excel, JSON, NPZ, Parquet or MATLAB files, or bags of ROS 2",
             "check the path, or convert the files",
         )
-    found = _of_same_columns(found)
+    kinds = _of_same_columns(kinds)
     lines = []
-    for key, entry in found.items():
+    for key, entry in kinds.items():
         kind, _, inside = key.partition(INSIDE)
         files = f"{entry.count} {'table' if inside and '#' in inside else 'file'}{'s' * (entry.count > 1)}"
         lines.append(f"{kind} ({files}){f', {inside}' if inside else ''}: {entry.table.rows} rows")
         lines += _columns(entry.table)
         lines += [f"    {note}" for note in entry.table.notes]
     lines += [f"not read: {text}" for text in refused]
-    return found, "\n".join(lines)
+    return kinds, "\n".join(lines)
 
 
 def _read(path: Path, options: dict[str, Any]) -> tuple[SourceTable, dict[str, Any]]:
     """Return a file's table and the options that read it: with trials along the axis that loses fewest arrays."""
     table = read_table(path, options)
-    best, chosen = len(_lost(table)), options
+    best, best_options = len(_lost(table)), options
     for axis in (2, 0, 1) if path.suffix in (".mat", ".npz") and best else ():
         try:
             tried = read_table(path, {**options, "trial_axis": axis})
         except FormatError:
             break
         if len(_lost(tried)) < best:
-            table, best, chosen = tried, len(_lost(tried)), {**options, "trial_axis": axis}
+            table, best, best_options = tried, len(_lost(tried)), {**options, "trial_axis": axis}
     if not best and any("trial_axis says" in note for note in table.notes):
         for axis in (2, 1, 0):
             tried = read_table(path, {**options, "trial_axis": axis})
             if _one_clock(tried):
                 return tried, {**options, "trial_axis": axis}
-    return table, chosen
+    return table, best_options
 
 
 def _one_clock(table: SourceTable) -> bool:
@@ -124,64 +124,64 @@ def _lost(table: SourceTable) -> list[str]:
     return [name for note in table.notes if "left out" in note for name in note.split("left out: ")[-1].split(", ")]
 
 
-def _of_same_columns(found: dict[str, FoundKind]) -> dict[str, FoundKind]:
+def _of_same_columns(kinds: dict[str, FoundKind]) -> dict[str, FoundKind]:
     """Put kinds together that are whole trials of the same columns: their paths differ by words."""
     alike: dict[Any, list[str]] = {}
-    found = _boards_together(found)
-    for key, entry in found.items():
-        own = key if entry.join or not is_whole(roles_of(entry.table)) else ""
+    kinds = _boards_together(kinds)
+    for key, entry in kinds.items():
+        identity = key if entry.join or not is_whole(roles_of(entry.table)) else ""
         depth = key.partition(INSIDE)[0].count("/")
-        alike.setdefault((own, depth, INSIDE in key, tuple(entry.table.columns)), []).append(key)
+        alike.setdefault((identity, depth, INSIDE in key, tuple(entry.table.columns)), []).append(key)
     result = {}
     for keys in alike.values():
-        if len(keys) > 1 and (order := parts_in_order({key: found[key].table for key in keys})):
-            result[order.keys[0]] = _joined_kind(order, found)
+        if len(keys) > 1 and (order := parts_in_order({key: kinds[key].table for key in keys})):
+            result[order.keys[0]] = _joined_kind(order, kinds)
             continue
-        whole = merged(keys) if len(keys) > 1 else None
-        if whole is None:
-            result |= {key: found[key] for key in keys}
+        pattern = merged(keys) if len(keys) > 1 else None
+        if pattern is None:
+            result |= {key: kinds[key] for key in keys}
             continue
-        first = found[keys[0]]
-        result[whole] = replace(first, count=sum(found[key].count for key in keys), words=_words(keys, whole))
+        first = kinds[keys[0]]
+        result[pattern] = replace(first, count=sum(kinds[key].count for key in keys), words=_words(keys, pattern))
     return result
 
 
-def _boards_together(found: dict[str, FoundKind]) -> dict[str, FoundKind]:
+def _boards_together(kinds: dict[str, FoundKind]) -> dict[str, FoundKind]:
     """Put kinds together that hold the same channels at the same times, next to a kind with the position."""
-    roles = {key: roles_of(entry.table) for key, entry in found.items()}
+    roles = {key: roles_of(entry.table) for key, entry in kinds.items()}
     if not any({"depth", "z"} & set(each) for each in roles.values()):
-        return found
+        return kinds
     boards: dict[Any, list[str]] = {}
     for key, each in roles.items():
         if each["channels"] and each.get("time") and not {"depth", "z"} & set(each):
-            clock = found[key].table.column(each["time"][0])
-            boards.setdefault((tuple(found[key].table.columns), len(clock), found[key].count), []).append(key)
+            clock = kinds[key].table.column(each["time"][0])
+            boards.setdefault((tuple(kinds[key].table.columns), len(clock), kinds[key].count), []).append(key)
     for keys in boards.values():
-        clocks = [found[key].table.column(roles[key]["time"][0]) for key in keys]
+        clocks = [kinds[key].table.column(roles[key]["time"][0]) for key in keys]
         if len(keys) < 2 or any(clock.dtype == object or not np.allclose(clock, clocks[0]) for clock in clocks):
             continue
-        found = {key: entry for key, entry in found.items() if key not in keys[1:]} | {
-            keys[0]: _joined_kind(PartsInOrder(tuple(keys), "columns"), found)
+        kinds = {key: entry for key, entry in kinds.items() if key not in keys[1:]} | {
+            keys[0]: _joined_kind(PartsInOrder(tuple(keys), "columns"), kinds)
         }
-    return found
+    return kinds
 
 
-def _joined_kind(order: PartsInOrder, found: dict[str, FoundKind]) -> FoundKind:
+def _joined_kind(order: PartsInOrder, kinds: dict[str, FoundKind]) -> FoundKind:
     """Return the kind of a trial whose parts are in several files or sheets."""
-    tables = [found[key].table for key in order.keys]
+    tables = [kinds[key].table for key in order.keys]
     time = (roles_of(tables[0]).get("time") or [None])[0]
     options = {"join": order.join, **({"time": {"column": time}} if time else {})}
     if order.join == "columns":
         table = side_by_side(tables, list(titles_of([key.replace(INSIDE, " ") for key in order.keys])), options)
     else:
         table = joined(tables, options)
-    return replace(found[order.keys[0]], table=table, parts=order.keys, join=order.join)
+    return replace(kinds[order.keys[0]], table=table, parts=order.keys, join=order.join)
 
 
-def _words(keys: list[str], whole: str) -> dict[int, list[str]]:
+def _words(keys: list[str], pattern: str) -> dict[int, list[str]]:
     """Return the names of each level of folders that were put together, by the number of its #."""
     words: dict[int, list[str]] = {}
-    steps = whole.partition(INSIDE)[0].split("/")
+    steps = pattern.partition(INSIDE)[0].split("/")
     for level, step in enumerate(steps[:-1]):
         names = list(dict.fromkeys(key.split("/")[level] for key in keys))
         if len(names) > 1 and step.count("#") == 1:
@@ -202,8 +202,8 @@ def _line(table: SourceTable, name: str) -> str:
     values = table.column(name)
     unit = f" [{table.units[name]}]" if table.units.get(name) and not _says(name, table.units[name]) else ""
     if values.dtype == object:
-        known = sorted({str(value) for value in values.tolist() if value is not None})
-        return f"    {name}{unit}: text, {len(known)} different, for example {', '.join(known[:3])}"
+        texts = sorted({str(value) for value in values.tolist() if value is not None})
+        return f"    {name}{unit}: text, {len(texts)} different, for example {', '.join(texts[:3])}"
     numbers = values.astype(float)
     missing = np.isnan(numbers).mean()
     shape = f" x {values.shape[1]}" if values.ndim > 1 else ""
@@ -216,7 +216,7 @@ def _line(table: SourceTable, name: str) -> str:
 
 def _says(name: str, unit: str) -> bool:
     """Return whether a column's name contains its unit already."""
-    return any(f"{left}{unit}{right}" in name for left, right in ("[]", "()", "{}"))
+    return any(f"{opening}{unit}{closing}" in name for opening, closing in ("[]", "()", "{}"))
 
 
 def _sentinel(numbers: np.ndarray) -> str:
@@ -224,12 +224,12 @@ def _sentinel(numbers: np.ndarray) -> str:
 
     A stage at rest at 0 is none: it leaves 0 in small steps.
     """
-    known, times = np.unique(numbers[np.isfinite(numbers)], return_counts=True)
+    distinct, times = np.unique(numbers[np.isfinite(numbers)], return_counts=True)
     often = times.max() / numbers.size
-    value = known[times.argmax()]
-    others = known[known != value]
-    if often <= 0.2 or len(known) <= 10 or value not in SENTINELS:
+    value = distinct[times.argmax()]
+    remainder = distinct[distinct != value]
+    if often <= 0.2 or len(distinct) <= 10 or value not in SENTINELS:
         return ""
-    if np.abs(others - value).min() < 0.1 * np.ptp(others):
+    if np.abs(remainder - value).min() < 0.1 * np.ptp(remainder):
         return ""
     return f", {100 * often:.0f} % are {value:g}: missing?"

@@ -30,23 +30,23 @@ def stand_in(tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str
 
     A hinge drives a sensor as a stage does. So does a hand over a load cell.
     """
-    if any({"depth", "z"} & set(found) for found in roles.values()):
+    if any({"depth", "z"} & set(entry) for entry in roles.values()):
         return ""
     for role in MEANT:
-        moving = [(alias, name) for alias, found in roles.items() for name in found.get(role, [])]
+        moving = [(alias, name) for alias, entry in roles.items() for name in entry.get(role, [])]
         moving = [(alias, name) for alias, name in moving if _levels(tables[alias], name) > 2]
-        others = [name for found in roles.values() for name in found["channels"]]
-        if not moving or not others:
+        channels = [name for entry in roles.values() for name in entry["channels"]]
+        if not moving or not channels:
             continue
-        alias, name = max(moving, key=lambda found: _levels(tables[found[0]], found[1]))
+        alias, name = max(moving, key=lambda pair: _levels(tables[pair[0]], pair[1]))
         roles[alias]["depth"] = roles[alias]["stand_in"] = [name]
-        for found in roles.values():
-            found.pop(role, None)
+        for entry in roles.values():
+            entry.pop(role, None)
         unit = plain(tables[alias].units.get(name, "")) or "of its units"
-        much = f"{1000 if length_of(tables[alias], name) == 'um' else 1} {unit}"
+        distance = f"{1000 if length_of(tables[alias], name) == 'um' else 1} {unit}"
         return (
-            f"no column is a position or a depth: {name} stands for one, {much} as 1 mm. So a verdict says how "
-            f"readings follow it, and its mm are {much}"
+            f"no column is a position or a depth: {name} stands for one, {distance} as 1 mm. So a verdict says how "
+            f"readings follow it, and its mm are {distance}"
         )
     return ""
 
@@ -56,12 +56,12 @@ def length_of(table: SourceTable, name: str) -> str:
     return "um" if float(np.nanmax(np.abs(table.column(name).astype(float)))) > DEEPEST else "mm"
 
 
-def rate_of(table: SourceTable, found: dict[str, list[str]]) -> float:
+def rate_of(table: SourceTable, columns: dict[str, list[str]]) -> float:
     """Return a rate by which a press takes some seconds."""
     rows = [float(table.rows)]
-    moving = found.get("depth") or found.get("z")
-    if "trial" in found:
-        _, rows = np.unique(table.column(found["trial"][0]).astype(str), return_counts=True)
+    moving = columns.get("depth") or columns.get("z")
+    if "trial" in columns:
+        _, rows = np.unique(table.column(columns["trial"][0]).astype(str), return_counts=True)
     elif moving and (axis := table.column(moving[0])).dtype != object:
         way = np.abs(axis.astype(float) - axis[0])[np.isfinite(axis.astype(float))]
         rows = [table.rows / max(strokes(way, CLEAR * float(way.max(initial=0.0))), 1)]
@@ -84,13 +84,13 @@ def are_halves(labels: np.ndarray, axis: np.ndarray) -> bool:
     edges = [0, *(np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist(), len(labels)]
     runs = [axis[a:b][np.isfinite(axis[a:b])] for a, b in pairwise(edges)]
     runs = [run for run in runs if len(run) > 2]
-    whole = float(np.nanmax(axis) - np.nanmin(axis))
-    if len(runs) < 4 or whole <= 0:
+    extent = float(np.nanmax(axis) - np.nanmin(axis))
+    if len(runs) < 4 or extent <= 0:
         return False
     net = np.array([run[-1] - run[0] for run in runs])
     spans = np.array([np.ptp(run) for run in runs])
-    half = (np.abs(net) > ONE_WAY * spans) & (spans > WIDE * whole)
-    joined = np.abs([b[0] - a[-1] for a, b in pairwise(runs)]) < APART * whole
+    half = (np.abs(net) > ONE_WAY * spans) & (spans > WIDE * extent)
+    joined = np.abs([b[0] - a[-1] for a, b in pairwise(runs)]) < APART * extent
     turns = net[1:] * net[:-1] < 0
     return bool(half.mean() > ALIKE - 0.1 and joined.mean() > ALIKE - 0.1 and turns.mean() > ALIKE - 0.1)
 

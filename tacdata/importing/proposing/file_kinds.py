@@ -37,10 +37,10 @@ def merged(kinds: list[str]) -> str | None:
     if len({len(path.parts) for path in paths}) > 1 or len({path.suffix for path in paths}) > 1:
         return None
     steps = [_one(list(names)) for names in zip(*(path.parts for path in paths), strict=True)]
-    whole = "/".join(steps)
+    path_pattern = "/".join(steps)
     if all(inner):
-        whole += INSIDE + _one(list(inner))
-    return whole
+        path_pattern += INSIDE + _one(list(inner))
+    return path_pattern
 
 
 def _one(names: list[str]) -> str:
@@ -48,15 +48,15 @@ def _one(names: list[str]) -> str:
     if len(set(names)) == 1:
         return names[0]
     begin = re.sub(r"[^-_ .]*$", "", _common(names))
-    rest = [name[len(begin) :] for name in names]
-    end = re.sub(r"^[^-_ .]*", "", _common([name[::-1] for name in rest])[::-1])
-    while any(len(name) <= len(end) for name in rest):
+    tails = [name[len(begin) :] for name in names]
+    end = re.sub(r"^[^-_ .]*", "", _common([name[::-1] for name in tails])[::-1])
+    while any(len(name) <= len(end) for name in tails):
         end = re.sub(r"^.[^-_ .]*", "", end)
     return f"{begin}{PART}{end}"
 
 
 def _common(names: list[str]) -> str:
-    return "".join(letters[0] for letters in takewhile(lambda found: len(set(found)) == 1, zip(*names, strict=False)))
+    return "".join(letters[0] for letters in takewhile(lambda signs: len(set(signs)) == 1, zip(*names, strict=False)))
 
 
 def pattern(kind: str, first: int = 0) -> tuple[str, int]:

@@ -139,12 +139,12 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     if values.ndim == 2 and values.shape[1] in (3, 6, 7) and re.fullmatch(PLACE, bare):
         return "place"
     role = next((role for role, pattern in GUESSES.items() if re.fullmatch(pattern, bare)), None)
-    given = plain(table.units.get(name) or inside)
-    unit = quantity_of(given)
-    if given.lower() in DEGREES:
+    unit_text = plain(table.units.get(name) or inside)
+    unit = quantity_of(unit_text)
+    if unit_text.lower() in DEGREES:
         return "temperature"
     # "t" with the unit of another quantity, as V, is no time.
-    if role == "time" and values.dtype != object and unit != "s" and given.lower() in OTHERS:
+    if role == "time" and values.dtype != object and unit != "s" and unit_text.lower() in OTHERS:
         role = None
     role = {"N": "force", "s": "time"}.get(unit or "", role)
     if role is None and len(bare) > 1 and quantity_of(bare) == "s":
@@ -181,8 +181,8 @@ def _most_evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None
             usual = float(np.median(steps))
             rising[name] = float(np.median(np.abs(steps - usual))) / usual if usual > 0 else np.inf
     if rising:
-        most = max(EVEN, 2 * min(rising.values()))
-        roles["time"] = [next(name for name, spread in rising.items() if spread <= most)]
+        limit = max(EVEN, 2 * min(rising.values()))
+        roles["time"] = [next(name for name, spread in rising.items() if spread <= limit)]
         roles["channels"].remove(roles["time"][0])
 
 
@@ -206,7 +206,7 @@ def _first_rising_inside(table: SourceTable, name: str, roles: dict[str, list[st
 
 def _evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None:
     """Tell the time by its even steps, whatever it is called; no path rises throughout."""
-    found: list[str] = []
+    candidates: list[str] = []
     for name in roles["channels"]:
         values = table.columns.get(name)
         if values is None or values.ndim > 1 or len(values) < ROWS:
@@ -214,10 +214,10 @@ def _evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None:
         steps = np.diff(values.astype(float))
         usual = float(np.median(steps))
         if usual > 0 and (np.abs(steps - usual) < 0.5 * usual).all():
-            found.append(name)
-    if found:
-        roles["time"] = roles["by_values"] = found[:1]
-        roles["channels"] = [name for name in roles["channels"] if name not in found]
+            candidates.append(name)
+    if candidates:
+        roles["time"] = roles["by_values"] = candidates[:1]
+        roles["channels"] = [name for name in roles["channels"] if name not in candidates]
 
 
 def _set_for_each_trial(table: SourceTable, roles: dict[str, list[str]]) -> None:

@@ -48,18 +48,18 @@ def pressing_axis(time_ns: np.ndarray, axis: np.ndarray, deviation: np.ndarray |
     Raises:
         ValueError: If fewer than three rows have both.
     """
-    known = np.isfinite(axis) & (time_ns != NEVER)
-    if known.sum() < 3:
+    valid = np.isfinite(axis) & (time_ns != NEVER)
+    if valid.sum() < 3:
         raise ValueError("fewer than three rows with a time and a position")
-    time_ns, axis = time_ns[known], axis[known]
+    time_ns, axis = time_ns[valid], axis[valid]
     sign = 1 if axis.mean() >= axis[0] else -1  # a trial begins away from the skin
-    if deviation is not None and np.ptp(axis) > 0 and np.nanstd(deviation[known]) > 0:
-        both = np.isfinite(deviation[known])
-        correlation = float(np.corrcoef(axis[both], deviation[known][both])[0, 1])
+    if deviation is not None and np.ptp(axis) > 0 and np.nanstd(deviation[valid]) > 0:
+        joint = np.isfinite(deviation[valid])
+        correlation = float(np.corrcoef(axis[joint], deviation[valid][joint])[0, 1])
         sign = sign if abs(correlation) < SURE else int(np.sign(correlation))
     low, high = np.sort(np.abs([axis.min(), axis.max()]))
-    beside = CLEAR * np.ptp(axis)
-    at_zero = bool(axis.min() <= beside and axis.max() >= -beside)
+    margin = CLEAR * np.ptp(axis)
+    at_zero = bool(axis.min() <= margin and axis.max() >= -margin)
     lifted = bool(axis.min() * axis.max() > 0 and low > LIFTED * (high - low))
     steps = np.diff(time_ns) / 1e9
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
@@ -67,5 +67,5 @@ def pressing_axis(time_ns: np.ndarray, axis: np.ndarray, deviation: np.ndarray |
     pause = float(f"{(long[0] + max(steps[steps < long[0]], default=0.0)) / 2:.2g}") if len(long) else 0.0
     down = sign * axis - (sign * axis).min()
     edges = [0, *(np.flatnonzero(steps > pause) + 1).tolist(), len(down)] if pause else [0, len(down)]
-    most = max(strokes(down[a:b], CLEAR * down.max()) for a, b in pairwise(edges))
-    return PressingAxis(sign, at_zero, lifted, pause, len(long), most, float(f"{2 * CLEAR * np.ptp(axis):.2g}"))
+    count = max(strokes(down[a:b], CLEAR * down.max()) for a, b in pairwise(edges))
+    return PressingAxis(sign, at_zero, lifted, pause, len(long), count, float(f"{2 * CLEAR * np.ptp(axis):.2g}"))

@@ -72,8 +72,8 @@ def parts_in_order(tables: dict[str, SourceTable]) -> PartsInOrder | None:
 def _disorder(keys: tuple[str, ...]) -> int:
     """Return how many parts stand before one that comes before them by its name."""
     ranks = [next((rank for rank, words in enumerate(ORDER) if words.search(key)), None) for key in keys]
-    known = [rank for rank in ranks if rank is not None]
-    return sum(a > b for a, b in pairwise(known))
+    positions = [rank for rank in ranks if rank is not None]
+    return sum(a > b for a, b in pairwise(positions))
 
 
 def _numbers(table: SourceTable, name: str) -> np.ndarray:

@@ -42,13 +42,13 @@ class _Outcome:
     refusals: list[TacdataError] = field(default_factory=list)
 
 
-def tried(source: Path, mapping: dict[str, Any], beside: Path, policy: TrialPolicy = POLICY) -> str:
+def tried(source: Path, mapping: dict[str, Any], folder: Path, policy: TrialPolicy = POLICY) -> str:
     """Return the outcome of importing some of the files by a mapping, or why nothing is imported, as a sentence.
 
     Args:
         source: The files.
         mapping: The mapping's document.
-        beside: The mapping's folder.
+        folder: The mapping's folder.
         policy: The limits of a good mapping.
     """
     try:
@@ -56,21 +56,21 @@ def tried(source: Path, mapping: dict[str, Any], beside: Path, policy: TrialPoli
         sets = file_sets(source, mapping["files"])
     except TacdataError as error:
         return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
-    chosen = [sets[k] for k in sorted({round(k) for k in np.linspace(0, len(sets) - 1, policy.sets)})]
+    samples = [sets[k] for k in sorted({round(k) for k in np.linspace(0, len(sets) - 1, policy.sets)})]
     outcome = _Outcome()
-    for files in chosen:
-        _try_set(files, mapping, beside, outcome)
+    for files in samples:
+        _try_set(files, mapping, folder, outcome)
     if not outcome.presses:
         error = outcome.refusals[0]
         return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
-    names = f"{len(chosen)} of {len(sets)} sets of files hold" if len(sets) > 1 else "the source holds"
+    names = f"{len(samples)} of {len(sets)} sets of files hold" if len(sets) > 1 else "the source holds"
     sentence = f"tried: {names} {_figures(outcome.presses, policy)}"
     remedy = "zero: highest under z" if "z" in mapping.get("position", {}) else "zero: lowest under depth"
     faults = _faults(outcome, remedy, policy)
     return f"{sentence}\nnot good as it stands: {'; '.join(faults)}" if faults else sentence
 
 
-def _try_set(files: FileSet, mapping: dict[str, Any], beside: Path, outcome: _Outcome) -> None:
+def _try_set(files: FileSet, mapping: dict[str, Any], folder: Path, outcome: _Outcome) -> None:
     """Import a set of files without writing it."""
     record = {"trial": "", "name": mapping["name"]}
     try:
@@ -81,7 +81,7 @@ def _try_set(files: FileSet, mapping: dict[str, Any], beside: Path, outcome: _Ou
         parts = [
             part
             for label, rows in split_tables(tables, mapping)
-            for part in presses_of(mapping, beside, rows, files.parts, {**record, "trial": label}, centre)
+            for part in presses_of(mapping, folder, rows, files.parts, {**record, "trial": label}, centre)
         ]
     except TacdataError as error:
         outcome.refusals.append(error)
@@ -123,12 +123,12 @@ def _answers(presses: list[ImportedPress], policy: TrialPolicy) -> int | None:
     for press in presses:
         depth = np.interp(press.taxels.time_ns, press.position.time_ns, _depths(press))
         stroke = float(np.ptp(depth))
-        deep, rest = depth >= depth.min() + 0.8 * stroke, depth <= depth.min() + 0.1 * stroke
-        if stroke <= 0 or min(deep.sum(), rest.sum()) < 3:
+        deep, shallow = depth >= depth.min() + 0.8 * stroke, depth <= depth.min() + 0.1 * stroke
+        if stroke <= 0 or min(deep.sum(), shallow.sum()) < 3:
             continue
         readings = press.taxels.values
         noise = np.nanmedian(np.abs(np.diff(readings, axis=0)), axis=0)
-        change = np.abs(np.nanmedian(readings[deep], axis=0) - np.nanmedian(readings[rest], axis=0))
+        change = np.abs(np.nanmedian(readings[deep], axis=0) - np.nanmedian(readings[shallow], axis=0))
         changes.append(change > policy.answer * noise)
     return int(np.any(changes, axis=0).sum()) if changes else None
 

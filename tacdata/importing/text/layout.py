@@ -151,35 +151,35 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
 
 def _as_given(options: dict[str, Any]) -> str:
     """Return the layout that the mapping gives, as the end of a sentence."""
-    given = [f"{name} {options[name]!r}" for name in GUESSED if name in options]
-    return f", read with {' and '.join(given)} as the mapping says" if given else ""
+    settings = [f"{name} {options[name]!r}" for name in GUESSED if name in options]
+    return f", read with {' and '.join(settings)} as the mapping says" if settings else ""
 
 
 def _otherwise(text: str, options: dict[str, Any], origin: str) -> str:
     """Return a layout that reads a file which the mapping's delimiter or decimal sign does not; "" if there is none."""
-    rest = {name: value for name, value in options.items() if name not in GUESSED}
-    if len(rest) == len(options):
+    remainder = {name: value for name, value in options.items() if name not in GUESSED}
+    if len(remainder) == len(options):
         return ""
     try:
-        found = text_layout(text, rest, origin)
+        layout = text_layout(text, remainder, origin)
     except FormatError:
         return ""
-    delimiter = {"\t": "tab", " ": "space"}.get(found.delimiter, found.delimiter)
-    return f"write delimiter: {delimiter!r} and decimal: {found.decimal!r} in the mapping, by which it can be read"
+    delimiter = {"\t": "tab", " ": "space"}.get(layout.delimiter, layout.delimiter)
+    return f"write delimiter: {delimiter!r} and decimal: {layout.decimal!r} in the mapping, by which it can be read"
 
 
 def _refuse_commas_for_both(
-    before: list[list[str]], rows: list[list[str]], delimiter: str, width: int, origin: str
+    heading: list[list[str]], rows: list[list[str]], delimiter: str, width: int, origin: str
 ) -> None:
     """Refuse rows whose commas part the fields and stand for decimal points: the header has fewer names than fields.
 
     Raises:
         FormatError: If they do.
     """
-    names = len(before[-1]) if before else width
+    names = len(heading[-1]) if heading else width
     wide = [row for row in rows if len(row) == width]
-    whole = all(re.fullmatch(r"[-+]?\d+", field) for row in wide for field in row)
-    if delimiter == "," and names + 1 < width <= 2 * names and whole:
+    are_whole = all(re.fullmatch(r"[-+]?\d+", field) for row in wide for field in row)
+    if delimiter == "," and names + 1 < width <= 2 * names and are_whole:
         raise FormatError(
             f"{origin}: {names} names in the header, and {width} whole numbers a row: its commas part the fields and "
             "stand for decimal points too",
@@ -190,8 +190,8 @@ def _refuse_commas_for_both(
 
 def _commented_header(lines: list[str], first: str, delimiter: str, width: int) -> list[list[str]]:
     """Return the last comment before the data as a header if it has as many fields, as NumPy writes it."""
-    before = [line.lstrip().lstrip("#%/").strip() for line in lines[: lines.index(first)] if line.strip()]
-    fields = split(before[-1], delimiter) if before else []
+    comments = [line.lstrip().lstrip("#%/").strip() for line in lines[: lines.index(first)] if line.strip()]
+    fields = split(comments[-1], delimiter) if comments else []
     return [fields] if len(fields) == width else []
 
 
@@ -244,21 +244,23 @@ def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
     """
     wide = [row for row in rows if len(row) == width]
     tail = wide[len(wide) // 2 :]
-    told = [[is_number(field, decimal) and field not in MISSING for field in row] for row in tail]
-    numeric = [k for k in range(width) if 2 * sum(row[k] for row in told) > len(told)]
+    flags = [[is_number(field, decimal) and field not in MISSING for field in row] for row in tail]
+    numeric = [k for k in range(width) if 2 * sum(row[k] for row in flags) > len(flags)]
     if not numeric:
         return None
     for number, row in enumerate(rows):
         if len(row) != width:
             continue
-        told = [is_number(row[k], decimal) and row[k] not in MISSING for k in numeric]
+        flags = [is_number(row[k], decimal) and row[k] not in MISSING for k in numeric]
         # A word among the numbers of the first rows makes no header of them: the row before has no numbers.
         above = rows[number - 1] if number else []
         named = len(above) == width and not any(is_number(above[k], decimal) for k in numeric)
         # A header of several lines may tell a rate or a date first: names without a number follow.
-        later = [other for other in rows[number + 1 : number + LINES_OF_HEADER] if len(other) == width]
-        named = named and all(any(is_number(other[k], decimal) for k in numeric) for other in later)
-        if any(told) and (all(is_number(row[k], decimal) for k in numeric) or (named and 2 * sum(told) >= len(told))):
+        later = [line for line in rows[number + 1 : number + LINES_OF_HEADER] if len(line) == width]
+        named = named and all(any(is_number(line[k], decimal) for k in numeric) for line in later)
+        if any(flags) and (
+            all(is_number(row[k], decimal) for k in numeric) or (named and 2 * sum(flags) >= len(flags))
+        ):
             return number
     return None
 
@@ -318,22 +320,22 @@ def _groups(rows: list[list[str]], column: int, title: str) -> list[str]:
 
 def _are_units(fields: list[str]) -> bool:
     """Return whether a second header line gives units: short, and at least half of them in brackets or known."""
-    given = [field for field in fields if field]
-    known = [
-        bool(re.fullmatch(BRACKETED, field)) or quantity_of(field) or plain(field).lower() in OTHERS for field in given
+    texts = [field for field in fields if field]
+    is_unit = [
+        bool(re.fullmatch(BRACKETED, field)) or quantity_of(field) or plain(field).lower() in OTHERS for field in texts
     ]
-    return all(len(field.strip("[]() ")) <= 8 for field in given) and 2 * sum(map(bool, known)) >= max(len(given), 1)
+    return all(len(field.strip("[]() ")) <= 8 for field in texts) and 2 * sum(map(bool, is_unit)) >= max(len(texts), 1)
 
 
 def _kind(fields: list[str], decimal: str) -> str:
-    known = [field for field in fields if field not in MISSING]
-    numbers = [is_number(field, decimal) for field in known]
-    if not known or (2 * sum(numbers) >= len(known) and any(numbers)):
+    values = [field for field in fields if field not in MISSING]
+    numbers = [is_number(field, decimal) for field in values]
+    if not values or (2 * sum(numbers) >= len(values) and any(numbers)):
         # From 16 digits on, as in Unix nanoseconds, a float64 would round.
-        long = known and all(re.fullmatch(r"[-+]?\d{16,}", field) for field in known)
+        long = values and all(re.fullmatch(r"[-+]?\d{16,}", field) for field in values)
         return "int" if long else "float"
     return "text"
 
 
 def _line_of(lines: list[str], line: str, skip: int) -> int:
-    return next(k for k, other in enumerate(lines) if k >= skip and other == line)
+    return next(k for k, candidate in enumerate(lines) if k >= skip and candidate == line)
