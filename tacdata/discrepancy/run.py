@@ -57,8 +57,8 @@ def run(
         raise UsageError(f"step {until!r}", ", ".join(STEPS), "choose one of them for --stop-after")
     note("reading")
     course = course_of(paths)
-    called = Counter(path.name for path in paths)
-    names = [path.name if called[path.name] == 1 else str(path) for path in paths]
+    counts = Counter(path.name for path in paths)
+    names = [path.name if counts[path.name] == 1 else str(path) for path in paths]
     hashes = {f"recording {name}": recording_hash(path) for name, path in zip(names, paths, strict=True)}
     parents = {"spec": spec.content_hash, **hashes}
     verdict = judge(course, spec, note, parents, until=until)

@@ -62,7 +62,7 @@ def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, np.ndarray, list[s
     Raises:
         FormatError: If none can.
     """
-    notes, kept, counts = [], [], np.concatenate([r.counts for r in recorded])
+    notes, numbers, counts = [], [], np.concatenate([r.counts for r in recorded])
     still = np.all([np.fmax.reduce(r.counts) == np.fmin.reduce(r.counts) for r in recorded if len(r.counts)], axis=0)
     for channel, values in enumerate(counts.T):
         good = values[np.isfinite(values)]
@@ -73,22 +73,22 @@ def usable(recorded: Sequence[Readings]) -> tuple[np.ndarray, np.ndarray, list[s
         elif still[channel]:
             notes.append(f"channel {channel}: one reading throughout each recording, stuck or dead, left out")
         else:
-            kept.append(channel)
-    if not kept:
+            numbers.append(channel)
+    if not numbers:
         raise FormatError(
             f"no channel with usable readings ({'; '.join(notes[:3])})",
             "at least one that changes",
             "mend the board, or name other columns in the import's mapping, and record or import again",
         )
-    limits, words = _clipped(recorded, kept)
-    return np.array(kept), limits, notes + words
+    limits, words = _clipped(recorded, numbers)
+    return np.array(numbers), limits, notes + words
 
 
 def _clipped(recorded: Sequence[Readings], channels: list[int]) -> tuple[np.ndarray, list[str]]:
     """Return where channels stop at their largest or smallest reading while the tip goes on deeper, as in `usable`."""
     words, limits = [], np.repeat([[-np.inf], [np.inf]], len(channels), axis=1)
     for side, name, extreme in ((1, "largest", np.nanmax), (0, "smallest", np.nanmin)):
-        found = []
+        entries = []
         for at, channel in enumerate(channels):
             values = np.concatenate([r.counts[:, channel] for r in recorded])
             limit = float(extreme(values))
@@ -96,10 +96,10 @@ def _clipped(recorded: Sequence[Readings], channels: list[int]) -> tuple[np.ndar
             runs = [run for r in recorded for run in _stops(r.counts[:, channel], r.depth, limit, float(steps.min()))]
             if len(runs) >= FEWEST_STOPS or sum(runs) >= MANY_STOPPED:
                 limits[side, at] = limit
-                found.append(f"channel {channel} at {limit:g} ({100 * np.mean(values == limit):.2g} %)")
-        if found:
+                entries.append(f"channel {channel} at {limit:g} ({100 * np.mean(values == limit):.2g} %)")
+        if entries:
             words.append(
-                f"clipped at the {name} reading (share of its readings): {', '.join(found)}; it stays while the tip "
+                f"clipped at the {name} reading (share of its readings): {', '.join(entries)}; it stays while the tip "
                 "goes on deeper, so these are left out: press less deep, or give it a wider range"
             )
     return limits, words
@@ -114,8 +114,8 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
         limit: The reading at which it may stop.
         step: Smallest difference of two readings.
     """
-    known = np.isfinite(values) & np.isfinite(depth)
-    values, depth = values[known], depth[known]
+    valid = np.isfinite(values) & np.isfinite(depth)
+    values, depth = values[valid], depth[valid]
     if len(values) < FEWEST_STOPPED:
         return []
     # A second difference of white noise has 6 times its variance, and a press hardly contributes to it.
@@ -126,8 +126,8 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
         on = float(depth[begin:end].max() - depth[begin])
         if begin == 0 or end - begin < FEWEST_STOPPED or on < DEEPER * float(np.ptp(depth)):
             continue
-        before = np.flatnonzero(depth[:begin] <= depth[begin] - on)
-        at = int(before[-1]) if len(before) else int(np.argmin(depth[:begin]))
+        shallower = np.flatnonzero(depth[:begin] <= depth[begin] - on)
+        at = int(shallower[-1]) if len(shallower) else int(np.argmin(depth[:begin]))
         way = float(depth[begin] - depth[at])
         if way > 0 and abs(limit - values[at]) * min(on / way, 1.0) > FLAT_Z * max(noise, step):
             words.append(end - begin)
@@ -144,19 +144,19 @@ def without_codes(recordings: Sequence[Recording]) -> tuple[Sequence[Recording],
     odd = codes(counts)
     if not odd.any():
         return recordings, []
-    made, first = [], 0
+    result, first = [], 0
     for recording in recordings:
         episode = recording.episode
         last = first + len(episode.taxels.counts)
         readings = np.where(odd[first:last], np.nan, episode.taxels.counts)
         taxels = replace(episode.taxels, counts=readings)
-        made.append(replace(recording, episode=replace(episode, taxels=taxels)))
+        result.append(replace(recording, episode=replace(episode, taxels=taxels)))
         first = last
     listed = [
         f"channel {k} ({np.count_nonzero(odd[:, k])}, as {counts[odd[:, k], k][0]:.3g})"
         for k in np.flatnonzero(odd.any(axis=0))
     ]
-    return made, [f"readings that are an instrument's codes, set aside: {', '.join(listed)}"]
+    return result, [f"readings that are an instrument's codes, set aside: {', '.join(listed)}"]
 
 
 def codes(values: np.ndarray) -> np.ndarray:
@@ -167,21 +167,21 @@ def codes(values: np.ndarray) -> np.ndarray:
     """
     result = np.zeros(values.shape, dtype=bool)
     for k, column in enumerate(values.T):
-        known = np.isfinite(column)
-        if not known.any():
+        finite = np.isfinite(column)
+        if not finite.any():
             continue
-        low, middle, high = np.quantile(column[known], [INNER[0], 0.5, INNER[1]])
+        low, middle, high = np.quantile(column[finite], [INNER[0], 0.5, INNER[1]])
         # For a channel that hardly moves, its size replaces its range.
         size = max(float(high - low), STILL * abs(float(middle)))
         if 0 < size < np.inf:
-            result[known, k] = np.abs(column[known] - middle) > FAR * size
+            result[finite, k] = np.abs(column[finite] - middle) > FAR * size
     return result
 
 
 def in_source(recordings: Sequence[Recording], channels: int) -> list[str]:
     """Return in words which columns of the source the channels are; nothing where names say no more than numbers."""
-    known = {tuple(recording.board.get("names", ()))[:channels] for recording in recordings}
-    names = list(next(iter(known))) if len(known) == 1 else []
+    name_sets = {tuple(recording.board.get("names", ()))[:channels] for recording in recordings}
+    names = list(next(iter(name_sets))) if len(name_sets) == 1 else []
     parts = [re.fullmatch(r"(.*?)(\d+)\]?", name) for name in names]
     if len(names) != channels or all(p and int(p[2]) == k for k, p in enumerate(parts)):
         return []

@@ -58,16 +58,16 @@ def check(setting: Setting) -> DataChecks:
     """Check recordings, and whether they are of the model's sensor."""
     course, response = setting.course, setting.response
     wiring = () if setting.given else tuple(miswired(course, response))
-    late, words = shifted(course)
+    is_late, words = shifted(course)
     return DataChecks(
         course.episodes,
         wiring,
         tuple(shortcomings(course)),
         _base(setting),
         (*idle_lines(course), *odd_channels(course, response)),
-        words if late else (),
+        words if is_late else (),
         _touched(course),
-        () if late else words,
+        () if is_late else words,
         tuple(limitations(course)),
     )
 

@@ -30,12 +30,12 @@ CLEARER = 0.3
 
 def shifted(course: Course) -> tuple[bool, tuple[str, ...]]:
     """Return whether readings follow the path late, and in words by how much they are late or early."""
-    lag, left, none = shift(course)
-    if abs(lag) <= LEAST_SHIFT or left > CLEARER * none:
+    lag, share, none = shift(course)
+    if abs(lag) <= LEAST_SHIFT or share > CLEARER * none:
         return lag > 0, ()
     return lag > 0, (
         f"readings follow the path about {abs(lag):.1f} s {'later' if lag > 0 else 'earlier'} than their "
-        f"times say ({100 * left:.0f} % of their change is left then, {100 * none:.0f} % as they are): were the "
+        f"times say ({100 * share:.0f} % of their change is left then, {100 * none:.0f} % as they are): were the "
         "clocks one? Record both on one clock, or give the offset of one in the import's mapping",
     )
 
@@ -47,23 +47,23 @@ def shift(course: Course) -> tuple[float, float, float]:
     """
     main = _main(course)
     lags = np.linspace(-WIDEST, WIDEST, LAGS)
-    left = np.array([_left_at(course, main, lag) for lag in lags])
-    best = int(np.argmin(left))
-    return float(lags[best]), float(left[best]), float(left[LAGS // 2])
+    shares = np.array([_left_at(course, main, lag) for lag in lags])
+    best = int(np.argmin(shares))
+    return float(lags[best]), float(shares[best]), float(shares[LAGS // 2])
 
 
 def _left_at(course: Course, reading: np.ndarray, lag: float) -> float:
     """Return the share of a reading's variance that depth does not explain at a delay, an offset an episode allowed."""
-    reduced, left, whole = course.reduced, 0.0, 0.0
+    reduced, unexplained, total = course.reduced, 0.0, 0.0
     for e in np.unique(reduced.episode):
         rows, path = reduced.episode == e, course.episode == e
         depth = np.interp(reduced.time[rows] - lag, course.time[path], np.maximum(course.tip[path, 2], 0.0))
-        own = reading[rows] - reading[rows].mean()
+        centred = reading[rows] - reading[rows].mean()
         depth = depth - depth.mean()
-        own_power, power = float(own @ own), float(depth @ depth)
-        whole += own_power
-        left += own_power - (float(own @ depth) ** 2 / power if power > 0 else 0.0)
-    return left / max(whole, 1e-30)
+        own_power, power = float(centred @ centred), float(depth @ depth)
+        total += own_power
+        unexplained += own_power - (float(centred @ depth) ** 2 / power if power > 0 else 0.0)
+    return unexplained / max(total, 1e-30)
 
 
 def edges(course: Course, about: float) -> tuple[float, float]:
@@ -76,17 +76,17 @@ def edges(course: Course, about: float) -> tuple[float, float]:
         course: The recordings.
         about: By how much readings are late on the whole [s].
     """
-    reduced, late = course.reduced, [about, about]
-    kept = np.arange(0, len(reduced.time), max(len(reduced.time) // MOST_ROWS, 1))
-    leaves = np.concatenate([time > turn + about for _, turn, time in _turns(course)])[kept]
-    main, episode = _main(course)[kept], reduced.episode[kept]
+    reduced, lags = course.reduced, [about, about]
+    rows = np.arange(0, len(reduced.time), max(len(reduced.time) // MOST_ROWS, 1))
+    leaves = np.concatenate([time > turn + about for _, turn, time in _turns(course)])[rows]
+    main, episode = _main(course)[rows], reduced.episode[rows]
     offsets = (episode[:, None] == np.unique(episode)).astype(float)
-    place = course.row_site[course.read][kept]
+    place = course.row_site[course.read][rows]
 
-    gap = np.diff(reduced.time[kept], prepend=reduced.time[kept][:1])
+    gap = np.diff(reduced.time[rows], prepend=reduced.time[rows][:1])
 
     def left(times: list[float]) -> float:
-        depth = _depth_before(course, np.where(leaves, times[1], times[0]), kept)
+        depth = _depth_before(course, np.where(leaves, times[1], times[0]), rows)
         inner = np.linspace(0.0, max(float(depth.max()), 1e-9), KNOTS + 1)
         design = BSpline.design_matrix(depth, np.r_[[inner[0]] * 3, inner, [inner[-1]] * 3], 3).toarray()
         slow = np.stack([low_pass(depth, gap, tau) for tau in CREEPS], axis=1)
@@ -97,10 +97,10 @@ def edges(course: Course, about: float) -> tuple[float, float]:
 
     for reach, step in SCANS:
         for way in (0, 1):
-            tried = late[way] + np.arange(-reach, reach + step / 2, step)
-            own = [left([t, late[1]] if way == 0 else [late[0], t]) for t in tried]
-            late[way] = float(tried[int(np.argmin(own))])
-    return late[0], late[1]
+            tried = lags[way] + np.arange(-reach, reach + step / 2, step)
+            shares = [left([t, lags[1]] if way == 0 else [lags[0], t]) for t in tried]
+            lags[way] = float(tried[int(np.argmin(shares))])
+    return lags[0], lags[1]
 
 
 def _main(course: Course) -> np.ndarray:
@@ -119,11 +119,11 @@ def _turns(course: Course) -> Iterator[tuple[int, float, np.ndarray]]:
         yield int(e), float(0.5 * (deep[0] + deep[-1])), course.reduced.time[course.reduced.episode == e]
 
 
-def _depth_before(course: Course, late: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Return the depth so long before each reading, never below 0, shape as ``late``."""
-    reduced, result = course.reduced, np.empty(len(kept))
-    for e in np.unique(reduced.episode[kept]):
-        rows, path = reduced.episode[kept] == e, course.episode == e
-        wanted = reduced.time[kept][rows] - late[rows]
-        result[rows] = np.interp(wanted, course.time[path], np.maximum(course.tip[path, 2], 0.0))
+def _depth_before(course: Course, lags: np.ndarray, selection: np.ndarray) -> np.ndarray:
+    """Return the depth so long before each reading, never below 0, shape as ``lags``."""
+    reduced, result = course.reduced, np.empty(len(selection))
+    for e in np.unique(reduced.episode[selection]):
+        rows, path = reduced.episode[selection] == e, course.episode == e
+        times = reduced.time[selection][rows] - lags[rows]
+        result[rows] = np.interp(times, course.time[path], np.maximum(course.tip[path, 2], 0.0))
     return result

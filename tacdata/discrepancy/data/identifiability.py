@@ -36,36 +36,36 @@ def lookalikes(course: Course, effect: Effect, values: Mapping[str, np.ndarray |
         values: Of its parameters, as far as they are known.
     """
     alike = _at_one_rate(course, effect, values)
-    others = [name for name in alike if name != effect.called] if effect.called in alike else []
+    rivals = [name for name in alike if name != effect.called] if effect.called in alike else []
     if _nearly_one(effect, values):
-        others += [name for name in _that(AtRest.CATCHES_UP) if name not in (effect.called, *others)]
+        rivals += [name for name in _that(AtRest.CATCHES_UP) if name not in (effect.called, *rivals)]
     if effect.grows_with is not None and _evenly_spaced(course):
-        others += sorted({e.called for e in library() if e.grows_with not in (None, effect.grows_with)})
-    return tuple(others)
+        rivals += sorted({e.called for e in library() if e.grows_with not in (None, effect.grows_with)})
+    return tuple(rivals)
 
 
 def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray | float]) -> list[str]:
     """Return the mechanisms that are indistinguishable at one rate; none if there are several rates."""
     if effect.at_rest is None or not one_rate(course):
         return []
-    known = {p.name: np.asarray(values.get(p.name, 0.0)) for p in effect.parameters}
-    hold, lag = longest_hold(course), max(effect.time_constant(known), effect.delay(known))
-    held = hold >= max(HOLD, effect.time_constant(known))
+    arrays = {p.name: np.asarray(values.get(p.name, 0.0)) for p in effect.parameters}
+    hold, lag = longest_hold(course), max(effect.time_constant(arrays), effect.delay(arrays))
+    is_held = hold >= max(HOLD, effect.time_constant(arrays))
     if (
         effect.at_rest is AtRest.CATCHES_UP
-        and effect.delay(known) >= 0
+        and effect.delay(arrays) >= 0
         and (stairs(course) or hold >= max(HOLD, OVER * lag))
     ):
         # At a stop it catches up, and is done: play stays behind there, a relaxing reading falls, a creeping one goes
         # on.
         return _that(AtRest.CATCHES_UP)
     if not stairs(course):
-        quick = effect.at_rest is AtRest.RELAXES and 0 < effect.time_constant(known) < QUICK * pressing_time(course)
-        slow = (AtRest.GOES_ON,) if held and not quick else (AtRest.GOES_ON, AtRest.RELAXES)
+        quick = effect.at_rest is AtRest.RELAXES and 0 < effect.time_constant(arrays) < QUICK * pressing_time(course)
+        slow = (AtRest.GOES_ON,) if is_held and not quick else (AtRest.GOES_ON, AtRest.RELAXES)
         return _that(AtRest.CATCHES_UP, AtRest.FALLS_BACK) + _that(AtRest.STAYS) + _that(*slow)
     if effect.at_rest in (AtRest.CATCHES_UP, AtRest.FALLS_BACK):
         return _that(AtRest.CATCHES_UP, AtRest.FALLS_BACK)
-    if held:
+    if is_held:
         return []
     if effect.at_rest is AtRest.STAYS:
         return [effect.called, *_that(AtRest.GOES_ON, AtRest.RELAXES)]
@@ -74,8 +74,8 @@ def _at_one_rate(course: Course, effect: Effect, values: Mapping[str, np.ndarray
 
 def _nearly_one(effect: Effect, values: Mapping[str, np.ndarray | float]) -> bool:
     """Return whether an effect is late by two times that hardly differ."""
-    late = [float(values.get(p.name, 0.0)) for p in effect.parameters if p.unit == "s"]
-    alike = len(late) == 2 and float(np.ptp(late)) < NEARLY_ONE * float(np.abs(late).max())
+    delays = [float(values.get(p.name, 0.0)) for p in effect.parameters if p.unit == "s"]
+    alike = len(delays) == 2 and float(np.ptp(delays)) < NEARLY_ONE * float(np.abs(delays).max())
     return alike and effect.at_rest is AtRest.CATCHES_UP
 
 
@@ -87,5 +87,5 @@ def _that(*kinds: AtRest) -> list[str]:
 def _evenly_spaced(course: Course) -> bool:
     """Return whether the number of presses at a place so far is collinear with the clock."""
     first = course.time[course.first]
-    before = np.array([np.sum(course.site[:k] == course.site[k]) for k in range(course.episodes)], dtype=float)
-    return bool(np.ptp(before) > 0 and np.corrcoef(before, first)[0, 1] > SAME_CLOCK)
+    counts = np.array([np.sum(course.site[:k] == course.site[k]) for k in range(course.episodes)], dtype=float)
+    return bool(np.ptp(counts) > 0 and np.corrcoef(counts, first)[0, 1] > SAME_CLOCK)

@@ -26,7 +26,7 @@ MOST_LISTED = 4
 
 def idle_lines(course: Course) -> list[str]:
     """Return in words which frequencies stand out of the readings without contact."""
-    windows, every = _windows(course)
+    windows, interval = _windows(course)
     if len(windows) < FEWEST:
         return []
     length = windows.shape[1]
@@ -36,27 +36,29 @@ def idle_lines(course: Course) -> list[str]:
     level = level - at[:, None] * (np.einsum("t,wtc->wc", at, level) / (at @ at))[:, None]
     power = np.square(np.abs(np.fft.rfft(level * shape[:, None], axis=1))).mean(axis=0)
     amplitude = 2 * np.sqrt(power) / shape.sum()
-    frequency = np.fft.rfftfreq(length, every)
+    frequency = np.fft.rfftfreq(length, interval)
     first = 3  # the trend and the window's own width lie below
     reduced = course.reduced
     rise = float(np.nanmax(np.nanquantile(reduced.readings, 0.999, axis=0) - np.nanmedian(windows, axis=(0, 1))))
     # The mean of n periodograms of noise is a chi square variable with 2 n degrees of freedom.
-    most = chi2.isf(CHANCE, 2 * len(windows)) / chi2.median(2 * len(windows))
-    found: dict[float, list[tuple[int, float]]] = {}
+    threshold = chi2.isf(CHANCE, 2 * len(windows)) / chi2.median(2 * len(windows))
+    groups: dict[float, list[tuple[int, float]]] = {}
     for channel in range(power.shape[1]):
-        own = power[first:, channel]
-        if not len(own):
+        spectrum = power[first:, channel]
+        if not len(spectrum):
             continue
-        top = int(np.argmax(own))
-        beside = np.concatenate([own[max(top - NEAR, 0) : max(top - 1, 0)], own[top + 2 : top + 1 + NEAR]])
+        top = int(np.argmax(spectrum))
+        neighbours = np.concatenate(
+            [spectrum[max(top - NEAR, 0) : max(top - 1, 0)], spectrum[top + 2 : top + 1 + NEAR]]
+        )
         strong = amplitude[first + top, channel]
         # Slow recovery after a press falls from the lowest frequency on: a line rises above it.
-        peak = top > 0 and len(beside) >= 3 and own[top] > most * np.median(beside)
+        peak = top > 0 and len(neighbours) >= 3 and spectrum[top] > threshold * np.median(neighbours)
         if peak and strong > LEAST * rise:
-            found.setdefault(float(frequency[first + top]), []).append((channel, float(strong)))
-    return [_said(course, hertz, lines, rise) for hertz, lines in sorted(found.items(), key=lambda one: -len(one[1]))][
-        :MOST_LISTED
-    ]
+            groups.setdefault(float(frequency[first + top]), []).append((channel, float(strong)))
+    return [
+        _said(course, hertz, lines, rise) for hertz, lines in sorted(groups.items(), key=lambda item: -len(item[1]))
+    ][:MOST_LISTED]
 
 
 def _said(course: Course, hertz: float, lines: list[tuple[int, float]], rise: float) -> str:
@@ -73,18 +75,18 @@ def _windows(course: Course) -> tuple[np.ndarray, float]:
     """Return evenly spaced readings without contact, shape (windows, length, channels), and their interval [s]."""
     reduced = course.reduced
     step = reduced.step[~reduced.first]
-    every = float(np.median(step)) if len(step) else 1.0
+    interval = float(np.median(step)) if len(step) else 1.0
     idle = (reduced.tip[:, 2] <= 0) & np.isfinite(reduced.readings).all(axis=1)
-    broken = ~idle | reduced.first | (np.abs(reduced.step - every) > EVEN * every)
+    broken = ~idle | reduced.first | (np.abs(reduced.step - interval) > EVEN * interval)
     edges = np.concatenate([np.flatnonzero(broken), [len(idle)]])
     # A reading that breaks a stretch may begin the next one.
     spans = [(a if idle[a] else a + 1, b) for a, b in pairwise(edges)]
     spans = [(a, b) for a, b in spans if b - a >= SHORTEST]
     if not spans:
-        return np.zeros((0, SHORTEST, reduced.channels)), every
+        return np.zeros((0, SHORTEST, reduced.channels)), interval
     usual = int(np.quantile([b - a for a, b in spans], 0.25))
     length = int(np.clip(2 ** int(np.log2(usual)), SHORTEST, LONGEST))
     starts = [a + k * length for a, b in spans for k in range((b - a) // length)]
     if not starts:
-        return np.zeros((0, length, reduced.channels)), every
-    return np.stack([reduced.readings[a : a + length] for a in starts]), every
+        return np.zeros((0, length, reduced.channels)), interval
+    return np.stack([reduced.readings[a : a + length] for a in starts]), interval

@@ -66,11 +66,11 @@ def resolved(tip_ns: np.ndarray, depth: np.ndarray, time_ns: np.ndarray) -> np.n
         return np.ones(len(time_ns), dtype=bool)
     step = np.maximum(np.diff(tip_ns) * 1e-9, 1e-12)
     speed = np.diff(depth) / step
-    turned = np.abs(np.diff(speed)) * np.minimum(step[1:], step[:-1])
-    corner = np.concatenate([[False], turned > CORNER * max(float(np.ptp(depth)), 1e-12), [False]])
-    beside = corner[1:] | corner[:-1]  # of each stretch between positions
-    at = np.clip(np.searchsorted(tip_ns, time_ns, side="right") - 1, 0, len(beside) - 1)
-    return ~beside[at]
+    changes = np.abs(np.diff(speed)) * np.minimum(step[1:], step[:-1])
+    corner = np.concatenate([[False], changes > CORNER * max(float(np.ptp(depth)), 1e-12), [False]])
+    excluded = corner[1:] | corner[:-1]  # of each stretch between positions
+    at = np.clip(np.searchsorted(tip_ns, time_ns, side="right") - 1, 0, len(excluded) - 1)
+    return ~excluded[at]
 
 
 def _sampled(time_ns: np.ndarray) -> bool:

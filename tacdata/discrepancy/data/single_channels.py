@@ -40,10 +40,10 @@ def odd_channels(course: Course, response: Response) -> list[str]:
     measured = [risen(reduced.readings[r]) for r in rows]
     expected = [risen(predicted[r]) for r in rows]
     swapped = _swaps(course, episodes, measured, expected)
-    turned = _turned(course, episodes, rows, measured)
-    taken, places = {*turned, *(c for pair in swapped for c in pair)}, [*turned.values(), *swapped.values()]
+    inversions = _turned(course, episodes, rows, measured)
+    excluded, places = {*inversions, *(c for pair in swapped for c in pair)}, [*inversions.values(), *swapped.values()]
     gains = press_gains(measured, expected)
-    return [*places, *_jumps_and_wanders(course, episodes, gains, taken)][:MOST_LISTED]
+    return [*places, *_jumps_and_wanders(course, episodes, gains, excluded)][:MOST_LISTED]
 
 
 def risen(values: np.ndarray) -> np.ndarray:
@@ -56,11 +56,11 @@ def _turned(course: Course, episodes: np.ndarray, rows: list[np.ndarray], measur
 
     A fitted response is of no help: it follows the mean of both signs. Slopes over depth are compared at each place.
     """
-    known, depth = [np.nan_to_num(m) for m in measured], course.reduced.tip[:, 2]
+    readings, depth = [np.nan_to_num(m) for m in measured], course.reduced.tip[:, 2]
     # About its mean: a press may begin with friction already.
     ways = [depth[r] - depth[r].mean() for r in rows]
-    peak = np.array([m.T @ way / max(float(np.linalg.norm(way)), 1e-9) for m, way in zip(known, ways, strict=True)])
-    place, steps = course.site[episodes], np.concatenate([np.abs(np.diff(m, axis=0)) for m in known])
+    peak = np.array([m.T @ way / max(float(np.linalg.norm(way)), 1e-9) for m, way in zip(readings, ways, strict=True)])
+    place, steps = course.site[episodes], np.concatenate([np.abs(np.diff(m, axis=0)) for m in readings])
     # A step between two readings has twice the variance of a reading's noise.
     noise = 1.4826 * np.median(steps, axis=0) / np.sqrt(2)
     words = {}
@@ -80,14 +80,14 @@ def _turned(course: Course, episodes: np.ndarray, rows: list[np.ndarray], measur
 def press_gains(measured: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
     """Return each channel's gain in each press [1], shape (presses, channels); NaN where a press hardly stirs it."""
     power = np.array([np.nansum(np.square(p), axis=0) for p in expected])
-    both = np.array([np.nansum(m * p, axis=0) for m, p in zip(measured, expected, strict=True)])
+    products = np.array([np.nansum(m * p, axis=0) for m, p in zip(measured, expected, strict=True)])
     peak = np.array([np.abs(p).max(axis=0) for p in expected])
     # A channel that no press stirs has no gain.
     strong = (peak >= STRONG * peak.max(axis=0)) & (power > 0)
-    gains = np.where(strong, both / np.where(strong, power, 1.0), np.nan)
+    gains = np.where(strong, products / np.where(strong, power, 1.0), np.nan)
     usual = np.full(gains.shape[1], np.nan)
-    known = strong.any(axis=0)
-    usual[known] = np.nanmedian(gains[:, known], axis=0)
+    stirred = strong.any(axis=0)
+    usual[stirred] = np.nanmedian(gains[:, stirred], axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return gains / usual
 
@@ -97,50 +97,50 @@ def _jumps_and_wanders(course: Course, episodes: np.ndarray, gains: np.ndarray, 
     if gains.shape[1] < 2:
         return []  # a channel without others cannot be compared: a change over the session may be an effect
     for channel in range(gains.shape[1]):
-        known = np.flatnonzero(np.isfinite(gains[:, channel]))
-        if len(known) < FEWEST or channel in left_out:
+        presses = np.flatnonzero(np.isfinite(gains[:, channel]))
+        if len(presses) < FEWEST or channel in left_out:
             continue
-        own, called = gains[known, channel], course.channel_names[channel]
-        others = _others(gains, channel)[known]
+        series, name = gains[presses, channel], course.channel_names[channel]
+        typical = _others(gains, channel)[presses]
         # The difference of two presses has twice the variance of one.
-        scatter = float(1.4826 * np.median(np.abs(np.diff(own) - np.median(np.diff(own)))) / np.sqrt(2))
-        begin, end = _longest(np.abs(own - 1) > max(LEAST_JUMP, JUMP_Z * scatter))
-        change = float(np.median(own[begin:end])) - 1 if end > begin else 0.0
-        if RUN <= end - begin <= len(own) // 2 and abs(np.median(others[begin:end]) - 1) < SHARED * abs(change):
-            first, last = (course.names[int(episodes[known[k]])] for k in (begin, end - 1))
-            healed = "and comes back" if end < len(own) else "to the end"
+        scatter = float(1.4826 * np.median(np.abs(np.diff(series) - np.median(np.diff(series)))) / np.sqrt(2))
+        begin, end = _longest(np.abs(series - 1) > max(LEAST_JUMP, JUMP_Z * scatter))
+        change = float(np.median(series[begin:end])) - 1 if end > begin else 0.0
+        if RUN <= end - begin <= len(series) // 2 and abs(np.median(typical[begin:end]) - 1) < SHARED * abs(change):
+            first, last = (course.names[int(episodes[presses[k]])] for k in (begin, end - 1))
+            healed = "and comes back" if end < len(series) else "to the end"
             words.append(
                 (
                     abs(change),
                     (
-                        f"{called}: reads {100 * abs(change):.0f} % {'more' if change > 0 else 'less'} "
+                        f"{name}: reads {100 * abs(change):.0f} % {'more' if change > 0 else 'less'} "
                         f"from {first} to {last} "
                         f"{healed}: look at its contact, or leave these presses out"
                     ),
                 )
             )
             continue
-        spread = float(np.ptp(_smooth(own)))
+        spread = float(np.ptp(_smooth(series)))
         # `_smooth` takes five presses together, so chance is smaller by the root of five.
-        if spread > max(LEAST_WANDER, WANDER_Z * scatter / np.sqrt(5)) and np.ptp(_smooth(others)) < SHARED * spread:
+        if spread > max(LEAST_WANDER, WANDER_Z * scatter / np.sqrt(5)) and np.ptp(_smooth(typical)) < SHARED * spread:
             words.append(
                 (
                     spread,
                     (
-                        f"{called}: its gain wanders by {100 * spread:.0f} % over the session, unlike the others': "
+                        f"{name}: its gain wanders by {100 * spread:.0f} % over the session, unlike the others': "
                         "look at its contact and its cable"
                     ),
                 )
             )
-    return [said for _, said in sorted(words, reverse=True)]
+    return [sentence for _, sentence in sorted(words, reverse=True)]
 
 
 def _others(gains: np.ndarray, channel: int) -> np.ndarray:
     """Return the median gain of all other channels [1], shape (presses,); 1 where none is stirred."""
-    rest = np.delete(gains, channel, axis=1)
-    known = np.isfinite(rest).any(axis=1)
+    remainder = np.delete(gains, channel, axis=1)
+    stirred = np.isfinite(remainder).any(axis=1)
     result = np.ones(len(gains))
-    result[known] = np.nanmedian(rest[known], axis=1)
+    result[stirred] = np.nanmedian(remainder[stirred], axis=1)
     return result
 
 
@@ -174,11 +174,15 @@ def _swaps(
     )
     for i in range(len(cross) and channels):
         for j in range(i + 1, channels):
-            own, other = cross[:, i, i] + cross[:, j, j], cross[:, i, j] + cross[:, j, i]
-            begin, end = _longest(other < SWAPPED * own)
-            rest = np.ones(len(own), dtype=bool)
-            rest[begin:end] = False
-            if end - begin >= RUN and rest.sum() >= RUN and own[rest].sum() < SWAPPED * other[rest].sum():
+            straight, crossed = cross[:, i, i] + cross[:, j, j], cross[:, i, j] + cross[:, j, i]
+            begin, end = _longest(crossed < SWAPPED * straight)
+            outside = np.ones(len(straight), dtype=bool)
+            outside[begin:end] = False
+            if (
+                end - begin >= RUN
+                and outside.sum() >= RUN
+                and straight[outside].sum() < SWAPPED * crossed[outside].sum()
+            ):
                 first, last = (course.names[int(episodes[k])] for k in (begin, end - 1))
                 names = course.channel_names
                 words[i, j] = (

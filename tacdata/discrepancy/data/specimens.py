@@ -41,19 +41,19 @@ def specimens(parts: Sequence[Rows], place: np.ndarray, channels: int) -> tuple[
     """
     result, words = place.copy(), []
     for where in np.unique(place):
-        own = np.flatnonzero(place == where)
-        group = _groups([parts[k] for k in own], channels)
+        index = np.flatnonzero(place == where)
+        group = _groups([parts[k] for k in index], channels)
         count = int(group.max()) + 1
         if count < 2:
             continue
         turns = int(np.count_nonzero(np.diff(group))) + 1
         if count == 2 and turns == 2:
             words.append(
-                f"{len(own)} presses of one place read as if of two specimens, one after the other: if they are two, "
+                f"{len(index)} presses of one place read as if of two specimens, one after the other: if they are two, "
                 "say which each press is of (`press: {specimen: ...}` in the import's mapping)"
             )
             continue
-        result[own[group > 0]] = result.max() + group[group > 0]
+        result[index[group > 0]] = result.max() + group[group > 0]
         sizes = ", ".join(str(int(n)) for n in np.bincount(group))
         words.append(
             f"presses of one place fall into {count} specimens by what they read at one depth ({sizes} presses): each "
@@ -78,10 +78,13 @@ def _groups(parts: Sequence[Rows], channels: int) -> np.ndarray:
     group = none.copy()
     group[deep] = number
     for k in np.setdiff1d(np.arange(len(parts)), deep):
-        own = 0.9 * float(deepest[k])
-        mine = np.log(max(_level(parts[k], own, channels), 1e-12))
+        level_depth = 0.9 * float(deepest[k])
+        stiffness = np.log(max(_level(parts[k], level_depth, channels), 1e-12))
         near = [
-            abs(mine - np.mean([np.log(max(_level(parts[i], own, channels), 1e-12)) for i in deep[number == n]]))
+            abs(
+                stiffness
+                - np.mean([np.log(max(_level(parts[i], level_depth, channels), 1e-12)) for i in deep[number == n]])
+            )
             for n in range(int(number.max()) + 1)
         ]
         group[k] = int(np.argmin(near))
@@ -101,9 +104,9 @@ def _apart(level: np.ndarray) -> np.ndarray:
     number[order] = np.repeat(np.arange(len(sizes)), sizes)
     within = max(float(np.ptp(level[number == k])) for k in range(len(sizes)))
     softer = bool(np.all(np.diff(number) <= 0))
-    least = FAR_APART if len(sizes) == 2 or (softer and len(sizes) < SURELY) else APART
-    wanted = within * (1.0 if len(sizes) >= SURELY else OVER_SCATTER)
-    return number if float(np.diff(level[order])[cuts].min()) >= max(wanted, least) else none
+    threshold = FAR_APART if len(sizes) == 2 or (softer and len(sizes) < SURELY) else APART
+    required = within * (1.0 if len(sizes) >= SURELY else OVER_SCATTER)
+    return number if float(np.diff(level[order])[cuts].min()) >= max(required, threshold) else none
 
 
 def _beside_rates(number: np.ndarray, rise: np.ndarray) -> bool:

@@ -17,10 +17,10 @@ def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
         time_ns: Times of the path [ns], shape (k,), int64.
         depth: Depth of the tip [mm], shape (k,).
     """
-    whole = (int(time_ns[0]), int(time_ns[-1]) + 1)
+    full_span = (int(time_ns[0]), int(time_ns[-1]) + 1)
     low, high = float(depth.min()), float(depth.max())
     if high - low <= 0:
-        return [whole]
+        return [full_span]
     share = (depth - low) / (high - low)
     tops, deep = [], False
     for i, value in enumerate(share.tolist()):
@@ -30,7 +30,7 @@ def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
         elif value < DOWN:
             deep = False
     if len(tops) < 2:
-        return [whole]
+        return [full_span]
     cuts = []
     for first, second in pairwise(tops):
         between = depth[first:second]
@@ -38,5 +38,5 @@ def strokes(time_ns: np.ndarray, depth: np.ndarray) -> list[tuple[int, int]]:
         # In the middle of the time at rest: idle readings before and after a stroke then belong to it.
         middle = first + int(lowest[len(lowest) // 2])
         cuts.append(int(time_ns[middle]))
-    edges = [whole[0], *cuts, whole[1]]
+    edges = [full_span[0], *cuts, full_span[1]]
     return list(pairwise(edges))

@@ -64,8 +64,8 @@ def one_rate(course: Course) -> bool:
 
 def _spread(rates: np.ndarray) -> float:
     """Return by which factor rates differ, the outermost tenths aside; 1 where none is known."""
-    known = rates[np.isfinite(rates)]
-    low, high = np.quantile(known, [0.1, 0.9]) if len(known) else (0.0, 0.0)
+    finite = rates[np.isfinite(rates)]
+    low, high = np.quantile(finite, [0.1, 0.9]) if len(finite) else (0.0, 0.0)
     return float(high / low) if low > 0 else 1.0
 
 
@@ -86,9 +86,9 @@ def units(course: Course) -> list[str]:
     if any(np.isfinite(t.radius) and t.radius > RADIUS for t in course.tools):
         remarks.append(f"an indenter of {max(t.radius for t in course.tools):.3g} mm radius: is it in mm?")
     reduced = course.reduced
-    every = float(np.median(reduced.step[~reduced.first])) if not reduced.first.all() else 0.0
-    if not EVERY[0] < every < EVERY[1]:
-        remarks.append(f"a reading every {every:.3g} s: are times in s?")
+    interval = float(np.median(reduced.step[~reduced.first])) if not reduced.first.all() else 0.0
+    if not EVERY[0] < interval < EVERY[1]:
+        remarks.append(f"a reading every {interval:.3g} s: are times in s?")
     return remarks
 
 
@@ -100,9 +100,9 @@ def stuck(course: Course) -> list[str]:
     for channel in np.flatnonzero(still.any(axis=0) & ~still.all(axis=0)):
         count = int(still[:, channel].sum())
         if count > 0.1 * len(episodes) and still[:, channel].mean() > 2 * np.median(still.mean(axis=0)):
-            called = course.channel_names[channel]
+            label = course.channel_names[channel]
             remarks.append(
-                f"{called}: the same reading throughout {count} of {len(episodes)} episodes: stuck at times; "
+                f"{label}: the same reading throughout {count} of {len(episodes)} episodes: stuck at times; "
                 "mend its contact, or leave it out"
             )
     for name, values in (("force", course.force), ("tag", None if course.tag is None else course.tag[:, 2])):
@@ -117,8 +117,8 @@ def _recovers(course: Course) -> bool:
         rows = np.flatnonzero(course.episode == e)
         top = rows[np.argmax(course.tip[rows, 2])]
         away = max(0.0, float(course.tip[rows, 2].min()) + 0.02 * course.stroke)
-        after = rows[(rows > top) & (course.tip[rows, 2] <= away)]
-        if len(after) > 1 and course.time[after[-1]] - course.time[after[0]] > 2.0:
+        recovery = rows[(rows > top) & (course.tip[rows, 2] <= away)]
+        if len(recovery) > 1 and course.time[recovery[-1]] - course.time[recovery[0]] > 2.0:
             return True
     return False
 

@@ -39,7 +39,7 @@ def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         While pressing and while letting go [mm/s], each of shape (episodes that touch,); NaN where it is not seen.
     """
-    least = max(course.span / LEVELS, CLEAR * course.dither)
+    spacing = max(course.span / LEVELS, CLEAR * course.dither)
     loading, unloading = [], []
     for e in range(course.episodes):
         rows = np.flatnonzero(course.episode == e)
@@ -47,26 +47,26 @@ def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
         if not len(rows) or depth.max() <= TOUCHING * course.span:
             continue
         top = int(np.argmax(depth))
-        loading.append(_speed(time[: top + 1], depth[: top + 1], TOUCHING * course.span, least))
+        loading.append(_speed(time[: top + 1], depth[: top + 1], TOUCHING * course.span, spacing))
         # Backwards in time the way out is a way in.
-        unloading.append(_speed(-time[top:][::-1], depth[top:][::-1], TOUCHING * course.span, least))
+        unloading.append(_speed(-time[top:][::-1], depth[top:][::-1], TOUCHING * course.span, spacing))
     return np.array(loading), np.array(unloading)
 
 
-def _speed(time: np.ndarray, depth: np.ndarray, low: float, least: float) -> float:
+def _speed(time: np.ndarray, depth: np.ndarray, low: float, spacing: float) -> float:
     """Return the speed at which a path first reaches levels of depth [mm/s]; NaN where it has none to reach."""
     reached = np.maximum.accumulate(depth)
     new = np.append(True, np.diff(reached) > 0)
     low = max(low, float(depth[0]))
-    count = min(LEVELS, int((reached[-1] - low) / least))
+    count = min(LEVELS, int((reached[-1] - low) / spacing))
     if count < 1:
         return np.nan
     levels = np.linspace(low, float(reached[-1]), count + 1)
     # A level is reached on the way from the row before, which may be long after the last new depth: not during a stop.
     at = np.flatnonzero(new)
-    before = np.maximum(at - 1, 0)
-    known_time = np.column_stack([time[before], time[at]]).ravel()
-    known_depth = np.column_stack([reached[before], reached[at]]).ravel()
+    lower = np.maximum(at - 1, 0)
+    known_time = np.column_stack([time[lower], time[at]]).ravel()
+    known_depth = np.column_stack([reached[lower], reached[at]]).ravel()
     passed = np.interp(levels, known_depth, known_time)
     took = np.diff(passed)
     took = took[took > 0]
@@ -122,14 +122,14 @@ def stairs(course: Course) -> bool:
 
 def _stops(time: np.ndarray, depth: np.ndarray, band: float) -> int:
     """Return how often a depth stays within a band for as long as a stop."""
-    found, begin = 0, 0
+    number, begin = 0, 0
     while begin < len(depth):
         outside = np.flatnonzero(np.abs(depth[begin:] - depth[begin]) > band)
         end = begin + int(outside[0]) if len(outside) else len(depth)
         stops = time[end - 1] - time[begin] >= STOP
-        found += bool(stops)
+        number += bool(stops)
         begin = end if stops else begin + 1
-    return found
+    return number
 
 
 def _within(time: np.ndarray, depth: np.ndarray, band: float) -> float:

@@ -37,20 +37,20 @@ def miswired(course: Course, response: Response) -> list[str]:
         return []
     read = course.reduced.readings[touched] - np.median(course.reduced.readings[~touched], axis=0)
     predicted = predicted[touched]
-    moved = np.abs(predicted).max(axis=0) > LEAST_MOTION * np.abs(predicted).max()
+    active = np.abs(predicted).max(axis=0) > LEAST_MOTION * np.abs(predicted).max()
     likeness = _likeness(read, predicted)
-    likeness[:, ~moved] = 0.0
-    own = np.diag(likeness)
-    turned = [int(k) for k in np.flatnonzero(moved & (own < INVERTED))]
-    words = [f"{course.channel_names[k]} reads the other way round: turn its sign" for k in turned]
-    likeness[turned] = np.abs(likeness[turned])
+    likeness[:, ~active] = 0.0
+    diagonal = np.diag(likeness)
+    inverted = [int(k) for k in np.flatnonzero(active & (diagonal < INVERTED))]
+    words = [f"{course.channel_names[k]} reads the other way round: turn its sign" for k in inverted]
+    likeness[inverted] = np.abs(likeness[inverted])
     # One-to-one, not the best for each channel: two channels of similar readings would both claim the same prediction.
     _, best = linear_sum_assignment(-likeness)
-    own = np.diag(likeness)
+    diagonal = np.diag(likeness)
     mismatched = [
         k
         for k in range(course.channels)
-        if moved[k] and moved[best[k]] and own[k] < POOR and likeness[k, best[k]] > own[k] + BETTER
+        if active[k] and active[best[k]] and diagonal[k] < POOR and likeness[k, best[k]] > diagonal[k] + BETTER
     ]
     return words + (_in_words(mismatched, best, course) if mismatched else [])
 
@@ -71,8 +71,8 @@ def _in_words(mismatched: list[int], best: np.ndarray, course: Course) -> list[s
             ("mirrored along y", (1, -1)),
             ("turned by 180 degrees", (-1, -1)),
         ):
-            there = middle + (centers - middle) * sign
-            mirror = np.argmin(np.linalg.norm(centers[None] - there[:, None], axis=2), axis=1)
+            mirrored = middle + (centers - middle) * sign
+            mirror = np.argmin(np.linalg.norm(centers[None] - mirrored[:, None], axis=2), axis=1)
             if len(mismatched) > 3 and np.mean(mirror[mismatched] == best[mismatched]) > 0.7:
                 return [f"the channels are {turn}: correct the order of channels, or how the sensor lies"]
     pairs = sorted({(min(k, int(best[k])), max(k, int(best[k]))) for k in mismatched if best[best[k]] == k})

@@ -70,12 +70,12 @@ class FittedResponse(Response):
         self._rows = [np.flatnonzero(self.context == k) for k in range(int(self.context.max()) + 1)]
         each = [reduced.readings[self._within(k)] for k in range(len(self._rows))]
         none = np.zeros(course.channels)
-        self._swings = np.stack([np.ptp(np.quantile(own, INNER, axis=0), axis=0) if len(own) else none for own in each])
+        self._swings = np.stack([np.ptp(np.quantile(y, INNER, axis=0), axis=0) if len(y) else none for y in each])
         streams = reduced.readings - self.idle
         self._has_force = course.force is not None
         if reduced.force is not None:
-            rows, there = np.arange(len(reduced.force)), np.isfinite(reduced.force)
-            filled = np.interp(rows, rows[there], reduced.force[there]) if there.any() else np.zeros(len(rows))
+            rows, measured = np.arange(len(reduced.force)), np.isfinite(reduced.force)
+            filled = np.interp(rows, rows[measured], reduced.force[measured]) if measured.any() else np.zeros(len(rows))
             streams = np.column_stack([streams, filled])
         self._shaken = np.zeros(streams.shape[1])
         count = knots or INTERVALS
@@ -94,20 +94,20 @@ class FittedResponse(Response):
 
     def copied(self) -> FittedResponse:
         """Return the same response, to be corrected by itself."""
-        other = copy.copy(self)
-        other._weights, other._designs, other._answers = [*self._weights], [*self._designs], [*self._answers]
-        return other
+        twin = copy.copy(self)
+        twin._weights, twin._designs, twin._answers = [*self._weights], [*self._designs], [*self._answers]
+        return twin
 
     def of_place(self, context: int, course: Course) -> FittedResponse:
         """Return it for another course, all of it at one of its places and tools."""
-        other = copy.copy(self)
-        other._bases, other._weights = [self._bases[context]], [self._weights[context]]
-        other._swings = self._swings[context : context + 1]
-        other._air = [self._air[context]]
-        vars(other).pop("air", None)  # that of all places
-        other.context, other._rows = np.zeros(course.rows, dtype=np.int64), [np.arange(course.rows)]  # ty: ignore[invalid-assignment]
-        other._course, other._read, other._designs, other._answers = course, np.arange(course.rows), [], []
-        return other
+        twin = copy.copy(self)
+        twin._bases, twin._weights = [self._bases[context]], [self._weights[context]]
+        twin._swings = self._swings[context : context + 1]
+        twin._air = [self._air[context]]
+        vars(twin).pop("air", None)  # that of all places
+        twin.context, twin._rows = np.zeros(course.rows, dtype=np.int64), [np.arange(course.rows)]  # ty: ignore[invalid-assignment]
+        twin._course, twin._read, twin._designs, twin._answers = course, np.arange(course.rows), [], []
+        return twin
 
     def load(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return readings above idle, shape (n, channels); rows must be the course's."""
@@ -115,8 +115,8 @@ class FittedResponse(Response):
 
     def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
         """Return the force as measured [N]; without one, the root mean square of the loads."""
-        both = self._both(pose)
-        return both[:, -1] if self._has_force else np.sqrt(np.mean(np.square(both), axis=1))
+        outputs = self._both(pose)
+        return outputs[:, -1] if self._has_force else np.sqrt(np.mean(np.square(outputs), axis=1))
 
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return readings, shape (n, channels)."""
@@ -177,10 +177,10 @@ class FittedResponse(Response):
             residual: As for `correct`.
             features: As for `correct`.
         """
-        left = np.nan_to_num(residual)
-        for k, of, own, more in self._corrections(residual, features):
-            left[self._within(k), of] -= own @ more
-        return left
+        remainder = np.nan_to_num(residual)
+        for k, of, block, more in self._corrections(residual, features):
+            remainder[self._within(k), of] -= block @ more
+        return remainder
 
     def _corrections(
         self, residual: np.ndarray, features: np.ndarray
@@ -191,11 +191,11 @@ class FittedResponse(Response):
         for k, basis in enumerate(self._bases):
             rows, count = self._within(k), len(basis.t) - basis.k - 1
             for of in parts:
-                own = (features[rows] if features.ndim == 2 else features[rows, of.start])[:, :count]
+                part = (features[rows] if features.ndim == 2 else features[rows, of.start])[:, :count]
                 more, _ = self._solve(
-                    rows, np.nan_to_num(residual[rows, of]), own, basis, self._smooth[k][of], self._weights[k][:, of]
+                    rows, np.nan_to_num(residual[rows, of]), part, basis, self._smooth[k][of], self._weights[k][:, of]
                 )
-                yield k, of, own, more
+                yield k, of, part, more
 
     def _fit(self, streams: np.ndarray) -> None:
         depth, self._weights, self._smooth = self._course.reduced.tip[:, 2], [], []
@@ -230,13 +230,13 @@ class FittedResponse(Response):
         monitor = np.mean([m / max(float(m.mean()), 1e-12) for m in each], axis=0)
         inner = len(basis.t) - 7
         share = BENT * monitor + 1 - BENT
-        whole = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
-        knots = np.interp(np.linspace(0, whole[-1], inner), whole, at)
-        kept = [low]
+        integral = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
+        knots = np.interp(np.linspace(0, integral[-1], inner), integral, at)
+        interior = [low]
         for knot in knots[1:-1]:
-            if np.searchsorted(depth, knot) - np.searchsorted(depth, kept[-1]) >= ROWS_EACH:
-                kept.append(float(knot))
-        ends = np.concatenate([[low] * 3, kept, [high] * 4])
+            if np.searchsorted(depth, knot) - np.searchsorted(depth, interior[-1]) >= ROWS_EACH:
+                interior.append(float(knot))
+        ends = np.concatenate([[low] * 3, interior, [high] * 4])
         return BSpline(ends, np.zeros(len(ends) - 4), 3)
 
     def _within(self, k: int) -> np.ndarray:
@@ -250,7 +250,7 @@ class FittedResponse(Response):
         design: np.ndarray,
         basis: BSpline,
         smooth: np.ndarray | None = None,
-        before: np.ndarray | float = 0.0,
+        start: np.ndarray | float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return spline weights, with an offset for every episode fitted as well and left out, and how smooth they are.
 
@@ -260,37 +260,37 @@ class FittedResponse(Response):
             design: Splines there, shape (k, splines).
             basis: Those splines.
             smooth: Weight of bending, shape (streams,); by restricted maximum likelihood (REML), unless given.
-            before: Weights that those returned are added to: together they should bend little.
+            start: Weights that those returned are added to: together they should bend little.
         """
         reduced, count = self._course.reduced, design.shape[1]
         episode = reduced.episode[rows]
-        own = (episode[:, None] == np.unique(episode)[None]).astype(float)
-        matrix = np.column_stack([design, own])
+        offsets = (episode[:, None] == np.unique(episode)[None]).astype(float)
+        matrix = np.column_stack([design, offsets])
         gram = matrix.T @ matrix
         scale = float(np.mean(np.diag(gram)))
         penalty = np.full(len(gram), RIDGE * scale)
         penalty[count:] = 1e-2 * scale  # offsets are small: the spline takes their common part
-        rough = np.zeros_like(gram)
-        rough[:count, :count] = _roughness(basis)
+        roughness = np.zeros_like(gram)
+        roughness[:count, :count] = _roughness(basis)
         # Both matrices are diagonal in these: one factorization for all weights of bending.
-        inner = np.linalg.inv(np.linalg.cholesky(gram + np.diag(penalty) + LEAST_SMOOTHING * scale * rough)).T
-        size, turn = np.linalg.eigh(inner.T @ rough @ inner)
-        size, across = np.maximum(size, 0.0), inner @ turn
-        target = across.T @ (matrix.T @ values)
+        inner = np.linalg.inv(np.linalg.cholesky(gram + np.diag(penalty) + LEAST_SMOOTHING * scale * roughness)).T
+        size, turn = np.linalg.eigh(inner.T @ roughness @ inner)
+        size, rotation = np.maximum(size, 0.0), inner @ turn
+        target = rotation.T @ (matrix.T @ values)
         already = np.zeros((len(gram), values.shape[1]))
-        already[:count] = before
-        bent = across.T @ (rough @ already)
+        already[:count] = start
+        bent = rotation.T @ (roughness @ already)
         if smooth is None:
             smooth = _smoothness(size, target, SLOPES * self._shaken**2)
-        weights = across @ ((target - smooth * bent) / (1 + size[:, None] * smooth))
+        weights = rotation @ ((target - smooth * bent) / (1 + size[:, None] * smooth))
         return weights[:count], smooth
 
     def _both(self, pose: np.ndarray) -> np.ndarray:
         if len(pose) != len(self.context):
             pose = np.broadcast_to(pose, (len(self.context), 3))
         depth = np.array(pose[:, 2])
-        for known, answer in reversed(self._answers):
-            if np.array_equal(known, depth):
+        for depths, answer in reversed(self._answers):
+            if np.array_equal(depths, depth):
                 return answer
         result = np.empty((len(pose), self._weights[0].shape[1]))
         for rows, design, air, weights in zip(
@@ -304,8 +304,8 @@ class FittedResponse(Response):
     def _designs_at(self, pose: np.ndarray) -> list[np.ndarray]:
         """Return each place's splines at depths of all rows. The last are kept: most effects move nothing."""
         depth = np.array(pose[:, 2])
-        for at, (known, designs) in enumerate(self._designs):
-            if np.array_equal(known, depth):
+        for at, (depths, designs) in enumerate(self._designs):
+            if np.array_equal(depths, depth):
                 self._designs.append(self._designs.pop(at))
                 return designs
         designs = [self._design(basis, depth[rows]) for basis, rows in zip(self._bases, self._rows, strict=True)]
@@ -344,12 +344,12 @@ def _roughness(basis: BSpline) -> np.ndarray:
     Plain ones take the end knots for evenly spaced: they bend a straight line there, to three times its slope. The unit
     is that of plain differences between evenly spaced knots.
     """
-    apart = np.diff((basis.t[1:-3] + basis.t[2:-2] + basis.t[3:-1]) / 3)
-    bend = np.zeros((len(apart) - 1, len(apart) + 1))
-    usual = float(np.median(apart))
-    for k, (before, after) in enumerate(pairwise(apart)):
-        scale = usual**1.5 / np.sqrt(0.5 * (before + after))
-        bend[k, k : k + 3] = scale / before, -scale / before - scale / after, scale / after
+    spacing = np.diff((basis.t[1:-3] + basis.t[2:-2] + basis.t[3:-1]) / 3)
+    bend = np.zeros((len(spacing) - 1, len(spacing) + 1))
+    usual = float(np.median(spacing))
+    for k, (first, second) in enumerate(pairwise(spacing)):
+        scale = usual**1.5 / np.sqrt(0.5 * (first + second))
+        bend[k, k : k + 3] = scale / first, -scale / first - scale / second, scale / second
     return bend.T @ bend
 
 
@@ -366,25 +366,25 @@ def _smoothness(size: np.ndarray, target: np.ndarray, noise: np.ndarray) -> np.n
     bends = (size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300))[:, None]
     smooth = np.ones(target.shape[1])
     for _ in range(REML_STEPS):
-        kept = 1 / (1 + size[:, None] * smooth)
-        bending = np.sum(size[:, None] * np.square(target * kept), axis=0)
-        smooth = np.clip(noise * np.sum(bends * kept, axis=0) / np.maximum(bending, 1e-300), 0.0, MOST_SMOOTHING)
+        shrinkage = 1 / (1 + size[:, None] * smooth)
+        bending = np.sum(size[:, None] * np.square(target * shrinkage), axis=0)
+        smooth = np.clip(noise * np.sum(bends * shrinkage, axis=0) / np.maximum(bending, 1e-300), 0.0, MOST_SMOOTHING)
     return smooth
 
 
-def _shaken(left: np.ndarray, course: Course) -> np.ndarray:
+def _shaken(trace: np.ndarray, course: Course) -> np.ndarray:
     """Return the noise of means of rows times the root of their number [each stream's unit], shape (streams,).
 
     Estimated by second differences of successive means of a response's residual; 0 where there are none.
     """
-    found = np.zeros((0, left.shape[1]))
-    for rows in np.split(np.arange(len(left)), np.flatnonzero(np.diff(course.episode)) + 1):
-        whole = len(rows) // BLOCK
-        if whole >= 3:
-            means = left[rows[: whole * BLOCK]].reshape(whole, BLOCK, -1).mean(axis=1)
-            found = np.concatenate([found, means[2:] - 2 * means[1:-1] + means[:-2]])
+    steps = np.zeros((0, trace.shape[1]))
+    for rows in np.split(np.arange(len(trace)), np.flatnonzero(np.diff(course.episode)) + 1):
+        blocks = len(rows) // BLOCK
+        if blocks >= 3:
+            means = trace[rows[: blocks * BLOCK]].reshape(blocks, BLOCK, -1).mean(axis=1)
+            steps = np.concatenate([steps, means[2:] - 2 * means[1:-1] + means[:-2]])
     # A second difference has 6 times the variance of a mean of BLOCK rows.
-    return 1.4826 * np.median(np.abs(found), axis=0) * np.sqrt(BLOCK / 6) if len(found) else np.zeros(left.shape[1])
+    return 1.4826 * np.median(np.abs(steps), axis=0) * np.sqrt(BLOCK / 6) if len(steps) else np.zeros(trace.shape[1])
 
 
 def about_means(residual: np.ndarray, course: Course) -> np.ndarray:
@@ -394,7 +394,7 @@ def about_means(residual: np.ndarray, course: Course) -> np.ndarray:
         residual: Of the rows read, shape (m, streams); NaN where nothing was read.
         course: Whose rows.
     """
-    known, episode = np.nan_to_num(residual), course.reduced.episode
+    finite, episode = np.nan_to_num(residual), course.reduced.episode
     into = csr_array((np.ones(len(episode)), (episode, np.arange(len(episode)))), shape=(course.episodes, len(episode)))
-    mean = (into @ known) / np.maximum(into.sum(axis=1), 1)[:, None]
-    return into @ np.square(known - mean[episode])
+    mean = (into @ finite) / np.maximum(into.sum(axis=1), 1)[:, None]
+    return into @ np.square(finite - mean[episode])

@@ -65,17 +65,22 @@ def response_curve(course: Course) -> ResponseCurve | None:
         return None
     power = sum(float(np.square(place.change[place.folds >= 0]).sum()) for place in places)
     tried = [_held_out(law, places) for law in laws()]
-    best = min((left for _, _, left in tried), key=np.sum)
-    law, numbers, left = min(
-        (one for one in tried if not _worse(one[2], best)), key=lambda one: (len(one[0].shapes) > 1, one[2].sum())
+    best = min((residuals for _, _, residuals in tried), key=np.sum)
+    law, numbers, residuals = min(
+        (trial for trial in tried if not _worse(trial[2], best)),
+        key=lambda trial: (len(trial[0].shapes) > 1, trial[2].sum()),
     )
-    if float(left.sum()) > FOLLOWS * power:
+    if float(residuals.sum()) > FOLLOWS * power:
         return None
     splines = min((np.concatenate([_splines(place, n) for place in places]) for n in INTERVALS), key=np.sum)
     low, high = np.quantile(numbers, MIDDLE, method="nearest")
     share = max(power, 1e-300)
     return ResponseCurve(
-        law, (float(low), float(high)), float(left.sum()) / share, float(splines.sum()) / share, _worse(left, splines)
+        law,
+        (float(low), float(high)),
+        float(residuals.sum()) / share,
+        float(splines.sum()) / share,
+        _worse(residuals, splines),
     )
 
 
@@ -101,10 +106,10 @@ class _Place:
 def _places(course: Course) -> Iterator[_Place]:
     """Give the places of a course whose episodes tell a law."""
     reduced = course.reduced
-    whole = np.isfinite(reduced.readings).all(axis=1)
+    complete = np.isfinite(reduced.readings).all(axis=1)
     context = contexts(reduced)
     for number in np.unique(context):
-        rows = whole & (context == number)
+        rows = complete & (context == number)
         _, episode = np.unique(reduced.episode[rows], return_inverse=True)
         count = int(episode.max(initial=-1)) + 1
         if count < EACH:
@@ -113,8 +118,8 @@ def _places(course: Course) -> Iterator[_Place]:
         np.maximum.at(deepest, episode, depth)
         folds = fold_of(count)
         # In a press deeper than all those fitted to, extrapolation would be compared, not the law.
-        others = np.array([deepest[folds != fold].max() for fold in folds])
-        folds = np.where(deepest <= others + DEEPER * np.abs(others), folds, -1)
+        reach = np.array([deepest[folds != fold].max() for fold in folds])
+        folds = np.where(deepest <= reach + DEEPER * np.abs(reach), folds, -1)
         yield _Place(depth, _centred(reduced.readings[rows], episode), episode, folds[episode])
 
 
@@ -125,31 +130,31 @@ def _centred(values: np.ndarray, episode: np.ndarray) -> np.ndarray:
     return values - (sums / np.bincount(episode)[:, None])[episode]
 
 
-def _worse(left: np.ndarray, best: np.ndarray) -> bool:
+def _worse(residuals: np.ndarray, best: np.ndarray) -> bool:
     """Return whether more is left of episodes than by the best, by over one standard error, shapes (episodes,)."""
-    more = left - best
+    more = residuals - best
     return float(more.mean()) > float(more.std(ddof=1) / np.sqrt(len(more)))
 
 
 def _held_out(law: ContactLaw, places: list[_Place]) -> tuple[ContactLaw, np.ndarray, np.ndarray]:
     """Return a law, its number in each channel of each place, and its residual of each left-out episode."""
     grid = [(touch, shape) for touch in TOUCHES for shape in law.shapes]
-    shapes, numbers, every = np.array([shape for _, shape in grid]), [], []
+    shapes, numbers, all_residuals = np.array([shape for _, shape in grid]), [], []
     for place in places:
         columns = np.stack([_risen(law, place.depth - touch, shape) for touch, shape in grid], axis=1)
         columns, channels = _centred(columns, place.episode), np.arange(place.change.shape[1])
-        left, chosen = np.zeros(int(place.episode.max()) + 1), []
+        residuals, choices = np.zeros(int(place.episode.max()) + 1), []
         for fold in np.unique(place.folds[place.folds >= 0]):
-            out = place.folds == fold
-            own = np.square(columns[~out]).sum(axis=0)[:, None]
-            factor = columns[~out].T @ place.change[~out] / np.maximum(own, 1e-300)
-            at = np.argmax(np.square(factor) * own, axis=0)
-            missed = place.change[out] - columns[out][:, at] * factor[at, channels]
-            left += np.bincount(place.episode[out], np.square(missed).sum(axis=1), minlength=len(left))
-            chosen.append(shapes[at])
-        every.append(left[place.asked])
-        numbers.append(np.median(chosen, axis=0) if chosen else np.zeros(0))
-    return law, np.concatenate(numbers), np.concatenate(every)
+            mask = place.folds == fold
+            power = np.square(columns[~mask]).sum(axis=0)[:, None]
+            factor = columns[~mask].T @ place.change[~mask] / np.maximum(power, 1e-300)
+            at = np.argmax(np.square(factor) * power, axis=0)
+            missed = place.change[mask] - columns[mask][:, at] * factor[at, channels]
+            residuals += np.bincount(place.episode[mask], np.square(missed).sum(axis=1), minlength=len(residuals))
+            choices.append(shapes[at])
+        all_residuals.append(residuals[place.asked])
+        numbers.append(np.median(choices, axis=0) if choices else np.zeros(0))
+    return law, np.concatenate(numbers), np.concatenate(all_residuals)
 
 
 def _risen(law: ContactLaw, depth: np.ndarray, shape: float) -> np.ndarray:
@@ -161,19 +166,19 @@ def _risen(law: ContactLaw, depth: np.ndarray, shape: float) -> np.ndarray:
 
 def _splines(place: _Place, intervals: int) -> np.ndarray:
     """Return the splines' residual of each left-out episode, shape (episodes asked,)."""
-    left = np.zeros(int(place.episode.max()) + 1)
+    residuals = np.zeros(int(place.episode.max()) + 1)
     for fold in np.unique(place.folds[place.folds >= 0]):
-        out = place.folds == fold
-        low, high = float(place.depth[~out].min()), float(place.depth[~out].max()) + 1e-9
+        mask = place.folds == fold
+        low, high = float(place.depth[~mask].min()), float(place.depth[~mask].max()) + 1e-9
         knots = np.r_[[low] * 3, np.linspace(low, high, intervals + 1), [high] * 3]
         basis = BSpline.design_matrix(np.clip(place.depth, low, high), knots, 3).toarray()
         columns = _centred(basis, place.episode)
-        gram = columns[~out].T @ columns[~out]
+        gram = columns[~mask].T @ columns[~mask]
         # B-splines sum to 1, centred ones to 0: without a ridge the matrix is singular.
         gram = gram + RIDGE * max(float(np.trace(gram)) / len(gram), 1e-300) * np.eye(len(gram))
-        missed = place.change[out] - columns[out] @ np.linalg.solve(gram, columns[~out].T @ place.change[~out])
-        left += np.bincount(place.episode[out], np.square(missed).sum(axis=1), minlength=len(left))
-    return left[place.asked]
+        missed = place.change[mask] - columns[mask] @ np.linalg.solve(gram, columns[~mask].T @ place.change[~mask])
+        residuals += np.bincount(place.episode[mask], np.square(missed).sum(axis=1), minlength=len(residuals))
+    return residuals[place.asked]
 
 
 def _percent(share: float) -> str:

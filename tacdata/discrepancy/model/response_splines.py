@@ -30,8 +30,8 @@ class SplineResponse(Response):
 
         Shape (n, splines + 1).
         """
-        there = self._response.basis(np.broadcast_to(pose, (len(self._response.context), 3)))
-        more = np.pad(there - self._response.air, ((0, 0), (0, 1)))
+        basis = self._response.basis(np.broadcast_to(pose, (len(self._response.context), 3)))
+        more = np.pad(basis - self._response.air, ((0, 0), (0, 1)))
         return self.force(pose, tool)[:, None] + self._weight * more
 
     def force(self, pose: np.ndarray, tool: np.ndarray) -> np.ndarray:
@@ -65,10 +65,10 @@ def taken_up(course: Course, response: Response, placed: Sequence[Placed]) -> np
     if not isinstance(response, FittedResponse) or not acting:
         return response.features(course.reduced)
     readings = _through(course, response, acting)
-    own = [p.effect.of_force(p.values) for p in acting]
-    if course.force is None or not any(own):
+    force_values = [p.effect.of_force(p.values) for p in acting]
+    if course.force is None or not any(force_values):
         return readings
-    force = [p if values is None else replace(p, values=values) for p, values in zip(acting, own, strict=True)]
+    force = [p if values is None else replace(p, values=values) for p, values in zip(acting, force_values, strict=True)]
     return np.stack([*[readings] * course.channels, _through(course, response, force)], axis=1)
 
 

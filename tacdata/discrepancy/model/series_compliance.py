@@ -53,12 +53,12 @@ class SeriesCompliance:
 
     def __str__(self) -> str:
         """Return it in words."""
-        before, after = (f"{100 * share:.2g} %" for share in self.left)
+        uncorrected, corrected = (f"{100 * share:.2g} %" for share in self.left)
         return (
             f"if the frame gives way by {self.compliance:.3g} +- {self.error:.1g} mm per unit of the load "
             f"({self.compliance * self.largest:.2g} mm at most), one law (depth to the power {self.power:.2g}) follows "
-            f"all {self.specimens} specimens: of the one that shows it most it misses {after} of the depth, "
-            f"{before} without"
+            f"all {self.specimens} specimens: of the one that shows it most it misses {corrected} of the depth, "
+            f"{uncorrected} without"
         )
 
 
@@ -69,38 +69,41 @@ def series_compliance(course: Course) -> SeriesCompliance | None:
     """
     presses = list(_presses(course))
     of = np.array([p.specimen for p in presses])
-    kept = [s for s in np.unique(of) if np.count_nonzero(of == s) >= EACH] if len(of) else []
-    presses = [p for p in presses if p.specimen in kept]
-    if len(kept) < SPECIMENS:
+    members = [s for s in np.unique(of) if np.count_nonzero(of == s) >= EACH] if len(of) else []
+    presses = [p for p in presses if p.specimen in members]
+    if len(members) < SPECIMENS:
         return None
     of = np.array([p.specimen for p in presses])
-    stiff = [float(np.median([p.stiffness for p in presses if p.specimen == s])) for s in kept]
+    stiff = [float(np.median([p.stiffness for p in presses if p.specimen == s])) for s in members]
     if max(stiff) < STIFFER * min(stiff):
         return None
-    made = np.array([[p.products(n) for n in POWERS] for p in presses])  # presses, powers, 3
-    noise = np.array([_noise(made[of == s], sum(len(p.load) for p in presses if p.specimen == s)) for s in kept])
-    made /= noise[np.searchsorted(kept, of)][:, None, None]
-    bare, (at, c) = int(np.argmin(made[:, :, 0].sum(axis=0))), _best(made)
-    without, with_it, own = made[:, bare, 0], _left(made[:, at], c), np.zeros(len(presses))
-    for s in kept:
-        own[of == s] = made[of == s][:, int(np.argmin(made[of == s, :, 0].sum(axis=0))), 0]
+    products = np.array([[p.products(n) for n in POWERS] for p in presses])  # presses, powers, 3
+    noise = np.array([_noise(products[of == s], sum(len(p.load) for p in presses if p.specimen == s)) for s in members])
+    products /= noise[np.searchsorted(members, of)][:, None, None]
+    bare, (at, c) = int(np.argmin(products[:, :, 0].sum(axis=0))), _best(products)
+    without, with_it, individual = products[:, bare, 0], _left(products[:, at], c), np.zeros(len(presses))
+    for s in members:
+        individual[of == s] = products[of == s][:, int(np.argmin(products[of == s, :, 0].sum(axis=0))), 0]
     count = len(presses)
-    each = np.array([_best(np.delete(made, k, axis=0))[1] for k in range(count)])
+    each = np.array([_best(np.delete(products, k, axis=0))[1] for k in range(count)])
     # The jackknife over presses, as readings of one press are correlated.
     error = float(np.sqrt((count - 1) / count * np.square(each - each.mean()).sum()))
-    better, worse, chance = without - with_it, with_it - own, sum(len(p.load) - 2 for p in presses)
-    shown = 0 < with_it.sum() - chance <= (1 - CLOSES) * (without.sum() - chance) or with_it.sum() <= chance
+    better, worse, chance = without - with_it, with_it - individual, sum(len(p.load) - 2 for p in presses)
+    is_visible = 0 < with_it.sum() - chance <= (1 - CLOSES) * (without.sum() - chance) or with_it.sum() <= chance
     # Where a power of each specimen's own explains more, the specimens differ by their law.
     differ = worse.mean() > worse.std(ddof=1) / np.sqrt(count)
-    most = max(kept, key=lambda s: float(better[of == s].sum()))
+    clearest = max(members, key=lambda s: float(better[of == s].sum()))
     # Noise in the load bends all curves a little: one specimen at least must show it plainly.
-    plain = with_it[of == most].sum() <= (1 - CLOSES) * without[of == most].sum()
+    plain = with_it[of == clearest].sum() <= (1 - CLOSES) * without[of == clearest].sum()
     # A power at the end of the grid is a bound, not an optimum: the law is then another one.
-    if not (shown and plain) or differ or c < SURE * error or not 0 < at < len(POWERS) - 1:
+    if not (is_visible and plain) or differ or c < SURE * error or not 0 < at < len(POWERS) - 1:
         return None
-    much = noise[kept.index(most)] / sum(p.change for p in presses if p.specimen == most)
-    left = (float(np.sqrt(without[of == most].sum() * much)), float(np.sqrt(with_it[of == most].sum() * much)))
-    return SeriesCompliance(c, error, max(p.largest for p in presses), float(POWERS[at]), len(kept), left)
+    factor = noise[members.index(clearest)] / sum(p.change for p in presses if p.specimen == clearest)
+    depths = (
+        float(np.sqrt(without[of == clearest].sum() * factor)),
+        float(np.sqrt(with_it[of == clearest].sum() * factor)),
+    )
+    return SeriesCompliance(c, error, max(p.largest for p in presses), float(POWERS[at]), len(members), depths)
 
 
 @dataclass(frozen=True)
@@ -131,9 +134,13 @@ class _Press:
     def products(self, power: float) -> tuple[float, float, float]:
         """Return z.z, z.F and F.F: depth z and load F given the press's own touch and factor of a power law."""
         law = np.stack([np.ones_like(self.load), self.load ** (1 / power)], axis=1)
-        both = np.stack([self.depth, self.load], axis=1)
-        left = both - law @ np.linalg.lstsq(law, both, rcond=None)[0]
-        return float(left[:, 0] @ left[:, 0]), float(left[:, 0] @ left[:, 1]), float(left[:, 1] @ left[:, 1])
+        pair = np.stack([self.depth, self.load], axis=1)
+        residual = pair - law @ np.linalg.lstsq(law, pair, rcond=None)[0]
+        return (
+            float(residual[:, 0] @ residual[:, 0]),
+            float(residual[:, 0] @ residual[:, 1]),
+            float(residual[:, 1] @ residual[:, 1]),
+        )
 
 
 def _left(products: np.ndarray, c: float) -> np.ndarray:
@@ -141,21 +148,21 @@ def _left(products: np.ndarray, c: float) -> np.ndarray:
     return products[:, 0] - 2 * c * products[:, 1] + c**2 * products[:, 2]
 
 
-def _noise(made: np.ndarray, count: int) -> float:
+def _noise(products: np.ndarray, count: int) -> float:
     """Return the mean square of one specimen given the power and compliance that fit it best [mm^2].
 
     Args:
-        made: Products of its presses, shape (presses, powers, 3).
+        products: Products of its presses, shape (presses, powers, 3).
         count: How many values are behind them.
     """
-    total = made.sum(axis=0)
-    least = float((total[:, 0] - total[:, 1] ** 2 / np.maximum(total[:, 2], 1e-300)).min())
-    return max(least / max(count - 2 * len(made) - 2, 1), 1e-16)
+    total = products.sum(axis=0)
+    smallest = float((total[:, 0] - total[:, 1] ** 2 / np.maximum(total[:, 2], 1e-300)).min())
+    return max(smallest / max(count - 2 * len(products) - 2, 1), 1e-16)
 
 
-def _best(made: np.ndarray) -> tuple[int, float]:
+def _best(products: np.ndarray) -> tuple[int, float]:
     """Return the power's number and the compliance that fit presses best, shape (presses, powers, 3)."""
-    total = made.sum(axis=0)
+    total = products.sum(axis=0)
     each = total[:, 1] / np.maximum(total[:, 2], 1e-300)
     at = int(np.argmin(total[:, 0] - each * total[:, 1]))
     return at, float(each[at])
@@ -167,23 +174,23 @@ def _presses(course: Course) -> list[_Press]:
     load = rows.force if rows.force is not None else rows.readings[:, 0] if course.channels == 1 else None
     if load is None:
         return []
-    specimen, found = contexts(rows), []
+    specimen, result = contexts(rows), []
     for e in range(course.episodes):
-        own = np.flatnonzero((rows.episode == e) & np.isfinite(load))
-        if len(own) < BINS:
+        indices = np.flatnonzero((rows.episode == e) & np.isfinite(load))
+        if len(indices) < BINS:
             continue
-        depth = rows.tip[own, 2]
+        depth = rows.tip[indices, 2]
         idle = depth <= depth.min() + IDLE * np.ptp(depth)
-        air = load[own][idle]
-        rise = load[own] - np.median(air)
+        air = load[indices][idle]
+        rise = load[indices] - np.median(air)
         # Test machines count compression as positive or as negative.
         rise = rise * np.sign(rise[np.argmax(np.abs(rise))])
-        down = np.arange(len(own)) <= int(np.argmax(depth))
+        down = np.arange(len(indices)) <= int(np.argmax(depth))
         loaded = down & (rise >= max(BEGINS * rise.max(), NOISE * float(air.std())))
         step = np.minimum((rise[loaded] / max(float(rise.max()), 1e-300) * BINS).astype(int), BINS - 1)
         count = np.bincount(step, minlength=BINS)
         if np.count_nonzero(count) < BINS // 2:
             continue
         mean = [np.bincount(step, v[loaded], minlength=BINS)[count > 0] / count[count > 0] for v in (depth, rise)]
-        found.append(_Press(int(specimen[own[0]]), *mean))
-    return found
+        result.append(_Press(int(specimen[indices[0]]), *mean))
+    return result

@@ -47,11 +47,11 @@ class Spec:
         placed = []
         for entry in self.document["effects"]:
             effect = load(entry["effect"])
-            wanted = {p.name for p in effect.parameters}
-            if set(entry["values"]) != wanted:
+            names = {p.name for p in effect.parameters}
+            if set(entry["values"]) != names:
                 raise FormatError(
                     f"model spec: {effect.name} with {', '.join(entry['values']) or 'no values'}",
-                    ", ".join(sorted(wanted)),
+                    ", ".join(sorted(names)),
                     "correct values",
                 )
             placed.append(Placed(effect, {name: np.array(value, float) for name, value in entry["values"].items()}))
@@ -63,16 +63,16 @@ class Spec:
         Raises:
             FormatError: If the table does not fit the course.
         """
-        given = self.document["response"]
-        if given["kind"] == "fitted":
+        entry = self.document["response"]
+        if entry["kind"] == "fitted":
             return FittedResponse(course)
-        if given["kind"] == "recordings":
+        if entry["kind"] == "recordings":
             raise FormatError(
                 "model spec: response of kind recordings, a healthy machine's sessions",
                 "fitted or table",
                 "compare with them by `tacdata discrepancy SESSION --spec SPEC --out DIR`",
             )
-        table = TableResponse.read(self.folder / given.get("file", ""))
+        table = TableResponse.read(self.folder / entry.get("file", ""))
         if len(table.gain) != course.channels:
             raise FormatError(
                 f"a response table of {len(table.gain)} channels, recordings of {course.channels}",
@@ -96,13 +96,13 @@ class Spec:
         """Return the document of the next version."""
         entries = [
             {
-                "effect": one.effect.name,
-                "stage": one.stage,
-                "values": {name: np.asarray(value).tolist() for name, value in one.values.items()},
+                "effect": member.effect.name,
+                "stage": member.stage,
+                "values": {name: np.asarray(value).tolist() for name, value in member.values.items()},
                 "error": {name: float(value) for name, value in error.items()},
                 "evidence": evidence,
             }
-            for one, error in zip(placed, errors, strict=True)
+            for member, error in zip(placed, errors, strict=True)
         ]
         return {**self.document, "parent": self.content_hash, "effects": [*self.document["effects"], *entries]}
 

@@ -57,81 +57,81 @@ class EpisodeErrors:
         """Return the noise besides errors of pose, shape (m, streams, kinds)."""
         course, relative = self.course, readings.relative_scale(self.residual, self.rise, self.course)
         residual = readings.beside_depth(self.residual, course)
-        known = readings.first_guess(residual, course, relative)
+        estimate = readings.first_guess(residual, course, relative)
         columns = np.concatenate([residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
         for _ in range(2):
-            best = self._best(columns, Whitener(course, known, self.context, self.features, errors))
-            left = (residual - self.rich @ best.astype(np.float32)) / known.scale
-            still = readings.still(known, left.shape[1])
-            whitener = Whitener(course, still, self.context, self.features, errors / known.scale[None, :, None])
-            bare = whitener.whitened(left[:, :, None])[:, :, 0]
+            best = self._best(columns, Whitener(course, estimate, self.context, self.features, errors))
+            standardized = (residual - self.rich @ best.astype(np.float32)) / estimate.scale
+            still = readings.still(estimate, standardized.shape[1])
+            whitener = Whitener(course, still, self.context, self.features, errors / estimate.scale[None, :, None])
+            bare = whitener.whitened(standardized[:, :, None])[:, :, 0]
             bare[~np.isfinite(residual)] = np.nan
-            known = readings.refined(bare * known.scale, course, known)
-        rest = residual - self.rich @ best.astype(np.float32)
+            estimate = readings.refined(bare * estimate.scale, course, estimate)
+        remainder = residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
-        process = offset_process(rest, course, known.scale, known.memory, kinds)
-        rate = offset_random_walk.walk_rate(rest, course, known.scale, known.memory, self._repeats)
-        walk = offset_random_walk.modes(rate, course, known.memory)
-        tag = readings.tag_offset_spread(rest, course, known)
-        return replace(known, offsets=process, random_walk=walk, walk_rate=rate, tag=tag)
+        process = offset_process(remainder, course, estimate.scale, estimate.memory, kinds)
+        rate = offset_random_walk.walk_rate(remainder, course, estimate.scale, estimate.memory, self._repeats)
+        walk = offset_random_walk.modes(rate, course, estimate.memory)
+        tag = readings.tag_offset_spread(remainder, course, estimate)
+        return replace(estimate, offsets=process, random_walk=walk, walk_rate=rate, tag=tag)
 
-    def left(self, known: Noise, errors: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
+    def left(self, noise: Noise, errors: np.ndarray, counts: np.ndarray | None = None) -> np.ndarray:
         """Return the residual of an over-rich fit, shape (m, streams), float32.
 
         Its weights hardly depend on the sizes of the errors fitted with it: one fit serves all their estimates.
 
         Args:
-            known: Noise.
+            noise: Noise.
             errors: Of pose, shape (m, streams, kinds).
             counts: Weight of each episode, shape (episodes,); equal, unless given.
         """
         columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
-        best = self._best(columns, Whitener(self.course, known, self.context, self.features, errors), counts)
+        best = self._best(columns, Whitener(self.course, noise, self.context, self.features, errors), counts)
         return (self.residual - self.rich @ best.astype(np.float32)).astype(np.float32)
 
-    def poses(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> ErrorSizes:
+    def poses(self, noise: Noise, errors: np.ndarray, residual: np.ndarray) -> ErrorSizes:
         """Return the estimated size of episodes' own errors of pose.
 
         A difference that depends on place, depth, rate or session is no error of an episode's own: those that repeat
         one another have a mean of their own. Where places are not visited again, a few successive episodes have one.
 
         Args:
-            known: Noise, with the errors of an episode's gains.
+            noise: Noise, with the errors of an episode's gains.
             errors: Effect of errors of one standard deviation of their prior, shape (m, streams, kinds).
-            left: Residual of an over-rich fit, shape (m, streams).
+            residual: Residual of an over-rich fit, shape (m, streams).
         """
         course, kinds, place = self.course, errors.shape[2], self._places()
-        plain = Whitener(course, known, self.context, self.features, np.zeros_like(errors[:, :, :1]))
-        told = plain.joint_scores(left, errors)
-        there = np.sort(np.concatenate([run.episodes for run in told]))
+        plain = Whitener(course, noise, self.context, self.features, np.zeros_like(errors[:, :, :1]))
+        scores = plain.joint_scores(residual, errors)
+        episodes = np.sort(np.concatenate([run.episodes for run in scores]))
         groups, places = [self._repeats, course.session], [place, course.session]
-        if _freedom(there, groups) < readings.FEWEST_GAPS:
+        if _freedom(episodes, groups) < readings.FEWEST_GAPS:
             number = np.zeros(course.episodes, dtype=np.int64)
-            number[there] = np.arange(len(there)) // TOGETHER
-            told, groups, places = one_by_one(told), [number], [number]
+            number[episodes] = np.arange(len(episodes)) // TOGETHER
+            scores, groups, places = one_by_one(scores), [number], [number]
         counts = np.ones(course.episodes)
-        if _freedom(there, groups) < readings.FEWEST_GAPS:
+        if _freedom(episodes, groups) < readings.FEWEST_GAPS:
             return ErrorSizes(np.ones(kinds), np.zeros(0, dtype=np.int64), counts)
-        told = together(told)
-        estimated = components(told, groups, LEAST_SIZE, MOST_SIZE).sizes
+        scores = together(scores)
+        estimated = components(scores, groups, LEAST_SIZE, MOST_SIZE).sizes
         # Few repeat one another: an odd episode among them makes the size that hides it. A place has more.
-        each = components(told, places, LEAST_SIZE, MOST_SIZE)
+        each = components(scores, places, LEAST_SIZE, MOST_SIZE)
         spread = each.unsure + np.diag(np.square(np.minimum(estimated, each.sizes)))
         far = np.einsum("ek,ek->e", each.own, np.linalg.solve(spread, each.own[:, :, None])[:, :, 0])
         counts[each.episodes] = each.counts
         return ErrorSizes(estimated, np.sort(each.episodes[far > ODD_Z**2]), counts)
 
-    def gains(self, known: Noise, errors: np.ndarray, left: np.ndarray) -> float:
+    def gains(self, noise: Noise, errors: np.ndarray, residual: np.ndarray) -> float:
         """Return how far an episode's gain of a stream is off the next one's that repeats it [1].
 
         Args:
-            known: Noise without own gains.
+            noise: Noise without own gains.
             errors: Of pose, shape (m, streams, kinds).
-            left: Residual of an over-rich fit, shape (m, streams).
+            residual: Residual of an over-rich fit, shape (m, streams).
         """
-        whitener = Whitener(self.course, known, self.context, self.features, errors)
-        score, information = whitener.stream_scores(left, self.rise)
+        whitener = Whitener(self.course, noise, self.context, self.features, errors)
+        score, information = whitener.stream_scores(residual, self.rise)
         return readings.gain_spread(score, information, self._repeats)
 
     @cached_property
@@ -148,8 +148,8 @@ class EpisodeErrors:
         count = self.rich.shape[2]
         each = whitener.episode_grams(columns).gram
         gram = each.sum(axis=0) if counts is None else np.einsum("e,eij->ij", counts, each)
-        free = np.full(count, np.inf)
-        return solve(gram, np.arange(count), np.ones(count), -free, free)
+        bounds = np.full(count, np.inf)
+        return solve(gram, np.arange(count), np.ones(count), -bounds, bounds)
 
 
 def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray]:

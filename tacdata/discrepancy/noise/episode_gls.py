@@ -56,31 +56,33 @@ class JointScores:
 class FactoredErrors:
     """Factored covariance of the episodes of one place: whitens any columns."""
 
-    def __init__(self, spans: Sequence[slice], own: EpisodeErrorModel, like: FactoredErrors | None = None) -> None:
+    def __init__(
+        self, spans: Sequence[slice], model: EpisodeErrorModel, reference: FactoredErrors | None = None
+    ) -> None:
         """Factor the error covariance of episodes, each given by its rows.
 
         Args:
             spans: Rows of each episode.
-            own: Their random effects.
-            like: Errors with the same offsets and random walks, which are not factored again.
+            model: Their random effects.
+            reference: Errors with the same offsets and random walks, which are not factored again.
         """
-        gain_error = None if own.gain_error is None else own.gain_error[:, :, None]
-        parts = {"pose": own.pose_errors, "gain": gain_error}
-        given = {name: value for name, value in parts.items() if value is not None}
-        edges = np.cumsum([value.shape[2] for value in given.values()])[:-1]
-        stacked = np.concatenate([*given.values()], axis=2) if given else None
-        self._free = None if own.features is None else _Free(len(own.offset), own.features.shape[2])
+        gain_error = None if model.gain_error is None else model.gain_error[:, :, None]
+        parts = {"pose": model.pose_errors, "gain": gain_error}
+        arrays = {name: value for name, value in parts.items() if value is not None}
+        edges = np.cumsum([value.shape[2] for value in arrays.values()])[:-1]
+        stacked = np.concatenate([*arrays.values()], axis=2) if arrays else None
+        self._free = None if model.features is None else _Free(len(model.offset), model.features.shape[2])
         self._episodes: list[tuple[slice, _Offsets, _Errors]] = []
-        known = [None] * len(spans) if like is None else [offsets for _, offsets, _ in like._episodes]
-        for rows, prior, before in zip(spans, own.prior, known, strict=True):
-            modes = None if own.random_walk is None else own.random_walk[:, rows]
-            offsets, rest = before or _Offsets(own.offset[:, rows, None], float(prior), modes), {}
+        cache = [None] * len(spans) if reference is None else [offsets for _, offsets, _ in reference._episodes]
+        for rows, prior, entry in zip(spans, model.prior, cache, strict=True):
+            modes = None if model.random_walk is None else model.random_walk[:, rows]
+            offsets, roots = entry or _Offsets(model.offset[:, rows, None], float(prior), modes), {}
             if stacked is not None:
-                rest = dict(zip(given, np.split(offsets.rooted(stacked[:, rows]), edges, axis=2), strict=True))
-            errors = _Errors(len(own.offset), rows.stop - rows.start, rest.get("pose"), rest.get("gain"))
+                roots = dict(zip(arrays, np.split(offsets.rooted(stacked[:, rows]), edges, axis=2), strict=True))
+            errors = _Errors(len(model.offset), rows.stop - rows.start, roots.get("pose"), roots.get("gain"))
             self._episodes.append((rows, offsets, errors))
-            if self._free is not None and own.features is not None:
-                self._free.take(offsets.rooted(own.features[:, rows]), errors)
+            if self._free is not None and model.features is not None:
+                self._free.take(offsets.rooted(model.features[:, rows]), errors)
         if self._free is not None:
             self._free.factor()
 
@@ -96,9 +98,9 @@ class FactoredErrors:
             columns: Whitened, shape (streams, n, k).
         """
         for rows, offsets, errors in self._episodes:
-            own = columns[:, rows]
-            own -= offsets.part(own)
-            own -= errors.part(own)
+            block = columns[:, rows]
+            block -= offsets.part(block)
+            block -= errors.part(block)
         self.project(columns)
 
     def project(self, white: np.ndarray) -> None:
@@ -109,55 +111,55 @@ class FactoredErrors:
         for k, (rows, _, _) in enumerate(self._episodes):
             white[:, rows] -= self._free.fitted(k, weights)
 
-    def joint_scores(self, left: np.ndarray, columns: np.ndarray) -> list[JointScores]:
+    def joint_scores(self, residual: np.ndarray, columns: np.ndarray) -> list[JointScores]:
         """Return scores and information of columns of which each episode has its own, episodes of a run together.
 
         Args:
-            left: A residual, as `without` returns it, shape (streams, n).
+            residual: A residual, as `without` returns it, shape (streams, n).
             columns: Whitened, shape (streams, n, k).
         """
         runs = []
         for first in range(0, len(self._episodes), MOST_TOGETHER):
             scores, powers, rights = [], [], []
             for k, (rows, offsets, errors) in enumerate(self._episodes[first : first + MOST_TOGETHER], first):
-                own, rest = offsets.rooted(columns[:, rows]), left[:, rows]
-                inner = errors.inner(own)
-                turned = np.linalg.solve(np.eye(len(errors.gram)) + errors.gram, inner)
-                pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
-                scores.append(np.einsum("smk,sm->k", own, rest, dtype=np.float64) - inner.T @ pulled)
-                flat = own.reshape(-1, own.shape[2]).astype(np.float64)
-                powers.append(flat.T @ flat - inner.T @ turned)
+                rooted_columns, segment = offsets.rooted(columns[:, rows]), residual[:, rows]
+                inner = errors.inner(rooted_columns)
+                solution = np.linalg.solve(np.eye(len(errors.gram)) + errors.gram, inner)
+                pull = errors.root @ errors.inner(segment[:, :, None])[:, 0]
+                scores.append(np.einsum("smk,sm->k", rooted_columns, segment, dtype=np.float64) - inner.T @ pull)
+                flat = rooted_columns.reshape(-1, rooted_columns.shape[2]).astype(np.float64)
+                powers.append(flat.T @ flat - inner.T @ solution)
                 if self._free is not None:
-                    rights.append(self._free.right(k, own, turned))
+                    rights.append(self._free.right(k, rooted_columns, solution))
             information = block_diag(*powers)
             if self._free is not None:
                 information = information - self._free.taken_of_all(np.concatenate(rights, axis=2))
             runs.append(JointScores(np.arange(first, first + len(scores)), np.array(scores), information))
         return runs
 
-    def stream_scores(self, left: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def stream_scores(self, residual: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return scores and information of columns that each stand in one stream of one episode.
 
         Like the products with the columns that `without` returns, but for streams times episodes of them at once.
         Streams must not have gains of their own as well.
 
         Args:
-            left: A residual, as `without` returns it, shape (streams, n).
-            alone: The columns of all streams and episodes, whitened, shape (streams, n).
+            residual: A residual, as `without` returns it, shape (streams, n).
+            columns: The columns of all streams and episodes, whitened, shape (streams, n).
 
         Returns:
             Scores and information, shapes (episodes, streams).
         """
-        scores, known = [], []
+        scores, information = [], []
         for k, (rows, offsets, errors) in enumerate(self._episodes):
-            own, rest = offsets.rooted(alone[:, rows, None])[:, :, 0], left[:, rows]
-            pose = errors.of_each(own)
-            pulled = errors.root @ errors.inner(rest[:, :, None])[:, 0]
-            turned = pose @ np.linalg.inv(np.eye(len(errors.gram)) + errors.gram)
-            scores.append(np.einsum("sm,sm->s", own, rest) - pose @ pulled)
-            power = np.einsum("sm,sm->s", own, own) - np.einsum("sk,sk->s", turned, pose)
-            known.append(power if self._free is None else power - self._free.taken(k, own, turned))
-        return np.array(scores), np.array(known)
+            rooted_columns, segment = offsets.rooted(columns[:, rows, None])[:, :, 0], residual[:, rows]
+            pose = errors.of_each(rooted_columns)
+            pull = errors.root @ errors.inner(segment[:, :, None])[:, 0]
+            solution = pose @ np.linalg.inv(np.eye(len(errors.gram)) + errors.gram)
+            scores.append(np.einsum("sm,sm->s", rooted_columns, segment) - pose @ pull)
+            power = np.einsum("sm,sm->s", rooted_columns, rooted_columns) - np.einsum("sk,sk->s", solution, pose)
+            information.append(power if self._free is None else power - self._free.taken(k, rooted_columns, solution))
+        return np.array(scores), np.array(information)
 
 
 class _Offsets:
@@ -174,12 +176,12 @@ class _Offsets:
         else:
             constant = prior * offset
         self._columns = np.concatenate([constant, modes], axis=2)
-        turned = self._columns.transpose(0, 2, 1)
-        root = _root(turned.astype(np.float64) @ self._columns)
+        transposed = self._columns.transpose(0, 2, 1)
+        root = _root(transposed.astype(np.float64) @ self._columns)
         if np.isinf(prior):  # unpenalized directions are projected out
             root[:, 0], root[:, :, 0] = 0.0, 0.0
             root[:, 0, 0] = 1.0
-        self._pull = (root @ turned).astype(np.float32)
+        self._pull = (root @ transposed).astype(np.float32)
 
     def part(self, block: np.ndarray) -> np.ndarray:
         """Return the correction to subtract from columns (streams, m, k) to account for it."""
@@ -201,18 +203,18 @@ class _Errors:
     """One episode's errors of pose and gain, T: kinds of pose, then a gain a stream."""
 
     def __init__(self, streams: int, rows: int, pose: np.ndarray | None, gain_error: np.ndarray | None) -> None:
-        given = [part for part in (pose, gain_error) if part is not None]
+        arrays = [part for part in (pose, gain_error) if part is not None]
         # Part of a stream in each of T's columns that are not another stream's: pose, then its own gain.
-        self._own = np.concatenate([np.zeros((streams, rows, 0), dtype=np.float32), *given], axis=2)
+        self._own = np.concatenate([np.zeros((streams, rows, 0), dtype=np.float32), *arrays], axis=2)
         self._kinds = 0 if pose is None else pose.shape[2]
         self._mean = None
-        every = self._own[:, :, : self._kinds]
+        columns = self._own[:, :, : self._kinds]
         if gain_error is not None:
             power = np.square(gain_error).sum(axis=(1, 2)).astype(np.float64)
             self._mean = power / max(float(power.sum()), 1e-12)
             gains = gain_error * (np.eye(streams) - self._mean)[:, None, :].astype(np.float32)
-            every = np.concatenate([every, gains], axis=2)
-        self.gram = self.inner(every)
+            columns = np.concatenate([columns, gains], axis=2)
+        self.gram = self.inner(columns)
         # The Gram matrix is symmetric only up to rounding, and `eigh` reads one triangle of it.
         self.root = _root(0.5 * (self.gram + self.gram.T))
 
@@ -225,9 +227,9 @@ class _Errors:
         gain = each[:, self._kinds]
         return np.concatenate([pose, gain - self._mean[:, None] * gain.sum(axis=0)])
 
-    def of_each(self, own: np.ndarray) -> np.ndarray:
+    def of_each(self, columns: np.ndarray) -> np.ndarray:
         """Return T' of columns that each stand in one stream alone, shape (streams, m): shape (streams, kinds)."""
-        return np.einsum("smk,sm->sk", self._own[:, :, : self._kinds], own, dtype=np.float64)
+        return np.einsum("smk,sm->sk", self._own[:, :, : self._kinds], columns, dtype=np.float64)
 
     def joint(self, shared: np.ndarray) -> np.ndarray:
         """Return T' of columns (streams, m, p), each in one stream alone, shape (streams, p, kinds + streams)."""
@@ -239,11 +241,11 @@ class _Errors:
 
     def times(self, weights: np.ndarray) -> np.ndarray:
         """Return T weights, shape (streams, m, k), for weights of shape (kinds + streams, k)."""
-        own = np.repeat(weights[None, : self._kinds], len(self._own), axis=0)
+        stacked = np.repeat(weights[None, : self._kinds], len(self._own), axis=0)
         if self._mean is not None:
             gain = weights[self._kinds :]
-            own = np.concatenate([own, (gain - self._mean @ gain)[:, None]], axis=1)
-        return self._own @ own.astype(np.float32)
+            stacked = np.concatenate([stacked, (gain - self._mean @ gain)[:, None]], axis=1)
+        return self._own @ stacked.astype(np.float32)
 
     def part(self, block: np.ndarray) -> np.ndarray:
         """Return the correction of columns (streams, m, k) that multiplies them by (1 + T T')^-1/2."""
@@ -288,46 +290,49 @@ class _Free:
             at += count
         self._inner = np.linalg.inv(matrix)
 
-    def weights(self, left: list[np.ndarray]) -> np.ndarray:
+    def weights(self, residuals: list[np.ndarray]) -> np.ndarray:
         """Return the weights that fit best, shape (streams, p, k), to the columns of each episode (streams, m, k)."""
-        right = np.zeros((*self._inverse.shape[:2], left[0].shape[2]))
-        for shared, joint, errors, own in zip(self._shared, self._joints, self._errors, left, strict=True):
-            right += (shared.transpose(0, 2, 1) @ own).astype(np.float64) - joint @ (errors.root @ errors.inner(own))
+        right = np.zeros((*self._inverse.shape[:2], residuals[0].shape[2]))
+        for shared, joint, errors, block in zip(self._shared, self._joints, self._errors, residuals, strict=True):
+            right += (shared.transpose(0, 2, 1) @ block).astype(np.float64) - joint @ (
+                errors.root @ errors.inner(block)
+            )
         return self._solved(right)
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
         """Return the solution of the normal equations, shape (streams, p, k)."""
-        alone = self._inverse @ right
+        local = self._inverse @ right
         if not self._joint.shape[1]:
-            return alone
-        pulled = self._joint.T @ alone.reshape(len(self._joint), -1)
-        return alone + self._through @ (self._inner @ pulled)
+            return local
+        pull = self._joint.T @ local.reshape(len(self._joint), -1)
+        return local + self._through @ (self._inner @ pull)
 
-    def right(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
-        """Return products of features and an episode's columns (streams, m, k), (streams, p, k); ``turned`` (T, k)."""
-        return (self._shared[episode].transpose(0, 2, 1) @ own).astype(np.float64) - self._joints[episode] @ turned
+    def right(self, episode: int, columns: np.ndarray, solution: np.ndarray) -> np.ndarray:
+        """Return products of features and an episode's columns (streams, m, k), (streams, p, k); solution (T, k)."""
+        product = (self._shared[episode].transpose(0, 2, 1) @ columns).astype(np.float64)
+        return product - self._joints[episode] @ solution
 
     def taken_of_all(self, right: np.ndarray) -> np.ndarray:
         """Return the information that features absorb, shape (k, k); ``right``: products with them (streams, p, k)."""
         return np.einsum("spk,spl->kl", right, self._solved(right), optimize=True)
 
-    def taken(self, episode: int, own: np.ndarray, turned: np.ndarray) -> np.ndarray:
+    def taken(self, episode: int, columns: np.ndarray, solution: np.ndarray) -> np.ndarray:
         """Return the information of columns in one stream of an episode that features absorb, shape (streams,).
 
         Args:
             episode: Its number.
-            own: The columns, shape (streams, m).
-            turned: (1 + T'T)^-1 T' of each, shape (streams, kinds).
+            columns: The columns, shape (streams, m).
+            solution: (1 + T'T)^-1 T' of each, shape (streams, kinds).
         """
         joint = self._joints[episode]
-        alone = np.einsum("smp,sm->sp", self._shared[episode], own, dtype=np.float64)
-        through = np.einsum("sp,spt->st", alone, self._through)
-        inside = np.einsum("sp,spq,sq->s", alone, self._inverse, alone)
+        projection = np.einsum("smp,sm->sp", self._shared[episode], columns, dtype=np.float64)
+        through = np.einsum("sp,spt->st", projection, self._through)
+        inside = np.einsum("sp,spq,sq->s", projection, self._inverse, projection)
         inside += np.einsum("st,tu,su->s", through, self._inner, through)
         pose = self._inverse @ joint
         pose += self._through @ (self._inner @ np.einsum("spt,spk->tk", self._through, joint))
-        inside -= 2 * np.einsum("sp,spk,sk->s", alone, pose, turned)
-        return inside + np.einsum("sk,kl,sl->s", turned, np.einsum("spk,spl->kl", joint, pose), turned)
+        inside -= 2 * np.einsum("sp,spk,sk->s", projection, pose, solution)
+        return inside + np.einsum("sk,kl,sl->s", solution, np.einsum("spk,spl->kl", joint, pose), solution)
 
     def fitted(self, episode: int, weights: np.ndarray) -> np.ndarray:
         """Return the change of an episode by weights, shape (streams, m, k)."""

@@ -48,24 +48,28 @@ class EpisodeGrams:
 
 
 def episode_grams(
-    columns: np.ndarray, course: Course, beside: np.ndarray | None = None, inner: np.ndarray | None = None
+    columns: np.ndarray, course: Course, extra: np.ndarray | None = None, inner: np.ndarray | None = None
 ) -> EpisodeGrams:
     """Return the `Evidence` of columns that are cleaned.
 
     Args:
         columns: Shape (n, streams, k).
         course: Whose rows.
-        beside: Further columns, cleaned before, shape (n, streams, more).
+        extra: Further columns, cleaned before, shape (n, streams, more).
         inner: Their own Gram matrices, shape (episodes, more, more).
     """
-    few, more = columns.shape[2], 0 if beside is None else beside.shape[2]
-    gram, rows = np.zeros((course.episodes, few + more, few + more)), np.zeros(course.episodes)
+    width, more = columns.shape[2], 0 if extra is None else extra.shape[2]
+    gram, rows = np.zeros((course.episodes, width + more, width + more)), np.zeros(course.episodes)
     edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
     for number, (begin, end) in enumerate(pairwise(edges)):
         values = (end - begin) * columns.shape[1]
-        flat = columns[begin:end].reshape(values, few)
-        gram[number, :few, :few], rows[number] = flat.T @ flat, flat.shape[0]
-        if beside is not None and inner is not None:
-            both = flat.T @ beside[begin:end].reshape(values, more)
-            gram[number, :few, few:], gram[number, few:, :few], gram[number, few:, few:] = both, both.T, inner[number]
+        flat = columns[begin:end].reshape(values, width)
+        gram[number, :width, :width], rows[number] = flat.T @ flat, flat.shape[0]
+        if extra is not None and inner is not None:
+            cross = flat.T @ extra[begin:end].reshape(values, more)
+            gram[number, :width, width:], gram[number, width:, :width], gram[number, width:, width:] = (
+                cross,
+                cross.T,
+                inner[number],
+            )
     return EpisodeGrams(gram, rows)

@@ -39,5 +39,5 @@ class Noise:
     def of(self, rows: np.ndarray, episodes: np.ndarray | None = None) -> Noise:
         """Return the noise of some rows, shape (n,), bool; ``episodes`` are those left, if they are renumbered."""
         each = {name: getattr(self, name) for name in ("gain_error", "missing", "random_walk", "relative_scale")}
-        kept = {name: None if value is None else value[rows] for name, value in each.items()}
-        return replace(self, **kept, offsets=None if self.offsets is None else self.offsets.of(rows, episodes))
+        fields = {name: None if value is None else value[rows] for name, value in each.items()}
+        return replace(self, **fields, offsets=None if self.offsets is None else self.offsets.of(rows, episodes))

@@ -44,7 +44,7 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
     rise = Streams.of(course).rise(predict(course, response, placed), response)
     largest = float(np.abs(rise[:, : course.channels]).max())
     idle[:, np.arange(course.channels), np.arange(course.channels)] = IDLE * largest
-    off = table_error.common(response.error, rise, course.reduced)
+    load_errors = table_error.common(response.error, rise, course.reduced)
     weights = [
         # A column is the change by a typical size: a standard deviation s has the weight (typical / s)^2.
         (p.typical / setting.nuisance[c.effect.name]) ** 2
@@ -52,9 +52,9 @@ def nuisance_columns(setting: Setting, placed: Sequence[Placed]) -> tuple[np.nda
         for p in c.effect.amplitudes
         for _ in range(len(c.columns) // len(c.effect.amplitudes))
     ]
-    own, ridge = set_ups(setting, placed)
-    columns = np.concatenate([side_by_side(board.columns)[:, :, 1:], idle, off, own], axis=2)
-    return columns, np.array([*weights, *np.ones(course.channels + off.shape[2]), *ridge])
+    set_up_columns, ridge = set_ups(setting, placed)
+    columns = np.concatenate([side_by_side(board.columns)[:, :, 1:], idle, load_errors, set_up_columns], axis=2)
+    return columns, np.array([*weights, *np.ones(course.channels + load_errors.shape[2]), *ridge])
 
 
 def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.ndarray]:
@@ -62,12 +62,12 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
 
     A recording is set up once: its strokes share errors of pose and gain, which are no drift from one to the next.
     """
-    own = pose_errors(setting, placed)
+    pose_columns = pose_errors(setting, placed)
     recording = setting.course.recording
     if recording is None or not 1 < recording.max() + 1 <= MOST_SET_UPS:
-        return np.zeros((*own.shape[:2], 0), dtype=np.float32), np.zeros(0)
+        return np.zeros((*pose_columns.shape[:2], 0), dtype=np.float32), np.zeros(0)
     of = recording[setting.course.reduced.episode]
-    each = [SET_UP_FACTOR * own * (of == number)[:, None, None] for number in range(recording.max() + 1)]
+    each = [SET_UP_FACTOR * pose_columns * (of == number)[:, None, None] for number in range(recording.max() + 1)]
     columns = np.concatenate(each, axis=2).astype(np.float32)
     return columns, np.ones(columns.shape[2])
 

@@ -106,8 +106,8 @@ class OffsetProcess:
         """
         number = self.episode[rows]
         if episodes is None:
-            there = np.isin(np.arange(len(self.error)), number)
-            return replace(self, error=np.where(there, self.error, np.inf), quiet=self.quiet[rows], episode=number)
+            present = np.isin(np.arange(len(self.error)), number)
+            return replace(self, error=np.where(present, self.error, np.inf), quiet=self.quiet[rows], episode=number)
         among = np.ix_(episodes, episodes)
         return OffsetProcess(
             self.covariance[among],
@@ -148,23 +148,23 @@ def offset_process(
     quiet = quiet_rows(course)
     streams = residual[:, : course.channels] / scale[: course.channels]
     missing = ~np.isfinite(streams)
-    there = quiet & ~missing.any(axis=1)
-    known = np.bincount(course.episode[there], minlength=course.episodes) >= QUIET_ROWS
-    count = np.bincount(course.episode[there], course.averaged[there], minlength=course.episodes)
-    if known.sum() < FEWEST_OFFSETS:
+    rows = quiet & ~missing.any(axis=1)
+    usable = np.bincount(course.episode[rows], minlength=course.episodes) >= QUIET_ROWS
+    count = np.bincount(course.episode[rows], course.averaged[rows], minlength=course.episodes)
+    if usable.sum() < FEWEST_OFFSETS:
         return None
-    weight = np.where(there, course.averaged, 0.0)
+    weight = np.where(rows, course.averaged, 0.0)
     offsets = _means(streams[:, :, None], weight, course.episode, course.episodes, None)[:, :, 0]
     # Variance of the mean of n readings of an AR(1) process with correlation m and innovations of variance 1.
-    error = np.where(known, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
+    error = np.where(usable, 1 / (np.maximum(count, 1) * (1 - memory) ** 2), np.inf)
     spans = _Spans.of(course, weight)
-    kinds, near, warmth = [level[known] for level in levels], spans.among(known), _warmth(course)[known]
-    alike, own_way = _shared(offsets[known], course, scale)
-    walk, length, own = _reml(own_way, error[known], near, kinds, warmth)
-    ratio = _variance_ratio(alike, (walk, length, own), error[known], near, kinds, warmth)
-    walk, own = walk * ratio, own * ratio
+    kinds, near, warmth = [level[usable] for level in levels], spans.among(usable), _warmth(course)[usable]
+    alike, own_way = _shared(offsets[usable], course, scale)
+    walk, length, independent = _reml(own_way, error[usable], near, kinds, warmth)
+    ratio = _variance_ratio(alike, (walk, length, independent), error[usable], near, kinds, warmth)
+    walk, independent = walk * ratio, independent * ratio
     same = FREE_LEVEL**2 * np.sum([level[:, None] == level for level in levels], axis=0)
-    nugget = max(own, LEAST_OWN**2) * np.eye(course.episodes)
+    nugget = max(independent, LEAST_OWN**2) * np.eye(course.episodes)
     covariance, cross, variance = spans.covariances(length)
     more = same + nugget
     return OffsetProcess(
@@ -192,21 +192,21 @@ class _Spans:
     def of(cls, course: Course, weight: np.ndarray) -> _Spans:
         """Return the times of a course; ``weight``: of each row in the mean without contact, shape (m,)."""
         time = _times(course)
-        quiet, whole, share = [], [], (np.arange(POINTS) + 0.5) / POINTS
+        quiet, full, share = [], [], (np.arange(POINTS) + 0.5) / POINTS
         edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
         for first, last in pairwise(edges):
-            own = course.time[first:last]
-            own = own - float(own.mean()) if len(own) else np.zeros(1)
+            clock = course.time[first:last]
+            clock = clock - float(clock.mean()) if len(clock) else np.zeros(1)
             sums = np.cumsum(weight[first:last])
-            there = len(sums) > 0 and sums[-1] > 0
-            quiet.append(own[np.searchsorted(sums, share * sums[-1])] if there else own[:0])
-            whole.append(own[0] + (own[-1] - own[0]) * share)
-        return cls(time, quiet, whole)
+            is_read = len(sums) > 0 and sums[-1] > 0
+            quiet.append(clock[np.searchsorted(sums, share * sums[-1])] if is_read else clock[:0])
+            full.append(clock[0] + (clock[-1] - clock[0]) * share)
+        return cls(time, quiet, full)
 
-    def among(self, known: np.ndarray) -> _Spans:
-        """Return the times of the first `MOST_OFFSETS` of some episodes; ``known``: shape (episodes,), bool."""
-        few = np.flatnonzero(known)[:MOST_OFFSETS]
-        return _Spans(self.time[few], [self.quiet[k] for k in few], [self.whole[k] for k in few])
+    def among(self, mask: np.ndarray) -> _Spans:
+        """Return the times of the first `MOST_OFFSETS` of some episodes; ``mask``: shape (episodes,), bool."""
+        numbers = np.flatnonzero(mask)[:MOST_OFFSETS]
+        return _Spans(self.time[numbers], [self.quiet[k] for k in numbers], [self.whole[k] for k in numbers])
 
     def covariances(self, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return covariances of a process of variance 1: of means, of offsets with means, and variances of offsets.
@@ -216,17 +216,17 @@ class _Spans:
         Args:
             length: Time constant [s].
         """
-        before = np.exp(-np.maximum(np.subtract.outer(self.time, self.time), 0.0) / length)
+        decay = np.exp(-np.maximum(np.subtract.outer(self.time, self.time), 0.0) / length)
         quiet_on, quiet_off, whole_off = (
             np.array([float(np.mean(np.exp(np.clip(sign * at / length, -40, 40)))) if len(at) else 1.0 for at in each])
             for sign, each in ((1, self.quiet), (-1, self.quiet), (-1, self.whole))
         )
-        later = np.tril(np.minimum(before * quiet_on[None, :] * quiet_off[:, None], 1.0), -1)
-        own = np.array([_mean_alike(a, a, length) for a in self.quiet])
-        cross = np.tril(np.minimum(before * quiet_on[None, :] * whole_off[:, None], 1.0), -1)
+        later = np.tril(np.minimum(decay * quiet_on[None, :] * quiet_off[:, None], 1.0), -1)
+        within = np.array([_mean_alike(a, a, length) for a in self.quiet])
+        cross = np.tril(np.minimum(decay * quiet_on[None, :] * whole_off[:, None], 1.0), -1)
         inside = np.array([_mean_alike(a, b, length) for a, b in zip(self.whole, self.quiet, strict=True)])
         variance = np.array([_mean_alike(a, a, length) for a in self.whole])
-        return later + later.T + np.diag(own), cross + np.diag(inside), variance
+        return later + later.T + np.diag(within), cross + np.diag(inside), variance
 
 
 def _mean_alike(first: np.ndarray, second: np.ndarray, length: float) -> float:
@@ -254,9 +254,9 @@ def _shared(offsets: np.ndarray, course: Course, scale: np.ndarray) -> tuple[np.
         shared.append(np.ones(channels))
     if not shared:
         return offsets[:, :0], offsets
-    along = np.stack(shared, axis=1) / scale[:channels, None]
-    apart = _complement(along / np.linalg.norm(along, axis=0))
-    return offsets @ _complement(apart), offsets @ apart
+    directions = np.stack(shared, axis=1) / scale[:channels, None]
+    complement = _complement(directions / np.linalg.norm(directions, axis=0))
+    return offsets @ _complement(complement), offsets @ complement
 
 
 def _variance_ratio(
@@ -279,21 +279,23 @@ def _variance_ratio(
         levels: Numbers of the levels of each episode.
         warmth: Further covariates of a drift, shape (episodes, k).
     """
-    walk, length, own = process
-    few = shared[:MOST_OFFSETS]
+    walk, length, independent = process
+    sample = shared[:MOST_OFFSETS]
     span = spans.time - spans.time[0]
     rates = np.exp(-np.outer(span, SETTLING) / max(float(span[-1]), 1e-9))
     contrast = _complement(np.column_stack([_slow(spans.time, levels, warmth), rates]))
-    if not few.size or not contrast.shape[1]:
+    if not sample.size or not contrast.shape[1]:
         return 1.0
     read_error = (contrast.T * error[:MOST_OFFSETS]) @ contrast
     process_of = spans.covariances(length)[0]
-    said = walk * contrast.T @ process_of @ contrast + max(own, LEAST_OWN**2) * np.eye(len(read_error))
-    seen = contrast.T @ few
-    ratio = float(np.sum(seen * np.linalg.solve(said + read_error, seen))) / seen.size
-    if ratio <= 1 + TOGETHER_Z * np.sqrt(2 / seen.size):
+    model_covariance = walk * contrast.T @ process_of @ contrast + max(independent, LEAST_OWN**2) * np.eye(
+        len(read_error)
+    )
+    contrasts = contrast.T @ sample
+    ratio = float(np.sum(contrasts * np.linalg.solve(model_covariance + read_error, contrasts))) / contrasts.size
+    if ratio <= 1 + TOGETHER_Z * np.sqrt(2 / contrasts.size):
         return 1.0
-    expected = float(np.trace(np.linalg.solve(said + read_error, said))) / len(said)
+    expected = float(np.trace(np.linalg.solve(model_covariance + read_error, model_covariance))) / len(model_covariance)
     return 1 + (ratio - 1) / max(expected, LEAST_OWN)
 
 
@@ -321,12 +323,12 @@ def _means(
     values: np.ndarray, weight: np.ndarray, episode: np.ndarray, episodes: int, missing: np.ndarray | None
 ) -> np.ndarray:
     """Return the weighted mean over the rows of each episode, shape (episodes, ...); 0 for episodes without rows."""
-    chosen = np.flatnonzero(weight > 0)
+    rows = np.flatnonzero(weight > 0)
     gone = ~np.isfinite(values[..., 0]) if missing is None else missing
-    if gone[chosen].any():
+    if gone[rows].any():
         values = np.where(gone[:, :, None], 0.0, values)
     flat = values.reshape(len(values), -1)
-    each = csr_array((weight[chosen].astype(values.dtype), (episode[chosen], chosen)), shape=(episodes, len(values)))
+    each = csr_array((weight[rows].astype(values.dtype), (episode[rows], rows)), shape=(episodes, len(values)))
     count = (each @ (~gone).astype(float))[:, :, None]
     return (each @ flat).astype(float).reshape(episodes, *values.shape[1:]) / np.where(count > 0, count, 1.0)
 
@@ -349,37 +351,41 @@ def _reml(
     if contrast.shape[1] < FEWEST_OFFSETS // 2:
         return 0.0, 1.0, float(np.var(offsets, axis=0).mean())
     between = max(float(np.median(np.diff(time))), 1e-9)
-    seen = contrast.T @ offsets
+    contrasts = contrast.T @ offsets
     read_error = (contrast.T * error) @ contrast
-    size = max(float(np.mean(seen**2) - np.trace(read_error) / len(read_error)), 0.01 * float(np.mean(seen**2)), 1e-6)
+    size = max(
+        float(np.mean(contrasts**2) - np.trace(read_error) / len(read_error)), 0.01 * float(np.mean(contrasts**2)), 1e-6
+    )
     best = []
     for steps in TIME_CONSTANTS:
         alike = spans.covariances(steps * between)[0]
         pattern = contrast.T @ alike @ contrast
 
         def cost(log: np.ndarray, pattern: np.ndarray = pattern) -> float:
-            walk, own = np.exp(np.clip(log, -14, 14))
-            covariance = walk * pattern + read_error + own * np.eye(len(read_error))
+            walk, independent = np.exp(np.clip(log, -14, 14))
+            covariance = walk * pattern + read_error + independent * np.eye(len(read_error))
             factor = cho_factor(covariance, lower=True, check_finite=False)
-            power = float(np.sum(seen * cho_solve(factor, seen, check_finite=False)))
+            power = float(np.sum(contrasts * cho_solve(factor, contrasts, check_finite=False)))
             # Half the log of a determinant is the sum of logs of its Cholesky factor's diagonal.
-            return seen.shape[1] * float(np.log(np.diag(factor[0])).sum()) + 0.5 * power
+            return contrasts.shape[1] * float(np.log(np.diag(factor[0])).sum()) + 0.5 * power
 
-        found = minimize(
+        optimum = minimize(
             cost, np.log([size, 0.1 * size]), method="Nelder-Mead", options={"maxfev": 80, "xatol": 0.05, "fatol": 0.05}
         )
-        walk, own = (float(v) for v in np.exp(np.clip(found.x, -14, 14)))
-        matrix = walk * alike + np.diag(error) + max(own, LEAST_OWN**2) * np.eye(len(time))
-        best.append((float(found.fun), _doubt(matrix, basis), (walk, steps * between, own)))
-    least = min(value for value, _, _ in best)
-    return max((b for b in best if b[0] <= least + LIKELY), key=lambda b: b[1])[2]
+        walk, independent = (float(v) for v in np.exp(np.clip(optimum.x, -14, 14)))
+        matrix = walk * alike + np.diag(error) + max(independent, LEAST_OWN**2) * np.eye(len(time))
+        best.append((float(optimum.fun), _doubt(matrix, basis), (walk, steps * between, independent)))
+    smallest = min(value for value, _, _ in best)
+    return max((b for b in best if b[0] <= smallest + LIKELY), key=lambda b: b[1])[2]
 
 
 def _slow(time: np.ndarray, levels: Sequence[np.ndarray], warmth: np.ndarray) -> np.ndarray:
     """Return the covariates of the process: unknown levels, temperature, and last a straight line in time."""
-    known = [level[:MOST_OFFSETS, None] == np.unique(level[:MOST_OFFSETS]) for level in levels]
+    indicators = [level[:MOST_OFFSETS, None] == np.unique(level[:MOST_OFFSETS]) for level in levels]
     clock = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
-    return np.column_stack([*known, warmth[:MOST_OFFSETS] / max(float(np.abs(warmth).max(initial=0.0)), 1e-9), clock])
+    return np.column_stack(
+        [*indicators, warmth[:MOST_OFFSETS] / max(float(np.abs(warmth).max(initial=0.0)), 1e-9), clock]
+    )
 
 
 def _complement(basis: np.ndarray) -> np.ndarray:

@@ -30,8 +30,8 @@ def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np
         rise: Rise of each stream under presses, shape (n, streams).
         course: Whose rows.
     """
-    own = np.abs(rise[:, : course.channels])
-    share = own / max(float(own.max(initial=0.0)), 1e-12)
+    magnitude = np.abs(rise[:, : course.channels])
+    share = magnitude / max(float(magnitude.max(initial=0.0)), 1e-12)
     second, inside = _second(residual[:, : course.channels], course)
     at, read = share[1:-1][inside], np.isfinite(second)
     quiet = read & (at <= LOAD_EDGES[1])
@@ -41,10 +41,10 @@ def relative_scale(residual: np.ndarray, rise: np.ndarray, course: Course) -> np
     if count[informative].sum() < FEWEST_DIFFERENCES:
         return None
     size = np.sqrt(power[informative] / count[informative])
-    second, at, known = second[:, informative] / size, at[:, informative], read[:, informative]
-    nodes, levels = [0.0], [_spread(second[known & (at <= LOAD_EDGES[1])])]
+    second, at, is_read = second[:, informative] / size, at[:, informative], read[:, informative]
+    nodes, levels = [0.0], [_spread(second[is_read & (at <= LOAD_EDGES[1])])]
     for low, high in itertools.pairwise(LOAD_EDGES[1:]):
-        inside = known & (at > low) & (at <= high)
+        inside = is_read & (at > low) & (at <= high)
         if inside.sum() >= FEWEST_DIFFERENCES:
             nodes.append(float(np.mean(at[inside])))
             levels.append(_spread(second[inside]))
@@ -77,48 +77,48 @@ def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | Non
     """
     residual = residual if relative is None else residual / relative
     second, _ = _second(residual, course)
-    seen = np.isfinite(residual).any(axis=0)  # a gauge sees the depth alone
-    whole = np.ones(residual.shape[1])
-    whole[seen] = np.nanstd(residual[:, seen], axis=0)
-    known = np.isfinite(second).sum(axis=0) > 10
-    scale = whole.copy()
-    if known.any():
+    observed = np.isfinite(residual).any(axis=0)  # a gauge sees the depth alone
+    overall = np.ones(residual.shape[1])
+    overall[observed] = np.nanstd(residual[:, observed], axis=0)
+    enough = np.isfinite(second).sum(axis=0) > 10
+    scale = overall.copy()
+    if enough.any():
         # A reading less the mean of its neighbours has 1.5 times the variance of white noise.
-        scale[known] = 1.4826 * np.nanmedian(np.abs(second[:, known]), axis=0) / np.sqrt(1.5)
+        scale[enough] = 1.4826 * np.nanmedian(np.abs(second[:, enough]), axis=0) / np.sqrt(1.5)
     missing = ~np.isfinite(residual)
     tag = np.inf if course.tag is not None else None
-    found = np.maximum(scale, 1e-3 * whole + 1e-12)
+    floor = np.maximum(scale, 1e-3 * overall + 1e-12)
     return Noise(
-        found, 0.0, median_step(course), missing=missing if missing.any() else None, tag=tag, relative_scale=relative
+        floor, 0.0, median_step(course), missing=missing if missing.any() else None, tag=tag, relative_scale=relative
     )
 
 
-def refined(leftover: np.ndarray, course: Course, before: Noise) -> Noise:
+def refined(leftover: np.ndarray, course: Course, previous: Noise) -> Noise:
     """Return autocorrelated noise, estimated from the residual of an over-rich fit.
 
     Args:
         leftover: Shape (n, streams).
         course: Whose rows.
-        before: The guess so far.
+        previous: The guess so far.
     """
-    seen = np.isfinite(leftover).any(axis=0)
-    if not seen.all():
-        own = replace(before, scale=before.scale[seen], missing=None)
-        estimate = refined(leftover[:, seen], course, own)
-        scale = before.scale.copy()
-        scale[seen] = estimate.scale
-        return replace(before, scale=scale, memory=estimate.memory)
+    observed = np.isfinite(leftover).any(axis=0)
+    if not observed.all():
+        part = replace(previous, scale=previous.scale[observed], missing=None)
+        estimate = refined(leftover[:, observed], course, part)
+        scale = previous.scale.copy()
+        scale[observed] = estimate.scale
+        return replace(previous, scale=scale, memory=estimate.memory)
     # Rows on both sides of a gap in time would make the correlation of successive rows too small.
-    pairs = ~course.first & (course.step < 1.5 * before.step)
+    pairs = ~course.first & (course.step < 1.5 * previous.step)
     later, earlier = leftover[pairs], leftover[np.flatnonzero(pairs) - 1]
     weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-24)
     products = float(np.nansum(later * earlier * weight))
     squares = float(np.nansum(np.where(np.isfinite(later * earlier), 0.5 * (later**2 + earlier**2) * weight, 0.0)))
     memory = float(np.clip(products / max(squares, 1e-12), 0.0, 0.98))
     spread = 1.4826 * np.nanmedian(np.abs(leftover - np.nanmedian(leftover, axis=0)), axis=0)
-    mixed = np.maximum(0.5 * (spread + np.nanstd(leftover, axis=0)), before.scale * 0.3)
+    mixed = np.maximum(0.5 * (spread + np.nanstd(leftover, axis=0)), previous.scale * 0.3)
     # The scale is that of the innovations: in an AR(1) process their variance is 1 - memory^2 of the readings'.
-    return replace(before, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
+    return replace(previous, scale=mixed * np.sqrt(max(1 - memory**2, 0.02)), memory=memory)
 
 
 def median_step(course: Course) -> float:
@@ -138,16 +138,16 @@ def gain_spread(score: np.ndarray, information: np.ndarray, place: np.ndarray) -
         information: How much it knows of it, shape (episodes, streams).
         place: Of each episode, shape (episodes,).
     """
-    gaps, known = [], []
+    gaps, errors = [], []
     informative = information.max(axis=1) > 0  # sealed episodes have none
     for key in np.unique(place[informative]):
         power = information[informative & (place == key)]
         gain = score[informative & (place == key)] / np.maximum(power, 1e-9)
-        both = (power[1:] > 1.0) & (power[:-1] > 1.0)
-        gaps.append(np.diff(gain, axis=0)[both])
-        known.append((1 / np.maximum(power[1:], 1e-9) + 1 / np.maximum(power[:-1], 1e-9))[both])
+        pairs = (power[1:] > 1.0) & (power[:-1] > 1.0)
+        gaps.append(np.diff(gain, axis=0)[pairs])
+        errors.append((1 / np.maximum(power[1:], 1e-9) + 1 / np.maximum(power[:-1], 1e-9))[pairs])
     none = np.zeros(0)  # a single press: its splines absorb all information on gains
-    return spread_of(np.concatenate([none, *gaps]), np.concatenate([none, *known]))
+    return spread_of(np.concatenate([none, *gaps]), np.concatenate([none, *errors]))
 
 
 MEDIAN_CHI2 = 0.4549
@@ -158,7 +158,7 @@ EQUAL_WEIGHTS = 40
 """Spread: the best known differences, so many, have equal weights: no few of them decide."""
 
 
-def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
+def spread_of(gaps: np.ndarray, errors: np.ndarray) -> float:
     """Return the standard deviation that numbers have beyond their known errors, 0 or more.
 
     Estimated by the median of differences of successive ones: neither a slow change nor a step makes it larger. Each
@@ -166,16 +166,16 @@ def spread_of(gaps: np.ndarray, known: np.ndarray) -> float:
 
     Args:
         gaps: Differences of successive numbers, shape (n,).
-        known: Variance of each that is known, shape (n,).
+        errors: Variance of each that is known, shape (n,).
     """
     if len(gaps) < FEWEST_GAPS:
         return 0.0
     square = np.square(gaps)
-    floor = float(np.partition(known, min(EQUAL_WEIGHTS, len(known)) - 1)[min(EQUAL_WEIGHTS, len(known)) - 1])
+    floor = float(np.partition(errors, min(EQUAL_WEIGHTS, len(errors)) - 1)[min(EQUAL_WEIGHTS, len(errors)) - 1])
 
     def beyond(power: float) -> bool:
-        ratio = square / np.maximum(2 * power + known, 1e-30)
-        weight = 1 / np.square(2 * power + np.maximum(known, floor) + 1e-30)
+        ratio = square / np.maximum(2 * power + errors, 1e-30)
+        weight = 1 / np.square(2 * power + np.maximum(errors, floor) + 1e-30)
         return float(weight[ratio > MEDIAN_CHI2].sum()) > 0.5 * float(weight.sum())
 
     low, high = 0.0, float(np.max(square)) + 1e-30
@@ -211,13 +211,13 @@ def beside_depth(residual: np.ndarray, course: Course) -> np.ndarray:
     leaving = (course.speed < 0)[:, None]
     columns = np.concatenate([np.where(leaving, 0.0, hats), np.where(leaving, hats, 0.0)], axis=1)
     for k in range(residual.shape[1] - 3, residual.shape[1]):
-        there = np.isfinite(residual[:, k])
-        if there.sum() < FEWEST_VIEWS:
+        rows = np.isfinite(residual[:, k])
+        if rows.sum() < FEWEST_VIEWS:
             continue
-        own = [_about_mean(x, course.episode[there]) for x in (columns[there], residual[there, k : k + 1])]
-        gram = own[0].T @ own[0]
+        centred = [_about_mean(x, course.episode[rows]) for x in (columns[rows], residual[rows, k : k + 1])]
+        gram = centred[0].T @ centred[0]
         gram += 1e-6 * max(float(np.trace(gram)) / len(gram), 1e-12) * np.eye(len(gram))
-        result[:, k] -= columns @ np.linalg.solve(gram, own[0].T @ own[1])[:, 0]
+        result[:, k] -= columns @ np.linalg.solve(gram, centred[0].T @ centred[1])[:, 0]
     return result
 
 
@@ -228,27 +228,27 @@ def _about_mean(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     return values - means[group]
 
 
-def tag_offset_spread(residual: np.ndarray, course: Course, known: Noise) -> float | None:
+def tag_offset_spread(residual: np.ndarray, course: Course, noise: Noise) -> float | None:
     """Return how far an episode's offset of the tag is off the next one's, in noise scales [1]; None without a tag.
 
     Args:
         residual: Shape (n, streams).
         course: Whose rows.
-        known: Noise so far.
+        noise: Noise so far.
     """
     if course.tag is None:
         return None
     gaps, error = [], []
-    for column in (residual[:, -3:] / known.scale[-3:]).T:
-        there = np.isfinite(column)
-        count = np.bincount(course.episode[there], minlength=course.episodes)
-        mean = np.bincount(course.episode[there], column[there], minlength=course.episodes) / np.maximum(count, 1)
-        both = (count[1:] > 2) & (count[:-1] > 2) & (course.site[1:] == course.site[:-1])
-        gaps.append(np.diff(mean)[both])
-        error.append((1 / np.maximum(count[1:], 1) + 1 / np.maximum(count[:-1], 1))[both])
+    for column in (residual[:, -3:] / noise.scale[-3:]).T:
+        rows = np.isfinite(column)
+        count = np.bincount(course.episode[rows], minlength=course.episodes)
+        mean = np.bincount(course.episode[rows], column[rows], minlength=course.episodes) / np.maximum(count, 1)
+        pairs = (count[1:] > 2) & (count[:-1] > 2) & (course.site[1:] == course.site[:-1])
+        gaps.append(np.diff(mean)[pairs])
+        error.append((1 / np.maximum(count[1:], 1) + 1 / np.maximum(count[:-1], 1))[pairs])
     return max(spread_of(np.concatenate(gaps), np.concatenate(error)), 0.2)
 
 
-def still(known: Noise, streams: int) -> Noise:
+def still(noise: Noise, streams: int) -> Noise:
     """Return noise that whitens nothing, so that residuals keep their memory and size."""
-    return replace(known, scale=np.ones(streams), memory=0.0)
+    return replace(noise, scale=np.ones(streams), memory=0.0)

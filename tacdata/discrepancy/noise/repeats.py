@@ -25,21 +25,25 @@ def repeats(course: Course, place: np.ndarray) -> np.ndarray:
         course: With the rows read alone.
         place: Of each episode, shape (episodes,).
     """
-    told, result = _told(course), np.zeros(course.episodes, dtype=np.int64)
-    known: list[tuple[int, np.ndarray]] = []
-    for episode, (at, own) in enumerate(zip(place, told, strict=True)):
-        near = [k for k, (where, other) in enumerate(known) if where == at and np.all(np.abs(own - other) <= ALIKE)]
+    profiles, result = _told(course), np.zeros(course.episodes, dtype=np.int64)
+    groups: list[tuple[int, np.ndarray]] = []
+    for episode, (at, profile) in enumerate(zip(place, profiles, strict=True)):
+        near = [
+            k
+            for k, (where, reference) in enumerate(groups)
+            if where == at and np.all(np.abs(profile - reference) <= ALIKE)
+        ]
         if not near:
-            known.append((int(at), own))
-        result[episode] = near[0] if near else len(known) - 1
-    there = result[np.isfinite(told).all(axis=1)]
-    pairs = len(there) - len(np.unique(there))
-    return result if pairs >= ENOUGH * len(there) else place.astype(np.int64)
+            groups.append((int(at), profile))
+        result[episode] = near[0] if near else len(groups) - 1
+    complete = result[np.isfinite(profiles).all(axis=1)]
+    pairs = len(complete) - len(np.unique(complete))
+    return result if pairs >= ENOUGH * len(complete) else place.astype(np.int64)
 
 
 def _told(course: Course) -> np.ndarray:
     """Return how deep, how fast and how long each episode presses [natural logarithm], NaN where nothing was read."""
-    told = np.full((course.episodes, 3), np.nan)
+    profiles = np.full((course.episodes, 3), np.nan)
     away = max(0.0, float(course.tip[:, 2].min())) + TOUCHING * course.stroke
     for episode in np.unique(course.episode):
         rows = course.episode == episode
@@ -52,5 +56,5 @@ def _told(course: Course) -> np.ndarray:
         first, last = (int(np.argmax(depth[: top + 1] >= away + share * reach)) for share in RISE)
         rise = max(float(time[last] - time[first]), float(np.median(np.diff(time))))
         lasting = max(float(time[pressed[-1]] - time[pressed[0]]), 1e-6)
-        told[episode] = np.log([max(reach, 1e-9), max(rise, 1e-6), lasting])
-    return told
+        profiles[episode] = np.log([max(reach, 1e-9), max(rise, 1e-6), lasting])
+    return profiles

@@ -53,40 +53,44 @@ class Components:
     """Weight of each episode [1], shape (n,)."""
 
 
-def components(told: Sequence[JointScores], groups: Sequence[np.ndarray], least: float, most: float) -> Components:
+def components(runs: Sequence[JointScores], groups: Sequence[np.ndarray], lower: float, upper: float) -> Components:
     """Return the sizes of episodes' own errors.
 
     A few episodes unlike all others hardly count: each has a weight by how far it is off (multivariate t: Pinheiro, Liu
     & Wu, J. Comput. Graph. Stat. 10, 2001, 249). It is scaled to be consistent for normal errors.
 
     Args:
-        told: Runs of episodes.
+        runs: Runs of episodes.
         groups: Kinds of groups with a mean of their own, each as the number of the one that an episode has.
-        least: Least size.
-        most: Largest size.
+        lower: Least size.
+        upper: Largest size.
     """
-    told, kinds = [_sound(run) for run in told], told[0].score.shape[1]
-    shared = [_shared(run.episodes, groups, kinds) for run in told]
-    weights = [np.ones(len(run.episodes)) for run in told]
+    runs, kinds = [_sound(run) for run in runs], runs[0].score.shape[1]
+    shared = [_shared(run.episodes, groups, kinds) for run in runs]
+    weights = [np.ones(len(run.episodes)) for run in runs]
     log = np.zeros(kinds)
     for _ in range(ROUNDS):
-        given = (told, shared, weights)
-        found = minimize(_unlikely, log, given, method="L-BFGS-B", bounds=[(np.log(least), np.log(most))] * kinds)
-        log, before = found.x, weights
-        posterior = [_posterior(run, mean, own, log) for run, mean, own in zip(*given, strict=True)]
+        arguments = (runs, shared, weights)
+        optimum = minimize(
+            _unlikely, log, arguments, method="L-BFGS-B", bounds=[(np.log(lower), np.log(upper))] * kinds
+        )
+        log, previous = optimum.x, weights
+        posterior = [_posterior(run, mean, counts, log) for run, mean, counts in zip(*arguments, strict=True)]
         weights = [_weights(errors, spread, log) for errors, spread in posterior]
-        if max(np.abs(new - old).max() for new, old in zip(weights, before, strict=True)) <= SETTLED:
+        if max(np.abs(new - old).max() for new, old in zip(weights, previous, strict=True)) <= SETTLED:
             break
-    alone = [_alone(*one, own, log) for one, own in zip(posterior, before, strict=True)]
-    own, unsure = (np.concatenate([one[k] for one in alone]) for k in (0, 1))
-    return Components(np.exp(log), np.concatenate([run.episodes for run in told]), own, unsure, np.concatenate(weights))
+    results = [_alone(*entry, counts, log) for entry, counts in zip(posterior, previous, strict=True)]
+    estimates, unsure = (np.concatenate([entry[k] for entry in results]) for k in (0, 1))
+    return Components(
+        np.exp(log), np.concatenate([run.episodes for run in runs]), estimates, unsure, np.concatenate(weights)
+    )
 
 
-def together(told: Sequence[JointScores]) -> list[JointScores]:
+def together(runs: Sequence[JointScores]) -> list[JointScores]:
     """Return runs laid together, `MOST_TOGETHER` episodes at most, unless one has more: groups span them."""
     packs: list[list[JointScores]] = []
-    for run in told:
-        if not packs or sum(len(one.episodes) for one in packs[-1]) + len(run.episodes) > MOST_TOGETHER:
+    for run in runs:
+        if not packs or sum(len(member.episodes) for member in packs[-1]) + len(run.episodes) > MOST_TOGETHER:
             packs.append([])
         packs[-1].append(run)
     return [
@@ -99,23 +103,23 @@ def together(told: Sequence[JointScores]) -> list[JointScores]:
     ]
 
 
-def one_by_one(told: Sequence[JointScores]) -> list[JointScores]:
+def one_by_one(runs: Sequence[JointScores]) -> list[JointScores]:
     """Return a run for each episode, in their order: its own estimate."""
-    kinds, each = told[0].score.shape[1], []
-    for run in told:
+    kinds, each = runs[0].score.shape[1], []
+    for run in runs:
         for k, episode in enumerate(run.episodes):
             at = slice(k * kinds, (k + 1) * kinds)
             each.append(JointScores(np.array([episode]), run.score[k : k + 1], run.information[at, at]))
-    return sorted(each, key=lambda one: int(one.episodes[0]))
+    return sorted(each, key=lambda entry: int(entry.episodes[0]))
 
 
 def _sound(run: JointScores) -> JointScores:
     """Return a run without information that is rounding: directions that a response absorbs are known of no episode."""
     values, vectors = np.linalg.eigh(0.5 * (run.information + run.information.T))
-    kept = values > ROUNDED * max(float(values[-1]), 1e-300)
-    inside = vectors[:, kept]
+    significant = values > ROUNDED * max(float(values[-1]), 1e-300)
+    inside = vectors[:, significant]
     score = inside @ (inside.T @ run.score.ravel())
-    return replace(run, score=score.reshape(run.score.shape), information=(inside * values[kept]) @ inside.T)
+    return replace(run, score=score.reshape(run.score.shape), information=(inside * values[significant]) @ inside.T)
 
 
 def _shared(episodes: np.ndarray, groups: Sequence[np.ndarray], kinds: int) -> np.ndarray:
@@ -126,21 +130,21 @@ def _shared(episodes: np.ndarray, groups: Sequence[np.ndarray], kinds: int) -> n
 
 def _covariance(shared: np.ndarray, weights: np.ndarray, log: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the prior variance of episodes' own errors, shape (n kinds,), and the covariance of all."""
-    own = (np.exp(2 * log) / weights[:, None]).ravel()
-    return own, shared + np.diag(own)
+    variances = (np.exp(2 * log) / weights[:, None]).ravel()
+    return variances, shared + np.diag(variances)
 
 
 def _unlikely(
-    log: np.ndarray, told: Sequence[JointScores], shared: list[np.ndarray], weights: list[np.ndarray]
+    log: np.ndarray, runs: Sequence[JointScores], shared: list[np.ndarray], weights: list[np.ndarray]
 ) -> float:
     """Return the negative logarithm of how likely sizes are, given as logarithms."""
     cost = 0.5 * float(np.sum(np.square(log / SURE)))
-    for run, mean, counts in zip(told, shared, weights, strict=True):
+    for run, mean, counts in zip(runs, shared, weights, strict=True):
         # det(1 + L'IL) instead of det(I): the information I is zero along directions that the response absorbs.
         root = cholesky(_covariance(mean, counts, log)[1], lower=True, check_finite=False)
         factor = cholesky(np.eye(len(root)) + root.T @ run.information @ root, lower=True, check_finite=False)
-        seen = solve_triangular(factor, root.T @ run.score.ravel(), lower=True, check_finite=False)
-        cost += float(np.log(np.diag(factor)).sum()) - 0.5 * float(seen @ seen)
+        whitened = solve_triangular(factor, root.T @ run.score.ravel(), lower=True, check_finite=False)
+        cost += float(np.log(np.diag(factor)).sum()) - 0.5 * float(whitened @ whitened)
     return cost
 
 
@@ -149,10 +153,10 @@ def _posterior(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return episodes' own errors, shape (n, kinds), and the covariance of each one's, shape (n, kinds, kinds)."""
     count, kinds = run.score.shape
-    own, every = _covariance(mean, counts, log)
-    inner = np.linalg.inv(np.eye(len(every)) + run.information @ every)
-    errors = own * (inner @ run.score.ravel())
-    spread = np.diag(own) - own[:, None] * (inner @ run.information) * own
+    variances, covariance = _covariance(mean, counts, log)
+    inner = np.linalg.inv(np.eye(len(covariance)) + run.information @ covariance)
+    errors = variances * (inner @ run.score.ravel())
+    spread = np.diag(variances) - variances[:, None] * (inner @ run.information) * variances
     blocks = spread.reshape(count, kinds, count, kinds)[np.arange(count), :, np.arange(count)]
     return errors.reshape(count, kinds), blocks
 

@@ -55,11 +55,11 @@ class Candidate:
         at = 0
         for p in self.effect.amplitudes:
             width = channels if p.per_channel and channels <= MOST_CHANNELS else 1
-            taken = coefficients[at : at + width] * p.typical
+            sizes = coefficients[at : at + width] * p.typical
             if p.per_channel:
-                values[p.name] = np.broadcast_to(taken, (channels,)).copy()
+                values[p.name] = np.broadcast_to(sizes, (channels,)).copy()
             else:
-                values[p.name] = np.array(float(taken[0]))
+                values[p.name] = np.array(float(sizes[0]))
             at += width
         return Placed(self.effect, values)
 
@@ -95,8 +95,8 @@ def build(
     """
     streams = Streams.of(course)
     chain = Chain(course, response, placed)
-    now = streams.predicted(chain.prediction)
-    columns = [(streams.measured(course) - now).astype(np.float32)]
+    baseline = streams.predicted(chain.prediction)
+    columns = [(streams.measured(course) - baseline).astype(np.float32)]
     candidates: list[Candidate] = []
     unjudgeable: dict[str, str] = {}
     for effect in effects:
@@ -108,10 +108,10 @@ def build(
         for shapes in _shapes(effect):
             if among is not None and (effect.name, tuple(shapes.values())) not in among:
                 continue
-            made, low, high = _columns(effect, shapes, course, chain, placed, streams, now)
-            sizes = [made]
+            full, low, high = _columns(effect, shapes, course, chain, placed, streams, baseline)
+            sizes = [full]
             for share in shares:
-                small, _, _ = _columns(effect, shapes, course, chain, placed, streams, now, share)
+                small, _, _ = _columns(effect, shapes, course, chain, placed, streams, baseline, share)
                 if not _unlike(sizes[-1], small):
                     shares = shares[: shares.index(share)]  # A threshold is one at all times and lengths, or at none.
                     break
@@ -157,9 +157,9 @@ def _absorbed(effect: Effect, absorbed: Collection[str]) -> str:
 
 def _unlike(first: list[np.ndarray], second: list[np.ndarray]) -> bool:
     """Return whether two sets of columns of one effect point elsewhere."""
-    both = sum(float(np.vdot(a, b)) for a, b in zip(first, second, strict=True))
+    overlap = sum(float(np.vdot(a, b)) for a, b in zip(first, second, strict=True))
     sizes = [sum(float(np.vdot(a, a)) for a in columns) for columns in (first, second)]
-    return both < ALIKE * float(np.sqrt(sizes[0] * sizes[1]))
+    return overlap < ALIKE * float(np.sqrt(sizes[0] * sizes[1]))
 
 
 def _shapes(effect: Effect) -> list[dict[str, float]]:
@@ -174,27 +174,27 @@ def _columns(
     chain: Chain,
     placed: Sequence[Placed],
     streams: Streams,
-    now: np.ndarray,
+    baseline: np.ndarray,
     share: float = 1.0,
 ) -> tuple[list[np.ndarray], list[float], list[float]]:
     """Return the change by an effect at a share of its typical sizes, over that share, and the bounds."""
-    made, low, high = [], [], []
-    rest = {
+    result, low, high = [], [], []
+    defaults = {
         p.name: np.full(course.channels, p.default) if p.per_channel else np.array(p.default) for p in effect.amplitudes
     }
-    rest |= {name: np.array(value) for name, value in shapes.items()}
+    defaults |= {name: np.array(value) for name, value in shapes.items()}
     for p in effect.amplitudes:
-        values = {**rest, p.name: rest[p.name] + share * p.typical}
-        change = streams.predicted(chain.again([*placed, Placed(effect, values)])) - now
+        values = {**defaults, p.name: defaults[p.name] + share * p.typical}
+        change = streams.predicted(chain.again([*placed, Placed(effect, values)])) - baseline
         change = (change / share).astype(np.float32)
         if p.per_channel and course.channels <= MOST_CHANNELS:
             for channel in range(course.channels):
-                own = np.zeros_like(change)
-                own[:, channel] = change[:, channel]
-                made.append(own)
+                single = np.zeros_like(change)
+                single[:, channel] = change[:, channel]
+                result.append(single)
         else:
-            made.append(change)
-        count = len(made) - len(low)
+            result.append(change)
+        count = len(result) - len(low)
         low += [p.low / p.typical] * count
         high += [p.high / p.typical] * count
-    return made, low, high
+    return result, low, high

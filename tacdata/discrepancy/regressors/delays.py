@@ -18,18 +18,18 @@ EARLY_LEAVES = 0.3
 
 def delays(setting: Setting) -> list[Placed]:
     """Return the library's delays and filters, as long as readings follow the path later; none where they do not."""
-    lag, left, none = shift(setting.course)
-    if abs(lag) < LEAST or left > (LEAVES if lag > 0 else EARLY_LEAVES) * none:
+    lag, share, none = shift(setting.course)
+    if abs(lag) < LEAST or share > (LEAVES if lag > 0 else EARLY_LEAVES) * none:
         return []
     onset, recovery = edges(setting.course, lag)
     plain = [e for e in setting.effects if not e.shapes and (type(e).delay is not Effect.delay or _filters(e))]
-    found = []
+    result = []
     for e in (e for e in plain if not e.unjudgeable(setting.course, setting.response)):
-        own = e.amplitudes
-        times = (onset, recovery) if len(own) == 2 else [0.5 * (onset + recovery)] * len(own)
-        values = {p.name: np.array(float(np.clip(t, p.low, p.high))) for p, t in zip(own, times, strict=True)}
-        found.append(Placed(e, values))
-    return found
+        amplitudes = e.amplitudes
+        times = (onset, recovery) if len(amplitudes) == 2 else [0.5 * (onset + recovery)] * len(amplitudes)
+        values = {p.name: np.array(float(np.clip(t, p.low, p.high))) for p, t in zip(amplitudes, times, strict=True)}
+        result.append(Placed(e, values))
+    return result
 
 
 def _filters(effect: Effect) -> bool:

@@ -23,9 +23,9 @@ def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndar
     slope = depth_slope(course, response, placed)
     level = np.zeros_like(rise)
     level[:, : course.channels] = np.abs(rise[:, : course.channels]).max()
-    own = np.delete(histories(course), CLOCK_HISTORIES, axis=1)[streams.rows]
-    parts = [rise[:, :, None] * own[:, None, :], slope[:, :, None] * own[:, None, :] * 0.1]
-    parts.append(level[:, :, None] * own[:, None, ::2])
+    path_histories = np.delete(histories(course), CLOCK_HISTORIES, axis=1)[streams.rows]
+    parts = [rise[:, :, None] * path_histories[:, None, :], slope[:, :, None] * path_histories[:, None, :] * 0.1]
+    parts.append(level[:, :, None] * path_histories[:, None, ::2])
     return np.concatenate(parts, axis=2).astype(np.float32)
 
 
@@ -36,10 +36,12 @@ def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray
     """
     streams = Streams.of(course)
     rise = streams.rise(predict(course, response, placed), response)
-    own = [histories(course)[:, k] for k in CLOCK_HISTORIES]
+    clock_histories = [histories(course)[:, k] for k in CLOCK_HISTORIES]
     if course.temperature is not None:
-        own.append((course.temperature - course.temperature.mean()) / max(float(np.std(course.temperature)), 1e-9))
-    follow = np.stack(own, axis=-1)[streams.rows][:, None, :]
+        clock_histories.append(
+            (course.temperature - course.temperature.mean()) / max(float(np.std(course.temperature)), 1e-9)
+        )
+    follow = np.stack(clock_histories, axis=-1)[streams.rows][:, None, :]
     slope = depth_slope(course, response, placed)[:, :, None] * (0.1 * course.stroke)
     return np.concatenate([rise[:, :, None] * follow, slope * follow], axis=2).astype(np.float32)
 
@@ -50,7 +52,7 @@ def histories(course: Course) -> np.ndarray:
     speed = course.speed
     fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)
     clock = course.time / max(float(course.time[-1]), 1e-9) - 0.5
-    most = running_max(share, course.row_site)
+    deepest = running_max(share, course.row_site)
     recent = np.maximum.accumulate(np.where(course.first, 0.0, share))
     stroke = _since_start(course, share)
     columns = [
@@ -59,9 +61,9 @@ def histories(course: Course) -> np.ndarray:
         fast,
         clock,
         clock**2 - 1 / 12,
-        most - share,
+        deepest - share,
         stroke - share,
-        most - recent * 0.0 - stroke,
+        deepest - recent * 0.0 - stroke,
         *(low_pass(share, course.step, tau) for tau in TIME_CONSTANTS),
         *(np.square(low_pass(share, course.step, tau)) for tau in TIME_CONSTANTS[1::2]),
         *(play(share, r) - share for r in (0.03, 0.1, 0.3)),

@@ -42,78 +42,82 @@ def model_errors(
     A large effect whose equation is a little wrong leaves a residual that small effects explain: a part along these
     columns is no evidence of another one.
     """
-    streams, every = Streams.of(course), list(given)
+    streams, fixed = Streams.of(course), list(given)
     none = np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
     if not placed:
         return ModelErrors(none, np.zeros(0, dtype=np.int64), none)
     columns: list[np.ndarray] = []
     of, parts = [], []
-    for at, one in enumerate(placed):
-        rest = [*every, *(p for k, p in enumerate(placed) if k != at)]
-        chain = Chain(course, response, rest)
+    for at, member in enumerate(placed):
+        background = [*fixed, *(p for k, p in enumerate(placed) if k != at)]
+        chain = Chain(course, response, background)
         bare = streams.predicted(chain.prediction)
-        own = streams.predicted(chain.again([*rest, one])) - bare
-        columns += [one.effect.form_error * own * by for by in modulations(course, streams, own)]
-        size = float(np.linalg.norm(own))
-        for other in variants(one, course.channels):
-            if other.effect.name != one.effect.name and other.effect.unjudgeable(course, response):
+        contribution = streams.predicted(chain.again([*background, member])) - bare
+        columns += [member.effect.form_error * contribution * by for by in modulations(course, streams, contribution)]
+        size = float(np.linalg.norm(contribution))
+        for variant in variants(member, course.channels):
+            if variant.effect.name != member.effect.name and variant.effect.unjudgeable(course, response):
                 continue
-            change = streams.predicted(chain.again([*rest, other])) - bare
+            change = streams.predicted(chain.again([*background, variant])) - bare
             large = float(np.linalg.norm(change))
             if large > NEGLIGIBLE * size:
                 # Scaled to the effect itself, as `form_error` is a share of it.
-                columns.append(OTHER_FORMS * one.effect.form_error * size / large * change)
-        parts.append(own)
+                columns.append(OTHER_FORMS * member.effect.form_error * size / large * change)
+        parts.append(contribution)
         of += [at] * (len(columns) - len(of))
     return ModelErrors(
         np.stack(columns, axis=-1).astype(np.float32), np.array(of), np.stack(parts, axis=-1).astype(np.float32)
     )
 
 
-def variants(one: Placed, channels: int) -> list[Placed]:
+def variants(reference: Placed, channels: int) -> list[Placed]:
     """Return a mechanism in its other forms and shapes: no polymer relaxes with one time constant.
 
     Args:
-        one: An effect with its numbers.
+        reference: An effect with its numbers.
         channels: How many channels there are.
     """
-    made = []
+    result = []
     for effect in library():
-        if effect.called != one.effect.called:
+        if effect.called != reference.effect.called:
             continue
-        if not effect.shapes and effect.name == one.effect.name:
-            made += [_sized(one, by) for by in OTHER_SIZES if effect.distributed]
+        if not effect.shapes and effect.name == reference.effect.name:
+            result += [_sized(reference, by) for by in OTHER_SIZES if effect.distributed]
             continue
         sizes = [
             {
-                p.name: np.full(channels if p.per_channel else (), p.default + p.typical * (p is own), dtype=float)
+                p.name: np.full(
+                    channels if p.per_channel else (), p.default + p.typical * (p is parameter), dtype=float
+                )
                 for p in effect.amplitudes
             }
-            for own in effect.amplitudes
+            for parameter in effect.amplitudes
         ]
-        every = list(product(*(p.grid for p in effect.shapes)))
-        if effect.name == one.effect.name:
-            now = [float(one.values[p.name]) for p in effect.shapes]
-            beside = [(k, by * value) for k, value in enumerate(now) for by in OTHER_SHAPES]
-            every += [(*now[:k], value, *now[k + 1 :]) for k, value in beside]
-        for shapes in every:
-            own = {p.name: np.clip(value, p.low, p.high) for p, value in zip(effect.shapes, shapes, strict=True)}
-            made += [Placed(effect, alone | own) for alone in sizes]
-    return made
+        grid = list(product(*(p.grid for p in effect.shapes)))
+        if effect.name == reference.effect.name:
+            current = [float(reference.values[p.name]) for p in effect.shapes]
+            neighbours = [(k, by * value) for k, value in enumerate(current) for by in OTHER_SHAPES]
+            grid += [(*current[:k], value, *current[k + 1 :]) for k, value in neighbours]
+        for shapes in grid:
+            shape_values = {
+                p.name: np.clip(value, p.low, p.high) for p, value in zip(effect.shapes, shapes, strict=True)
+            }
+            result += [Placed(effect, size_values | shape_values) for size_values in sizes]
+    return result
 
 
-def _sized(one: Placed, by: float) -> Placed:
+def _sized(reference: Placed, by: float) -> Placed:
     """Return an effect of another size, within its bounds."""
     return Placed(
-        one.effect,
+        reference.effect,
         {
-            p.name: np.clip(p.default + by * (one.values[p.name] - p.default), p.low, p.high)
-            for p in one.effect.parameters
+            p.name: np.clip(p.default + by * (reference.values[p.name] - p.default), p.low, p.high)
+            for p in reference.effect.parameters
         },
     )
 
 
-def modulations(course: Course, streams: Streams, own: np.ndarray) -> list[np.ndarray]:
+def modulations(course: Course, streams: Streams, contribution: np.ndarray) -> list[np.ndarray]:
     """Return how a contribution, shape (n, streams), may differ: with depth, rate, direction, time and its own size.
 
     Each has a mean of 0 and a root mean square of 1, weighted by the square of the contribution; shape (n, 1) or that
@@ -123,12 +127,12 @@ def modulations(course: Course, streams: Streams, own: np.ndarray) -> list[np.nd
     speed = np.abs(course.speed) / max(float(np.abs(course.speed).max()), 1e-9)
     clock = course.time / max(float(course.time[-1]), 1e-9)
     rows = [h[streams.rows][:, None] for h in (depth, speed, np.sign(course.speed), clock)]
-    size = np.linalg.norm(own, axis=1, keepdims=True)
+    size = np.linalg.norm(contribution, axis=1, keepdims=True)
     weight = np.square(size)
     total = max(float(weight.sum()), 1e-30)
     result = []
     for row in (*rows, size):
-        apart = row - float((row * weight).sum()) / total
-        spread = float(np.sqrt((np.square(apart) * weight).sum() / total))
-        result.append(apart / spread if spread > 1e-9 else np.zeros_like(apart))
+        deviation = row - float((row * weight).sum()) / total
+        spread = float(np.sqrt((np.square(deviation) * weight).sum() / total))
+        result.append(deviation / spread if spread > 1e-9 else np.zeros_like(deviation))
     return result

@@ -77,9 +77,9 @@ def saturated(course: Course, response: Response, placed: list[Placed]) -> dict[
         response: Input of the chain.
         placed: Effects that the model has.
     """
-    streams, said = Streams.of(course), predict(course, response, placed)
-    ways = _ways(course, streams, response, said, placed)
-    made = {
+    streams, prediction = Streams.of(course), predict(course, response, placed)
+    ways = _ways(course, streams, response, prediction, placed)
+    result = {
         Family.DRIFT: _drift(ways),
         Family.KINEMATICS: _pose(ways, response, placed),
         Family.SKIN_MEMORY: _memory(ways),
@@ -87,20 +87,20 @@ def saturated(course: Course, response: Response, placed: list[Placed]) -> dict[
         Family.DELAY_AND_FILTER: _late(ways),
     }
     if not response.fitted:  # a fitted one takes these up
-        made |= {Family.RESPONSE_CURVE: _curve(ways), Family.CROSSTALK: _spread(ways)}
-    return {family: side_by_side(columns) for family, columns in made.items() if columns}
+        result |= {Family.RESPONSE_CURVE: _curve(ways), Family.CROSSTALK: _spread(ways)}
+    return {family: side_by_side(columns) for family, columns in result.items() if columns}
 
 
-def _ways(course: Course, streams: Streams, response: Response, said: Prediction, placed: list[Placed]) -> _Ways:
+def _ways(course: Course, streams: Streams, response: Response, prediction: Prediction, placed: list[Placed]) -> _Ways:
     depth = np.maximum(course.tip[:, 2], 0.0)
     if depth.max() <= 0:
         depth = course.tip[:, 2] - course.tip[:, 2].min()
     return _Ways(
         course,
         streams,
-        streams.rise(said, response),
+        streams.rise(prediction, response),
         depth_slope(course, response, placed) * (0.1 * course.stroke),
-        said.signal - response.signal(np.zeros((1, course.channels))),
+        prediction.signal - response.signal(np.zeros((1, course.channels))),
         depth / max(float(depth.max()), 1e-9),
         np.sign(course.speed) * (depth > 0),
         course.time / max(float(course.time[-1]), 1e-9),
@@ -128,7 +128,7 @@ def _maps(course: Course) -> list[np.ndarray]:
     at = course.centers - course.centers.mean(axis=0)
     x, y = (at / max(float(np.abs(at).max()), 1e-9)).T
     maps = [x, y, x * y, x * x - np.mean(x * x), y * y - np.mean(y * y)]
-    return [np.ones(course.channels), *(one for one in maps if np.abs(one).max() > 1e-6)]
+    return [np.ones(course.channels), *(weights for weights in maps if np.abs(weights).max() > 1e-6)]
 
 
 def _pose(ways: _Ways, response: Response, placed: list[Placed]) -> list[np.ndarray]:
@@ -137,7 +137,7 @@ def _pose(ways: _Ways, response: Response, placed: list[Placed]) -> list[np.ndar
     places, orders = _places(course), [*_waves(ways, WAVES), *(np.sign(ways.clock - at) for at in STEPS)]
     touching = (ways.share > 0).astype(float)
     within = [np.ones(course.rows), ways.leaving, *(low_pass(touching, course.step, tau) - touching for tau in LAGS)]
-    histories = [place * one for place in places for one in within]
+    histories = [place * factor for place in places for factor in within]
     histories += [*orders, *(order * ways.leaving for order in orders[:2])]
     columns = [ways.slope * history[rows][:, None] for history in histories]
     if response.fitted:  # differences between places are its own, and it knows no sides
@@ -154,15 +154,15 @@ def _places(course: Course) -> list[np.ndarray]:
     at = course.tip[:, :2] - np.median(course.tip[:, :2], axis=0)
     x, y = (at / np.maximum(np.abs(at).max(axis=0), 1e-6)).T
     each = [np.ones(course.rows), x, y, x * x, x * y, y * y, np.tanh(SIDE * x), np.tanh(SIDE * y)]
-    return [one for one in each if np.abs(one).max() > 1e-6]
+    return [shape for shape in each if np.abs(shape).max() > 1e-6]
 
 
 def _moved(ways: _Ways, response: Response, placed: list[Placed], axis: int) -> np.ndarray:
     """Return the change of every stream with a tip that is aside, shape (m, streams)."""
     course, by = ways.course, np.zeros(3)
     by[axis] = LATERAL
-    there, back = (predict(replace(course, tip=course.tip + sign * by), response, placed) for sign in (1, -1))
-    change = 0.5 * (ways.streams.predicted(there) - ways.streams.predicted(back))
+    forward, backward = (predict(replace(course, tip=course.tip + sign * by), response, placed) for sign in (1, -1))
+    change = 0.5 * (ways.streams.predicted(forward) - ways.streams.predicted(backward))
     if ways.streams.tag:
         change[:, -3:] = 0.0
     return change
@@ -172,15 +172,15 @@ def _memory(ways: _Ways) -> list[np.ndarray]:
     """Readings that follow by any time, harder or later in the session; a skin that differs once it was pressed."""
     columns: list[np.ndarray] = []
     for tau in TIME_CONSTANTS:
-        behind = low_pass(ways.full, ways.course.step, tau) - ways.full
+        difference = low_pass(ways.full, ways.course.step, tau) - ways.full
         by = (np.ones(ways.course.rows), ways.share, ways.clock - 0.5)
-        columns += [ways.of_channels(behind * one[:, None]) for one in by]
+        columns += [ways.of_channels(difference * factor[:, None]) for factor in by]
     course, deepest = ways.course, running_max(ways.share, ways.course.row_site)
-    before = _earlier(course)[course.episode]
-    fresh = np.exp(-before / MANY)
+    presses = _earlier(course)[course.episode]
+    fresh = np.exp(-presses / MANY)
     # Skin that was pressed as deep before is softer there, and only there.
     met = (ways.share < deepest - 1e-3).astype(float)
-    for history in (deepest - ways.share, fresh, fresh * ways.share, np.exp(-before / FEW), met):
+    for history in (deepest - ways.share, fresh, fresh * ways.share, np.exp(-presses / FEW), met):
         columns += ways.times(history)
     return columns
 
@@ -200,7 +200,7 @@ def _friction(ways: _Ways) -> list[np.ndarray]:
     columns: list[np.ndarray] = []
     top = np.abs(ways.full).max(axis=0)
     for width in WIDTHS:
-        each = [play(reading, width * much) - reading for reading, much in zip(ways.full.T, top, strict=True)]
+        each = [play(reading, width * scale) - reading for reading, scale in zip(ways.full.T, top, strict=True)]
         columns.append(ways.of_channels(np.stack(each, axis=1)))
         columns.append(ways.times((play(ways.share, width) - ways.share) / 0.1)[1])
     near = np.exp(-np.square(ways.share / 0.1)) * (ways.leaving < 0)
@@ -215,8 +215,8 @@ def _late(ways: _Ways) -> list[np.ndarray]:
     columns: list[np.ndarray] = []
     for history in (speed, speed * ways.share, np.abs(speed), np.abs(speed) * speed):
         columns += ways.times(history)
-    behind: Iterable[np.ndarray] = (low_pass(ways.full, ways.course.step, tau) - ways.full for tau in LATE)
-    return [*columns, *(ways.of_channels(one) for one in behind)]
+    differences: Iterable[np.ndarray] = (low_pass(ways.full, ways.course.step, tau) - ways.full for tau in LATE)
+    return [*columns, *(ways.of_channels(difference) for difference in differences)]
 
 
 def _curve(ways: _Ways) -> list[np.ndarray]:
@@ -236,4 +236,6 @@ def _spread(ways: _Ways) -> list[np.ndarray]:
         nearest = np.min(far + np.where(far > 0, 0.0, np.inf), axis=1, keepdims=True)
         mixed.append(full @ ((far > 0) & (far <= 1.2 * nearest)).T)
     mixed += [np.roll(full, by, axis=1) for by in (1, -1)]
-    return [ways.of_channels(one * by[:, None]) for one in mixed for by in (np.ones(course.rows), ways.share)]
+    return [
+        ways.of_channels(neighbour * by[:, None]) for neighbour in mixed for by in (np.ones(course.rows), ways.share)
+    ]

@@ -42,13 +42,13 @@ class Spectrum(Effect):
     def apply(self, state: State, values: dict[str, np.ndarray]) -> State:
         """Return the state after it."""
         course = state.course
-        both = np.column_stack([state.load, state.force])
-        kept = both * np.maximum(state.depth, 0.0)[:, None] / course.span if self.by_depth else both
+        loads = np.column_stack([state.load, state.force])
+        base = loads * np.maximum(state.depth, 0.0)[:, None] / course.span if self.by_depth else loads
         shares = np.array([float(values[p.name]) for p in self.parameters])
         for radius, rows in _tools(course.tool, [tool.radius for tool in course.tools], self.by_radius):
-            own = np.where(rows[:, None], kept, 0.0)
-            both = both - low_passes(own, course.step, np.array(TIMES) * radius, shares)
-        return replace(state, load=both[:, :-1], force=both[:, -1])
+            excerpt = np.where(rows[:, None], base, 0.0)
+            loads = loads - low_passes(excerpt, course.step, np.array(TIMES) * radius, shares)
+        return replace(state, load=loads[:, :-1], force=loads[:, -1])
 
 
 def spectrum(law: Effect, by_radius: float) -> Placed:
@@ -61,5 +61,5 @@ def _tools(tool: np.ndarray, radii: list[float], power: float) -> list[tuple[flo
     """Return by how much the times of each tool are longer [1], and its rows; all at once where they are not."""
     if not power:
         return [(1.0, np.ones(len(tool), dtype=bool))]
-    known = np.where(np.isfinite(radii), radii, np.nanmedian(radii))
-    return [(float(r), tool == k) for k, r in enumerate((known / np.median(known)) ** power)]
+    sizes = np.where(np.isfinite(radii), radii, np.nanmedian(radii))
+    return [(float(r), tool == k) for k, r in enumerate((sizes / np.median(sizes)) ** power)]

@@ -16,13 +16,13 @@ def side_by_side(columns: Iterable[np.ndarray]) -> np.ndarray:
     Args:
         columns: Each of shape (n, streams).
     """
-    given = list(columns)
-    rows, streams = given[0].shape
-    result = np.empty((rows, streams, len(given)), dtype=np.float32)
+    parts = list(columns)
+    rows, streams = parts[0].shape
+    result = np.empty((rows, streams, len(parts)), dtype=np.float32)
     step = max(BLOCK_BYTES // max(result[:1].nbytes, 1), 1)
     for begin in range(0, rows, step):
         block = result[begin : begin + step]
-        for k, column in enumerate(given):
+        for k, column in enumerate(parts):
             block[:, :, k] = column[begin : begin + step]
     return result
 

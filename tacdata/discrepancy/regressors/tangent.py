@@ -38,8 +38,8 @@ class Knob:
     def moved(self, placed: Sequence[Placed], by: float) -> list[Placed]:
         """Return the effects with it moved by ``by`` typical sizes or e-folds, kept within its bounds."""
         p, result = self.parameter, list(placed)
-        wanted = self.value(placed) * np.exp(by) if self.shape else self.value(placed) + by * p.typical
-        inside = float(np.clip(wanted, p.low, p.high))
+        goal = self.value(placed) * np.exp(by) if self.shape else self.value(placed) + by * p.typical
+        inside = float(np.clip(goal, p.low, p.high))
         value = np.array(placed[self.at].values[p.name], dtype=float).copy()
         if self.channel is None:
             value = np.array(inside)
@@ -74,8 +74,8 @@ class Tangent:
 def knobs_of(placed: Sequence[Placed], channels: int) -> list[Knob]:
     """Return every number that placed effects can be moved by."""
     result = []
-    for at, one in enumerate(placed):
-        for p in one.effect.parameters:
+    for at, member in enumerate(placed):
+        for p in member.effect.parameters:
             result += [Knob(at, p, c) for c in range(channels)] if p.per_channel else [Knob(at, p, None)]
     return result
 
@@ -97,22 +97,22 @@ def tangents(
     if not knobs:
         return Tangent([], np.zeros((len(course.read), streams.count, 0), dtype=np.float32), np.zeros(0, dtype=int))
     chain = run or Chain(course, response, [*given, *placed])
-    now = streams.predicted(chain.prediction)
-    values = np.zeros((*now.shape, len(knobs)), dtype=np.float32)
+    baseline = streams.predicted(chain.prediction)
+    values = np.zeros((*baseline.shape, len(knobs)), dtype=np.float32)
     for group in _groups(knobs, placed, given):
-        steps, there = {}, list(placed)
+        steps, trial = {}, list(placed)
         for k in group:
             low, high = knobs[k].room(placed)
             # At its upper bound a parameter is moved downwards.
             step = STEP if high > STEP else -STEP
             if low < step < high:
-                steps[k], there = step, knobs[k].moved(there, step)
+                steps[k], trial = step, knobs[k].moved(trial, step)
         if not steps:
             continue
-        change = streams.predicted(chain.again([*given, *there])) - now
+        change = streams.predicted(chain.again([*given, *trial])) - baseline
         for k, step in steps.items():
-            own = slice(None) if len(group) == 1 else knobs[k].channel
-            values[:, own, k] = change[:, own] / step
+            channels = slice(None) if len(group) == 1 else knobs[k].channel
+            values[:, channels, k] = change[:, channels] / step
     return Tangent(knobs, values, np.arange(len(knobs)))
 
 
@@ -120,7 +120,7 @@ def _groups(knobs: list[Knob], placed: Sequence[Placed], given: Sequence[Placed]
     """Return knobs that are moved at once: a parameter of every channel's own, unless something else mixes channels."""
     groups: dict[tuple[int, str, int | None], list[int]] = {}
     for k, knob in enumerate(knobs):
-        others = [*given, *(p for at, p in enumerate(placed) if at != knob.at)]
-        apart = any(p.effect.by_channel for p in others)
-        groups.setdefault((knob.at, knob.parameter.name, knob.channel if apart else None), []).append(k)
+        companions = [*given, *(p for at, p in enumerate(placed) if at != knob.at)]
+        is_split = any(p.effect.by_channel for p in companions)
+        groups.setdefault((knob.at, knob.parameter.name, knob.channel if is_split else None), []).append(k)
     return list(groups.values())

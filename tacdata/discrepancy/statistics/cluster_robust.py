@@ -71,10 +71,10 @@ class ClusteredScore:
         variance, (first, second) = self.variance, self.freedom
         if pooled is not None:
             expected, more = pooled.excess * self.expected_variance, pooled.freedom * self._prior_weight(pooled)
-            own, prior = second * variance / (second + more), more * expected / (second + more)
-            variance, second = own + prior, second + more
+            sample_part, prior = second * variance / (second + more), more * expected / (second + more)
+            variance, second = sample_part + prior, second + more
             # The prior's covariance is a multiple of the unit matrix: all amplitudes are degrees of freedom.
-            square = own**2 / first + (2 * own + prior) * prior / self.residuals.shape[1]
+            square = sample_part**2 / first + (2 * sample_part + prior) * prior / self.residuals.shape[1]
             first = variance**2 / square
         return float(_normal(np.array([np.sum(np.square(self.total)) / variance]), first, second)[0])
 
@@ -133,31 +133,31 @@ def pooled_excess(effects: dict[str, list[ClusteredScore]]) -> PooledExcess | No
     chance, independent = float(np.mean(polygamma(1, half))), INDEPENDENT * len(excited)
     # A spread of ratios is one beyond its standard error under chance.
     spread = float(1.4826 * np.median(np.abs(log - middle))) ** 2 - chance * (1 + SURELY * np.sqrt(2 / independent))
-    most = PRIOR_FREEDOM * len(excited)
-    freedom = min(2 * _trigamma_inverse(spread), most) if spread > 0 else most
+    limit = PRIOR_FREEDOM * len(excited)
+    freedom = min(2 * _trigamma_inverse(spread), limit) if spread > 0 else limit
     ratio = float(np.exp(middle + digamma(freedom / 2) - np.log(freedom / 2)))
     # A median's standard error is sqrt(pi / 2) = 1.2533 times a mean's.
     return PooledExcess(max(ratio, LEAST_EXCESS), freedom, 1.2533 * float(np.sqrt(chance / independent)))
 
 
-def pooled_by_kind(others: PooledExcess | None, clock: PooledExcess | None) -> dict[bool, PooledExcess | None]:
+def pooled_by_kind(general: PooledExcess | None, clock: PooledExcess | None) -> dict[bool, PooledExcess | None]:
     """Return the priors of effects that follow the clock (True) and of all others (False).
 
     Few effects follow the clock, and estimate a prior badly. They get that of the others. Where something drifts, they
     surely scatter more, and keep their own.
     """
-    if others is not None and clock is not None:
-        surely = float(np.log(clock.excess / others.excess)) > CLOCK_Z * np.hypot(clock.error, others.error)
-        clock = clock if surely else others
-    return {False: others, True: clock}
+    if general is not None and clock is not None:
+        surely = float(np.log(clock.excess / general.excess)) > CLOCK_Z * np.hypot(clock.error, general.error)
+        clock = clock if surely else general
+    return {False: general, True: clock}
 
 
 def _trigamma_inverse(value: float) -> float:
     """Return x with trigamma(x) = value > 0, by Newton's method on its inverse (Smyth 2004, appendix)."""
     x = 0.5 + 1 / value
     for _ in range(30):
-        now = float(polygamma(1, x))
-        step = now * (1 - now / value) / float(polygamma(2, x))
+        current = float(polygamma(1, x))
+        step = current * (1 - current / value) / float(polygamma(2, x))
         x = max(x + step, 1e-3)
         if abs(step) < 1e-8 * x:
             break
@@ -174,16 +174,16 @@ def clustered_score(gram: np.ndarray, columns: np.ndarray) -> ClusteredScore:
     index = columns + 1
     information = gram[:, index][:, :, index]
     total = information.sum(axis=0)
-    kept = np.diag(total) > 1e-9 * max(float(np.diag(total).max(initial=0.0)), 1e-12)
-    index, information, total = index[kept], information[:, kept][:, :, kept], total[np.ix_(kept, kept)]
+    excited = np.diag(total) > 1e-9 * max(float(np.diag(total).max(initial=0.0)), 1e-12)
+    index, information, total = index[excited], information[:, excited][:, :, excited], total[np.ix_(excited, excited)]
     if not len(index):
         return _nothing(len(gram))
     scores = gram[:, index, 0]
-    turned = _unit(total)
-    white = scores @ turned.T
-    whole = white.sum(axis=0)
-    inside = np.einsum("ji,eik,lk->ejl", turned, information, turned, optimize=True)
-    bare = white - inside @ whole
+    root = _unit(total)
+    white = scores @ root.T
+    sum_score = white.sum(axis=0)
+    inside = np.einsum("ji,eik,lk->ejl", root, information, root, optimize=True)
+    bare = white - inside @ sum_score
     leverage = np.einsum("ejj->ej", inside)
     # A drift makes successive presses dependent. They are joined into larger clusters until their scores no longer
     # correlate: the sandwich assumes independent clusters.
@@ -204,7 +204,7 @@ def clustered_score(gram: np.ndarray, columns: np.ndarray) -> ClusteredScore:
     residuals = together[:, tested] / (1 - heavy[:, tested])
     expected = float(np.sum(heavy[:, tested] / (1 - heavy[:, tested])))
     drawn, freedom = _freedom(residuals, heavy[:, tested])
-    return ClusteredScore(whole[tested], residuals, cluster, freedom, expected, drawn)
+    return ClusteredScore(sum_score[tested], residuals, cluster, freedom, expected, drawn)
 
 
 def _nothing(episodes: int) -> ClusteredScore:
@@ -236,13 +236,13 @@ def _freedom(residuals: np.ndarray, heavy: np.ndarray) -> tuple[float, tuple[flo
     tr C^2 is too large by (tr C)^2 / n, which is taken off.
     """
     product = residuals @ residuals.T
-    whole, square = float(np.trace(product)) ** 2, max(float(np.sum(product**2)), FLOOR)
+    trace_square, square = float(np.trace(product)) ** 2, max(float(np.sum(product**2)), FLOOR)
     share = heavy.sum(axis=1) / max(float(heavy.sum()), 1e-12)
     together = float(np.sum(share**2))
-    least = whole / residuals.shape[1]
-    own = whole / max((square - together * whole) / (1 + together), least, FLOOR)
-    own = max(own, 1.0)
-    return max(whole / square, 1.0), (own, max(own * (1 / together - 1), 1.0))
+    lowest = trace_square / residuals.shape[1]
+    degrees = trace_square / max((square - together * trace_square) / (1 + together), lowest, FLOOR)
+    degrees = max(degrees, 1.0)
+    return max(trace_square / square, 1.0), (degrees, max(degrees * (1 / together - 1), 1.0))
 
 
 def _normal(ratio: np.ndarray, first: float, second: float) -> np.ndarray:

@@ -46,26 +46,26 @@ def bounded(matrix: np.ndarray, target: np.ndarray, low: np.ndarray, high: np.nd
     if np.all(best >= low) and np.all(best <= high):
         return best
     x = np.clip(best, low, high)
-    held = x != best
+    fixed = x != best
     diagonal = np.diag(matrix)
     size = np.sqrt(np.where(diagonal > 0, diagonal, np.inf))  # by round-off a column without information is below 0
     for _ in range(MOST_SETS * len(x)):
-        free = np.flatnonzero(~held)
+        interior = np.flatnonzero(~fixed)
         step = np.zeros(len(x))
-        step[free] = np.linalg.solve(matrix[np.ix_(free, free)], target[free] - matrix[free] @ x)
+        step[interior] = np.linalg.solve(matrix[np.ix_(interior, interior)], target[interior] - matrix[interior] @ x)
         with np.errstate(divide="ignore", invalid="ignore"):
             room = np.where(step > 0, (high - x) / step, np.where(step < 0, (low - x) / step, np.inf))
         share = min(float(room.min()), 1.0)
         x = np.clip(x + share * step, low, high)
         if share < 1:
             first = int(np.argmin(room))
-            x[first], held[first] = (high if step[first] > 0 else low)[first], True
+            x[first], fixed[first] = (high if step[first] > 0 else low)[first], True
             continue
         slope = (target - matrix @ x) / size
-        inward = np.where(held, np.where(x <= low, slope, -slope), 0.0)
+        inward = np.where(fixed, np.where(x <= low, slope, -slope), 0.0)
         if inward.max() <= SETTLED * np.abs(target / size).max():
             break
-        held[int(np.argmax(inward))] = False
+        fixed[int(np.argmax(inward))] = False
     return x
 
 
@@ -108,10 +108,10 @@ class Beside:
         key, index = np.asarray(episodes).tobytes(), self._at[columns + 1]
         if key not in self._left:
             self._left[key] = self._without(self._gram[episodes])
-        left = self._left[key]
-        linear = left[:, 0, :][:, index] @ values
-        square = np.einsum("i,eij,j->e", values, left[:, index[:, None], index], values)
-        return 0.5 * (self._gram[episodes, 0, 0] - left[:, 0, 0]) + linear - 0.5 * square
+        remainder = self._left[key]
+        linear = remainder[:, 0, :][:, index] @ values
+        square = np.einsum("i,eij,j->e", values, remainder[:, index[:, None], index], values)
+        return 0.5 * (self._gram[episodes, 0, 0] - remainder[:, 0, 0]) + linear - 0.5 * square
 
     def _without(self, gram: np.ndarray) -> np.ndarray:
         """Return Gram matrices of the other columns after projecting out the free ones."""

@@ -22,6 +22,8 @@ class BondedLayer(ContactLaw):
         wide = shape * np.sqrt(depth)
         return depth**1.5 * sum(c * wide**k for k, c in enumerate(SERIES))
 
-    def said(self, least: float, most: float) -> str:
+    def said(self, smallest: float, largest: float) -> str:
         """Return the law with its number, in words."""
-        return f"{self.title} (at the deepest, the contact's radius is {between(least, most)} times its thickness)"
+        return (
+            f"{self.title} (at the deepest, the contact's radius is {between(smallest, largest)} times its thickness)"
+        )

@@ -18,6 +18,6 @@ class ClosingGap(ContactLaw):
         """Return the rise [1]; the shape is how much of the gap the deepest press closes [1]."""
         return depth / (1 - shape * depth)
 
-    def said(self, least: float, most: float) -> str:
+    def said(self, smallest: float, largest: float) -> str:
         """Return the law with its number, in words."""
-        return f"{self.title}, by {between(100 * least, 100 * most)} % at the deepest"
+        return f"{self.title}, by {between(100 * smallest, 100 * largest)} % at the deepest"

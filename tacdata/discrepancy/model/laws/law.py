@@ -31,20 +31,20 @@ class ContactLaw(ABC):
             shape: Its own number [1].
         """
 
-    def said(self, least: float, most: float) -> str:
+    def said(self, smallest: float, largest: float) -> str:
         """Return the law with its own number [1] in most channels and places, in words."""
         return self.title
 
 
-def between(least: float, most: float) -> str:
+def between(smallest: float, largest: float) -> str:
     """Return a range of numbers, or one where they are the same."""
-    return f"{least:.2g}" if least == most else f"{least:.2g} to {most:.2g}"
+    return f"{smallest:.2g}" if smallest == largest else f"{smallest:.2g} to {largest:.2g}"
 
 
 def laws() -> tuple[ContactLaw, ...]:
     """Return every contact law, by name."""
-    found = []
+    result = []
     for name in registry.names(ROOM, BASE):
         kind: type[ContactLaw] = registry.load(ROOM, BASE, name, ContactLaw)
-        found.append(kind())
-    return tuple(found)
+        result.append(kind())
+    return tuple(result)

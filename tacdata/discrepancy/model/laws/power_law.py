@@ -18,6 +18,6 @@ class PowerLaw(ContactLaw):
         """Return the rise [1]; the shape is the power [1]."""
         return depth**shape
 
-    def said(self, least: float, most: float) -> str:
+    def said(self, smallest: float, largest: float) -> str:
         """Return the law with its number, in words."""
-        return f"depth to the power {between(least, most)}"
+        return f"depth to the power {between(smallest, largest)}"
