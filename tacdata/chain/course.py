@@ -77,6 +77,8 @@ class Course:
     """Readings that a channel's range ends at: more would read the same, shape (n, channels), bool; None: none."""
     specimens: tuple[str, ...] = ()
     """Name of each episode's specimen, by the source; empty: it names none."""
+    effort: bool | None = None
+    """Whether channels are an effort of the drive, as a current, or a response; None: the source says neither."""
     apart: bool = False
     """Whether episodes are so far apart that no memory lasts from one to the next, regardless of the clock."""
     restarts: np.ndarray | None = None

@@ -33,6 +33,9 @@ class DryFriction(Effect):
     )
     at_rest = AtRest.STAYS
 
+    def unjudgeable(self, course: Course, response: Response) -> str:
+        return "channels are an effort, which sees friction only while the drive moves" if course.effort else ""
+
     def apply(self, state: State, values: Values) -> State:
         course = state.course
         way = max(float(values["w"]) * course.span, 1e-9)
@@ -70,7 +73,7 @@ class SealFriction(DryFriction):
         return (state.depth + play(-state.depth, way, state.course.first)) / way
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        return "many channels share the pattern of a load" if course.channels > FEW else ""
+        return super().unjudgeable(course, response) or _many(course)
 
 
 class FrictionClearance(SealFriction):
@@ -115,7 +118,13 @@ class EffortFriction(SealFriction):
         return rate / (np.abs(rate) + float(values["c"]) * max(float(np.abs(rate).max()), 1e-9))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        return super().unjudgeable(course, response) or ("" if np.any(course.speed) else "the tip never moves")
+        if course.effort is False:
+            return "channels are a response, in which friction stays at rest"
+        return _many(course) or ("" if np.any(course.speed) else "the tip never moves")
+
+
+def _many(course: Course) -> str:
+    return "many channels share the pattern of a load" if course.channels > FEW else ""
 
 
 def _rubbed(state: State, share: np.ndarray, turn: np.ndarray) -> State:

@@ -50,6 +50,8 @@ class ImportedPress:
         }
         if specimen := self.record.get("specimen"):
             imported["specimen"] = specimen
+        if kind := self.record["mapping"]["taxels"].get("channels_are"):
+            imported["channels_are"] = kind
         return {"name": self.record["name"], "registration": self.registration, "imported": imported}
 
     @property

@@ -35,6 +35,8 @@ class PressKind:
     """Readings of the healthy presses in the order of time [the source's unit], shape (h, t, channels)."""
     measured: np.ndarray
     """Readings of the other presses [the source's unit], shape (m, t, channels)."""
+    effort: bool | None = None
+    """Whether channels are an effort of the drive, as a current, or a response; None: the source says neither."""
 
     @property
     def base(self) -> np.ndarray:
@@ -156,7 +158,8 @@ def _on_one_clock(
     at = course.tip[rows[group[0]][0], :2]
     name = names[group[0]] or f"x {at[0]:.2g}, y {at[1]:.2g} mm"
     label = f"{name}, {spans[group[0]].depth:.3g} mm deep at {np.quantile(speed, 0.75):.2g} mm/s"
-    return PressKind(label, 0.5 * (edges[1:] + edges[:-1]) + lead, np.mean(depths, axis=0), *sides)
+    middle = 0.5 * (edges[1:] + edges[:-1]) + lead
+    return PressKind(label, middle, np.mean(depths, axis=0), *sides, effort=course.effort)
 
 
 def _means(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:

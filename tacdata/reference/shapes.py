@@ -18,6 +18,7 @@ MEMORIES, FILTERS, DELAYS = (0.15, 0.5), (0.01, 0.03), (0.003, 0.01, 0.03)
 """Time constants of memory and of filters, and delays, as shares of the press [1]."""
 FLAT = 0.02
 """A curve that spans less than this share of the base's range is no shape [1]."""
+AGAINST = "while it moves, against the motion"
 TYPICAL, TYPICAL_LAG, TYPICAL_SHIFT = 0.3, 0.02, 0.03
 """Sizes that would not surprise: shares of the base's range, of the press's duration, of its depth [1]."""
 
@@ -57,10 +58,13 @@ def shapes(condition: PressKind) -> list[Shape]:
         "s": TYPICAL_LAG * span * ones,
         "mm": TYPICAL_SHIFT * float(np.ptp(condition.depth)) * ones,
     }
+    # A response holds friction at rest; an effort has it only while the drive moves.
+    friction = [
+        *([] if condition.effort else [("held at rest", last)]),
+        *([] if condition.effort is False else [(AGAINST, way), ("while it moves, either way", moving)]),
+    ]
     entries: list[tuple[str, str, str, np.ndarray]] = [
-        ("dry_friction", "held at rest", "reading", last[:, None] * ones),
-        ("dry_friction", "while it moves, against the motion", "reading", way[:, None] * ones),
-        ("dry_friction", "while it moves, either way", "reading", moving[:, None] * ones),
+        *(("dry_friction", form, "reading", curve[:, None] * ones) for form, curve in friction),
         ("gain", "of the readings", "1", base - baseline),
         ("z_offset", "of the depth", "mm", slope),
         ("backlash", "of the drive", "mm", slope * (last < 0)[:, None]),

@@ -17,7 +17,7 @@ WAY = np.sign(np.gradient(DEPTH, TIME)) * (np.abs(np.gradient(DEPTH, TIME)) > 2)
 HEADING = Machines(("after",), ("before",), "", "A")
 
 
-def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01):
+def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01, effort=None):
     """Compare presses of a motor with load, friction and wander; a change acts in the second half of each load."""
     rng = np.random.default_rng(seed)
     readings, names, measured = [], [], []
@@ -43,6 +43,7 @@ def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01):
         tools=(Tool("unknown", "unknown", np.nan),),
         names=tuple(f"press {k}" for k in range(episodes)),
         specimens=tuple(names),
+        effort=effort,
     )
     return difference(course, course.specimens, np.array(measured))
 
@@ -68,6 +69,12 @@ def test_a_seeded_fault_is_named_with_its_signed_size(fault):
     for s in found.named[0].changed:
         assert s.value == pytest.approx(size, rel=0.2)
     assert found.named[0].changed
+
+
+def test_a_response_has_no_friction_that_ends_with_the_motion():
+    found = machine(FAULTS["friction either way"][0], effort=False)
+    assert not any("while it moves" in m.form for m in found.mechanisms)
+    assert not any("held at rest" in m.form for m in machine(FAULTS["friction either way"][0], effort=True).mechanisms)
 
 
 def test_a_fault_at_one_load_is_said_with_the_bound_at_the_other():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -95,7 +95,24 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
         notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
     if any(e.tags for _, e in found) and not views:
         notes.append("the tag was seen too seldom to check the guide: keep it in view during the presses")
-    return _joined(parts, (kept, limits), found[0][1], (bool(force), bool(temperature), bool(views)), notes)
+    course = _joined(parts, (kept, limits), found[0][1], (bool(force), bool(temperature), bool(views)), notes)
+    return replace(course, effort=_effort([e for _, e in found]))
+
+
+def _effort(episodes: list[Episode]) -> bool | None:
+    """Return whether channels are an effort of the drive; None where the source says neither.
+
+    Raises:
+        FormatError: If recordings differ.
+    """
+    kinds = sorted({e.rig.get("imported", {}).get("channels_are", "not stated") for e in episodes})
+    if len(kinds) > 1:
+        raise FormatError(
+            f"recordings whose channels are: {', '.join(kinds)}",
+            "the same throughout",
+            "state taxels: {channels_are: ...} in each mapping, and import again",
+        )
+    return {"effort": True, "response": False}.get(kinds[0])
 
 
 def _of_one_sensor(episodes: list[Episode]) -> list[str]:
