@@ -75,6 +75,7 @@ def faults(name: str, stream: TaxelStream, begin_ns: int, end_ns: int) -> list[s
         remarks.append(f"{name}: no reading of its board ever changes: it is not connected to a skin")
     elif len(stuck):
         remarks.append(f"{name}: channels {', '.join(map(str, stuck))} never change")
+    # Readings of a coarse board may not change at all at rest: one count is its resolution.
     noise = np.median(np.abs(np.diff(stream.counts, axis=0)), axis=0) + 1.0
     if len(stuck) < len(spread) and (spread < TOUCH * noise).all():
         remarks.append(f"{name}: its board speaks, but nothing ever touched the finger")

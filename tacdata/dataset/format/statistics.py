@@ -23,7 +23,9 @@ def column_statistics(values: np.ndarray) -> Statistics:
     """
     shape = {1: (1,), 2: values.shape[1:], 3: (1, 1, 1)}[values.ndim]
     table = values.reshape(len(values), -1) if values.ndim == 2 else values.reshape(-1, 1)
+    # Maps stay float32: as float64 a long dataset would need twice the memory.
     table = table.astype(np.float64) if values.dtype != np.float32 else table
+    # Sorted once for all quantiles.
     ordered = np.sort(table, axis=0)
     result = {
         "min": ordered[0],
@@ -58,6 +60,7 @@ def merge(parts: list[Statistics]) -> Statistics:
         return np.tensordot(weights, np.stack(values), axes=1)
 
     mean = average([part["mean"] for part in parts])
+    # Law of total variance: the spread within the parts and that of their means.
     variance = average([part["std"] ** 2 + (part["mean"] - mean) ** 2 for part in parts])
     return {
         "min": np.min([part["min"] for part in parts], axis=0),

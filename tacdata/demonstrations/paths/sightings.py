@@ -152,6 +152,7 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     covariance = rotation @ np.where(np.isfinite(covariance), covariance, np.nan) @ rotation.T
     lost = ~np.isfinite(covariance).all(axis=(1, 2))
     covariance[lost] = _diagonal(*UNKNOWN)
+    # A matrix with a negative variance is of a damaged message.
     covariance[np.linalg.eigvalsh(covariance)[:, 0] < -ROUNDING] = _diagonal(*UNKNOWN)
     sigma = np.hypot(timing, np.zeros(count) if view.timing is None else view.timing[sightings])
     stamps = view.sample_ns[sightings]

@@ -71,6 +71,7 @@ def check_together(recording: DemoRecording) -> None:
             )
     spans: dict[str, tuple[int, int]] = {}
     for name, values in times.items():
+        # A camera has a stream for each finger, all on the camera's clock.
         device = name.split(" on ")[0]
         first, last = spans.get(device, (int(values[0]), int(values[-1])))
         spans[device] = min(first, int(values[0])), max(last, int(values[-1]))
@@ -134,6 +135,7 @@ def late_stretches(sightings: Mapping[str, Sightings], begin_ns: int) -> tuple[d
     times = np.concatenate([np.zeros(0, np.int64), *(series.time_ns for series in sightings.values())])
     if len(cameras) < 2 or not len(times):
         return dict(sightings), []
+    # Stretches overlap by half, so that a short lateness lies whole in one of them.
     moments = np.arange(times.min(), times.max(), round(WINDOW / 2 * 1e9), dtype=np.int64)
     for reference, partner in combinations(cameras, 2):
         for first in moments:
@@ -207,7 +209,9 @@ def known_to(sightings: Sightings, times_ns: np.ndarray) -> np.ndarray:
         ends = [np.clip(upper - 1, 0, len(times) - 1), np.clip(upper, 0, len(times) - 1)]
         away = np.min([np.abs(times[k] - times_ns) for k in ends], axis=0)
         near = away <= SPACED * 1e9
+        # Both images determine the path between them, so the less certain time counts.
         best[near] = np.minimum(best, np.max([sigma[k] for k in ends], axis=0))[near]
+    # In a gap no image is near: the path there depends on the sightings at its ends.
     if len(sightings):
         nearest = np.clip(np.searchsorted(sightings.time_ns, times_ns), 1, max(len(sightings) - 1, 1))
         ends = np.maximum(sightings.timing[nearest - 1], sightings.timing[np.minimum(nearest, len(sightings) - 1)])
@@ -226,6 +230,7 @@ def late_words(sightings: Mapping[str, Sightings], begin_ns: int) -> list[str]:
                 times, sigma = [*times, *series.time_ns[rows]], [*sigma, *series.timing[rows]]
                 step = np.diff(series.time_ns[rows]) * 1e-9
                 speed = np.linalg.norm(np.diff(series.position[rows], axis=0), axis=1) / np.maximum(step, STILL)
+                # Not the largest speed: a mirrored pose jumps faster than any finger.
                 fastest = max(fastest, float(np.quantile(speed, 0.99)))
         vague = np.array(sigma) > LATE
         if not vague.any():
@@ -253,6 +258,7 @@ def _more(sightings: Sightings, timing: np.ndarray) -> np.ndarray:
         times, places = sightings.time_ns[rows], sightings.position[rows]
         added[rows, 3:, 3:] = (
             displaced(times, places, times, timing[rows])
+            # Uncertainties that have not grown are in the covariance already.
             * (timing[rows] > sightings.timing[rows]).astype(float)[:, None, None]
         )
     return added
@@ -285,6 +291,7 @@ def _lag(
     for series in sightings.values():
         of = [np.array([camera == name for camera in series.camera]) for name in (reference, partner)]
         if all(rows.sum() >= fewest for rows in of):
+            # From the first sighting on: float64 does not resolve nanoseconds since 1970.
             pairs.append([((series.time_ns[rows] - series.time_ns[0]) * 1e-9, series.position[rows]) for rows in of])
     if not pairs:
         return None
@@ -311,6 +318,7 @@ def _difference(pairs: list[list[tuple[np.ndarray, np.ndarray]]], lag: float, fe
         deviation = other_path[inside] - expected
         # A constant distance of the paths is an error of a camera's place and not of its time.
         squares.append(((deviation - np.median(deviation, axis=0)) ** 2).sum(axis=1))
+    # A few common sightings agree at some lag by chance.
     if count < max(fewest, OVERLAP * total):
         return np.inf
     errors = np.sort(np.concatenate(squares))

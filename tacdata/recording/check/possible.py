@@ -68,6 +68,7 @@ def _times(time_ns: np.ndarray) -> list[Doubt]:
     doubts: list[Doubt] = []
     if distinct < rows:
         doubts.append((WARNING, "taxels", f"{rows - distinct} of {rows} rows have the time of another row"))
+    # Rows of one time count once: a coarse clock repeats times, and the sensor is no faster for it.
     rate = (distinct - 1) / span
     if not RATES[0] <= rate <= RATES[1]:
         text = f"{rate:.3g} rows a second: the times are in another unit than the file says"
@@ -118,6 +119,7 @@ def _repeats(counts: np.ndarray) -> list[Doubt]:
     # Windows that overlap do not count: a resting signal equals itself one row later.
     for later in np.flatnonzero(first[group] <= np.arange(windows) - REPEATED).tolist():
         earlier = int(first[group[later]])
+        # A coarse signal at rest repeats itself by rounding alone.
         if len(np.unique(kind[later : later + REPEATED])) < VARIED:
             continue
         same = kind[later:] == kind[earlier : earlier + len(kind) - later]

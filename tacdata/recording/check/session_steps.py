@@ -77,6 +77,7 @@ def find_step(explained: np.ndarray, values: np.ndarray, threshold: float) -> St
         significance = float((np.abs(solved[-1]) / error).max())
         if best is None or significance > best[0]:
             best = significance, at, solved[-1]
+        # Half-way through the session both sides have most presses, so a step is most certain there.
         middle = min(middle, SURE * float(error.max())) if abs(at - count / 2) <= 1 else middle
     if best is None or best[0] < SURE or np.abs(best[2]).max() < threshold:
         return StepSearch(None, middle)
@@ -88,12 +89,14 @@ def slip(sample: Answers) -> AnswerStep | None:
     centers = sample.taxels.centers
     low, high = centers.min(axis=0) + INSIDE, centers.max(axis=0) - INSIDE
     rows = np.flatnonzero(np.all((sample.sites > low) & (sample.sites < high), axis=1))
+    # Squared: the noise of the many taxels around the contact must not pull its centre.
     weight = np.maximum(sample.response[rows], 0.0) ** 2
     total = weight.sum(axis=1)
     if len(rows) < 2 * FEWEST or not total.all():
         return None
     sites = sample.sites[rows]
     offset = (weight[:, :, None] * centers).sum(axis=1) / total[:, None] - sites
+    # Answers end at the array's rim, which draws their centre inwards in proportion to the site.
     step = find_step(np.column_stack([np.ones(len(rows)), sites]), offset, SLIP).step
     return None if step is None else AnswerStep(int(rows[step.row]), step.size)
 
@@ -136,4 +139,5 @@ def _explained(presses: list[Press]) -> np.ndarray:
     table = np.array([(p.x, p.y, np.log(p.speed), p.overshoot) for p in presses], float)
     table = (table - table.mean(axis=0)) / np.maximum(table.std(axis=0), 1e-9)
     each = [[float(kind == category) for category in sorted(set(kinds))] for kind in kinds]
+    # The last column is a drift over the session, which is no step.
     return np.column_stack([each, table, table[:, :2] ** 2, np.linspace(-1.0, 1.0, len(presses))])

@@ -139,6 +139,7 @@ def _slope(device: np.ndarray, excess: np.ndarray) -> float:
         append_to_hull(hull, point)
     if len(hull) < 2:
         return 0.0
+    # The edge under the middle: at the ends of a recording few latencies bound the line.
     edge = next((k for k in range(1, len(hull) - 1) if hull[k][0] >= device.mean()), len(hull) - 1)
     (x1, y1), (x2, y2) = hull[edge - 1], hull[edge]
     return float(np.clip((y2 - y1) / (x2 - x1), -CRYSTAL, CRYSTAL))
@@ -152,6 +153,8 @@ def _numbered(
     steps = np.diff(begun) / np.diff(number)
     period, drift = _period(begun, float(np.median(steps)), 1e9 / rate if rate else None)
     excess = begun - period * (number - number[0])
+    # Numbers are given on arrival: a lost image raises the excess of all later ones for good, lateness does not. So an
+    # image is at least as late as against the later ones, and at most as against the earlier ones.
     lower = excess - np.minimum.accumulate(excess[::-1])[::-1]
     upper = np.empty(len(excess))
     upper[0] = max(lower[0], _before(model, int(arrival[0]), int(number[0])))

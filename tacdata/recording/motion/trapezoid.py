@@ -55,6 +55,7 @@ class Trapezoid:
         if not self.length:
             return np.zeros_like(t)
         remainder = self.duration - t
+        # A ramp covers half of the distance of a cruise as long.
         cruise = self.peak * (t - self.ramp / 2)
         rising, falling = self.acceleration * t**2 / 2, self.length - self.acceleration * remainder**2 / 2
         return np.where(t < self.ramp, rising, np.where(remainder < self.ramp, falling, cruise))
@@ -100,6 +101,7 @@ class AxisLimits:
             return Trapezoid(start, target, speed, float(self.acceleration.min()))
         share = np.abs(target - start) / length
         moving = share > 0
+        # Grbl plans along the line: each axis limits it by the axis's share of the direction.
         rate = float((self.max_rate[moving] / share[moving]).min())
         acceleration = float((self.acceleration[moving] / share[moving]).min())
         return Trapezoid(start, target, min(speed, rate), acceleration)

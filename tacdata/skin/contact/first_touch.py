@@ -46,6 +46,7 @@ def rise(indenter: Indenter, turn: np.ndarray) -> float:
     if not np.abs(lateral).max() > 1e-12:
         return 0.0
     half, center, best = indenter.extent, np.zeros(2), 0.0
+    # A narrowing grid, since profiles need not be smooth: surfaces from files have edges.
     for _ in range(_ZOOMS):
         samples = np.linspace(-half, half, _SAMPLES)
         x, y = np.meshgrid(center[0] + samples, center[1] + samples, indexing="ij")
@@ -86,6 +87,7 @@ def reach(sensor: Sensor, request: PressRequest) -> tuple[float, float]:
     local = np.stack([x, y, z])[:, np.isfinite(z)]
     place = turn @ local
     heights = [
+        # Beside the skin there is no height: the rim's counts.
         np.clip(c + place[k], -h / 2, h / 2)
         for k, (c, h) in enumerate(((request.x, skin.size_x), (request.y, skin.size_y)))
     ]

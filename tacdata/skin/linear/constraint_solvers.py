@@ -50,6 +50,7 @@ class FactoredCompliance:
         for member in changed:
             room = torch.empty(1, sizes[member], sizes[member], device=device)
             assemble(torch.tensor([member], device=device), room)
+            # Nearly dependent constraints break a factorization in single precision, but not the solves by its factor.
             self._factor[member] = torch.linalg.cholesky(room[0].double()).float()
 
     def times(self, v: torch.Tensor, member: torch.Tensor) -> torch.Tensor:
@@ -89,9 +90,11 @@ class InvertedCompliance:
         by_size: dict[int, list[int]] = {}
         for member in changed:
             if sizes[member]:
+                # Sizes are rounded up, so that members of about one size are inverted in one call.
                 by_size.setdefault(-(-sizes[member] // self.STEP) * self.STEP, []).append(member)
         parts = [
             (size, torch.tensor(members[start : start + max(1, _ROOM // size**2)], device=device))
+            # The largest begin first: they take longest, and the streams finish together.
             for size, members in sorted(by_size.items(), reverse=True)
             for start in range(0, len(members), max(1, _ROOM // size**2))
         ]

@@ -98,6 +98,7 @@ class DepthRaster:
         if self._parts == 1:
             return depth.permute(2, 0, 1).contiguous(), covered.permute(2, 0, 1).double()
         total, share = self._mean(depth), self._mean(covered.double())
+        # The mean over the covered part only: a pixel on the rim would read too shallow.
         return torch.where(share > 0, total / share.clamp_min(1e-12), 0.0), share
 
     def _height(self, u: torch.Tensor) -> torch.Tensor:

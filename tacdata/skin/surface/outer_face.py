@@ -46,6 +46,7 @@ class OuterFace:
             for i in range(a[0], b[0] + 1):
                 for j in range(a[1], b[1] + 1):
                     bins[i * self._count[1] + j].append(triangle)
+        # Equal lengths, so that all points are located at once.
         width = max(len(b) for b in bins)
         return np.array([b + b[-1:] * (width - len(b)) if b else [0] * width for b in bins])
 
@@ -61,6 +62,7 @@ class OuterFace:
         if self._bent:
             local = self._bend(candidates, local, inside)
         worst = np.minimum(np.minimum(local[..., 0], local[..., 1]), 1 - local.sum(axis=-1))
+        # The largest of the smallest coordinates also decides on the rim, where rounding puts points outside of all.
         best = worst.argmax(axis=1)
         row = np.arange(len(points))
         return candidates[row, best], _inside(local[row, best])
@@ -73,6 +75,7 @@ class OuterFace:
         for _ in range(_NEWTON):
             remainder = target - np.einsum("na,nai->ni", elements.triangle_shapes(local), plan)
             jacobian = np.einsum("nai,nak->nik", plan, elements.triangle_gradients(local))
+            # Candidates that do not contain the point may degenerate or diverge; they are never chosen.
             regular = np.abs(np.linalg.det(jacobian)) > 1e-12
             step = np.zeros_like(local)
             step[regular] = np.linalg.solve(jacobian[regular], remainder[regular][..., None])[..., 0]

@@ -114,6 +114,7 @@ def estimate(
     taxels = sensor.taxels.centers
     pitch = max(sensor.taxels.pitch_x, sensor.taxels.pitch_y)
     surface = _local(coarse.surface - fine.surface[rows], pixels, _STEEP * reach)
+    # With at least one neighbour: on a single taxel two meshes may agree by chance.
     taxel = _local(coarse.taxel_force - fine.taxel_force[rows], taxels, max(_STEEP * reach, pitch))
     force = _along(coarse, fine.force[rows])
 
@@ -142,6 +143,7 @@ def _along(coarse: Figures, force: np.ndarray) -> np.ndarray:
     """
     size = np.linalg.norm(force, axis=1)
     square = (np.linalg.norm(coarse.force - force, axis=1) / np.maximum(size, 1e-12)) ** 2
+    # States without force have no share: as zeros they would lower their neighbours' error.
     touched = (size > 0).astype(float)
     kernel = np.array([1.0, 2.0, 1.0])
     total = np.convolve(touched, kernel)[1:-1]

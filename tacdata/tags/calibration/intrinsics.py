@@ -149,6 +149,7 @@ def _without_strays(views: list[BoardView], fit: _Fit) -> tuple[list[BoardView],
     members, count = [], 0
     for view, far in zip(views, deviation, strict=True):
         good = far <= limit
+        # Many outliers in one view are evidence against the view, which is judged as a whole later.
         is_minority = (~good).sum() <= MOST_STRAYS * len(good)
         count += int((~good).sum()) if is_minority else 0
         members.append(replace(view, ids=view.ids[good], corners=view.corners[good]) if is_minority else view)
@@ -284,6 +285,7 @@ def _fit(views: list[BoardView], board: Board, size: tuple[int, int], model: str
         raise FormatError(
             "these views determine no camera", "the board in several attitudes", f"take other views ({error.err})"
         ) from None
+    # OpenCV also returns the coefficients that it kept at 0.
     bent = bent.ravel()[: {MODELS[0]: 4, MODELS[1]: 5, MODELS[2]: 8}[model]]
     residuals = []
     for point, pixel, turn, place in zip(points, pixels, turns, places, strict=True):

@@ -81,6 +81,7 @@ class Protrusion:
             # A remainder at the foot that would be a sliver joins the last ring.
             polar = 90.0 if polar + 0.5 * np.degrees(edge / self.sphere) > 90.0 else polar
             count = max(round(2 * np.pi * self.sphere * np.sin(np.radians(polar)) / edge), 6)
+            # Every other ring is turned by half a vertex, so that triangles between rings are nearly equilateral.
             rings.append((float(polar), count, 0.5 * (len(rings) % 2)))
             edge *= _GROWTH
         return tuple(rings)
