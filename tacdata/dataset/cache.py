@@ -64,6 +64,7 @@ def dataset_hash(root: Path, info: dict[str, Any], paths: list[Path], place: Pat
     digests, fresh = {}, {}
     for path in paths:
         name, state = path.relative_to(root).as_posix(), path.stat()
+        # The inode, too: a file may be replaced by one of its size within a tick of the clock.
         mark = f"{state.st_size}-{state.st_mtime_ns}-{state.st_ino}"
         entry = entries.get(name, [])
         fresh[name] = entry if entry[:1] == [mark] else [mark, provenance.file_hash(path)]
@@ -97,6 +98,7 @@ def open_columns(
     target = place / f"{digest[:32]}-{LAYOUT}"
     if not target.is_dir():
         place.mkdir(parents=True, exist_ok=True)
+        # In the same folder, as a rename to another file system is not atomic.
         temporary = Path(tempfile.mkdtemp(dir=place, prefix=".making-"))
         try:
             _fill(root, info, paths, temporary)
@@ -134,6 +136,7 @@ def _fill(root: Path, info: dict[str, Any], paths: list[Path], target: Path) -> 
     for path in paths:
         table = folder.read_parquet(path, list(described))
         index = table["index"].to_numpy()
+        # An append that was broken off leaves frames that info.json does not count.
         counted = min(len(index), total - at)
         if not np.array_equal(index[:counted], np.arange(at, at + counted)):
             raise FormatError(
@@ -153,6 +156,7 @@ def _fill(root: Path, info: dict[str, Any], paths: list[Path], target: Path) -> 
         raise FormatError(
             f"{root}: the data files hold {at} frames", f"{total} as {folder.INFO} counts", "pack the session again"
         )
+    # A full disk shows here, before the folder gets its name.
     for values in maps.values():
         values.flush()
 

@@ -133,5 +133,6 @@ def episode_record(episode: Episode, label: Label, recording: str, sensor: Senso
         quality=float(valid(episode).mean()),
         complete=episode.complete,
         notes=episode.notes,
+        # The skin that was pressed: its label may be of the nominal one.
         specimen=episode.sensor.name,
     )

@@ -85,9 +85,11 @@ def pack(
             reason = "it has no label"
         else:
             recording, skin = frames.recording_hash(episode), sensor or episode.sensor
+            # The first label decides for all: a network must not learn from two models.
             model = model or label.provenance["parents"].get("model")
             frames.check_pair(episode, label, {"recording": recording, "sensor": skin.content_hash, "model": model})
             if writer is None or writer.sensor != skin:
+                # The folder may have been made in this call, by the writer of another sensor.
                 again = target.exists() and (append or writer is not None)
                 writer = (DatasetWriter.open if again else DatasetWriter.create)(target, skin, extra)
             reason = append_episode(writer, episode, label, recording)

@@ -159,6 +159,7 @@ class DatasetWriter:
             **{key: features.cast(key, values) for key, values in columns.items()},
             features.SENSOR: np.full(frames, features.short_hash(record.sensor)),
             features.RECORD: np.full(frames, record.key),
+            # LeRobot wants even times; the true ones have a column of their own.
             "timestamp": (np.arange(frames) / self.info["fps"]).astype(np.float32),
             "frame_index": np.arange(frames),
             "episode_index": np.full(frames, episode),
@@ -181,6 +182,7 @@ class DatasetWriter:
             "total_tasks": len(tasks),
             "splits": {"train": f"0:{episode + 1}"},
         }
+        # Last: until info.json counts the episode, a crash leaves only files that nobody reads.
         documents.write_text(self.root / folder.INFO, json.dumps(self.info, indent=4))
         self.tasks, self.data_file, self.row_file = tasks, self.data_file + 1, self.row_file + 1
         self.recordings.add(record.recording)
@@ -238,6 +240,7 @@ def _record_keys(paths: list[Path], info: dict[str, Any]) -> set[int]:
     keys: set[int] = set()
     for path in paths:
         table = folder.read_parquet(path, ["index", features.RECORD])
+        # Frames beyond are of an append that was broken off.
         counted = table["index"].to_numpy() < info["total_frames"]
         keys.update(np.unique(table[features.RECORD].to_numpy()[counted]).tolist())
     return keys

@@ -72,6 +72,7 @@ def difference_limit(registration: Registration, document: dict[str, object]) ->
     stated = document.get("uncertainty")
     claim = stated["origin"][2] if isinstance(stated, dict) and "origin" in stated else document.get("residual")
     sigma = float(claim) if isinstance(claim, int | float) else UNSTATED
+    # On a tilted skin the indenter's rim touches before its centre.
     return PROVED + 3.0 * sigma + HALF_WIDTH * float(np.hypot(*registration.tilt))
 
 
@@ -107,6 +108,7 @@ def touch_evidence(
     probe.go((*place, height), LIFT_SPEED)
     probe.wait(1.0)
     idle = probe.read(IDLE_FRAMES)
+    # The standard deviation of rounding alone: a quiet channel may show one count throughout.
     noise = np.maximum(idle.spread, 0.3)
     near = min(height, expected + NEAR)
     far, fine = np.arange(height - FAR, near, -FAR), np.arange(near, expected - limit - BELOW, -COARSE)

@@ -168,6 +168,7 @@ class GuardedProbe(Probe):
                 )
             self._rig.clock.host.sleep(LOOK)
         sample = np.array(rows[:frames])
+        # A registration takes thousands of frames, which nobody reads again.
         self._sink.frames.clear()
         spread = sample.std(axis=0, ddof=1) if frames > 1 else np.zeros(sample.shape[1])
         return StillReading(sample.mean(axis=0), spread, frames)
@@ -199,6 +200,7 @@ def guarded_probe(
     """
     interruption = interruption or Interruption()
     motion = motion or GuardedMotion(devices.cnc, rig.clock, interruption)
+    # No image is needed, and a search for tags would slow the readings down.
     without_cameras = replace(devices, cameras={})
     streams = RigStreams(without_cameras, {}, motion.stop, off_path=motion.off_path)
     with (

@@ -27,6 +27,7 @@ QUIET_RISE = 0.4
 def reference_taxels(sensor: Sensor) -> tuple[int, ...]:
     """Return two opposite taxels and one between them, of the inner array if there is one."""
     columns, rows = sensor.taxels.columns, sensor.taxels.rows
+    # At the rim the skin is softer to one side, which displaces the centre of an answer.
     i = (1, columns - 2) if columns >= 4 else (0, columns - 1)
     j = (1, rows - 2) if rows >= 4 else (0, rows - 1)
     corners = [(i[0], j[0]), (i[1], j[1]), ((i[0] + i[1]) // 2, j[1])]
@@ -128,6 +129,7 @@ def _touches(
         mx, my, expected = guess.to_machine(x, y, 0.0)
         top, lowest = expected + settings.above, expected - settings.limit
         if touches:
+            # The skin may be higher here, by a degree more tilt than is allowed.
             rise = float(np.hypot(x, y)) * np.tan(np.radians(settings.most_tilt + 1.0))
             top = min(top, touches[0].onset.height + expected - guess.origin[2] + QUIET_RISE + rise)
         above = max(top, touches[-1].onset.height + settings.above if touches else top)
@@ -144,6 +146,7 @@ def _touches(
 def _with_one_power(touches: list[Touch]) -> list[Touch]:
     """Fit the onsets again with one common power; its error moves all heights by the same amount (`model`)."""
     power, doubt = shared_power([(t.height, t.answer) for t in touches])
+    # Fits with the power off by its uncertainty show how far it moves the heights.
     powers = np.clip([power, power - doubt, power + doubt], POWERS[0], POWERS[-1]).tolist()
     fits = [[onset(t.height, t.answer, p) for p in powers] for t in touches]
     shifts = [abs(a.height - b.height) / 2 for _, a, b in fits if a and b]

@@ -43,6 +43,7 @@ def fit_plane(place: np.ndarray, height: np.ndarray, uncertainty: np.ndarray) ->
         uncertainty: Standard uncertainty of each [mm], shape (n,).
     """
     center = place.mean(axis=0)
+    # About their centre the errors of height and slope are nearly independent.
     design = np.column_stack([np.ones(len(place)), place - center])
     weighted = design / uncertainty[:, None]
     solution = np.linalg.lstsq(weighted, height / uncertainty, rcond=None)[0]
@@ -90,6 +91,7 @@ def fit_rigid_motion(sensor: np.ndarray, machine: np.ndarray, uncertainty: np.nd
     residual = np.linalg.norm(machine - shift - sensor @ rotation.T, axis=1)
     lever = float((a**2).sum())
     degrees = max(2 * len(sensor) - 3, 1)
+    # The larger of stated and observed scatter: three taxels may agree by chance.
     spread = max(float(np.sqrt((uncertainty**2).mean())), float(np.sqrt((residual**2).sum() / degrees)))
     turning = spread / np.sqrt(lever)
     # The origin is off the taxels' mean, so an error of the yaw moves it by that distance.

@@ -59,6 +59,7 @@ def symmetric_center(place: np.ndarray, answer: np.ndarray, noise: float) -> Cen
     start = [float(np.clip(place[peak], lower[0] + 1e-3, upper[0] - 1e-3)), 0.5 * span, 2.5, 1.0, 0.0]
     fit = least_squares(residual, start, bounds=(lower, upper), loss="soft_l1", x_scale=[0.1, 1.0, 1.0, 0.3, 0.1])
     center = float(fit.x[0])
+    # At an end of the line one flank is missing, and the centre depends on both.
     if not place.min() + 0.1 * span < center < place.max() - 0.1 * span:
         return None
     residuals = residual(fit.x)

@@ -87,6 +87,7 @@ def approach(
     """
     for above in ABOVE:
         probe.go((*place, contact + max(above, HIGHER)), LIFT_SPEED)
+        # The skin is still dented by the touch before.
         probe.wait(RECOVERY)
         heights = np.arange(contact + above, max(contact - BELOW, lowest) - 1e-9, -FINE)
         readings = []

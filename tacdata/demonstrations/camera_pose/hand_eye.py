@@ -168,6 +168,7 @@ def _spread(base: np.ndarray, mount: np.ndarray, grippers: np.ndarray, cubes: np
         jacobian[:, k] = (_residuals(_nudged(base, x[:6]), _nudged(mount, x[6:]), grippers, cubes) - start) / step
     # Two poses of six numbers each were fitted.
     variance = float(start @ start) / max(len(start) - 12, 1)
+    # A pseudo-inverse: turns about almost one axis leave a direction undetermined.
     covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
     return float(np.sqrt(np.trace(covariance[3:6, 3:6]))), float(np.sqrt(np.trace(covariance[:3, :3])))
 

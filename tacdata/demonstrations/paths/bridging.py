@@ -85,6 +85,7 @@ def _errors(path: Smoothed, begins: np.ndarray, rows: int) -> tuple[float, float
     middle = (path.position[begins] + path.position[ends]) / 2 + bent
     deviation = np.abs(path.position[middles] - middle).max()
     rotation_error = 0.0
+    # Every third: each takes four logarithms of matrices.
     for a, m, b in zip(begins[::3], middles[::3], ends[::3], strict=True):
         first, second, last, penultimate = (
             logarithm(path.rotation[k] @ path.rotation[m].T) for k in (a, a + 1, b, b - 1)

@@ -190,6 +190,7 @@ def _step(pairs: list[tuple[np.ndarray, np.ndarray]]) -> tuple[int, float] | Non
     if not pairs:
         return None
     moments = np.unique(np.concatenate([t for t, _ in pairs]))
+    # Coarse first: every moment takes two medians of each finger.
     moments = moments[:: max(len(moments) // 200, 1)]
     costs = [_cost(pairs, moment) for moment in moments]
     best = int(np.argmin(costs))
@@ -213,6 +214,7 @@ def _step(pairs: list[tuple[np.ndarray, np.ndarray]]) -> tuple[int, float] | Non
         return None
     jump, local = jump / weight, local / weight
     size = float(np.linalg.norm(jump))
+    # A slow drift changes the distance far from any moment, and shows no step close to it.
     if size < max(SMALLEST, CLEAR * np.sqrt(variance) / weight) or local @ jump < AGREEING * size**2:
         return None
     return at, size
@@ -258,6 +260,7 @@ def _which(
     opposite = cameras[1] if best[0] == cameras[0] else cameras[0]
     rival = max((score for (name, _), score in scores.items() if name == opposite), default=-np.inf)
     gain = scores[best] - without[best[0]]
+    # Where either camera alone shows a smooth motion, naming one would be a guess.
     if scores[best] - rival < DECISIVE:
         return cameras, moment, gain
     return (best[0],), best[1], gain

@@ -277,6 +277,7 @@ def _observed(expected: _State, sightings: Sightings, n: int) -> np.ndarray:
 def _go_back(nodes: list[_Node]) -> None:
     for k in range(len(nodes) - 2, -1, -1):
         node, successor = nodes[k], nodes[k + 1]
+        # The smoother of Rauch, Tung and Striebel, on errors about each predicted state.
         gain = np.linalg.solve(successor.spread, successor.step @ node.known).T
         correction = gain @ successor.state.minus(successor.expected)
         covariance = node.known + gain @ (successor.known - successor.spread) @ gain.T

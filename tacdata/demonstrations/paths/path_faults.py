@@ -84,6 +84,7 @@ def _angle(a: np.ndarray, b: np.ndarray) -> float:
 
 def _mean(rotations: list[np.ndarray]) -> np.ndarray:
     """Return the median rotation, shape (3, 3): the one with the smallest sum of angles to the others."""
+    # All pairs are compared, so some thirty rotations must do.
     sample = rotations[:: max(len(rotations) // 30, 1)]
     return sample[int(np.argmin([sum(_angle(a, b) for b in sample) for a in sample]))]
 
@@ -112,6 +113,7 @@ def exchanges(
             _on_the_others_path(sightings[a], paths[a], paths[b], times_ns)
             for a, b in ((finger, partner), (partner, finger))
         ]
+        # Both fingers: a single wrong tag puts only one onto the other's path.
         if all(len(times) >= 2 for times in encounters):
             moments = np.sort(np.concatenate(encounters))
             first, last = (moments[[0, -1]] - begin_ns) * 1e-9  # ty: ignore[unsupported-operator]
@@ -143,6 +145,7 @@ def other_hand(paths: dict[str, Smoothed], fingers: dict[str, Finger], rate: flo
     """Name the hand whose index and middle finger are arranged, along the whole path, as those of the other hand."""
     remarks = []
     for hand in ("left", "right"):
+        # The paths are those of the fingertips: an offset of the tip would count twice.
         hand_fingers = {n: replace(f, tip=np.eye(4)) for n, f in fingers.items() if f.hand == hand and n in paths}
         if not {"index", "middle"} <= {f.kind for f in hand_fingers.values()}:
             continue

@@ -99,6 +99,7 @@ def _residuals(
     order = np.flatnonzero(rows)[np.argsort(distance[rows])]
     residuals = []
     for lag in LAGS:
+        # How fast readings fall with the distance differs between fingers; only the direction is assumed.
         felt = np.interp(seconds[order] - lag, seconds, reading)
         residuals.append(float(((felt - isotonic_regression(felt, increasing=False).x) ** 2).sum()))
     return np.array(residuals)

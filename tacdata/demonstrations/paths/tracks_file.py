@@ -139,6 +139,7 @@ def _track(name: str, entry: dict[str, Any], table: pa.Table, sensor: Sensor | N
 
     maps = sensor.map.shape if sensor else ()
     arrays = column("position", 3), column("quaternion", 4), column("covariance", 6, 6)
+    # A missing one ends in a ValueError, which the reader turns into a message about the file.
     position, quaternion, covariance = (values for values in arrays if values is not None)
     return FingerTrack(
         name,

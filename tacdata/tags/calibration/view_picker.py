@@ -60,6 +60,7 @@ class ViewPicker:
         self.with_board += 1
         if self.still:
             unit = size[0] / 1000
+            # A board in motion is blurred, and a rolling shutter shears it.
             if previous is None or view.moved(previous) > STILL * unit:
                 return False
             if any(view.moved(member) < NEW * unit for member in self.views):
@@ -102,8 +103,10 @@ def images_of(source: Path) -> Iterator[tuple[str, np.ndarray]]:
         return
     if not source.is_file():
         raise UsageError(f"no file or folder {source}", "a folder of images or a video", "check the path")
+    # OpenCV's own messages name neither the file nor a remedy.
     quiet = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     film = cv2.VideoCapture(str(source))
+    # Images that are turned for display would be those of another camera.
     film.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
     cv2.utils.logging.setLogLevel(quiet)
     number, good = 0, film.isOpened()

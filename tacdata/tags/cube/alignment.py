@@ -167,6 +167,7 @@ def _step(
     except np.linalg.LinAlgError:
         return None
     move = inverse @ right
+    # Beyond half a radian the linearization is no guide.
     if not np.isfinite(move).all() or np.linalg.norm(move[:3]) > 0.5:
         return None
     focal, depth = matrix[0, 0], max(float(pose.translation[2]), 1e-3)

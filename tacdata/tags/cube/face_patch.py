@@ -98,13 +98,13 @@ def draw_face(
     fine = int(np.clip(np.ceil(8 * CELL * detail / width), 1, FINEST))
     model = _drawn(cube.ids[face], to_plane, (int(right - left), int(bottom - top)), blur, fine)
     u, v = np.arange(2.0, right - left - 2), np.arange(2.0, bottom - top - 2)[:, None]
-    columns_in_image, rows_in_image, depth = (a * u + (b * v + c) for a, b, c in to_plane.tolist())
-    columns_in_image, rows_in_image = columns_in_image / depth, rows_in_image / depth
+    face_x, face_y, depth = (a * u + (b * v + c) for a, b, c in to_plane.tolist())
+    face_x, face_y = face_x / depth, face_y / depth
     # Near the paper's edge the background shines in.
     clear = _inset((pixels - (left + 2, top + 2)).tolist(), CLEAR * blur + FILLED)
     if clear is None:
         return None
-    paper = np.zeros(columns_in_image.shape, np.uint8)
+    paper = np.zeros(face_x.shape, np.uint8)
     cv2.fillConvexPoly(paper, np.rint(16 * np.array(clear)).astype(np.int32), 1, shift=4)
     inside = np.flatnonzero(paper)
     if len(inside) < 30:
@@ -114,7 +114,7 @@ def draw_face(
     slope_x = (model[2:-2, 3:-1] - model[2:-2, 1:-3]).ravel()[inside] / 2
     slope_y = (model[3:-1, 2:-2] - model[1:-3, 2:-2]).ravel()[inside] / 2
     columns = np.empty((9, len(inside)))
-    places = np.stack([columns_in_image.ravel()[inside], rows_in_image.ravel()[inside]])
+    places = np.stack([face_x.ravel()[inside], face_y.ravel()[inside]])
     arm = half * axes[:, :2] @ places + (centre - translation)[:, None]
     slopes_of(slope_x, slope_y, arm, translation, matrix, columns)
     # The heat equation: the derivative of a Gaussian blur by its variance is half the Laplacian.

@@ -44,6 +44,7 @@ class PoseHypothesis:
         start = Alignment(candidate.rotation, candidate.translation)
         self.alignment = _aligned(start, self.seen, grey, cube, camera)
         self.reprojection = candidate.moved(self.alignment.rotation, self.alignment.translation, cube, camera)
+        # The image led to another minimum than the corners, which are the safer guide.
         if not self.reprojection <= 1.5 * max(TIGHT * max(tag.size for tag in self.tags), 1.2):
             self.alignment = _aligned(start, self.seen, grey, cube, camera, steps=0)
             self.reprojection = candidate.reprojection

@@ -75,6 +75,7 @@ class FrameFormat:
         parts = []
         for field in self.order:
             kind, count = self.type_of(field), self.channels if field == "channels" else 1
+            # NumPy has no numbers of 24 bits.
             base = "u1" if BITS[kind] == 24 else f"{arrow}{kind[0]}{BITS[kind] // 8}"
             parts.append((field, base, (count, 3) if BITS[kind] == 24 else (count,)))
         return np.dtype(parts)

@@ -50,6 +50,7 @@ def greet(link: GrblLink, baud: int) -> None:
         DeviceError: If nothing speaks GRBL 1.1.
     """
     for turn in range(int(GREETING / FIRST_QUERY)):
+        # Bytes beyond ASCII come at another baud rate, which waiting does not change.
         if turn * FIRST_QUERY >= GARBAGE and not bytes(link.seen).isascii():
             break
         if link.hear(FIRST_QUERY):
@@ -122,6 +123,7 @@ def clear(link: GrblLink) -> str:
         )
     attune(link)
     _place(link)
+    # Overrides outlive programs: moves would take longer than planned.
     for override in FULL_SPEED:
         link.realtime(override)
     return initial
@@ -145,6 +147,7 @@ def attune(link: GrblLink) -> None:
             if link.fault:
                 raise
             unanswered += isinstance(error, OwesAnswer)
+            # Each attempt without an answer costs its whole patience, so two of them are enough.
             if ATTEMPTS in (attempt, unanswered + 1):
                 raise DeviceError(
                     f"the controller on {link.port.port} answers ? but no line: {error.given}",
