@@ -17,7 +17,7 @@ from tacdata.wire.grbl.answers import ECHO, UNASKED_ANSWER, SentLine, changed_on
 from tacdata.wire.grbl.lines import ALARM, RESPONSE, WELCOME, StatusReport, parse_status
 from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.statuses import Statuses
-from tacdata.wire.grbl.watch import SILENT, UNREADABLE, WELCOME_IN_MID_STREAM, stopped_by, what_is_wrong
+from tacdata.wire.grbl.watch import PENDANT, SILENT, UNREADABLE, WELCOME_IN_MID_STREAM, stopped_by, what_is_wrong
 from tacdata.wire.patience import Patience
 from tacdata.wire.serial_port import read_available, why_broken, write_all
 
@@ -191,10 +191,15 @@ class GrblLink:
                 if reached():
                     return
                 if overdue := watch.ending(self.last):
-                    raise overdue
+                    raise DeviceError(*PENDANT) if self.pendant else overdue
                 self._changed.wait(0.05)
             if not self.polled:
                 self.ask()
+
+    def write_off(self) -> None:
+        """Expect no more answers to the lines so far; one that still comes is taken for the next line's."""
+        with self._changed:
+            self._unanswered.clear()
 
     def take_statuses(self) -> list[CncStatus]:
         """Return the reports received since the last call."""

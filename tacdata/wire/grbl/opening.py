@@ -154,6 +154,7 @@ def attune(link: GrblLink) -> None:
                     "answers to lines, too",
                     "see that no pendant (MPG) and no other program has control of it; reset it if it hangs",
                 ) from None
+            link.write_off()
             if link.last and link.last.state.startswith("Alarm"):
                 _reset(link)
         link.clock.host.sleep(SETTLE)
