@@ -14,10 +14,13 @@ from tacdata.errors import DeviceError
 from tacdata.wire import Decoder, FrameFormat, default_format, read_format
 from tacdata.wire.frames.frame_format import from_document
 from tacdata.wire.grbl.lines import WELCOME
-from tacdata.wire.serial_port import open_port, read_available, why_broken
+from tacdata.wire.patience import Lateness, Patience
+from tacdata.wire.serial_port import bytes_waiting, open_port, read_available, why_broken
 
 FINE_TICK = 0.0002
 """Coarsest tick of a board's own time stamp that is preferred to its frame counter [s]."""
+READ = 0.05
+"""Timeout of one read [s, real time]."""
 FIRST_FRAME = 2.0
 """Timeout for the first good frame [s, real time]."""
 
@@ -50,6 +53,7 @@ class CapacitiveBoard(TaxelBoard):
         self._changed = clock.host.condition()
         self._stopped = clock.host.event()
         self._thread: threading.Thread | None = None
+        self._reader = Lateness(2 * READ, clock.host)
 
     def describe(self) -> dict[str, Any]:
         """Return channels, type, rate and the frame format."""
@@ -78,15 +82,17 @@ class CapacitiveBoard(TaxelBoard):
         Raises:
             DeviceError: If the port is missing or busy, or no good frame comes within 2 s.
         """
-        self._line = open_port(self.port, self.baud, "taxel board", 0.05)
+        self._line = open_port(self.port, self.baud, "taxel board", READ)
         self._decoder = Decoder(self.format)
         self.counts = self._decoder.counts
         self._frames, self._seen, self._fault = [], bytearray(), None
         self._stopped.clear()
         self._thread = self.clock.host.thread(self._listen, "taxel-board")
         self._thread.start()
+        patience = Patience(FIRST_FRAME, host=self.clock.host)
         with self._changed:
-            self._changed.wait_for(lambda: self._frames or self._fault, FIRST_FRAME)
+            while not (self._frames or self._fault or patience.over(self.late)):
+                self._changed.wait(READ)
             begun, fault = bool(self._frames), self._fault
         if not begun:
             self.close()
@@ -104,6 +110,11 @@ class CapacitiveBoard(TaxelBoard):
             except (serial.SerialException, OSError):
                 pass
             self._line = None
+
+    @property
+    def late(self) -> float:
+        """Lateness in reading frames that wait in the port [s, real time]."""
+        return self._reader.seconds if self._line is not None and bytes_waiting(self._line) else 0.0
 
     def read(self, timeout: float) -> list[TaxelFrame]:
         """Return the received frames, waiting at most ``timeout`` [s of the clock] for something.
@@ -130,8 +141,10 @@ class CapacitiveBoard(TaxelBoard):
                 return
             # Before decoding, whose duration would count as latency of the link.
             arrival_ns = self.clock.now_ns()
+            self._reader.look()
             if not data:
                 continue
+            self._reader.restart()
             with self._changed:
                 # The first bytes, for the error of a stream in which no frame was found.
                 self._seen += data[: max(0, 4096 - len(self._seen))]

@@ -89,6 +89,11 @@ class Device(ABC):
             DeviceError: If the port is missing, busy or silent, or if another device answers.
         """
 
+    @property
+    def late(self) -> float:
+        """Lateness in reading what the device sent [s, real time]; 0 if nothing waits."""
+        return 0.0
+
     @abstractmethod
     def close(self) -> None:
         """Close the device; never raises, may be called twice."""

@@ -17,6 +17,7 @@ from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked, name_alarm, 
 from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.rest import come_to_rest, in_motion, in_words
 from tacdata.wire.grbl.settings import GrblSettings
+from tacdata.wire.grbl.silence import READ
 from tacdata.wire.serial_port import open_port
 
 HOMING = 600.0
@@ -91,7 +92,7 @@ class Grbl(MotionController):
         Raises:
             DeviceError: If the port is missing or busy, nothing answers, or the machine is moving or locked.
         """
-        port = open_port(self.port, self.baud, "motion controller", 0.05, self.dtr)
+        port = open_port(self.port, self.baud, "motion controller", READ, self.dtr)
         link = self._link = GrblLink(port, self.clock, self.poll_rate)
         try:
             link.start()
@@ -163,7 +164,12 @@ class Grbl(MotionController):
     @property
     def unreadable(self) -> str:
         """The latest report if it could not be read, else nothing."""
-        return self._link.unread if self._link is not None else ""
+        return self._link.silence.unread if self._link is not None else ""
+
+    @property
+    def late(self) -> float:
+        """Lateness in reading what the controller sent [s, real time]."""
+        return self._link.silence.late if self._link is not None else 0.0
 
     @property
     def damaged_reports(self) -> int:

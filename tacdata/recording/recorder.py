@@ -36,6 +36,7 @@ from tacdata.recording.sync_tap import delays
 from tacdata.recording.sync_tap.session_delays import add_sync, changes, latencies
 from tacdata.rig import Rig
 from tacdata.sensor import Sensor
+from tacdata.wire.patience import Patience
 
 Prove = Callable[..., Position]
 """Touches the skin before the first press (`tacdata.registration.evidence.prove_zero`)."""
@@ -236,12 +237,12 @@ class Recorder:
 
     def _wait_for_streams(self, streams: RigStreams) -> None:
         host = self.rig.clock.host
-        end = host.monotonic() + FIRST_FRAME
+        patience = Patience(FIRST_FRAME, host=host)
         while streams.frames < 2 or streams.position is None:
             if streams.fault:
                 raise streams.fault
             self._interruption.check()
-            if host.monotonic() > end:
+            if patience.over():
                 raise streams.nothing_yet(FIRST_FRAME)
             host.sleep(WATCH)
         end = host.monotonic() + FIRST_SEARCH

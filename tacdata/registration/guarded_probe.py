@@ -18,6 +18,7 @@ from tacdata.recording.live.rig_streams import RigStreams
 from tacdata.recording.motion.press_steps import Step
 from tacdata.registration.probe import Position, Probe, StillReading
 from tacdata.rig import Rig
+from tacdata.wire.patience import Patience
 
 PATIENCE = 5.0
 """Timeout of the first frames and of a reading [s of real time, and of the rig's clock]."""
@@ -91,12 +92,12 @@ class GuardedProbe(Probe):
         return self._position
 
     def _begin(self) -> Position:
-        end = self._rig.clock.host.monotonic() + PATIENCE
+        patience = Patience(PATIENCE, host=self._rig.clock.host)
         while self._streams.position is None or len(self._sink.frames) < 2:
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            if self._rig.clock.host.monotonic() > end:
+            if patience.over():
                 raise self._streams.nothing_yet(PATIENCE)
             self._rig.clock.host.sleep(LOOK)
         return self._streams.position
@@ -154,7 +155,8 @@ class GuardedProbe(Probe):
 
     def read(self, frames: int) -> StillReading:
         """Collect frames sampled since the guide came to rest; see the base."""
-        end = self._rig.clock.host.monotonic() + PATIENCE + PATIENCE * frames / 30 / self._rig.clock.rate
+        clock = self._rig.clock
+        patience = Patience(PATIENCE + PATIENCE * frames / 30 / clock.rate, host=clock.host)
         while True:
             rows = [counts for sample_ns, counts in list(self._sink.frames) if sample_ns >= self._rested_ns]
             if len(rows) >= frames:
@@ -162,7 +164,7 @@ class GuardedProbe(Probe):
             self._interruption.check()
             if self._streams.fault:
                 raise self._streams.fault
-            if self._rig.clock.host.monotonic() > end:
+            if patience.over():
                 raise DeviceError(
                     f"{len(rows)} of {frames} frames within the time", "a board that keeps its rate", "check the board"
                 )

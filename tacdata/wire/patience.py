@@ -1,4 +1,4 @@
-"""A timeout that counts only the time during which this process runs."""
+"""Timeouts that count only the waking time of this process. The lateness of its readers."""
 
 from __future__ import annotations
 
@@ -8,6 +8,42 @@ REAL_FLOOR = 1.0
 """Shortest timeout of any wait for a device [s, real time], however fast the clock runs."""
 STEP = 0.25
 """Largest time that one check adds [s, real time]. Checks are far more frequent, unless the host is stopped."""
+
+LATE = 0.5
+"""Lateness of this computer that is named in a fault [s, real time]."""
+EMULATED = 5.0
+"""Shortest silence of an emulated device [s, real time]. It runs on this computer, and a busy one delays it."""
+
+
+class Lateness:
+    """Lateness of this computer in reading one stream, since its latest data.
+
+    Example:
+        ``lateness = Lateness(0.1)``; in the reader's loop ``lateness.look()``, and ``restart()`` after data
+    """
+
+    def __init__(self, pause: float, host: Host = COMPUTER) -> None:
+        """Begin; ``pause`` [s, real time] is the longest usual time between two looks."""
+        self._host, self._pause, self._looked, self._sum = host, pause, host.monotonic(), 0.0
+
+    def look(self) -> None:
+        """Take that the reader runs now."""
+        instant = self._host.monotonic()
+        self._sum, self._looked = self._sum + max(instant - self._looked - self._pause, 0.0), instant
+
+    def restart(self) -> None:
+        """Restart, because something was received."""
+        self._sum = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """All pauses of the reader beyond the usual one, the present one included [s, real time]."""
+        return self._sum + max(self._host.monotonic() - self._looked - self._pause, 0.0)
+
+
+def while_late(seconds: float) -> str:
+    """Return a lateness [s, real time] in words; empty if it is small."""
+    return f", while this computer was {seconds:.1f} s late in reading" if seconds > LATE else ""
 
 
 class Patience:
@@ -35,9 +71,13 @@ class Patience:
         """Restart, because something was received."""
         self._waited, self._looked = 0.0, self._host.monotonic()
 
-    def over(self) -> bool:
-        """Check the clock; return whether the time is up."""
+    def over(self, late: float = 0.0) -> bool:
+        """Check the clock; return whether the time is up.
+
+        Args:
+            late: Lateness in reading [s, real time]. It extends the timeout, and at most doubles it.
+        """
         instant = self._host.monotonic()
         self._waited += min(instant - self._looked, self._step)
         self._looked = instant
-        return self._waited > self._limit
+        return self._waited > self._limit + min(late, self._limit)

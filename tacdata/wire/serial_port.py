@@ -78,6 +78,14 @@ def read_available(line: serial.SerialBase) -> bytes:
     return line.read(max(1, getattr(line, "in_waiting", 0)))
 
 
+def bytes_waiting(line: serial.SerialBase) -> int:
+    """Return the number of bytes that were received and not read yet; 0 for a line that broke."""
+    try:
+        return getattr(line, "in_waiting", 0)
+    except (serial.SerialException, OSError, TypeError):
+        return 0
+
+
 def why_broken(error: Exception) -> str:
     """Return why a line broke, for a person; pyserial's words for a device that is gone are a programmer's."""
     return "the device is gone (unplugged, or switched off)" if "returned no data" in str(error) else str(error)

@@ -86,7 +86,7 @@ class Schedule:
                 self.now_ns = max(self.now_ns, time_ns)
                 what()
             elif what.turn == turn and not what.ended:
-                late_ns = what.process.late(time_ns)
+                late_ns = what.process.late(time_ns, what.name)
                 if late_ns:
                     self._push(time_ns + late_ns, what, turn, woken)
                     continue

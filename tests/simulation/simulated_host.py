@@ -16,19 +16,20 @@ EPOCH = 1_760_000_000 * SECOND
 class SimulatedHost(Host):
     """One computer, or one process of it.
 
-    `stalls` are stretches of time [ns] in which nothing of it runs. `preempt` is the probability that another task
-    runs at a place where it might.
+    `stalls` are stretches of time [ns] in which nothing of it runs, `starved` (thread, begin, end) those of one thread.
+    `preempt` is the probability that another task runs at a place where it might.
     """
 
     def __init__(self, schedule, preempt=0.0, lateness=()):
         """Begin; ``lateness`` are (probability, most [s]) of a task that wakes too late."""
         self.schedule, self.preempt, self.lateness = schedule, preempt, lateness
-        self.stalls, self.tasks, self.handlers = [], [], {}
+        self.stalls, self.starved, self.tasks, self.handlers = [], [], [], {}
         self.main, self.disk, self.killed = None, None, False
 
-    def late(self, time_ns):
-        """Return by how much a task that should run now must wait [ns]."""
-        for begin, end in self.stalls:
+    def late(self, time_ns, name):
+        """Return by how much a task of this name that should run now must wait [ns]."""
+        starved = [(begin, end) for thread, begin, end in self.starved if thread == name]
+        for begin, end in [*self.stalls, *starved]:
             if begin <= time_ns < end:
                 return end - time_ns + self.schedule.random.randrange(1000, 1_000_000)
         return 0

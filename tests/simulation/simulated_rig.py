@@ -73,14 +73,27 @@ class World:
     """One computer, one controller, one board and their lines, driven by one seed."""
 
     def __init__(
-        self, seed, folder, presses=2, firmware="Grbl", settings=None, echo=False, camera=False, zero=False, **entries
+        self,
+        seed,
+        folder,
+        presses=2,
+        firmware="Grbl",
+        settings=None,
+        echo=False,
+        camera=False,
+        zero=False,
+        speed=1.0,
+        **entries,
     ):
-        """Switch everything on; with ``zero`` the place where a controller counts from lies in the envelope."""
+        """Switch everything on; with ``zero`` the place where a controller counts from lies in the envelope.
+
+        The rig's clock runs ``speed`` times as fast as the computers'.
+        """
         self.envelope = {**ENVELOPE, "max": [1.0, 1.0, 1.0]} if zero else ENVELOPE
         self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
         self.schedule = Schedule(seed, LIMIT)
         self.bench = SimulatedHost(self.schedule)
-        self.clock = Clock(EPOCH + START, START, 1.0, self.bench)
+        self.clock = Clock(EPOCH + START, START, speed, self.bench)
         self.computer = self._boot()
         names = [f"sim://{seed}/{device}" for device in ("cnc", "board")]
         self.cnc_line = SimulatedLine(names[0], self.computer, self.bench, 115200)
@@ -157,7 +170,7 @@ class World:
             "envelope": self.envelope,
             "state_directory": str(self.folder.parent / "machines"),
         }
-        clock = Clock(EPOCH + START, START, 1.0, self.computer)
+        clock = Clock(EPOCH + START, START, self.clock.rate, self.computer)
         return replace(from_document(document, "simulated"), clock=clock)
 
     def repair(self, lost, unlocks=False):

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-from tacdata.devices.device import Camera, ImageFrame, StreamCounts, TaxelBoard, TaxelFrame
+from tacdata.devices.device import Camera, Device, ImageFrame, StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError, TacdataError
 from tacdata.recording.clocks.clock_model import ClockModel, StreamLatency
 from tacdata.recording.clocks.polled_clock import PolledClock
@@ -17,12 +17,10 @@ from tacdata.recording.files.writer import EpisodeWriter
 from tacdata.recording.live.camera_stream import CameraStream
 from tacdata.recording.live.detection_process import Detect
 from tacdata.recording.live.live_feed import LiveFeed, Watch
-from tacdata.wire.patience import Patience
+from tacdata.wire.patience import Lateness, Patience, while_late
 
 BOARD = "taxel board"
 """Name of a single board in messages."""
-LATE = 0.5
-"""Lateness of this computer in a stream's silence that is named [s of real time]."""
 POLL = 0.05
 """Timeout of one read [s of the host's clock]."""
 CATCH_UP = 5.0
@@ -64,21 +62,34 @@ class DeviceStreams(ABC):
         self._sink: EpisodeWriter | None = None
         self._before: dict[str, StreamCounts] = {}
         self._passes: dict[str, int] = {}
-        self._late: dict[str, float] = {}  # by how much this computer was late in reading since the last data [s]
         self._clocks = {name: stream_clock(board) for name, board in self._boards.items()}
         self._clocks |= {name: StreamClock("order", camera.clock.rate) for name, camera in self._cameras.items()}
         self._views = [CameraStream(name, entries.get(name, {}), detect, fingers) for name in cameras]
         self._work: dict[str, Callable[[], int]] = {}
+        self._devices: dict[str, Device] = dict(self._cameras)
         for name, stream in zip(boards, self._boards, strict=True):
             self._work[stream if name else BOARD] = self._board_reader(stream, name)
+            self._devices[stream if name else BOARD] = boards[name]
         for view in self._views:
             self._work[f"camera {view.name}"] = self._camera_reader(view)
+        self._readers: dict[str, Lateness] = {}
         self._threads: list[threading.Thread] = []
 
     def _busy(self, name: str) -> str:
         """Name this computer's own lateness in a stream's silence, as part of a sentence; empty if it was in time."""
-        delay = self._late.get(name, 0.0)
-        return f", while this computer was {delay:.1f} s late in reading" if delay > LATE else ""
+        return while_late(self._late(name))
+
+    def _late(self, name: str) -> float:
+        """Return the lateness in taking a stream's data [s of real time]."""
+        device = self._devices.get(name)
+        own = self._readers[name].seconds if name in self._readers else 0.0
+        return max(own, device.late if device else 0.0)
+
+    def _waiting(self, name: str) -> float:
+        """Return the lateness that extends a stream's timeout [s of real time]."""
+        device = self._devices[name]
+        # An emulated device runs on this computer: any lateness counts.
+        return self._late(name) if device.clock.rate > 1.0 else device.late
 
     def _silence_of(self, name: str) -> float:
         """Time without data after which a stream counts as silent [s of real time]."""
@@ -161,18 +172,16 @@ class DeviceStreams(ABC):
     def _run(self, name: str, read: Callable[[], int]) -> None:
         # A look comes each `POLL`, and later on a computer that is far too busy: that is no silence of the device.
         patience = Patience(self._silence_of(name), step=2 * POLL, host=self._host)
-        looked = self._host.monotonic()
+        reader = self._readers[name] = Lateness(2 * POLL, self._host)
         while not self._stop.is_set():
-            instant = self._host.monotonic()
-            self._late[name] = self._late.get(name, 0.0) + max(instant - looked - 2 * POLL, 0.0)
-            looked = instant
+            reader.look()
             self._passes[name] = self._passes.get(name, 0) + 1
             try:
                 if count := read():
                     patience.restart()
-                    self._late[name] = 0.0
+                    reader.restart()
                     self._delivered(name, count)
-                elif patience.over():
+                elif patience.over(self._waiting(name)):
                     self._silent(name)
             except TacdataError as error:
                 return self._broken(name, error)

@@ -18,6 +18,7 @@ from tacdata.recording.live.device_streams import BOARD, POLL, DeviceStreams
 from tacdata.recording.live.live_feed import Watch
 from tacdata.recording.live.reading_health import BadReadings, ReadingHealth
 from tacdata.recording.live.rig_devices import RigDevices
+from tacdata.wire.patience import EMULATED
 
 TRIPS = 4096
 """Round trips of status reports that are kept for the controller's clock [count]."""
@@ -26,6 +27,8 @@ BOARD_SILENCE, SILENT_FRAMES = 1.8, 5
 AGAIN_NS = 60_000_000_000
 """Bad readings that go on are reported again after this time [ns of the host's clock]."""
 TOO_BUSY = "end other programs on this computer, then check cable and power, and start again"
+CONTROLLER = "motion controller"
+"""Name of the controller's stream in messages."""
 TAXELS = "taxels"
 """Name of the only board's stream."""
 
@@ -71,10 +74,12 @@ class RigStreams(DeviceStreams):
         rate = described.get("rate", {}).get("nominal")
         self._health_of = lambda: ReadingHealth(reading_limits(described), rate, devices.board.clock.rate)
         self._health, self._on_bad_readings, self._quiet_until_ns = self._health_of(), on_bad_readings, 0
+        if self._cnc.clock.rate > 1.0:
+            self.silence = EMULATED
         # An emulated board faster than time shares this computer: it may wait where a real one goes on.
         is_timed = rate and devices.board.clock.rate == 1
         self._board_silence = max(BOARD_SILENCE, SILENT_FRAMES / rate) if is_timed else self.silence
-        self._work["motion controller"] = self._read_status
+        self._work[CONTROLLER], self._devices[CONTROLLER] = self._read_status, devices.cnc
 
     def __enter__(self) -> RigStreams:
         """Start the threads."""
@@ -163,6 +168,11 @@ class RigStreams(DeviceStreams):
                     "readings that change, below their limit",
                     "check the board's supply, its ribbon cable and firmware, then start again",
                 )
+
+    def _waiting(self, name: str) -> float:
+        # A guide whose reports wait unread is not watched: while a real one moves, nothing extends that.
+        real = name == CONTROLLER and self._cnc.clock.rate <= 1.0
+        return 0.0 if real else super()._waiting(name)
 
     def _silence_of(self, name: str) -> float:
         return self._board_silence if name == BOARD else self.silence

@@ -16,13 +16,11 @@ from tacdata.wire.grbl import codes
 from tacdata.wire.grbl.answers import ECHO, UNASKED_ANSWER, SentLine, changed_on_its_way, refusal
 from tacdata.wire.grbl.lines import ALARM, RESPONSE, WELCOME, StatusReport, parse_status
 from tacdata.wire.grbl.owed import Owed
+from tacdata.wire.grbl.silence import Silence
 from tacdata.wire.grbl.statuses import Statuses
-from tacdata.wire.grbl.watch import PENDANT, SILENT, UNREADABLE, WELCOME_IN_MID_STREAM, stopped_by, what_is_wrong
-from tacdata.wire.patience import Patience
+from tacdata.wire.grbl.watch import PENDANT, WELCOME_IN_MID_STREAM, stopped_by, what_is_wrong
 from tacdata.wire.serial_port import read_available, why_broken, write_all
 
-SILENCE = 3.0
-"""Time without an answer after which the controller counts as gone [s of the clock, and of real time]."""
 LINE_BYTES = 79
 """Longest line that Grbl 1.1 takes [bytes without its end] (``LINE_BUFFER_SIZE`` 80; grblHAL takes 256)."""
 RX_BYTES = 128
@@ -68,10 +66,7 @@ class GrblLink:
         self.homing = False
         self._held = False
         self._unanswered: deque[SentLine] = deque()
-        step = max(0.25, 2.0 / (poll_rate * clock.rate))  # it is looked at once a poll
-        self._silence = Patience(SILENCE, clock.rate, SILENCE, step, clock.host)
-        self.unread = ""
-        """The latest line that could not be read, since a report that could."""
+        self.silence = Silence(port, clock, poll_rate)
         self._commanded_ns = clock.now_ns()
         self._welcome_expected, self._reset_asked = True, False
         self.polled = False
@@ -104,7 +99,7 @@ class GrblLink:
     def poll(self) -> None:
         """Start to poll the status and to watch for silence; from now on a welcome means a lost position."""
         self._welcome_expected, self.polled = False, True
-        self._silence.restart()
+        self.silence.hold()
         self._begin(self._ask_regularly, "grbl-poll")
 
     def stop(self) -> None:
@@ -190,14 +185,14 @@ class GrblLink:
                 self.check(through_hold)
                 if reached():
                     return
-                if overdue := watch.ending(self.last):
+                if overdue := watch.ending(self.last, self.silence.late):
                     raise DeviceError(*PENDANT) if self.pendant else overdue
                 self._changed.wait(0.05)
             if not self.polled:
                 self.ask()
 
     def write_off(self) -> None:
-        """Expect no more answers to the lines so far; one that still comes is taken for the next line's."""
+        """Expect no more answers to the lines so far."""
         with self._changed:
             self._unanswered.clear()
 
@@ -219,7 +214,7 @@ class GrblLink:
                 self.check(through_hold=True)
                 if self.last and self.last.sent_ns >= begun:
                     return self.last
-                if overdue := watch.ending(self.last):
+                if overdue := watch.ending(self.last, self.silence.late):
                     raise overdue
                 if self.statuses.asked_ns is not None or self.statuses.automatic:
                     self._changed.wait(0.05)
@@ -285,24 +280,18 @@ class GrblLink:
 
     def _ask_regularly(self) -> None:
         while not self._stopped.wait(1.0 / (self.poll_rate * self.clock.rate)):
-            # A homing controller (Grbl 1.1) answers nothing; its own time-out minds it.
-            if self.homing:
-                self._silence.restart()
-            elif self._silence.over():
-                self._take_silence()
+            if self.homing:  # its own timeout ends it
+                self.silence.hold()
+            elif ending := self.silence.ending():
+                error, lost = ending
+                if lost:
+                    self._fail(error.given, error.allowed, error.remedy, lost)
+                self.interruption = self.interruption or error
             if self.fault is None:
                 try:
                     self.ask()
                 except DeviceError:
                     return
-
-    def _take_silence(self) -> None:
-        if self.unread:  # it is there, and a report that can be read may come again
-            cause = UNREADABLE[0].format(self.port.port, self.unread)
-            self.interruption = self.interruption or DeviceError(cause, *UNREADABLE[1:])
-            return
-        cause, allowed, remedy = SILENT
-        self._fail(cause.format(self.port.port, SILENCE), allowed.format(SILENCE), remedy, lost=True)
 
     def _listen(self) -> None:
         buffer = bytearray()
@@ -314,6 +303,7 @@ class GrblLink:
                     self._break(error)
                 return
             arrival_ns = self.clock.now_ns()
+            self.silence.look(bool(data))
             if not data:
                 continue
             self.seen += data[: 64 - len(self.seen)] if len(self.seen) < 64 else b""
@@ -324,7 +314,7 @@ class GrblLink:
                 if line:
                     self._take(line, arrival_ns)
             if len(buffer) > LINE_BYTES:  # noise may hold no end of a line
-                self.unread = bytes(buffer[:LINE_BYTES]).decode("ascii", "replace")
+                self.silence.unread = bytes(buffer[:LINE_BYTES]).decode("ascii", "replace")
             del buffer[: max(0, len(buffer) - 4096)]
 
     def _take(self, line: str, arrival_ns: int) -> None:
@@ -335,7 +325,7 @@ class GrblLink:
                 if report:
                     self._take_status(report, arrival_ns)
                 else:
-                    self.unread = line
+                    self.silence.unread = line
                     self.statuses.spoilt()
                     self.notes.append(f"damaged status report: {line!r}")
             elif RESPONSE.match(line):
@@ -350,7 +340,7 @@ class GrblLink:
                 self.interruption = self.interruption or changed
             else:
                 if not line.startswith(PUSHED):
-                    self.unread = line
+                    self.silence.unread = line
                 (self._unanswered[0].pushed if self._unanswered else self.notes).append(line)
             del self.notes[:-200]
             self._changed.notify_all()
@@ -387,8 +377,7 @@ class GrblLink:
             self._fail(cause.format(line), allowed, remedy, lost=True)
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
-        self._silence.restart()
-        self.unread = ""
+        self.silence.restart()
         self.pendant = self.pendant if report.pendant is None else report.pendant
         again = self.last is not None and self.last.state == report.state
         place = self.last.position if again and self.last else None

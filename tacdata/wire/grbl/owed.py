@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tacdata.clock import Clock
 from tacdata.errors import DeviceError
 from tacdata.wire.delivered import CncStatus, OwesAnswer
-from tacdata.wire.patience import REAL_FLOOR, Patience
+from tacdata.wire.patience import EMULATED, REAL_FLOOR, Patience
 
 IDLE, IDLE_FLOOR = 2.0, 1.5
 """Time after the end of its motion within which an idle controller must answer [s of the clock], and its minimum [s,
@@ -16,11 +16,6 @@ real time]. Idle means that nothing runs that could delay the answer; a pause (G
 """
 FLOOR = 3.0
 """Shortest timeout for a line's answer [s, real time], so that an idle controller is recognized as idle first."""
-
-BUSY = 5.0
-"""Shortest timeout for a report where the clock runs faster than real time [s, real time]: the emulated controller
-shares the computer, and a busy one keeps it from answering.
-"""
 
 
 @dataclass(frozen=True)
@@ -50,22 +45,22 @@ class Watch:
         """Start now."""
         self._owed, self._clock = owed, clock
         self._due_ns = clock.now_ns() + round(min(owed.motion, owed.limit) * 1e9)
-        floor = FLOOR if owed.idle_ends_it else min(max(owed.limit, REAL_FLOOR), BUSY)
+        floor = FLOOR if owed.idle_ends_it else min(max(owed.limit, REAL_FLOOR), EMULATED)
         self._late = Patience(owed.limit, clock.rate, floor, host=clock.host)
         self._idle = Patience(IDLE, clock.rate, IDLE_FLOOR, host=clock.host)
 
-    def ending(self, last: CncStatus | None) -> DeviceError | None:
-        """Return why the wait must end, or None."""
+    def ending(self, last: CncStatus | None, late: float = 0.0) -> DeviceError | None:
+        """Return why the wait must end, or None; ``late`` is this computer's lateness in reading [s, real time]."""
         if last is None or last.state != "Idle" or last.sent_ns < self._due_ns or not self._owed.idle_ends_it:
             self._idle.restart()
-        elif self._idle.over():
+        elif self._idle.over(late):
             return OwesAnswer(
                 f"the controller stands idle and still owes {self._owed.what}{self._said}",
                 f"an answer within {IDLE:g} s after the motion has ended",
                 "check cable and ground (an answer was lost or damaged on its way) and the firmware (it may have "
                 "stalled), then start again",
             )
-        if self._late.over():
+        if self._late.over(late):
             return DeviceError(
                 f"waited {self._owed.limit:g} s for {self._owed.what}{self._said}; the controller's last state is "
                 f"{last.state if last else 'unknown'}",

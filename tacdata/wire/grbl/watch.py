@@ -14,16 +14,6 @@ WELCOME_IN_MID_STREAM: Words = (
     "check its power supply and cable (a brown-out does this), and that no other program uses its port (one can reset "
     "it); home or touch off again",
 )
-SILENT: Words = (
-    "the controller on {} is silent: no answer to ? for {:g} s",
-    "an answer to ? within {:g} s",
-    "check power and cable; the position is unknown, home or touch off again",
-)
-UNREADABLE: Words = (
-    "the controller on {} sends reports that cannot be read: {!r}",
-    "reports with a position in numbers",
-    "check cable, ground and baud rate, then start again",
-)
 AGAIN = "start again"
 RESUME = f"see why, put it right, then {AGAIN}"
 UNASKED = {

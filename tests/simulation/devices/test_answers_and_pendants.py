@@ -1,4 +1,4 @@
-"""An answer that is lost and a pendant that takes over, at every stage: opening, travel, press, hold, lift, register."""
+"""A lost answer and a pendant that takes over, at every stage: opening, travel, press, hold, lift, register."""
 
 import re
 

@@ -49,7 +49,7 @@ MUTANTS = {
         MachineState, why_lost="", loss="", difference="", is_known=True
     ),
     "no watch of the path": lambda: mock.patch.object(AllowedPath, "off", lambda self, status: None),
-    "an owed answer is waited for": lambda: mock.patch.object(owed.Watch, "ending", lambda self, last: None),
+    "an owed answer is waited for": lambda: mock.patch.object(owed.Watch, "ending", lambda self, last, late=0.0: None),
     "every press 0.3 mm too deep": lambda: mock.patch.object(recorder, "steps", _deeper),
     "no watch of stalls": lambda: mock.patch.object(guarded_motion, "_look_again", lambda looked, now: now),
     "an override is ignored": lambda: _without_state("override"),
