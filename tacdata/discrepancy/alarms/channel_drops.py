@@ -36,10 +36,10 @@ def channel_drops(cleaned: Cleaned) -> list[Alarm]:
     predicted = predict(setting.course, setting.response, placed).signal[setting.course.read]
     rows = [np.flatnonzero(course.episode == e) for e in cleaned.episodes]
     gains = press_gains([risen(course.readings[r]) for r in rows], [risen(predicted[r]) for r in rows])
-    found = drops(gains)
-    if found is None:
+    drop = drops(gains)
+    if drop is None:
         return []
-    channel, far, change = found
+    channel, far, change = drop
     names = ", ".join(setting.course.names[int(cleaned.episodes[k])] for k in far[:SEVERAL])
     way = "less" if change < 0 else "more"
     return [
@@ -59,10 +59,10 @@ def drops(gains: np.ndarray, seed: int = 0) -> tuple[int, np.ndarray, float] | N
             hardly stirs it.
         seed: Of the draws.
     """
-    known = np.isfinite(gains) & (gains > 0)
+    valid = np.isfinite(gains) & (gains > 0)
     with np.errstate(invalid="ignore"):
-        logs = np.where(known, np.log(np.where(known, gains, 1.0)), np.nan)
-    rows = np.count_nonzero(known, axis=1) >= FEWEST_CHANNELS
+        logs = np.where(valid, np.log(np.where(valid, gains, 1.0)), np.nan)
+    rows = np.count_nonzero(valid, axis=1) >= FEWEST_CHANNELS
     if np.count_nonzero(rows) < FEWEST_PRESSES:
         return None
     logs = np.where(rows[:, None], logs, np.nan)
@@ -74,8 +74,8 @@ def drops(gains: np.ndarray, seed: int = 0) -> tuple[int, np.ndarray, float] | N
     logs[:, enough] -= np.nanmedian(logs[:, enough], axis=0)
     scatter = np.full(gains.shape[1], np.inf)
     scatter[enough] = 1.4826 * np.nanmedian(np.abs(logs[:, enough]), axis=0)
-    off = np.nan_to_num(logs)
-    far = np.abs(off) > np.maximum(LEAST, FAR_Z * scatter)
+    deviation = np.nan_to_num(logs)
+    far = np.abs(deviation) > np.maximum(LEAST, FAR_Z * scatter)
     table = np.empty((DRAWS + 1, gains.shape[1]))
     # Counts are compared as they are: the harness takes cube roots, as of sums of squares.
     table[0] = far.sum(axis=0) ** 3.0
@@ -87,4 +87,4 @@ def drops(gains: np.ndarray, seed: int = 0) -> tuple[int, np.ndarray, float] | N
     if not test.alarms:
         return None
     presses = np.flatnonzero(far[:, test.at])
-    return test.at, presses, float(np.expm1(np.median(off[presses, test.at])))
+    return test.at, presses, float(np.expm1(np.median(deviation[presses, test.at])))

@@ -63,46 +63,48 @@ def channel_histories(cleaned: Cleaned) -> list[Alarm]:
 
 def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
     """Return the history that channels follow most, with its p-value over all of them."""
-    found, tables, beyond = [], [], []
+    candidates, tables, beyond = [], [], []
     signs: np.ndarray | None = None
-    for kind, history, over, column in _columns(cleaned):
+    for kind, history, covariate, column in _columns(cleaned):
         white = cleaned.whitened(column)
-        score, known = cleaned.sums(white * cleaned.residual), cleaned.sums(white * white)
+        score, information = cleaned.sums(white * cleaned.residual), cleaned.sums(white * white)
         if signs is None:
             # All histories share the flips: the distribution of the largest statistic keeps their correlation.
             signs = flips(len(score), DRAWS + 1, seed)[1:]
-        total = known.sum(axis=0)
-        leverage = known / np.maximum(total, 1e-30)
+        total = information.sum(axis=0)
+        leverage = information / np.maximum(total, 1e-30)
         counts = (leverage.max(axis=0) < MOST_LEVERAGE) & (total > STIRRED * total.max(initial=0.0))
         if counts.sum() < FEWEST_CHANNELS:
             continue
         score, total, leverage = score[:, counts], total[counts], leverage[:, counts]
         weight = score.sum(axis=0) / total
-        rest = (score - known[:, counts] * weight) / (1 - leverage) / np.sqrt(total)
-        null = np.square(signs @ rest).sum(axis=1) * _scatter(rest)
+        scores = (score - information[:, counts] * weight) / (1 - leverage) / np.sqrt(total)
+        null = np.square(signs @ scores).sum(axis=1) * _scatter(scores)
         observed = float(np.sum(score.sum(axis=0) ** 2 / total))
         tables.append(np.append(observed, null))
         beyond.append(observed - null.mean() >= cleaned.least_of_channels)
-        every = np.zeros(len(counts))
-        every[counts] = weight
-        found.append((kind, history, over, every, np.abs(every) * np.quantile(np.abs(column), USUAL, axis=0)))
-    if not found:
+        full_weight = np.zeros(len(counts))
+        full_weight[counts] = weight
+        candidates.append(
+            (kind, history, covariate, full_weight, np.abs(full_weight) * np.quantile(np.abs(column), USUAL, axis=0))
+        )
+    if not candidates:
         return None
     test = largest(np.stack(tables, axis=1), np.array(beyond))
-    kind, history, over, weight, size = found[test.at]
-    return Best(kind, history, over, test, weight, size)
+    kind, history, covariate, weight, size = candidates[test.at]
+    return Best(kind, history, covariate, test, weight, size)
 
 
-def _scatter(rest: np.ndarray) -> float:
+def _scatter(scores: np.ndarray) -> float:
     """Return by how much scores, shape (presses, channels), scatter beyond their flips [1], 1 or more.
 
     Flips take presses as independent. Slow noise makes sums scatter by more. Few presses may scatter by chance by
     less than in the noise model. That is the least.
     """
-    later, earlier = rest[1:], rest[:-1]
+    later, earlier = scores[1:], scores[:-1]
     size = float(np.sqrt(np.sum(np.square(later)) * np.sum(np.square(earlier))))
     lagged = max(float(np.sum(later * earlier)) / max(size, 1e-30), 0.0)
-    mean = float(np.square(rest).sum(axis=0).mean())
+    mean = float(np.square(scores).sum(axis=0).mean())
     return (1 + 2 * lagged) * max(1.0, 1 / max(mean, 1e-30))
 
 
@@ -112,16 +114,16 @@ def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:
     reduced, read = course.reduced, course.read
     step = np.maximum(reduced.step, 1e-9)[:, None]
     rate = np.where(reduced.first[:, None], 0.0, np.diff(rise, axis=0, prepend=rise[:1]) / step)
-    whole = max(float(np.ptp(course.time)), 1e-9)
-    over = [("", np.ones(len(read))), ("the time", 2 * (reduced.time - reduced.time.mean()) / whole)]
+    span = max(float(np.ptp(course.time)), 1e-9)
+    covariates = [("", np.ones(len(read))), ("the time", 2 * (reduced.time - reduced.time.mean()) / span)]
     if course.temperature is not None:
         warm = course.temperature[read]
-        over.append(("the temperature", (warm - warm.mean()) / max(float(np.std(warm)), 1e-9)))
+        covariates.append(("the temperature", (warm - warm.mean()) / max(float(np.std(warm)), 1e-9)))
     flat = np.ones_like(rise)
-    own = [(name, values[read][:, None]) for name, values in _histories(course).items()]
+    named_histories = [(name, values[read][:, None]) for name, values in _histories(course).items()]
     leaving = np.sign(cleaned.speed)[:, None]
-    for goes, by in over:
-        for name, values in own:
+    for goes, by in covariates:
+        for name, values in named_histories:
             yield RISE, name, goes, values * rise * by[:, None]
             if not goes:  # a press's own offset, and a session's, is drift
                 yield OFFSET, name, goes, cleaned.without_mean(values) * flat
@@ -135,8 +137,8 @@ def _histories(course: Course) -> dict[str, np.ndarray]:
     share = depth_share(course)
     speed = course.speed
     fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)
-    late = {f"what was pressed {tau:g} s before": low_pass(share, course.step, tau) for tau in TIME_CONSTANTS}
-    turned = {f"turning back by {100 * r:.0f} % of the depth": play(share, r) - share for r in (0.03, 0.1, 0.3)}
+    lags = {f"what was pressed {tau:g} s before": low_pass(share, course.step, tau) for tau in TIME_CONSTANTS}
+    turning = {f"turning back by {100 * r:.0f} % of the depth": play(share, r) - share for r in (0.03, 0.1, 0.3)}
     return {
         "loading or unloading": np.sign(speed),
         "loading or unloading, and how fast": np.sign(speed) * fast,
@@ -144,8 +146,8 @@ def _histories(course: Course) -> dict[str, np.ndarray]:
         "how deep its place was pressed before": running_max(share, course.row_site) - share,
         "how deep this press has been": running_max(share, course.episode) - share,
         "unloading": share * (speed < 0),
-        **late,
-        **turned,
+        **lags,
+        **turning,
     }
 
 
@@ -153,20 +155,22 @@ def _told(cleaned: Cleaned, best: Best) -> Alarm:
     order = np.argsort(-best.size)[:MOST_NAMED]
     order = order[best.size[order] > 0]
     names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
-    most = float(best.size[order[0]])
-    share = plain_number(100 * most / cleaned.largest, 2)
-    large = f"by up to about {plain_number(most, 2)} in readings, {share} % of the largest rise"
+    peak = float(best.size[order[0]])
+    share = plain_number(100 * peak / cleaned.largest, 2)
+    large = f"by up to about {plain_number(peak, 2)} in readings, {share} % of the largest rise"
     changes = f", and that goes with {best.over}" if best.over else ""
     if best.kind == LATE:
-        late = 1e3 * float(np.abs(best.weight).max())
+        delay = 1e3 * float(np.abs(best.weight).max())
         where = f" {best.history}" if best.history else ""
-        seen = f"channels are late by times of their own{where}{changes}: {large} (some {plain_number(late, 2)} ms)"
+        finding = f"channels are late by times of their own{where}{changes}: {large} (some {plain_number(delay, 2)} ms)"
         following = "look at the order and the times at which channels are read; press at three speeds"
     elif best.kind == OFFSET:
-        seen = f"channels move with the path whatever presses them, each its own way ({best.history}{changes}): {large}"
+        finding = (
+            f"channels move with the path whatever presses them, each its own way ({best.history}{changes}): {large}"
+        )
         following = "make the same paths beside the skin, in the air: what stays is of a cable or a plug that moves"
     else:
-        seen = f"channels read more or less of a press by {best.history}, each its own way{changes}: {large}"
+        finding = f"channels read more or less of a press by {best.history}, each its own way{changes}: {large}"
         following = "look at what lies over these channels (torn, loose, dirty), and press there slowly, down and up"
         if "before" in best.history:
             following = "hold at one depth for a minute, wait as long between presses: do channels settle apart?"
@@ -174,4 +178,4 @@ def _told(cleaned: Cleaned, best: Best) -> Alarm:
         following = "make the same presses at the begin and the end of a session; say what was changed in between"
     elif best.over:
         following = "make the same presses cold and warm"
-    return Alarm(f"{seen}; most on {names}", following)
+    return Alarm(f"{finding}; most on {names}", following)

@@ -44,25 +44,27 @@ class Cleaned:
         null, setting = problem.null, problem.setting
         course, placed = setting.course, [*setting.given, *problem.placed]
         whitener = null.whitener_for(setting, placed)
-        left = whitener.whitened(problem.board.columns[0][:, :, None])[:, :, 0]
+        residual = whitener.whitened(problem.board.columns[0][:, :, None])[:, :, 0]
         if len(problem.nuisances):
             _, values = fitted(problem, [], np.arange(len(problem.folds)))
-            left = left - null.nuisances @ values[-len(problem.nuisances) :].astype(np.float32)
+            residual = residual - null.nuisances @ values[-len(problem.nuisances) :].astype(np.float32)
         channels, noise, streams = course.channels, null.noise, Streams.of(course)
         rise = streams.rise(predict(course, setting.response, placed), setting.response)[:, :channels]
         episode = course.reduced.episode
         begins = np.flatnonzero(np.diff(episode, prepend=-1))
         relative = None if noise.relative_scale is None else noise.relative_scale[:, :channels]
         missing = None if noise.missing is None else noise.missing[:, :channels]
-        own = Noise(noise.scale[:channels], noise.memory, noise.step, relative_scale=relative, missing=missing)
+        channel_noise = Noise(
+            noise.scale[:channels], noise.memory, noise.step, relative_scale=relative, missing=missing
+        )
         return cls(
             problem,
-            left[:, :channels].astype(float),
+            residual[:, :channels].astype(float),
             rise,
             course.speed[course.read],
             begins,
             episode[begins],
-            own,
+            channel_noise,
             form_error,
         )
 

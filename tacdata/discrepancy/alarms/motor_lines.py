@@ -43,25 +43,25 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
     inside = ~course.first
     if not inside.any() or _even(cleaned):
         return []
-    every, moving = float(np.median(course.step[inside])), _moving(course)
-    moved, stood = _periodogram(cleaned, moving, every), _periodogram(cleaned, ~moving, every)
-    if moved is None or stood is None:
+    interval, moving = float(np.median(course.step[inside])), _moving(course)
+    motion, standstill = _periodogram(cleaned, moving, interval), _periodogram(cleaned, ~moving, interval)
+    if motion is None or standstill is None:
         return []
-    frequency, power, values = moved
+    frequency, power, values = motion
     chance = _chance(frequency, power)
     best = int(np.argmin(chance))
     near = np.abs(frequency - frequency[best]) < BESIDE
-    if chance[best] > CHANCE or _chance(frequency, stood[1])[near].min() < STANDS:
+    if chance[best] > CHANCE or _chance(frequency, standstill[1])[near].min() < STANDS:
         return []
     # Power of a channel's line over its sum of squares, n a^2 / 4 over n.
     share = np.maximum(power[:, best] - 1.0, 0.0) / values
-    decay = np.abs(1 - cleaned.noise.memory * np.exp(-2j * np.pi * frequency[best] * every))
+    decay = np.abs(1 - cleaned.noise.memory * np.exp(-2j * np.pi * frequency[best] * interval))
     size = 2 * np.sqrt(share) * cleaned.noise.scale / max(float(decay), 1e-3)
     order = np.argsort(-size)[:MOST_NAMED]
     names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
-    most = float(size[order[0]])
-    share = plain_number(100 * most / cleaned.largest, 2)
-    large = f"by up to about {plain_number(most, 2)}, {share} % of the largest rise"
+    peak = float(size[order[0]])
+    share = plain_number(100 * peak / cleaned.largest, 2)
+    large = f"by up to about {plain_number(peak, 2)}, {share} % of the largest rise"
     return [
         Alarm(
             f"while the path moves, and not while it stands, readings swing at {frequency[best]:.3g} "
@@ -92,49 +92,51 @@ def _moving(course: Course) -> np.ndarray:
 
 def _even(cleaned: Cleaned) -> bool:
     """Return whether presses come so evenly that whatever they share has lines."""
-    apart = np.diff(cleaned.course.time[cleaned.begins])
-    return len(apart) < 2 or float(np.std(apart)) < EVEN * float(np.mean(apart))
+    intervals = np.diff(cleaned.course.time[cleaned.begins])
+    return len(intervals) < 2 or float(np.std(intervals)) < EVEN * float(np.mean(intervals))
 
 
-def _periodogram(cleaned: Cleaned, rows: np.ndarray, every: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _periodogram(
+    cleaned: Cleaned, rows: np.ndarray, interval: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Return frequencies [Hz], periodograms (channels, frequencies) about 1, and values of a channel; None if few."""
     course = cleaned.course
-    bins = int(2 ** np.ceil(np.log2(WINDOW * FINER / every)))
+    bins = int(2 ** np.ceil(np.log2(WINDOW * FINER / interval)))
     power, count, number = np.zeros((cleaned.residual.shape[1], bins // (2 * FINER))), 0, 0
     for window in _windows(cleaned):
-        own = window[rows[window]]
-        if len(own) < FEWEST_ROWS:
+        indices = window[rows[window]]
+        if len(indices) < FEWEST_ROWS:
             continue
-        press = course.episode[own] - course.episode[own[0]]
+        press = course.episode[indices] - course.episode[indices[0]]
         size = np.maximum(np.bincount(press), 1)
-        values = cleaned.residual[own]
+        values = cleaned.residual[indices]
         mean = np.stack([np.bincount(press, each) for each in values.T], axis=1) / size[:, None]
         values = np.clip(values - mean[press], -OUTLIER, OUTLIER)
-        at = np.round((course.time[own] - course.time[own[0]]) * FINER / every).astype(int)
+        at = np.round((course.time[indices] - course.time[indices[0]]) * FINER / interval).astype(int)
         grid = np.zeros((values.shape[1], bins), dtype=np.float32)
         grid[:, np.minimum(at, bins - 1)] = values.T
         # Up to half the rate of readings: the finer grid only keeps the phase of uneven times, beyond are aliases.
         spectrum = np.fft.rfft(grid, axis=1)[:, : bins // (2 * FINER)]
         squares = np.maximum(np.square(values).sum(axis=0), 1e-9)
         power = power + np.square(np.abs(spectrum)) / squares[:, None]
-        count, number = count + 1, number + len(own)
+        count, number = count + 1, number + len(indices)
     if not count:
         return None
-    frequency = np.fft.rfftfreq(bins, every / FINER)[: bins // (2 * FINER)]
+    frequency = np.fft.rfftfreq(bins, interval / FINER)[: bins // (2 * FINER)]
     return frequency, power / count, np.full(cleaned.residual.shape[1], number / count)
 
 
 def _windows(cleaned: Cleaned) -> list[np.ndarray]:
     """Return the rows of each window of a session: whole presses."""
-    course, made, first = cleaned.course, [], 0
+    course, result, first = cleaned.course, [], 0
     edges = [*cleaned.begins, len(course.time)]
     session = course.session[cleaned.episodes]
     for k in range(1, len(edges)):
         new = k == len(edges) - 1 or session[k] != session[k - 1]
         if new or course.time[edges[k + 1] - 1] - course.time[edges[first]] > WINDOW:
-            made.append(np.arange(edges[first], edges[k]))
+            result.append(np.arange(edges[first], edges[k]))
             first = k
-    return made
+    return result
 
 
 def _chance(frequency: np.ndarray, power: np.ndarray) -> np.ndarray:

@@ -47,16 +47,16 @@ def press_depths(cleaned: Cleaned) -> list[Alarm]:
     course = problem.setting.course
     place = np.zeros(course.episodes, dtype=np.int64)
     place[course.reduced.episode] = problem.null.context
-    found = stretch(depth, place[episodes])
-    if found is not None and abs(found[2]) * unit >= LEAST_MM:
-        begin, end, by = found
+    segment = stretch(depth, place[episodes])
+    if segment is not None and abs(segment[2]) * unit >= LEAST_MM:
+        begin, end, by = segment
         first, last = (course.names[int(episodes[k])] for k in (begin, end - 1))
         way = "deeper" if by > 0 else "less deep"
-        least = "at least " if problem.setting.response.fitted else ""  # which takes up a part of it
+        bound = "at least " if problem.setting.response.fitted else ""  # which takes up a part of it
         back = ", and the depth comes back" if end < len(depth) and begin > 0 else ""
         return [
             Alarm(
-                f"from {first} to {last} presses go {least}{abs(by) * unit:.2g} mm {way} than others of a place{back}: "
+                f"from {first} to {last} presses go {bound}{abs(by) * unit:.2g} mm {way} than others of a place{back}: "
                 "as if steps were lost and found, or something lay under the sensor",
                 "measure the height of a fixed point at every tenth press; look at the guide and at "
                 "what holds the sensor",
@@ -64,10 +64,10 @@ def press_depths(cleaned: Cleaned) -> list[Alarm]:
         ]
     if problem.setting.response.fitted:
         return []  # each place's depth is its own: it hides a difference of two groups
-    apart = two_groups(depth, error)
-    if apart is None or abs(apart[1]) * unit < LEAST_MM or reasoned(course, episodes, apart[0]):
+    groups = two_groups(depth, error)
+    if groups is None or abs(groups[1]) * unit < LEAST_MM or reasoned(course, episodes, groups[0]):
         return []
-    lower, by = apart
+    lower, by = groups
     return [
         Alarm(
             f"presses fall in two groups {by * unit:.2g} mm apart in depth, of {int(lower.sum())} and "
@@ -83,16 +83,16 @@ def estimates(problem: Problem) -> tuple[np.ndarray, np.ndarray, np.ndarray, flo
     null, setting = problem.null, problem.setting
     whitener = null.whitener_for(setting, [*setting.given, *problem.placed])
     each = one_by_one(whitener.joint_scores(np.nan_to_num(problem.board.columns[0]), null.errors))
-    each = [one for one in each if np.diagonal(one.information).min() > 0]  # sealed presses say nothing
-    there = np.array([one.episodes[0] for one in each], dtype=np.int64)
+    each = [run for run in each if np.diagonal(run.information).min() > 0]  # sealed presses say nothing
+    presses = np.array([run.episodes[0] for run in each], dtype=np.int64)
     kinds = null.errors.shape[2]
-    known = np.array([one.information for one in each]).reshape(-1, kinds, kinds)
-    unsure = np.linalg.inv(known + UNINFORMED * np.eye(kinds))
-    found = np.einsum("ekl,el->ek", unsure, np.array([one.score[0] for one in each]).reshape(-1, kinds))[:, 0]
+    information = np.array([run.information for run in each]).reshape(-1, kinds, kinds)
+    unsure = np.linalg.inv(information + UNINFORMED * np.eye(kinds))
+    estimate = np.einsum("ekl,el->ek", unsure, np.array([run.score[0] for run in each]).reshape(-1, kinds))[:, 0]
     error = np.sqrt(np.maximum(unsure[:, 0, 0] - 1.0, 0.0))  # the spread itself is in it
     prior = FITTED_DEPTH_PRIOR * setting.course.stroke if setting.response.fitted else POSE_PRIOR[2]
     size = 1.0 if null.sizes is None else float(null.sizes[0])
-    return there, found, error, prior * size
+    return presses, estimate, error, prior * size
 
 
 def stretch(depth: np.ndarray, place: np.ndarray, seed: int = 0) -> tuple[int, int, float] | None:
@@ -106,31 +106,31 @@ def stretch(depth: np.ndarray, place: np.ndarray, seed: int = 0) -> tuple[int, i
     at = np.unique(np.linspace(0, count, min(count, MOST_EDGES) + 1).astype(int))
     begin, end = (at[k] for k in np.triu_indices(len(at), 1))
     long = end - begin
-    kept = (long >= LEAST_STRETCH) & (long <= count - LEAST_STRETCH)
-    begin, end, long = begin[kept], end[kept], long[kept]
+    mask = (long >= LEAST_STRETCH) & (long <= count - LEAST_STRETCH)
+    begin, end, long = begin[mask], end[mask], long[mask]
     order = np.arange(count)[:, None]
     inside = ((order >= begin) & (order < end)).astype(float)
     inside -= basis @ (basis.T @ inside)
     power = np.square(inside).sum(axis=0)
     # A stretch that coincides with the visits of a place is explained by its level: no contrast remains.
-    kept = power > 1.5
+    mask = power > 1.5
     freedom = count - levels.shape[1] - 1
-    if not kept.any() or freedom < LEAST_STRETCH:
+    if not mask.any() or freedom < LEAST_STRETCH:
         return None
-    begin, end, long, contrast = begin[kept], end[kept], long[kept], inside[:, kept] / np.sqrt(power[kept])
-    rest = depth - basis @ (basis.T @ depth)
+    begin, end, long, contrast = begin[mask], end[mask], long[mask], inside[:, mask] / np.sqrt(power[mask])
+    remainder = depth - basis @ (basis.T @ depth)
     rng = np.random.default_rng([seed, 31])
-    drawn = np.stack([rest, *(rng.permutation(rest) for _ in range(DRAWS))])
+    drawn = np.stack([remainder, *(rng.permutation(remainder) for _ in range(DRAWS))])
     drawn -= (drawn @ basis) @ basis.T
     by = drawn @ contrast
-    left = np.maximum(np.square(drawn).sum(axis=1, keepdims=True) - np.square(by), 1e-12)
-    z = np.abs(by) / np.sqrt(left / freedom)
+    residual_power = np.maximum(np.square(drawn).sum(axis=1, keepdims=True) - np.square(by), 1e-12)
+    z = np.abs(by) / np.sqrt(residual_power / freedom)
     fair = z - np.sqrt(2 * np.log(count / np.minimum(long, count - long)))
     best = int(np.argmax(fair[0]))
     p = (1 + (fair[1:].max(axis=1) >= fair[0, best]).sum()) / (DRAWS + 1)
     if p > RATE or z[0, best] < LEAST_Z:
         return None
-    return int(begin[best]), int(end[best]), float(by[0, best] / np.sqrt(power[kept][best]))
+    return int(begin[best]), int(end[best]), float(by[0, best] / np.sqrt(power[mask][best]))
 
 
 def two_groups(depth: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, float] | None:
@@ -143,14 +143,14 @@ def two_groups(depth: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, float]
     spread, order = float(np.std(depth)), np.sort(depth)
     if spread <= 0:
         return None
-    known = np.square(error)
-    least = (0.1 * spread) ** 2
-    made = []
+    error_variance = np.square(error)
+    floor = (0.1 * spread) ** 2
+    fits = []
     # Expectation-maximization ends at the nearest optimum, so it starts from three divisions.
     for cut in (len(depth) // 3, len(depth) // 2, 2 * len(depth) // 3):
-        share, low, high, own = 0.5, float(order[:cut].mean()), float(order[cut:].mean()), (0.5 * spread) ** 2
+        share, low, high, between = 0.5, float(order[:cut].mean()), float(order[cut:].mean()), (0.5 * spread) ** 2
         for _ in range(ROUNDS):
-            variance = own + known
+            variance = between + error_variance
             first = np.log(share) - 0.5 * np.square(depth - low) / variance
             second = np.log(1 - share) - 0.5 * np.square(depth - high) / variance
             lower = 1 / (1 + np.exp(np.clip(second - first, -50, 50)))
@@ -158,16 +158,16 @@ def two_groups(depth: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, float]
             low = float(np.average(depth, weights=lower / variance + 1e-12))
             high = float(np.average(depth, weights=(1 - lower) / variance + 1e-12))
             square = lower * np.square(depth - low) + (1 - lower) * np.square(depth - high)
-            own = max(float(np.mean(square - known)), least)
-        made.append((_likelihood(depth, known + own, share, low, high), lower > 0.5, high - low))
-    best, lower, apart = max(made, key=lambda one: one[0])
+            between = max(float(np.mean(square - error_variance)), floor)
+        fits.append((_likelihood(depth, error_variance + between, share, low, high), lower > 0.5, high - low))
+    best, lower, separation = max(fits, key=lambda fit: fit[0])
     middle = float(depth.mean())
     for _ in range(5):
-        own = max(float(np.mean(np.square(depth - middle) - known)), least)
-        middle = float(np.average(depth, weights=1 / (own + known)))
-    alone = _likelihood(depth, known + own, 0.5, middle, middle)
+        between = max(float(np.mean(np.square(depth - middle) - error_variance)), floor)
+        middle = float(np.average(depth, weights=1 / (between + error_variance)))
+    single = _likelihood(depth, error_variance + between, 0.5, middle, middle)
     enough = min(lower.sum(), (~lower).sum()) >= LEAST_GROUP * len(depth)
-    return (lower, apart) if enough and 2 * (best - alone) >= LEAST_RATIO else None
+    return (lower, separation) if enough and 2 * (best - single) >= LEAST_RATIO else None
 
 
 def _likelihood(depth: np.ndarray, variance: np.ndarray, share: float, low: float, high: float) -> float:
@@ -182,12 +182,12 @@ def reasoned(course: Course, episodes: np.ndarray, lower: np.ndarray) -> bool:
     deep = np.array([round(float(course.tip[r, 2].max()), 2) for r in rows])
     fast = np.array([round(float(np.log(max(np.abs(course.speed[r]).max(), 1e-6))), 0) for r in rows])
     tool = np.array([course.tool[r[0]] for r in rows])
-    for known in (course.site[episodes], tool, deep, fast, course.session[episodes]):
-        kinds = np.unique(known)
+    for feature in (course.site[episodes], tool, deep, fast, course.session[episodes]):
+        kinds = np.unique(feature)
         # Kinds of one press each would determine any group.
         if not 1 < len(kinds) <= len(episodes) // 2:
             continue
-        table = np.array([[np.sum((known == k) & lower), np.sum((known == k) & ~lower)] for k in kinds])
+        table = np.array([[np.sum((feature == k) & lower), np.sum((feature == k) & ~lower)] for k in kinds])
         if chi2_contingency(table)[1] < REASON:
             return True
     return False

@@ -53,23 +53,23 @@ class Swing:
 
 def swings(cleaned: Cleaned) -> list[Alarm]:
     """Return the alarm of swings that differ from press to press, or none."""
-    found = strongest(cleaned)
-    if found is None or not found.test.alarms:
+    swing = strongest(cleaned)
+    if swing is None or not swing.test.alarms:
         return []
-    share, most = plain_number(100 * found.share, 2), plain_number(found.share * cleaned.largest, 2)
-    size = f"by about {share} % of the rise, up to {most} in readings"
-    if found.wave < len(WAVES):
-        every = cleaned.problem.setting.course.stroke / WAVES[found.wave]
+    share, peak = plain_number(100 * swing.share, 2), plain_number(swing.share * cleaned.largest, 2)
+    size = f"by about {share} % of the rise, up to {peak} in readings"
+    if swing.wave < len(WAVES):
+        wavelength = cleaned.problem.setting.course.stroke / WAVES[swing.wave]
         return [
             Alarm(
-                f"in each press all channels swing together along the path, every {every:.2g} mm or a "
+                f"in each press all channels swing together along the path, every {wavelength:.2g} mm or a "
                 f"part of it, {size}, "
                 "each time with another beginning: as friction does that lets go in jumps (stick-slip)",
                 "press slower and faster, and with a drop of oil or some powder between tool and "
                 "skin; look at the guide",
             )
         ]
-    hertz = HERTZ[found.wave - len(WAVES)]
+    hertz = HERTZ[swing.wave - len(WAVES)]
     return [
         Alarm(
             f"in each press all channels swing together at about {hertz:.2g} Hz, {size}, each time "
@@ -83,15 +83,15 @@ def swings(cleaned: Cleaned) -> list[Alarm]:
 
 def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
     """Return the wave with the most energy beyond chance, with its p-value over all of them; None if untestable."""
-    made = [(_projected(cleaned, rows), cleaned.course.episode[rows[:1]]) for rows in _presses(cleaned)]
-    there = [(*one, of[0]) for one, of in made if one is not None]
-    if len(there) < FEWEST or cleaned.course.channels < FEWEST_CHANNELS:
+    projections = [(_projected(cleaned, rows), cleaned.course.episode[rows[:1]]) for rows in _presses(cleaned)]
+    valid = [(*projection, of[0]) for projection, of in projections if projection is not None]
+    if len(valid) < FEWEST or cleaned.course.channels < FEWEST_CHANNELS:
         return None
     # Of shapes (presses, channels, waves), (presses, waves), (presses,).
-    parts, power, episodes = (np.array(each) for each in zip(*there, strict=True))
-    alone = np.square(np.abs(parts)).sum(axis=1)
+    parts, power, episodes = (np.array(each) for each in zip(*valid, strict=True))
+    diagonal = np.square(np.abs(parts)).sum(axis=1)
     # A press counts by the root of its energy: a single strong one must not decide.
-    weight = 1 / np.sqrt(np.where(alone > 0, alone, np.inf))
+    weight = 1 / np.sqrt(np.where(diagonal > 0, diagonal, np.inf))
     energy = np.zeros((DRAWS + 1, parts.shape[2]))
     rng = np.random.default_rng([seed, 29])
     together = episodes
@@ -101,14 +101,14 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
         place[cleaned.course.episode] = cleaned.problem.null.context
         together = place[episodes]
     signs: dict[int, np.ndarray] = {}
-    for own, by, at in zip(parts, weight, together.tolist(), strict=True):
+    for part, by, at in zip(parts, weight, together.tolist(), strict=True):
         if at not in signs:
-            signs[at] = rng.integers(0, 2, (DRAWS + 1, len(own))) * 2.0 - 1.0
+            signs[at] = rng.integers(0, 2, (DRAWS + 1, len(part))) * 2.0 - 1.0
             # Row 0 is the data as it is.
             signs[at][0] = 1.0
-        energy += by * (np.square(signs[at] @ own.real) + np.square(signs[at] @ own.imag))
+        energy += by * (np.square(signs[at] @ part.real) + np.square(signs[at] @ part.imag))
     energy[1:] *= 1 + _shared_in_air(cleaned)
-    beyond = np.square(np.abs(parts.sum(axis=1))) - alone
+    beyond = np.square(np.abs(parts.sum(axis=1))) - diagonal
     size = 4 * beyond.sum(axis=0) / np.maximum(np.square(power).sum(axis=0), 1e-30)
     explained = (2 * beyond / np.maximum(power, 1e-30)).sum(axis=0)
     test = largest(energy, explained >= cleaned.least)
@@ -122,22 +122,22 @@ def _shared_in_air(cleaned: Cleaned) -> float:
     """
     inside = cleaned.course.tip[:, 2] > 0
     edges = [*cleaned.begins, len(inside)]
-    together = alone = 0.0
+    together = diagonal = 0.0
     for first, last in pairwise(edges):
         rows = np.arange(first, last)
         air = rows[~inside[rows]]
         weighted = cleaned.residual[air] * (np.abs(cleaned.rise[rows]).max(axis=0) / cleaned.noise.scale)
         together += float(np.sum(np.square(weighted.sum(axis=1))))
-        alone += float(np.sum(np.square(weighted)))
-    return max(together / alone - 1.0, 0.0) if alone > 0 else 0.0
+        diagonal += float(np.sum(np.square(weighted)))
+    return max(together / diagonal - 1.0, 0.0) if diagonal > 0 else 0.0
 
 
 def _presses(cleaned: Cleaned) -> list[np.ndarray]:
     """Return the rows in contact of each press."""
     inside = cleaned.course.tip[:, 2] > 0
     edges = [*cleaned.begins, len(inside)]
-    chosen = np.unique(np.linspace(0, len(cleaned.begins) - 1, min(len(cleaned.begins), MOST_PRESSES)).astype(int))
-    each = [np.arange(edges[k], edges[k + 1]) for k in chosen]
+    numbers = np.unique(np.linspace(0, len(cleaned.begins) - 1, min(len(cleaned.begins), MOST_PRESSES)).astype(int))
+    each = [np.arange(edges[k], edges[k + 1]) for k in numbers]
     return [rows[inside[rows]] for rows in each]
 
 
@@ -155,13 +155,13 @@ def _projected(cleaned: Cleaned, rows: np.ndarray) -> tuple[np.ndarray, np.ndarr
     moving = rate[rows] > MOVES * np.quantile(rate, USUAL_RATE)
     if not moving.any():
         return None
-    every = max(float(np.median(np.diff(time))), 1e-9)
-    apart = WAVES * float(np.median(rate[rows][moving])) * every / stroke
-    along = (WAVES * way[-1] >= FEWEST_WAVES) & ((apart < 0.5) | (np.abs(apart - np.round(apart)) >= ALIAS))
+    interval = max(float(np.median(np.diff(time))), 1e-9)
+    phase = WAVES * float(np.median(rate[rows][moving])) * interval / stroke
+    resolved = (WAVES * way[-1] >= FEWEST_WAVES) & ((phase < 0.5) | (np.abs(phase - np.round(phase)) >= ALIAS))
     # Near the Nyquist frequency, half a wave a row, a frequency has its alias next to it.
-    in_time = (HERTZ * time[-1] >= FEWEST_WAVES) & (HERTZ * every <= 0.45)
+    in_time = (HERTZ * time[-1] >= FEWEST_WAVES) & (HERTZ * interval <= 0.45)
     waves = np.exp(2j * np.pi * np.concatenate([way[:, None] * WAVES, time[:, None] * HERTZ], axis=1))
     waves[:, : len(WAVES)] *= moving[:, None]
-    waves[:, ~np.concatenate([along, in_time])] = 0.0
+    waves[:, ~np.concatenate([resolved, in_time])] = 0.0
     power = np.square(np.abs(waves)).T @ np.square(shape).sum(axis=1)
     return (shape * cleaned.residual[rows]).T @ waves, power

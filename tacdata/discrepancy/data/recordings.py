@@ -58,45 +58,47 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
         FormatError: If they do not have the same channels, or hold no readings.
     """
     paths = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
-    every = [(number, read_recording(file)) for number, path in enumerate(paths) for file in _files(path)]
-    every = [(number, r) for number, r in every if len(r.episode.taxels.sample_ns) > 1]
-    every.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))
-    found = [(number, r.episode) for number, r in every]
+    numbered = [(number, read_recording(file)) for number, path in enumerate(paths) for file in _files(path)]
+    numbered = [(number, r) for number, r in numbered if len(r.episode.taxels.sample_ns) > 1]
+    numbered.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))
+    numbered_episodes = [(number, r.episode) for number, r in numbered]
     notes: list[str] = []
-    if not found:
+    if not numbered_episodes:
         raise UsageError(
             f"no readings in {', '.join(map(str, paths))}", "recordings with taxel readings", "record some"
         )
-    notes += _of_one_sensor([e for _, e in found])
-    counts = {e.taxels.counts.shape[1] for _, e in found}
+    notes += _of_one_sensor([e for _, e in numbered_episodes])
+    counts = {e.taxels.counts.shape[1] for _, e in numbered_episodes}
     if len(counts) > 1:
         raise FormatError(
             f"recordings of {', '.join(map(str, sorted(counts)))} channels",
             "the same channels throughout",
             "judge sensors one at a time",
         )
-    recordings, odd = without_codes([r for _, r in every])
-    found = [(number, r.episode) for (number, _), r in zip(every, recordings, strict=True)]
-    kept, limits, left_out = usable([readings(r) for r in recordings])
-    notes += in_source(recordings, min(counts)) + odd + left_out + _dropouts([e for _, e in found])
-    names = sorted({m.name for _, e in found for m in e.measured})
+    recordings, odd = without_codes([r for _, r in numbered])
+    numbered_episodes = [(number, r.episode) for (number, _), r in zip(numbered, recordings, strict=True)]
+    columns, limits, left_out = usable([readings(r) for r in recordings])
+    notes += in_source(recordings, min(counts)) + odd + left_out + _dropouts([e for _, e in numbered_episodes])
+    names = sorted({m.name for _, e in numbered_episodes for m in e.measured})
     force, temperature = _named(names, "force", "load", "weight"), _named(names, "temp")
     views: dict[int, Views] = {}
-    for number in sorted({n for n, _ in found}):
-        own = [k for k, (n, _) in enumerate(found) if n == number]
-        views |= {own[k]: v for k, v in second_views([found[k][1] for k in own]).items()}
+    for number in sorted({n for n, _ in numbered_episodes}):
+        members = [k for k, (n, _) in enumerate(numbered_episodes) if n == number]
+        views |= {members[k]: v for k, v in second_views([numbered_episodes[k][1] for k in members]).items()}
     parts: list[_Stroke] = []
-    for k, (number, episode) in enumerate(found):
-        parts += _strokes_of(episode, (number, k), kept, force, temperature, views.get(k), bool(views))
+    for k, (number, episode) in enumerate(numbered_episodes):
+        parts += _strokes_of(episode, (number, k), columns, force, temperature, views.get(k), bool(views))
     if not parts:
         raise FormatError("no stretch with enough readings", f"{FEW_ROWS} or more readings a press", "record again")
-    if len(parts) > len(found):
-        held = "one recording holds" if len(found) == 1 else f"{len(found)} recordings hold"
-        notes.append(f"{held} {len(parts)} strokes; each counts as an episode")
-    if any(e.tags for _, e in found) and not views:
+    if len(parts) > len(numbered_episodes):
+        subject = "one recording holds" if len(numbered_episodes) == 1 else f"{len(numbered_episodes)} recordings hold"
+        notes.append(f"{subject} {len(parts)} strokes; each counts as an episode")
+    if any(e.tags for _, e in numbered_episodes) and not views:
         notes.append("the tag was seen too seldom to check the guide: keep it in view during the presses")
-    course = _joined(parts, (kept, limits), found[0][1], (bool(force), bool(temperature), bool(views)), notes)
-    return replace(course, effort=_effort([e for _, e in found]))
+    course = _joined(
+        parts, (columns, limits), numbered_episodes[0][1], (bool(force), bool(temperature), bool(views)), notes
+    )
+    return replace(course, effort=_effort([e for _, e in numbered_episodes]))
 
 
 def _effort(episodes: list[Episode]) -> bool | None:
@@ -172,8 +174,8 @@ def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
         return np.full(len(time_ns), np.nan)
     at, value = stream.sample_ns[good], values[good, column]
     result = np.interp(time_ns, at, value)
-    behind = np.clip(np.searchsorted(at, time_ns), 1, len(at) - 1)
-    far = np.minimum(np.abs(time_ns - at[behind - 1]), np.abs(time_ns - at[behind])) > HELD * 1e9
+    upper = np.clip(np.searchsorted(at, time_ns), 1, len(at) - 1)
+    far = np.minimum(np.abs(time_ns - at[upper - 1]), np.abs(time_ns - at[upper])) > HELD * 1e9
     result[far] = np.nan
     return result
 
@@ -181,7 +183,7 @@ def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
 def _strokes_of(
     episode: Episode,
     of: tuple[int, int],
-    kept: np.ndarray,
+    channels: np.ndarray,
     force: str,
     temperature: str,
     views: Views | None,
@@ -190,7 +192,7 @@ def _strokes_of(
     time_ns = episode.taxels.sample_ns
     order = np.argsort(time_ns, kind="stable")
     time_ns = time_ns[order]
-    columns = [episode.taxels.counts[order][:, kept]]
+    columns = [episode.taxels.counts[order][:, channels]]
     columns += [_measured(episode, name, time_ns)[:, None] for name in (force, temperature) if name]
     if tag:
         columns.append(np.full((len(time_ns), 3), np.nan) if views is None else views.at(time_ns))
@@ -201,22 +203,22 @@ def _strokes_of(
     if len(time_ns) < FEW_ROWS or len(episode.tip_ns) < 2:
         return []
     tool = _tool(episode)
-    made, specimen = [], str(episode.rig.get("imported", {}).get("specimen", ""))
+    result, specimen = [], str(episode.rig.get("imported", {}).get("specimen", ""))
     tip, _ = without_noise(episode.tip_ns, without_dropouts(episode.tip_ns, episode.tip)[0])
-    known = resolved(episode.tip_ns, tip[:, 2], time_ns)
+    is_resolved = resolved(episode.tip_ns, tip[:, 2], time_ns)
     spans = _to_the_end(strokes(episode.tip_ns, tip[:, 2]), tip[:, 2], time_ns)
     for number, (first, last) in enumerate(spans):
-        rows = known & (time_ns >= first) & (time_ns < last)
+        rows = is_resolved & (time_ns >= first) & (time_ns < last)
         if rows.sum() < FEW_ROWS:
             continue
         origin = time_ns[0]
         path_time = (episode.tip_ns - origin) * 1e-9
-        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, tip, len(kept))
+        laid = rows_of((time_ns[rows] - origin) * 1e-9, values[rows], path_time, tip, len(channels))
         # The place of a press is where it is deepest: a path may come from aside.
         deepest = laid.tip[np.argmax(laid.tip[:, 2])]
         name = episode.path.stem + (f" stroke {number}" if len(spans) > 1 else "")
-        made.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2], specimen))
-    return made
+        result.append(_Stroke(name, *of, float(origin) * 1e-9, laid, tool, deepest[:2], specimen))
+    return result
 
 
 def _to_the_end(spans: list[tuple[int, int]], depth: np.ndarray, time_ns: np.ndarray) -> list[tuple[int, int]]:
@@ -244,7 +246,7 @@ def _joined(
     extra: tuple[bool, bool, bool],
     notes: list[str],
 ) -> Course:
-    (kept, (least, most)), (force, temperature, tag) = usable, extra
+    (channel_numbers, (lowest, highest)), (force, temperature, tag) = usable, extra
     tools = tuple(dict.fromkeys(p.tool for p in parts))
     clock, last = [], None
     restarts = np.zeros(len(parts), dtype=bool)
@@ -260,12 +262,12 @@ def _joined(
     count = [len(p.rows.time) for p in parts]
     episode = np.repeat(np.arange(len(parts)), count)
     values = np.concatenate([p.rows.values for p in parts])
-    channels = len(kept)
+    channels = len(channel_numbers)
     centers = example.sensor.taxels.centers
     numbers = {s: k for k, s in enumerate(sorted({p.session for p in parts}))}
     time, read = np.concatenate(clock), values[:, :channels]
-    clipped = (read <= least) | (read >= most)
-    site, told = _sites(parts, channels)
+    clipped = (read <= lowest) | (read >= highest)
+    site, remarks = _sites(parts, channels)
     recording = np.unique([p.recording for p in parts], return_inverse=True)[1]
     return Course(
         time=time - time[0],
@@ -278,13 +280,13 @@ def _joined(
         site=site,
         tools=tools,
         names=tuple(p.name for p in parts),
-        centers=centers[kept] if len(centers) > int(kept.max()) else None,
+        centers=centers[channel_numbers] if len(centers) > int(channel_numbers.max()) else None,
         force=values[:, channels] if force else None,
         temperature=_filled(values[:, channels + force]) if temperature else None,
-        notes=(*notes, *told, *_restarted(restarts)),
+        notes=(*notes, *remarks, *_restarted(restarts)),
         tag=values[:, channels + force + temperature :] if tag else None,
         recording=recording if recording.max() + 1 < len(parts) else None,
-        numbers=tuple(int(k) for k in kept),
+        numbers=tuple(int(k) for k in channel_numbers),
         clipped=clipped if clipped.any() else None,
         specimens=tuple(p.specimen for p in parts) if any(p.specimen for p in parts) else (),
         restarts=restarts if restarts.any() else None,
@@ -316,13 +318,13 @@ def _filled(values: np.ndarray) -> np.ndarray:
 
 def places(at: np.ndarray) -> np.ndarray:
     """Return the number of the place of each press: those within `SAME_PLACE` of a place's first belong to it."""
-    known: list[np.ndarray] = []
+    centres: list[np.ndarray] = []
     result = np.zeros(len(at), dtype=np.int64)
     for k, place in enumerate(at):
-        near = [n for n, other in enumerate(known) if np.linalg.norm(place - other) < SAME_PLACE]
+        near = [n for n, centre in enumerate(centres) if np.linalg.norm(place - centre) < SAME_PLACE]
         if near:
             result[k] = near[0]
         else:
-            result[k] = len(known)
-            known.append(place)
+            result[k] = len(centres)
+            centres.append(place)
     return result
