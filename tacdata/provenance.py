@@ -109,9 +109,6 @@ def _syntax(node: Any) -> Any:
     if isinstance(node, str):
         # Their versions are those of releases that had these packages outside tacdata.
         return re.sub(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)", "", node)
-    if isinstance(node, str):
-        # Their versions are those of releases that had these packages outside tacdata.
-        return re.sub(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)", "", node)
     if not isinstance(node, ast.AST):
         return node
     # Which fields of a kind there are grows with Python's releases; their new ones are empty.

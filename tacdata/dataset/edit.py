@@ -140,12 +140,14 @@ def _write(
     """Let lerobot write into a hidden folder, restore dropped fields, carry the flags along, and rename the folder."""
     refuse_existing(target, append=False)
     for source in sources:
+        # A damaged source is refused here: lerobot's error would not name it.
         folder.read_info(source)
     os.environ.setdefault("HF_HUB_OFFLINE", "1")  # before lerobot is imported: nothing here is on the hub
     from lerobot.datasets import dataset_tools
 
     target.parent.mkdir(parents=True, exist_ok=True)
     lacking = {}
+    # Hidden beside the target, so that a crash leaves no half dataset under its name.
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as work:
         draft = Path(work) / target.name
         try:

@@ -88,6 +88,7 @@ def set_flag(folder: Path, recording: str, file: str, reason: str) -> Flag:
         UsageError: If there is no reason, or a whole story.
         DeviceError: If the disk refuses it.
     """
+    # One line, as tables show it.
     reason = " ".join(reason.split())
     if not reason or len(reason) > LONGEST:
         fault = "a flag without a reason" if not reason else f"a reason of {len(reason)} letters"
@@ -157,6 +158,7 @@ def flagged_episodes(dataset: Dataset) -> dict[int, str]:
 
 def _write(folder: Path, flags: dict[str, Flag], changes: Sequence[FlagChange]) -> None:
     entries = [asdict(flag) for flag in sorted(flags.values(), key=lambda flag: (flag.file, flag.recording))]
+    # Only appended to: a flag that was taken back stays traceable.
     history = [asdict(change) for change in (*read_history(folder), *changes)]
     document = {"version": schemas.version("flags"), "flags": entries, "history": history}
     documents.write(path_of(folder), document, "flags")

@@ -187,6 +187,7 @@ def read_dataset(root: StrPath, cache_folder: StrPath | None = None) -> Dataset:
     digest = cache.dataset_hash(root, info, paths, place)
     columns = cache.open_columns(root, info, paths, place, digest)
     sensors, records = _provenance(root, paths)
+    # Frames carry the first 60 bits, which fit a column of integers.
     by_key = {features.short_hash(full): full for full in sensors}
     episodes = []
     for row in rows:
@@ -241,6 +242,7 @@ def _provenance(root: Path, paths: list[Path]) -> tuple[dict[str, Sensor], dict[
     if not documents:
         raise metadata.lost(root)
     sensors = {digest: Sensor.from_document(document, str(root)) for digest, document in documents.items()}
+    # Frames know only the hash: a changed description would pass for the recorded one.
     if any(sensor.content_hash != digest for digest, sensor in sensors.items()):
         raise FormatError(f"{root}: a sensor description was changed", "it as recorded", "put the original back")
     return sensors, records

@@ -42,10 +42,12 @@ def restore(root: Path | str, sources: Path | str | Iterable[Path | str]) -> lis
     for path in cache.data_files(root, rows):
         table = folder.read_parquet(path, [features.SENSOR, features.RECORD])
         short_hashes.update(np.unique(table[features.SENSOR].to_numpy()).tolist())
+        # Episodes may share a data file; all frames of one have the same key.
         keys.extend(dict.fromkeys(table[features.RECORD].to_pylist()))
     sensors: dict[str, dict] = {}
     records: dict[int, EpisodeRecord] = metadata.read_records(root)
     present = set(records)
+    # A source states the true rate; LeRobot's is rounded.
     rate = float(info["fps"])
     for source in (root, *map(Path, origins)):
         main = metadata.read_main(source)
@@ -53,6 +55,7 @@ def restore(root: Path | str, sources: Path | str | Iterable[Path | str]) -> lis
             continue
         rate = main["rate"]
         sensors |= {k: v for k, v in main["sensors"].items() if features.short_hash(k) in short_hashes}
+        # Records of the dataset itself take precedence over a source's.
         records = {**metadata.read_records(source), **records}
     lacking = short_hashes - {features.short_hash(k) for k in sensors}
     if lacking:

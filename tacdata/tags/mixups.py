@@ -39,6 +39,7 @@ def mixups(fingers: dict[str, Finger], cubes: dict[str, CubePose]) -> tuple[str,
     ]
     for (first_name, a), (second_name, b) in combinations(cubes.items(), 2):
         room = (fingers[first_name].cube.side + fingers[second_name].cube.side) / 2000
+        # Cubes that touch are a side's length apart; a tenth of it is for errors of their poses.
         if np.linalg.norm(a.position - b.position) < 0.9 * room:
             remarks.append(
                 f"the cubes of {first_name} and {second_name} are in one place: tags of both are on one cube"

@@ -54,6 +54,7 @@ class FingerTracker:
         grey = to_grey(image)
         self.camera.check(grey)
         fresh = {name for name, age in self._ages.items() if age == 0}
+        # Every few images all is searched: a finger that comes in is near no previous one.
         tags = [] if not fresh or self._since >= self._every else self._near(grey, fresh)
         unread = {name for name in fresh if not self._has_tag(name, tags)}
         self._since += 1

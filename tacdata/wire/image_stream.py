@@ -71,6 +71,7 @@ class ImageStream:
     def _next(self) -> ImagePart | None:
         head = _head(self._answer, self._boundary)
         length = int(head.get("content-length", "-1"))
+        # A damaged length must not make the reader wait for gigabytes.
         data = self._answer.read(length) if 0 <= length <= LONGEST else b""
         return ImagePart(data, _stamp(head)) if data and len(data) == length else None
 
@@ -93,6 +94,7 @@ def _head(stream: BinaryIO, mark: bytes) -> dict[str, str]:
     inside = False
     while line := stream.readline(HEADER):
         line = line.strip()
+        # Some servers announce another boundary than they send.
         if line.startswith(mark) or (not inside and line.startswith(b"--")):
             inside, fields = True, {}
         elif inside and not line and fields:
@@ -105,6 +107,7 @@ def _head(stream: BinaryIO, mark: bytes) -> dict[str, str]:
 
 def _stamp(head: dict[str, str]) -> int:
     for name in STAMPS:
+        # As integers: a float of seconds since 1970 resolves 0.2 us.
         seconds, _, part = head.get(name, "").partition(".")
         if seconds.isdigit() and (part.isdigit() or not part):
             return int(seconds) * 1_000_000_000 + int(part.ljust(9, "0")[:9] or 0)

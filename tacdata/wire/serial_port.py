@@ -58,6 +58,7 @@ def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | Non
     """
     try:
         line = serial.serial_for_url(port, baud, timeout=timeout, write_timeout=WRITE, do_not_open=True)
+        # Ports on a network know no lock.
         if "://" not in port:
             line.exclusive = True
         if dtr is not None:

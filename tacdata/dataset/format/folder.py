@@ -130,6 +130,7 @@ def _converted(root: Path, version: str) -> str:
 def write_parquet(path: Path, table: pa.Table) -> None:
     """Write a Parquet file under a temporary name, sync it, rename it."""
     with replacement(path) as stream:
+        # Only a checksum finds bits that have flipped on the disk.
         pq.write_table(table, stream, compression="snappy", write_page_checksum=True)
 
 
@@ -268,6 +269,7 @@ def read_row_stats(root: Path, info: dict[str, Any]) -> dict[str, Statistics]:
     parts: dict[str, list[Statistics]] = {}
     for path in sorted((root / "meta/episodes").glob("*/*.parquet")):
         for entry in read_parquet(path).to_pylist():
+            # Remains of an append that was broken off.
             if entry["episode_index"] >= info["total_episodes"]:
                 continue
             for key in info["features"]:

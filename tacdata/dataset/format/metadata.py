@@ -66,6 +66,7 @@ class EpisodeRecord:
         values = asdict(self)
         values |= {"baseline": list(self.baseline), "notes": list(self.notes)}
         if self.simulated is None:
+            # Records of recordings keep the form, and the hash, that they had before there were simulations.
             del values["simulated"]
         return {"version": schemas.version("dataset_record"), **values}
 
@@ -142,10 +143,12 @@ def append_record(root: Path, record: EpisodeRecord) -> None:
     """Append a record and bring it to the disk; a crash leaves at most an unfinished last line: ignored."""
     documents.check(record.document, "dataset_record", record.recording_file)
     path = root / RECORDS
+    # A crash may have left half a line, which this record must not continue.
     torn = path.is_file() and path.stat().st_size > 0 and not path.read_bytes()[-1:] == b"\n"
     with path.open("a") as stream:
         stream.write(("\n" if torn else "") + provenance.canonical(record.document) + "\n")
         stream.flush()
+        # On the disk before info.json counts the episode.
         os.fsync(stream.fileno())
 
 

@@ -74,6 +74,7 @@ def decode(column: pa.Array, shape: tuple[int, int]) -> np.ndarray:
         return np.empty((0, *shape), dtype=np.float32)
     first = blobs[0]
     start = _strip_start(first, shape)
+    # Images of ours share their header: decoded together, they need no image library.
     if start is not None and all(len(blob) == len(first) for blob in blobs):
         images = np.frombuffer(b"".join(blobs), dtype=np.uint8).reshape(len(blobs), len(first))
         end = start + shape[0] * shape[1] * 4

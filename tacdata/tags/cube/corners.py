@@ -52,6 +52,7 @@ def candidates(tags: list[Tag], cube: Cube, camera: PinholeCamera) -> list[PoseC
     """
     poses: list[PoseCandidate] = []
     several = len({tag.id for tag in tags}) > 1
+    # The largest first: its corners determine the pose best, and the search may end with it.
     for tag in sorted(tags, key=lambda tag: -tag.size):
         for candidate in _solved(tag, tags, cube, camera):
             poses.append(candidate)

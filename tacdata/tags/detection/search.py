@@ -65,6 +65,7 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
     """Return the candidates in an image, uint8, shape (height, width)."""
     import cv2
 
+    # At half size there are a quarter of the pixels and half of the noise, and readable tags still show.
     half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     if min(half.shape) < WINDOW:
         return [Suspect((0, 0), (grey.shape[1], grey.shape[0]))]
@@ -76,6 +77,7 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
     widths, heights = boxes[:, cv2.CC_STAT_WIDTH], boxes[:, cv2.CC_STAT_HEIGHT]
     short, long = np.minimum(widths, heights), np.maximum(widths, heights)
     likely = (short >= LEAST_SIDE) & (long <= SLENDER * short)
+    # A quadrilateral that stands on its corner covers half of its box.
     likely &= boxes[:, cv2.CC_STAT_AREA] >= 0.5 * DARK * widths * heights
     likely[0] = False  # bright cells
     places, quads = [], []

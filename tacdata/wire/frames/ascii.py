@@ -51,6 +51,7 @@ class AsciiLines:
         layout, text = self.layout, line.strip(b"\r \t")
         if not text:
             return None
+        # The last sync: a line may follow the remains of one that was cut off.
         start = text.rfind(layout.sync) if layout.sync else 0
         if start < 0 or self.unproven:
             self.unproven = False

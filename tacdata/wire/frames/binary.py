@@ -87,6 +87,7 @@ class BinaryFrames:
         self._drop(1)
 
     def _partial_sync(self) -> int:
+        # Two reads may divide a sync between them.
         sync = self.layout.sync
         return next((n for n in range(len(sync) - 1, 0, -1) if self.buffer.endswith(sync[:n])), 0)
 

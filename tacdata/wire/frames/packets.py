@@ -82,6 +82,7 @@ class PacketFrames:
             packet = bytes(self.buffer[:end])
             del self.buffer[: end + 1]
             self.offset += end + 1
+            # Two markers in a row: the next packet is received from its beginning.
             if not packet:
                 self.begun = True
                 continue

@@ -71,6 +71,7 @@ class GrblLink:
         self._welcome_expected, self._reset_asked = True, False
         self.polled = False
         self._stopped, self._changed = clock.host.event(), clock.host.condition()
+        # Answers carry no name: lines are written in the order in which they wait.
         self._turn = clock.host.lock()
         # Reentrant, because a signal handler may send a feed hold while its own thread is writing a line.
         self._writing = clock.host.lock()
@@ -163,6 +164,7 @@ class GrblLink:
             room = Owed("room in the controller's receive buffer", limit, motion)
             self.wait(lambda: self._room() >= len(data), room)
             with self._changed:
+                # Before the line is written: its answer may come at once.
                 self._unanswered.append(entry)
             sent_ns = self._commanded_ns = self.clock.now_ns()
             self._write(data)
@@ -188,6 +190,7 @@ class GrblLink:
                 if overdue := watch.ending(self.last, self.silence.late):
                     raise DeviceError(*PENDANT) if self.pendant else overdue
                 self._changed.wait(0.05)
+            # Nobody else asks before polling begins.
             if not self.polled:
                 self.ask()
 
@@ -239,6 +242,7 @@ class GrblLink:
         """Raise the fault, the interruption or the hold, if there is one; ``through_hold``: only the fault."""
         wrong = self.fault or (None if through_hold else self.interruption)
         if wrong:
+            # A new error each time: several threads raise it, each with its own notes.
             raise DeviceError(wrong.given, wrong.allowed, wrong.remedy)
         if self._held and not through_hold:
             raise DeviceError("the motion was stopped by a feed hold", "a running machine", "start again")
@@ -369,6 +373,7 @@ class GrblLink:
         self.welcome = line
         self.statuses.forget()
         self.resets += not self._reset_asked
+        # A reset empties the receive buffer: no earlier line is answered any more.
         while self._unanswered:
             self._unanswered.popleft().answer = "reset"
         if not self._welcome_expected:

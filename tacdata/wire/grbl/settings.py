@@ -103,6 +103,7 @@ class GrblSettings:
             tool = [float(value) for value in self.answers.get("TLO", "0").split(",")]
         except (KeyError, ValueError):
             return None
+        # Grbl states one number, for z; grblHAL one for each axis.
         length = np.array(tool[:3]) if len(tool) >= 3 else np.array([0.0, 0.0, tool[0]])
         return np.sum([*parts, length], axis=0)
 
@@ -112,6 +113,7 @@ class GrblSettings:
         modal = (word.split(":")[0] for word in self.answers.get("GC", "").split())  # grblHAL: G51:XYZ
         words = [word for word in modal if word in UNDONE_BY]
         for tag, word in (("G92", "G92"), ("TLO", "G43.1")):
+            # Both answers may state it, and it is ended once.
             already = any(UNDONE_BY[w][0] == UNDONE_BY[word][0] for w in words)
             if any(_numbers(self.answers.get(tag, ""))) and not already:
                 words.append(word)
