@@ -144,14 +144,28 @@ def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
     if whole in table.typed:
         return stated
     given = entry.get("unit", "")
-    ours = quantity_of(given) if given and stated else None
-    if ours and quantity_of(stated) == ours and not np.isclose(factor(given, ours, where), factor(stated, ours, where)):
+    if not given and _differ(stated, inside, where):
+        raise FormatError(
+            f"{where}: {table.path.name} states {stated} for {whole}, whose name says {inside}",
+            "one unit",
+            f"give unit: {stated} or unit: {inside} there in the mapping",
+        )
+    # Where the file contradicts itself, the mapping decides.
+    if given and _differ(given, stated, where) and not (inside and not _differ(given, inside, where)):
         raise FormatError(
             f"{where}: {table.path.name} states {stated} for {whole}, and the mapping {given}",
             "one unit",
             "leave unit out of the mapping; where the file is wrong, correct its header in a copy",
         )
     return given or stated
+
+
+def _differ(first: str, second: str, where: str) -> bool:
+    """Return whether two units are of one quantity and of different size."""
+    ours = quantity_of(first) if first and second else None
+    if not ours or quantity_of(second) != ours:
+        return False
+    return not np.isclose(factor(first, ours, where), factor(second, ours, where))
 
 
 def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:

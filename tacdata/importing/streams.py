@@ -11,13 +11,11 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, numbers, select, single, unit_of
 from tacdata.importing.formats.source_format import INNER, SourceTable
-from tacdata.importing.plausibility.codes import without_codes
-from tacdata.importing.plausibility.time_order import time_order
+from tacdata.importing.plausibility.codes import table_without_codes, without_codes
+from tacdata.importing.plausibility.repeats import without_repeats
+from tacdata.importing.plausibility.time_order import moments, spread, time_order
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, plain, quantity_of, split_unit
-
-COARSE = 0.2
-"""A clock is too coarse where more rows than this share repeat a time [1]."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +166,7 @@ def _timed(
     order = time_order(time_ns, f"{table.path.name}: {_clock_name(clock)}", tick_ns=tick_ns)
     offset_ns, stretches = round(clock.get("offset", 0.0) * 1e9), []
     for rows in order.stretches:
-        spread, shared = _apart(order.time_ns[rows] + offset_ns)
+        apart_ns, shared = spread(order.time_ns[rows] + offset_ns)
         notes = [*table.notes]
         if shared:
             notes.append(
@@ -178,7 +176,7 @@ def _timed(
         stretches.append(
             Stream(
                 name,
-                spread,
+                apart_ns,
                 values[rows],
                 names,
                 unit,
@@ -209,22 +207,6 @@ def _tick(table: SourceTable, clock: dict[str, Any], time_ns: np.ndarray, name: 
     return float(np.ptp(time_ns[known])) / span if span > 0 else 0.0
 
 
-def _apart(time_ns: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return times [ns] in order with rows of one time spread evenly up to the next, and how many there were.
-
-    So does a clock that counts whole seconds. Few rows of one time are left as they are: a logger wrote them twice.
-    """
-    steps = np.diff(time_ns)
-    shared = int((steps == 0).sum())
-    if shared <= COARSE * len(time_ns) or not (steps > 0).any():
-        return time_ns, 0
-    begins = np.flatnonzero(np.concatenate([[True], steps > 0]))
-    counts = np.diff(np.append(begins, len(time_ns)))
-    widths = np.append(np.diff(time_ns[begins]), int(np.median(np.diff(time_ns[begins]))))
-    inside = np.arange(len(time_ns)) - np.repeat(begins, counts)
-    return time_ns + np.rint(inside * np.repeat(widths / counts, counts)).astype(np.int64), shared
-
-
 def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[list[Stream], bool]:
     entry = mapping["taxels"]
     table = _table(mapping, tables, entry["file"], "taxels")
@@ -235,6 +217,7 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[li
     else:
         names = select(table, entry["columns"], "taxels: columns")
     unit = entry.get("unit") or next((table.units[n] for n in names if n in table.units), "") or "as in the source"
+    _refuse_clock(table, names, _clock(mapping, entry))
     values, doubts = _readings(table, names, _missing(mapping, entry), entry, "taxels")
     values = values * entry.get("scale", 1.0)
     labels = [f"{n}[{k}]" if width else n for n in names for width in (table.inner(n),) for k in range(max(width, 1))]
@@ -245,12 +228,30 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[li
     return stretches, counted
 
 
+def _refuse_clock(table: SourceTable, names: list[str], clock: dict[str, Any]) -> None:
+    """Refuse channels among which is their own clock.
+
+    Raises:
+        FormatError: Naming it.
+    """
+    if isinstance(column := clock.get("column"), str | int) and (time := single(table, column, "time")) in names:
+        raise FormatError(
+            f"taxels: {time} of {table.path.name} is the time, and among the channels",
+            "columns that the sensor reads",
+            "correct columns under taxels in the mapping",
+        )
+
+
 def _readings(
     table: SourceTable, names: list[str], missing: list[float], entry: dict[str, Any], name: str
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return columns as numbers without codes, unless the mapping trusts them; and notes on missing values."""
     values = numbers(table, names, missing, name)
-    return (values, ()) if entry.get("trusted") else without_codes(values, name, rails=name == "taxels")
+    if entry.get("trusted"):
+        return values, ()
+    values, codes = without_codes(values, name, rails=name == "taxels")
+    values, repeats = without_repeats(values, name)
+    return values, (*codes, *repeats)
 
 
 def _label(name: str) -> str:
@@ -268,8 +269,8 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
     channel = table.column(single(table, entry["long"]["channel"], "taxels: long: channel"))
     value = numbers(table, [single(table, entry["long"]["value"], "taxels: long: value")], [], "taxels: long")[:, 0]
     known, column = np.unique(channel.astype(str) if channel.dtype == object else channel, return_inverse=True)
-    moments, first, row, notes = _moments(times(table, clock, "taxels: time")[0], column, table.path.name)
-    wide = np.full((len(moments), len(known)), np.nan)
+    times_of_rows, first, row, notes = moments(times(table, clock, "taxels: time")[0], column, table.path.name)
+    wide = np.full((len(times_of_rows), len(known)), np.nan)
     wide[row, column] = value
     labels = [f"{k:g}" if isinstance(k, float) else str(k) for k in known.tolist()]
     columns = {time: table.column(time)[first], **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
@@ -277,35 +278,6 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
     return SourceTable(table.path, columns, unit, notes=(*table.notes, *notes), rate=table.rate), [
         f"channel {label}" for label in labels
     ]
-
-
-def _moments(
-    time_ns: np.ndarray, channel: np.ndarray, name: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Group the rows of a table with one row per channel by their time.
-
-    Where a channel's times begin again, the groups do, too.
-
-    Args:
-        time_ns: Time of each row [ns], shape (rows,).
-        channel: Number of each row's channel, shape (rows,), from 0.
-        name: The file's name, for notes.
-
-    Returns:
-        Stretch and time of each group, shape (groups, 2); its first row; the group of each row; notes.
-    """
-    stretch = np.zeros(len(time_ns), dtype=np.int64)
-    for number in range(int(channel.max(initial=0)) + 1):
-        rows = np.flatnonzero(channel == number)
-        order = time_order(time_ns[rows], name)
-        for count, part in enumerate(order.stretches):
-            stretch[rows[part]] = count
-    keys = np.stack([stretch, time_ns], axis=1)
-    moments, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    pairs = np.stack([group.ravel(), channel], axis=1)
-    twice = len(pairs) - len(np.unique(pairs, axis=0))
-    notes = [f"{name}: {twice} readings have the channel and the time of another; the later one counts"] * bool(twice)
-    return moments, first, group.ravel(), notes
 
 
 def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[list[Stream], bool]:
@@ -317,6 +289,9 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     table = _table(mapping, tables, entry["file"], "position")
     missing, known = _missing(mapping, entry), mapping.get("press", {})
     depth_given = "depth" in entry
+    doubts: tuple[str, ...] = ()
+    if not entry.get("trusted"):
+        table, doubts = _without_codes(table, entry)
     columns = []
     for name in ("x", "y"):
         fallback = known.get(name, 0.0)
@@ -325,9 +300,9 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     down = axis(table, entry["depth" if depth_given else "z"], "mm", missing, "position: depth or z")
     columns.append(-down if depth_given else down)
     values = np.stack(np.broadcast_arrays(*columns, np.zeros(table.rows))[:3], axis=1)
-    doubts: tuple[str, ...] = ()
     if not entry.get("trusted"):
-        values, doubts = without_codes(values, "position", rails=False)
+        values, further = without_codes(values, "position", rails=False)
+        doubts += further
     whole = np.isfinite(values).all(axis=1)
     stretches = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm", doubts)
     if not whole.any():
@@ -341,6 +316,12 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
         )
         for stream in stretches
     ], depth_given
+
+
+def _without_codes(table: SourceTable, entry: dict[str, Any]) -> tuple[SourceTable, tuple[str, ...]]:
+    """Return a table without codes in the columns of a position, as the file has them: a unit would hide them."""
+    axes = [axis for key in ("x", "y", "z", "depth") if isinstance(axis := entry.get(key), dict)]
+    return table_without_codes(table, [single(table, axis["column"], "position") for axis in axes], "position")
 
 
 def _taken_as_mm(table: SourceTable, entry: dict[str, Any]) -> Iterator[str]:

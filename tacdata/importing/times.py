@@ -51,6 +51,8 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
     if isinstance(clock["column"], list):
         table, clock = _joined(table, clock, where)
     name = single(table, clock["column"], f"{where}: column")
+    if "rate" in clock:  # the column counts rows, so that its restarts and lost rows are seen
+        clock = {"zero": "own", **clock, "unit": f"1/{clock['rate']:.12g} s"}
     unit = plain(unit_of(table, clock, where) or clock_unit(name))
     values = table.column(name)
     if values.dtype == object and (clocked := _times_of_day(values)) is not None:
@@ -203,15 +205,22 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
     Excel shows times as 34:56.7 and begins again every hour: seconds are then counted from the first one.
     """
     known = [str(text).strip() for text in values.tolist() if text is not None]
-    forms = {r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?": 86_400, r"\d{1,2}:\d{2}[.,]\d+": 3600}
+    forms = {
+        r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?": 86_400,
+        r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?\s*[AaPp]\.?[Mm]\.?": 86_400,
+        r"\d{1,2}:\d{2}[.,]\d+": 3600,
+    }
     turn = next((turn for form, turn in forms.items() if all(re.fullmatch(form, text) for text in known)), 0)
     if not known or not turn:
         return None
     seconds = np.full(len(values), np.nan)
     for row, text in enumerate(values.tolist()):
         if text is not None:
-            *hours, minutes, rest = str(text).strip().replace(",", ".").split(":")
-            seconds[row] = 3600 * int(hours[0] if hours else 0) + 60 * int(minutes) + float(rest)
+            digits, half = re.fullmatch(r"([\d:.,]+)\s*(.*)", str(text).strip()).groups()
+            *hours, minutes, rest = digits.replace(",", ".").split(":")
+            hour = int(hours[0] if hours else 0)
+            hour = hour % 12 + 12 * (half[0] in "Pp") if half else hour
+            seconds[row] = 3600 * hour + 60 * int(minutes) + float(rest)
     # A fall by more than half a turn is midnight (or the hour); a smaller one is a row out of order.
     back = np.diff(seconds, prepend=seconds[0]) < -turn / 2
     return seconds + turn * np.cumsum(back)

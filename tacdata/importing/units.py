@@ -41,7 +41,9 @@ FACTORS: dict[str, dict[str, float]] = {
 """Our unit -> the units that can be converted to it, and the factor."""
 _LENGTHS = ("", "milli", "micro", "nano", "centi")
 SPELLED = {
-    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden"), "s"),
+    **dict.fromkeys(("seconde", "secondes", "segundo", "segundos", "secondo", "secondi", "\u79d2"), "s"),
+    **dict.fromkeys(("millisekunde", "millisekunden", "milisegundos", "millisecondes", "\u6beb\u79d2"), "ms"),
     **dict.fromkeys(("msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"), "ms"),
     **dict.fromkeys(("usec", "usecs", "micros", "microsec", "microsecs", "microsecond", "microseconds"), "us"),
     **dict.fromkeys(("nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"), "ns"),
@@ -52,8 +54,12 @@ SPELLED = {
     **{
         f"{size}met{end}": unit
         for size, unit in zip(_LENGTHS, ("m", "mm", "um", "nm", "cm"), strict=True)
-        for end in ("er", "ers", "re", "res")
+        for end in ("er", "ers", "ern", "re", "res")
     },
+    **dict.fromkeys(("mikrometer", "mikrometern", "mikron", "micrometro", "\u5fae\u7c73"), "um"),
+    **dict.fromkeys(("millim\u00e8tre", "millim\u00e8tres", "mil\u00edmetros", "milimetros", "millimetri"), "mm"),
+    **dict.fromkeys(("zentimeter", "\u5398\u7c73"), "cm"),
+    "\u6beb\u7c73": "mm",
     "micron": "um",
     "microns": "um",
     "inch": "in",
@@ -62,8 +68,7 @@ SPELLED = {
     "thou": "mil",
     "foot": "ft",
     "feet": "ft",
-    "newton": "N",
-    "newtons": "N",
+    **dict.fromkeys(("newton", "newtons", "newtonios", "\u725b"), "N"),
     "millinewton": "mN",
     "millinewtons": "mN",
     "kilonewton": "kN",
@@ -176,8 +181,10 @@ def split_unit(name: str) -> tuple[str, str]:
         unit = next((text for text in match.groups() if text), "").strip()
         if quantity_of(unit):
             return f"{name[: match.start()]} {name[match.end() :]}".strip(), unit
+    if match := re.fullmatch(r"(.+?)\s+(?:in|en)\s+(\S+)", name):
+        return (match[1], match[2]) if _is_unit(match[2]) else (name, "")
     if match := re.fullmatch(r"(.+?)\s*[/_ ,;|]\s*([A-Za-z\u00b5\u03bc%]+)", name):
-        known = quantity_of(match[2]) or plain(match[2]).lower() in OTHERS - {"c", "k", "a", "v", "1"}
+        known = _is_unit(match[2])
         if match[2] == "S" and re.fullmatch(CLOCKS, match[1].strip().lower()):
             return match[1].strip(), "s"
         # Without brackets a lone "d" is a name (depth, distance), no unit of days.
@@ -190,6 +197,11 @@ def split_unit(name: str) -> tuple[str, str]:
         # "min" and "in" behind a point are rather a minimum and an input.
         return (match[1].strip(), unit) if quantity_of(unit) and unit not in ("min", "in") else (name, "")
     return name, ""
+
+
+def _is_unit(text: str) -> bool:
+    """Return whether a word behind a name is a unit; a single letter of electricity is rather a name."""
+    return bool(quantity_of(text)) or plain(text).lower() in OTHERS - {"c", "k", "a", "v", "1"}
 
 
 def clock_unit(name: str) -> str:

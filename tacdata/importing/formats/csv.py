@@ -41,6 +41,8 @@ STATED_RATE = re.compile(
     re.IGNORECASE,
 )
 """How a file states its rate above its rows."""
+HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+")
+"""A number to base 16, as boards print registers."""
 LARGEST = 256 * 1024 * 1024
 """Most bytes that a compressed text may become; the memory holds them some four times over."""
 RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
@@ -283,7 +285,7 @@ def _parsed(
     for name, kind in zip(layout.names, layout.kinds, strict=True):
         column = table.column(name)
         if kind == "text" or not pa.types.is_string(column.type):
-            columns[name] = _array(column, kind)
+            columns[name] = _of_base_16(_array(column, kind))
         else:
             columns[name] = _numbers(column.to_pylist(), layout, name, path, doubts)
     return columns, skipped, doubts
@@ -315,6 +317,13 @@ def _array(column: Any, kind: str) -> np.ndarray:
     if kind == "int" and not column.null_count:
         return column.to_numpy()
     return np.asarray(column.to_numpy(), dtype=float)
+
+
+def _of_base_16(values: np.ndarray) -> np.ndarray:
+    """Return texts as 0x0A3F as numbers, if all of them are so written."""
+    if values.dtype != object or not all(text is None or HEXADECIMAL.fullmatch(text.strip()) for text in values):
+        return values
+    return np.array([np.nan if text is None else float(int(text, 16)) for text in values.tolist()])
 
 
 def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path, doubts: list[str]) -> np.ndarray:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from tacdata.importing.formats.source_format import SourceTable
 
 
 @dataclass(frozen=True)
@@ -23,9 +26,25 @@ class CodePolicy:
     """Fewest readings at a rail [count]."""
     inside: float = 0.5
     """Largest share of a channel's readings at a rail [1]; a channel that is always there is a flag."""
+    apart: float = 3.0
+    """Smallest distance of a number that is usual as a code from all readings [their range]."""
+    unusual_apart: float = 5.0
+    """The same for any other number, which also repeats exactly and stays for few rows [their range]."""
+    levels: int = 10
+    """Fewest different readings from which numbers can lie apart [count]; a column of fewer tells states."""
+    share: float = 0.2
+    """Largest share of codes in a column [1]; above it they are the signal."""
+    stays: int = 3
+    """Longest run of rows of a code that is no usual one [rows]."""
 
 
 POLICY = CodePolicy()
+NINES = re.compile(r"-?(?:9{3,}(?:\.9*)?|9{2,}\.9{2,})")
+"""Numbers that loggers write for no value and displays for an overload: -999, 9999, 99.99, 999.99."""
+LIMITS = frozenset(
+    2.0**bits - one for bits in (7, 8, 10, 12, 14, 15, 16, 18, 20, 23, 24, 31, 32, 63, 64) for one in (0, 1)
+)
+"""Sizes of the first and the last numbers of integers and converters."""
 
 
 def without_codes(
@@ -42,6 +61,7 @@ def without_codes(
     codes = np.zeros(values.shape, dtype=bool)
     for column in range(values.shape[1]):
         codes[:, column] = _far(values[:, column], policy)
+        codes[:, column] |= _isolated(np.where(codes[:, column], np.nan, values[:, column]), policy)
     doubts = []
     if codes.any():
         doubts.append(_counted(values, codes, name, "stand for an overload or for no value"))
@@ -73,6 +93,45 @@ def _far(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
             if 2 * usual > len(column):
                 codes |= size >= rest[place]
     return codes
+
+
+def _isolated(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
+    """Return which numbers lie apart from all readings, with none between, and mean none, shape (rows,), bool."""
+    codes = np.zeros(len(column), dtype=bool)
+    known = np.unique(column[np.isfinite(column)])
+    if len(known) <= policy.levels:
+        return codes
+    core = known[policy.few : -policy.few]
+    for sign, outer in ((1, known[-policy.few :]), (-1, known[policy.few - 1 :: -1])):
+        edge = float(core[-1] if sign > 0 else core[0])
+        for value in outer.tolist():
+            here = column == value
+            usual = bool(NINES.fullmatch(f"{value:.10g}")) or abs(value) in LIMITS
+            brief = here.sum() >= policy.run and _longest(here) <= policy.stays
+            apart = policy.apart if usual else policy.unusual_apart if brief else np.inf
+            if sign * (value - edge) > apart * np.ptp(core):
+                codes |= here
+            else:
+                edge = value
+    return codes if codes.mean() <= policy.share else np.zeros_like(codes)
+
+
+def _longest(chosen: np.ndarray) -> int:
+    """Return the length of the longest run of True [rows]."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def table_without_codes(table: SourceTable, names: list[str], name: str) -> tuple[SourceTable, tuple[str, ...]]:
+    """Return a table with NaN for codes in some of its columns of numbers, and their counts as sentences."""
+    columns, doubts = {}, []
+    for column in names:
+        values = table.columns.get(column)
+        if values is not None and values.ndim == 1 and values.dtype.kind in "fiu":
+            columns[column], counts = without_codes(values.astype(float)[:, None], name, rails=False)
+            columns[column] = columns[column][:, 0]
+            doubts += counts
+    return replace(table, columns={**table.columns, **columns}), tuple(dict.fromkeys(doubts))
 
 
 def _at_rail(values: np.ndarray, policy: CodePolicy) -> np.ndarray:

@@ -30,6 +30,10 @@ class OrderPolicy:
     """Largest distance of the rows before and behind a wrap from its limits [usual intervals]."""
     shortest: float = 10.0
     """Fewest rows of a stretch, on average [rows]. Below it rows of several recordings alternate."""
+    turned: float = 0.95
+    """Smallest share of steps back in a file that begins with its last row [1]."""
+    coarse: float = 0.2
+    """Largest share of rows that repeat a time [1]. Above it the clock is too coarse for them."""
 
 
 POLICY = OrderPolicy()
@@ -37,8 +41,10 @@ BITS = (16, 24, 32)
 """Widths of counters that wrap [bit]."""
 TICKS = {1_000: "microseconds", 1_000_000: "milliseconds"}
 """Ticks that boards count, as micros() and millis() do [ns]."""
+COUNTED = 8
+"""Width of the narrowest counter of rows [bit]."""
 DAY_NS = 86_400_000_000_000
-"""After a day the seconds since midnight begin again [ns]."""
+"""After a day the seconds since midnight begin again, and after seven those of satellites [ns]."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,9 @@ def time_order(time_ns: np.ndarray, where: str, *, tick_ns: float = 0.0, policy:
     known = time_ns[rows]
     notes = [f"{where}: {len(time_ns) - len(rows)} rows without a time are left out"] * (len(rows) < len(time_ns))
     steps = np.diff(known)
+    if len(steps) and (steps < 0).mean() > policy.turned:
+        notes.append(f"{where}: its first row is the latest; the rows are turned")
+        rows, known, steps = rows[::-1], known[::-1], -steps[::-1]
     if not (steps < 0).any():
         return TimeOrder((rows,), time_ns, tuple(notes))
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
@@ -134,7 +143,7 @@ def _unwrapped(time_ns: np.ndarray, usual: float, tick_ns: float, policy: OrderP
     if not len(back):
         return time_ns, ""
     near = policy.wrap * usual
-    for span, name in _spans(tick_ns).items():
+    for span, name in _spans(tick_ns, counts=usual == tick_ns).items():
         # Counters are unsigned or signed, so they wrap to 0 or to minus half of the span.
         for low in (0.0, -span / 2):
             inside = time_ns.min() >= low and time_ns.max() < low + span
@@ -150,12 +159,15 @@ def _unwrapped(time_ns: np.ndarray, usual: float, tick_ns: float, policy: OrderP
     return time_ns, ""
 
 
-def _spans(tick_ns: float) -> dict[float, str]:
-    """Return the spans after which counters wrap [ns], each with its name."""
+def _spans(tick_ns: float, *, counts: bool) -> dict[float, str]:
+    """Return the spans after which counters wrap [ns], each with its name; ``counts``: a tick is a row."""
     ticks = {tick_ns: "steps"} | {float(tick): name for tick, name in TICKS.items()}
-    return {tick * 2.0**bits: f"2^{bits} {name}" for tick, name in ticks.items() for bits in BITS} | {
-        float(DAY_NS): "midnight"
-    }
+    narrow = {tick_ns * 2.0**COUNTED: f"2^{COUNTED} rows"} if counts else {}
+    return (
+        {tick * 2.0**bits: f"2^{bits} {name}" for tick, name in ticks.items() for bits in BITS}
+        | narrow
+        | {float(DAY_NS): "midnight", 7.0 * DAY_NS: "the end of a week"}
+    )
 
 
 def _believed(time_ns: np.ndarray, usual: float, policy: OrderPolicy) -> np.ndarray:
@@ -181,3 +193,48 @@ def _believed(time_ns: np.ndarray, usual: float, policy: OrderPolicy) -> np.ndar
             if constant or behind < len(time_ns):
                 believed[cut:behind] = False
     return believed
+
+
+def spread(time_ns: np.ndarray, policy: OrderPolicy = POLICY) -> tuple[np.ndarray, int]:
+    """Return times [ns] in order with rows of one time spread evenly up to the next, and how many there were.
+
+    So does a clock that counts whole seconds. Few rows of one time are left as they are: a logger wrote them twice.
+    """
+    steps = np.diff(time_ns)
+    shared = int((steps == 0).sum())
+    if shared <= policy.coarse * len(time_ns) or not (steps > 0).any():
+        return time_ns, 0
+    begins = np.flatnonzero(np.concatenate([[True], steps > 0]))
+    counts = np.diff(np.append(begins, len(time_ns)))
+    widths = np.append(np.diff(time_ns[begins]), int(np.median(np.diff(time_ns[begins]))))
+    inside = np.arange(len(time_ns)) - np.repeat(begins, counts)
+    return time_ns + np.rint(inside * np.repeat(widths / counts, counts)).astype(np.int64), shared
+
+
+def moments(
+    time_ns: np.ndarray, channel: np.ndarray, name: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Group the rows of a table with one row per channel by their time.
+
+    Where a channel's times begin again, the groups do, too.
+
+    Args:
+        time_ns: Time of each row [ns], shape (rows,).
+        channel: Number of each row's channel, shape (rows,), from 0.
+        name: The file's name, for notes.
+
+    Returns:
+        Stretch and time of each group, shape (groups, 2); its first row; the group of each row; notes.
+    """
+    stretch = np.zeros(len(time_ns), dtype=np.int64)
+    for number in range(int(channel.max(initial=0)) + 1):
+        rows = np.flatnonzero(channel == number)
+        order = time_order(time_ns[rows], name)
+        for count, part in enumerate(order.stretches):
+            stretch[rows[part]] = count
+    keys = np.stack([stretch, time_ns], axis=1)
+    known, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    pairs = np.stack([group.ravel(), channel], axis=1)
+    twice = len(pairs) - len(np.unique(pairs, axis=0))
+    notes = [f"{name}: {twice} readings have the channel and the time of another; the later one counts"] * bool(twice)
+    return known, first, group.ravel(), notes

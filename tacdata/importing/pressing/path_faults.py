@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tacdata.importing.pressing.held_position import held_rows
 from tacdata.importing.streams import ImportedStreams, Stream
 
 
@@ -62,6 +63,8 @@ def without_faults(streams: ImportedStreams, policy: PathPolicy = POLICY) -> Imp
             "{trusted: true} keeps them)"
         )
         position = position.chosen(np.flatnonzero(~dropped))
+    position, taxels, words = _without_held(position, taxels)
+    doubts += words
     inside, gaps = _in_gaps(position, taxels, policy)
     if inside.any():
         doubts.append(
@@ -72,6 +75,34 @@ def without_faults(streams: ImportedStreams, policy: PathPolicy = POLICY) -> Imp
         taxels = taxels.chosen(np.flatnonzero(~inside))
     doubts += _jumps(position, policy)
     return replace(streams, position=position, taxels=taxels, doubts=(*streams.doubts, *doubts))
+
+
+def _without_held(position: Stream, taxels: Stream) -> tuple[Stream, Stream, list[str]]:
+    """Return a position without old values, the channels without their rows at a stuck position, and both in words."""
+    span = _span(position.values)
+    held = held_rows(position, _readings_at(taxels, position.time_ns), span)
+    overruled = "(position: {trusted: true} keeps them)"
+    keep, inside, doubts = ~held.repeated, np.zeros(len(taxels.time_ns), dtype=bool), []
+    time_ns = position.time_ns
+    if held.repeated.any():
+        seconds = float(np.median(np.diff(time_ns))) / 1e9
+        cause = f"a new value comes every {held.every * seconds:.3g} s only" if held.every else "its last value repeats"
+        row = int(np.flatnonzero(held.repeated)[0])
+        doubts.append(
+            f"position: {cause} while the readings go on: {int(held.repeated.sum())} old values are left out, the "
+            f"first at {time_ns[row] / 1e9:.6g} s {overruled}"
+        )
+    for first, last in held.stuck:
+        inside |= (taxels.time_ns > time_ns[first]) & (taxels.time_ns < time_ns[last])
+        keep[first + 1 : last] = False
+    if held.stuck:
+        first, last = held.stuck[0]
+        doubts.append(
+            f"position: it stands still while the readings rise and fall, in {len(held.stuck)} stretches, first from "
+            f"{time_ns[first] / 1e9:.6g} s to {time_ns[last] / 1e9:.6g} s: {int(inside.sum())} rows of the channels "
+            f"there are left out {overruled}"
+        )
+    return position.chosen(np.flatnonzero(keep)), taxels.chosen(np.flatnonzero(~inside)), doubts
 
 
 def _span(values: np.ndarray) -> float:

@@ -173,7 +173,7 @@ def _imported(
     stand_ins: list[str],
     record: dict[str, Any],
 ) -> ImportedPress:
-    taxels, lost = _without_counter(streams)
+    taxels, lost, restarted = _without_counter(streams)
     spans = np.diff(taxels.time_ns)
     rate = float(1e9 / np.median(spans[spans > 0])) if (spans > 0).any() else 1.0
     sensor, unknown = foreign_sensor(mapping["sensor"], beside, len(taxels.names), round(rate, 3))
@@ -189,7 +189,7 @@ def _imported(
             f"presses of at most {most:g} mm",
             "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
         )
-    if doubt := _never_touched(taxels, position, tip[:, 2]):
+    for doubt in filter(None, (restarted, _never_touched(taxels, position, tip[:, 2]))):
         record = {**record, "set_aside": [*record["set_aside"], doubt], "notes": [*record["notes"], doubt]}
     indenter, name = _indenter(mapping)
     if name == "unknown":
@@ -239,8 +239,8 @@ def _never_touched(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
     if not (change > ANSWER * noise).any():
         return ""
     return (
-        f"position: it stays {-depth.max():.4g} mm above the skin, and the readings follow it: correct its zero "
-        "(contact, offset, or zero under the position)"
+        f"position: it stays {abs(depth.max()):.4g} mm above the skin, and the readings follow it: correct its zero "
+        "(contact, offset, or zero under the position) or its sign (scale: -1)"
     )
 
 
@@ -258,14 +258,21 @@ def _remarks(taxels: Stream, planned: ScheduledPress | None, path: PressPath, lo
     return notes
 
 
-def _without_counter(streams: ImportedStreams) -> tuple[Stream, int]:
+def _without_counter(streams: ImportedStreams) -> tuple[Stream, int, str]:
+    """Return the channels without the counter, the frames that it misses, and a doubt about its restarts.
+
+    A counter that falls by nearly a power of two wraps.
+    """
     taxels = streams.taxels
     if not streams.counted:
-        return taxels, -1
+        return taxels, -1, ""
     counter = taxels.values[:, -1]
     steps = np.diff(counter[np.isfinite(counter)])
     lost = int(np.maximum(steps[steps > 0] - 1, 0).sum())
-    return replace(taxels, values=taxels.values[:, :-1]), lost
+    falls = -steps[steps < 0]
+    begun = falls[2.0 ** np.ceil(np.log2(falls + 1)) - falls > FEWEST]
+    doubt = "taxels: the device's counter begins again: how many frames are missing there is not known"
+    return replace(taxels, values=taxels.values[:, :-1]), lost, doubt * bool(len(begun))
 
 
 def _indenter(mapping: dict[str, Any]) -> tuple[Indenter, str]:

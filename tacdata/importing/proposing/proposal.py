@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,15 @@ from tacdata.chain.at_rest import below_zero, zero_side
 from tacdata.errors import FormatError
 from tacdata.importing.columns import unit_of
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.plausibility.codes import table_without_codes
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
 from tacdata.importing.proposing.file_kinds import INSIDE, pattern
 from tacdata.importing.proposing.roles import roles_of
-from tacdata.importing.proposing.shapes import varying
+from tacdata.importing.proposing.shapes import counting_column, varying
 from tacdata.importing.proposing.stream_clocks import SHORT, own_clocks
 from tacdata.importing.proposing.strokes import CLEAR, PressingAxis, pressing_axis
-from tacdata.importing.proposing.unused import leave_unused_out, listed, without_summaries
+from tacdata.importing.proposing.unused import leave_unused_out, listed, unread, without_summaries
 from tacdata.importing.times import layouts_of, times
 from tacdata.importing.units import factor, plain
 
@@ -51,6 +52,8 @@ class Proposal:
 def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
     """Return a mapping for the kinds of files, as far as names and values allow, and its open questions."""
     asked: list[str] = []
+    bare = {kind: table_without_codes(entry.table, list(entry.table.columns), kind)[0] for kind, entry in kinds.items()}
+    kinds = {kind: replace(entry, table=bare[kind]) for kind, entry in kinds.items()}
     kinds = without_summaries(kinds, asked)
     aliases: dict[str, str] = {}
     for kind in kinds:
@@ -76,13 +79,18 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         "source": "say where the data come from",
         "files": {alias: _file(kind, kinds[kind], roles[alias], asked) for alias, kind in aliases.items()},
         "sensor": {"name": source.stem},
-        "taxels": {"file": wide, "columns": _short(roles[wide]["channels"]) or [0]},
+        "taxels": {
+            "file": wide,
+            "columns": _short(roles[wide]["channels"]) or unread(tables[wide], roles[wide], asked),
+        },
     }
     if "value" in roles[wide]:
         document["taxels"] = {
             "file": wide,
             "long": {"channel": roles[wide]["number"][0], "value": roles[wide]["value"][0]},
         }
+    elif roles[wide].get("time") and (counter := counting_column(tables[wide], roles[wide])):
+        document["taxels"]["counter"] = counter
     units = {plain(tables[wide].units.get(name, "")) for name in roles[wide]["channels"]}
     if len(units) == 1 and units != {""}:
         document["taxels"]["unit"] = units.pop()
@@ -190,7 +198,7 @@ def _motion(
         )
     if "trial" not in found and "trials" not in document:
         entry = position["depth" if is_depth else "z"]
-        above = motion.above * _in_mm(unit_of(table, {"column": name, **entry}, name))
+        above = motion.above * _in_mm(table, name, entry)
         _cut(document, motion, above if is_depth else None, asked)
 
 
@@ -201,11 +209,7 @@ def _from_the_lowest(
     parts = [table.column(channel) for channel in channels if channel in table.columns]
     if not parts:
         return
-    depth = (
-        entry.get("scale", 1.0)
-        * table.column(name).astype(float)
-        * _in_mm(unit_of(table, {"column": name, **entry}, name))
-    )
+    depth = entry.get("scale", 1.0) * table.column(name).astype(float) * _in_mm(table, name, entry)
     readings = np.column_stack(parts).astype(float)
     if low := below_zero([zero_side(depth[rows], readings[rows]) for rows in _each_press(depth)]):
         entry["offset"] = float(np.ceil(1000 * low) / 1000)
@@ -226,10 +230,10 @@ def _each_press(depth: np.ndarray) -> list[slice]:
     return [slice(a, b) for a, b in pairwise([0, *middles, len(depth)])]
 
 
-def _in_mm(unit: str) -> float:
-    """Return a unit's factor, 1 where it is no length: the trial run of the mapping reports that."""
+def _in_mm(table: SourceTable, name: str, entry: dict[str, Any]) -> float:
+    """Return the factor of a column's unit, 1 where it has no length: the trial run of the mapping reports that."""
     try:
-        return factor(unit or "mm", "mm", "")
+        return factor(unit_of(table, {"column": name, **entry}, name) or "mm", "mm", "")
     except FormatError:
         return 1.0
 
@@ -260,7 +264,9 @@ def _deviation(table: SourceTable, channels: list[str], axis: np.ndarray) -> np.
     way = np.abs(axis - axis[known[:1]].sum())
     moved = np.flatnonzero(way > CLEAR * np.ptp(axis[known])) if len(known) else known
     first = np.nanmedian(values[: max(min([len(values) // 50, *moved[:1].tolist()]), 1)], axis=0)
-    return np.nanmean(np.abs(values - first) / np.where(spread > 0, spread, 1.0), axis=1)
+    deviation = np.abs(values - first) / np.where(spread > 0, spread, 1.0)
+    known = np.isfinite(deviation)
+    return np.where(known, deviation, 0.0).sum(axis=1) / np.where(known.any(axis=1), known.sum(axis=1), np.nan)
 
 
 def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
@@ -313,12 +319,12 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[
     elif "#" in inside:
         found["table"] = pattern(inside, parts)[0]
     if not roles.get("time"):
-        rate = rate_of(table, roles)
+        rate, counter = rate_of(table, roles), counting_column(table, roles)
         asked.append(
             f"{Path(outer).name}: no column of times; {rate:g} rows a second is a guess, by which a press takes some "
-            "2 s: give time: {rate: ...}"
+            "2 s: give time: {rate: ...}" + f"; {counter} counts the rows" * bool(counter)
         )
-        return found | {"time": {"rate": rate}}
+        return found | {"time": {"rate": rate} | ({"column": counter} if counter else {})}
     if [table.column(name).dtype for name in roles["time"]] == [object, object]:
         # A date and a time of day.
         clock: dict[str, Any] = {"column": roles["time"]}

@@ -22,6 +22,8 @@ class ShapePolicy:
     """Smallest correlation of a drive with the readings [1]."""
     exact: float = 1e-6
     """Roughness of numbers without noise [range]; smaller ones are rounding."""
+    counts: float = 0.9
+    """Smallest share of steps of 1 in a counter of rows [1]."""
     returns: float = 0.3
     """Largest distance of a drive's last value from its first [its range]."""
 
@@ -67,6 +69,16 @@ def _reason(table: SourceTable, name: str) -> str:
     if len(levels) == 2 and np.isin(levels, (0, 1)).all():
         return "a flag"
     return "a counter of rows" if len(known) == len(values) and (np.diff(known) == 1).all() else ""
+
+
+def counting_column(table: SourceTable, roles: dict[str, list[str]], policy: ShapePolicy = POLICY) -> str:
+    """Return a column that counts the rows of a device and shows by a gap or a restart where some are lost; else ""."""
+    for name in roles.get("counter", []):
+        values = table.column(name)
+        steps = np.diff(values.astype(float)) if values.dtype != object and values.ndim == 1 else np.empty(0)
+        if len(steps) and policy.counts <= (steps == 1).mean() < 1:
+            return name
+    return ""
 
 
 def drive_by_shape(table: SourceTable, names: list[str], policy: ShapePolicy = POLICY) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.file_kinds import INSIDE
 from tacdata.importing.proposing.roles import is_whole, roles_of
@@ -51,6 +52,14 @@ def leave_unused_out(
     if idle:
         more = f" and {len(idle) - 12} more" if len(idle) > 12 else ""
         asked.append(f"no channels but settings, states, counters or constants: {', '.join(idle[:12])}{more}")
+
+
+def unread(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) -> list[str | int]:
+    """Return the columns of text that have no role, as channels: the import then says why they are no numbers."""
+    used = {name for names in roles.values() for name in names}
+    texts = [name for name in table.columns if name not in used and table.column(name).dtype == object]
+    asked.append("no column is a channel: " + (f"{listed(texts[:4])} hold text" if texts else "which are readings?"))
+    return [*texts] or [0]
 
 
 def listed(words: list[str]) -> str:

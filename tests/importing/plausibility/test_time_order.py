@@ -1,5 +1,7 @@
 """Inside a recording time never goes back: restarts are cut, wraps continued, wrong times set aside."""
 
+from datetime import datetime, timedelta
+
 import numpy as np
 import pytest
 from sources import FORMS, mapping, table, write
@@ -7,6 +9,8 @@ from sources import FORMS, mapping, table, write
 from tacdata.errors import FormatError
 from tacdata.importing.imported_session import import_session
 from tacdata.importing.plausibility.time_order import time_order
+from tacdata.importing.proposing.description import described
+from tacdata.importing.proposing.proposal import proposed_mapping
 from tacdata.recording import read_session
 from tacdata.recording.check.report import check
 from tacdata.recording.files.reader import read_episode
@@ -48,6 +52,85 @@ def test_the_wrap_of_a_counter_is_continued_and_named(tmp_path, bits, tick, unit
     made, (episode,) = imported(tmp_path, path, files=files)
     assert_in_order(episode, rows)
     assert any(f"wraps at 2^{bits}" in note and "row 61" in note for note in made.notes)
+
+
+def test_rows_from_the_latest_to_the_first_are_turned(tmp_path):
+    rows = table()
+    made, (episode,) = imported(tmp_path, write(tmp_path, "csv", rows[::-1]))
+    assert_in_order(episode, rows)
+    assert any("its first row is the latest; the rows are turned" in note for note in made.notes)
+
+
+@pytest.mark.parametrize("behind", (0, 60, 150))
+def test_seconds_of_a_week_are_continued(tmp_path, behind):
+    rows = table()
+    wrapped = rows.copy()
+    wrapped[:, 0] = np.round((rows[:, 0] + 604_800 - 0.05 * behind) % 604_800, 3)
+    made, (episode,) = imported(tmp_path, write(tmp_path, "csv", wrapped))
+    assert_in_order(episode, rows)
+    assert any("wraps at the end of a week" in note for note in made.notes) == (behind > 0)
+
+
+def test_half_days_are_continued_over_noon_and_midnight(tmp_path):
+    rows = table()
+    moments = [datetime(2026, 1, 1, 23, 59, 55) + timedelta(seconds=t) for t in rows[:, 0].tolist()]
+    lines = ["time,depth [mm],c0 [pF],c1 [pF]"]
+    for moment, row in zip(moments, rows.tolist(), strict=True):
+        lines.append(moment.strftime("%I:%M:%S.%f %p") + "".join(f",{value:.6f}" for value in row[1:]))
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(lines) + "\n")
+    _, (episode,) = imported(tmp_path, path, files={"run": {"path": path.name, "time": {"column": "time"}}})
+    assert_in_order(episode, rows)
+
+
+def counted(folder, rows, numbers):
+    """Write rows by a counter in place of a clock; a mapping's files."""
+    columns = np.column_stack([numbers, rows[:, 1:]])
+    path = write(folder, "csv", columns, ("frame", "depth [mm]", "c0 [pF]", "c1 [pF]"))
+    return path, {"run": {"path": path.name, "time": {"column": "frame", "rate": 20.0}}}
+
+
+@pytest.mark.parametrize("bits", (8, 16))
+def test_a_counter_of_rows_is_a_clock_that_wraps(tmp_path, bits):
+    rows = table()
+    path, files = counted(tmp_path, rows, (np.arange(len(rows)) + 2**bits - 70) % 2**bits)
+    made, (episode,) = imported(tmp_path, path, files=files)
+    assert_in_order(episode, rows)
+    assert any(f"wraps at 2^{bits}" in note and "row 71" in note for note in made.notes)
+
+
+def test_a_counter_of_rows_shows_lost_rows_and_restarts(tmp_path):
+    rows = table()
+    kept = np.delete(np.arange(len(rows)), slice(40, 50))
+    numbers = np.where(kept < 120, kept, kept - 120)
+    path, files = counted(tmp_path, rows[kept], numbers)
+    made, (first, second) = imported(tmp_path, path, files=files)
+    steps = np.diff(first.taxels.sample_ns) / 1e9
+    assert steps.max() == pytest.approx(0.55) and np.median(steps) == pytest.approx(0.05)
+    assert len(second.taxels.counts) == len(rows) - 120
+    assert any("frame: time goes back by 5.95 s in row 111" in note for note in made.notes)
+
+
+def test_a_devices_counter_that_begins_again_beside_a_clock_is_told(tmp_path):
+    rows = table()
+    numbers = np.arange(len(rows))
+    numbers[90:] -= 90
+    path = write(tmp_path, "csv", np.column_stack([rows, numbers]), ("t [s]", "depth [mm]", "c0 [pF]", "c1 [pF]", "n"))
+    taxels = {"file": "run", "columns": ["c0", "c1"], "unit": "pF", "counter": "n"}
+    made, _ = imported(tmp_path, path, taxels=taxels)
+    assert any("the device's counter begins again" in note for note in made.notes)
+    assert "counter begins again" in check(made.folder).text
+
+
+@pytest.mark.parametrize(("lost", "restart"), [(0, 90), (10, 0), (10, 120)])
+def test_a_proposal_takes_a_counter_for_the_clock_where_rows_are_lost(tmp_path, lost, restart):
+    rows = table()
+    numbers = np.arange(len(rows))
+    numbers[restart:] -= restart
+    numbers[40:] += lost
+    path, _ = counted(tmp_path, rows, numbers)
+    found = proposed_mapping(path, described(path)[0]).mapping
+    assert found["files"]["run"]["time"] == {"column": "frame", "rate": 50.0}
 
 
 def test_a_counter_that_wraps_many_times_is_continued():

@@ -10,7 +10,7 @@ from foreign import mapping
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import read_table
 from tacdata.importing.imported_session import import_session
-from tacdata.importing.units import clock_unit, split_unit
+from tacdata.importing.units import clock_unit, plain, split_unit
 from tacdata.recording.files.reader import read_recording
 
 ROWS, RATE = 120, 20.0
@@ -53,6 +53,9 @@ def refusal(folder, data, **changes):
         ("tMs", 1e3),
         ("t_ms_rel", 1e3),
         ("t in ms", 1e3),
+        ("Zeit in Millisekunden", 1e3),
+        ("temps en millisecondes", 1e3),
+        ("\u65f6\u95f4(\u6beb\u79d2)", 1e3),
         ("ms", 1e3),
         ("millis", 1e3),
         ("millis()", 1e3),
@@ -73,7 +76,7 @@ def test_a_unit_is_understood_however_it_is_spelled(tmp_path, header, scale):
     np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 50_000_000, atol=20_000)
 
 
-@pytest.mark.parametrize("unit", ["ticks", "Sekunden", "weeks", "hh:mm:ss", "ms/10", "?", "mm", "m"])
+@pytest.mark.parametrize("unit", ["ticks", "Takte", "weeks", "hh:mm:ss", "ms/10", "?", "mm", "m"])
 def test_a_unit_that_is_not_understood_is_named_as_it_stands(tmp_path, unit):
     error = refusal(tmp_path, text(f"t [{unit}],disp,cap0,cap1"))
     assert f"unit {unit!r}" in error.given and error.allowed == "s, ms, us, ns, min, h, d"
@@ -248,3 +251,38 @@ def test_a_long_stroke_without_a_unit_is_asked_for_it_and_none_is_of_metres(tmp_
     assert "238 mm deep" in error.given and error.allowed == "presses of at most 100 mm"
     error = refusal(tmp_path, **stretched("disp [cm]", {}))
     assert error.allowed == "presses of at most 1000 mm"
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "scale"),
+    [
+        ("Weg in Millimetern", "mm", 1.0),
+        ("Weg in Mikrometern", "um", 1000.0),
+        ("\u4f4d\u79fb(\u6beb\u7c73)", "mm", 1.0),
+        ("d\u00e9placement en millim\u00e8tres", "mm", 1.0),
+        ("disp in in", "in", 1 / 25.4),
+    ],
+)
+def test_a_length_is_read_in_the_units_of_other_languages(tmp_path, header, unit, scale):
+    assert plain(split_unit(header)[1]) == unit
+    rows = [f"{t:.3f},{d * scale:.9g},{20 + d:.4f},{30 + d:.4f}" for t, d in zip(TIME, DEPTH, strict=True)]
+    data = "\n".join([f"t [s],{header},cap0,cap1", *rows]) + "\n"
+    _, episode = brought(tmp_path, data, position={"file": "data", "depth": {"column": 1}})
+    np.testing.assert_allclose(episode.tip[:, 2], DEPTH, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ("V_IN", "made in house", "time in air", "in", "depth in the skin"))
+def test_a_name_with_in_has_no_unit(name):
+    assert split_unit(name) == (name, "")
+
+
+@pytest.mark.parametrize("given", (None, "um", "mm", "cm"))
+def test_a_file_whose_name_and_line_of_units_differ_is_decided_by_the_mapping(tmp_path, given):
+    data = text("t,disp [mm],cap0,cap1\ns,um,pF,pF")
+    position = {"file": "data", "depth": {"column": 1, **({"unit": given} if given else {})}}
+    if given in ("um", "mm"):
+        _, episode = brought(tmp_path, data, position=position)
+        np.testing.assert_allclose(episode.tip[:, 2], DEPTH * (1.0 if given == "mm" else 1e-3), atol=1e-6)
+        return
+    error = refusal(tmp_path, data, position=position)
+    assert "disp [mm]" in error.given and ("um" in error.given)
