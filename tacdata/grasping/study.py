@@ -122,6 +122,7 @@ def trials(
         strategy = strategies.create(name, touch.sensor, maps)
         for position, place in enumerate(PLACES, 1):
             for repeat in range(setup.repeats):
+                # Without the strategy's name, so that every strategy meets the same world.
                 world = np.random.default_rng([setup.seed, position, repeat])
                 aside, up = world.uniform(-setup.disorder.place, setup.disorder.place, 2).tolist()
                 friction = setup.grip.friction * float(1 + setup.disorder.friction * world.standard_normal())

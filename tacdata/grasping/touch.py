@@ -30,6 +30,7 @@ class OrangeTouch:
 
     def depth(self, x: float, y: float, force: float) -> float:
         """Return the depth [mm] at which the orange presses with a normal force [N]; NaN beyond the deepest state."""
+        # Interpolated forces may fall by rounding, and np.interp needs an ascent.
         forces = np.maximum.accumulate(self._normal((abs(x), abs(y))))
         return float(np.interp(force, forces, self._depths, right=np.nan))
 

@@ -113,6 +113,7 @@ def compare(
         )
     ):
         change = _change("network error", None, grown, "1", float(np.log1p(NETWORK)))
+        # The test is of the logarithm; a person reads the share.
         value, low, high = (float(np.expm1(v)) for v in (change.value, change.low, change.high))
         changes.append(replace(change, value=value, low=low, high=high, tolerance=NETWORK))
     return VisitComparison(against, tuple(pairs), gains, faults, tuple(changes))

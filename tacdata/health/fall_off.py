@@ -57,11 +57,13 @@ def fall_off(presses: Sequence[PressResponse], near: Sequence[Sequence[int]], ce
     unit = max(
         float(np.mean(np.concatenate([s[list(channels)] for s, channels in zip(squared, near, strict=True)]))), 1e-9
     )
+    # Strengths of presses and gains are known up to a common factor only; this keeps gains near 1.
     prior = np.hstack([np.zeros((taxels, DEGREE + len(presses))), HELD * np.eye(taxels)])
     terms = []
     for level in range(len(LEVELS) + 1):
         rows, heights = [prior], [0.0] * taxels
         for k, (press, channels, distances) in enumerate(zip(presses, near, squared, strict=True)):
+            # A logarithm needs the sign of the hold, which noise may turn in a faint answer.
             use = [c for c in channels if press.levels[level, c] * press.hold[c] > 0]
             row = np.zeros((len(use), prior.shape[1]))
             row[:, :DEGREE] = (distances[use, None] / unit) ** powers

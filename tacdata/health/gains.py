@@ -102,9 +102,11 @@ def fit_gains(
     fall = fall_off([p.before for p in pairs], [p.channels for p in pairs], sensor.taxels.centers)
     freedom = max(float(sum(len(p.channels) for p in pairs) - len(channels)), 1.0)
     visits = 1.0 if predicted else 2.0
+    # Gains have no prior; depth, x and y have the spread of a new registration at each visit.
     precision = np.concatenate([np.zeros(len(channels)), 1 / (visits * np.square(_spreads(sensor)))])
     value = np.concatenate([np.full(len(channels), _scale(pairs) if predicted else 1.0), np.zeros(3)])
     covariance, errors = np.empty((0, 0)), np.array(START)
+    # The rows are linear about the shift, so they are solved again about the one found.
     for number in range(ROUNDS):
         rows = [_rows(pair, channels, value, fall, noise, visits, sensor) for pair in pairs]
         if number:  # the first round only finds the shift
@@ -143,6 +145,7 @@ def _rows(
     """Return the observations of a site, linear about gains and shift as they are known."""
     members, count, levels = pair.channels, len(pair.channels), len(pair.before.spread)
     place, shift = [channels.index(k) for k in members], value[-2:]
+    # Answers of a gain near 0 would have no relative error, and so all the weight.
     gain = np.maximum(value[place], WEAKEST * float(np.median(value[: len(channels)])))[:, None]
     away = sensor.taxels.centers - (pair.before.press.x, pair.before.press.y)
     factor, sides = (np.moveaxis(part[:, members], 0, 1) for part in fall.shifted(away, shift))

@@ -93,6 +93,7 @@ def press_response(episode: Episode, counts: np.ndarray | None = None) -> PressR
     rising = powers[1:] * np.array(LEVELS)[:, None] ** powers[:-1]
     hold = np.median(above[plateau], axis=0)
     levels, slope = at @ fitted, rising @ fitted[1:] / episode.press.deepest
+    # The variance of a median is pi / 2 times that of a mean.
     spread = np.concatenate([((at @ inverse) ** 2).sum(axis=1), [np.pi / 2 / plateau.sum()]])
     return PressResponse(
         episode.press,

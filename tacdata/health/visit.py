@@ -85,6 +85,7 @@ class Visit:
     def zero(self) -> dict[int, UncertainValue]:
         """Reading of each channel at rest before the first press [counts]."""
         readings = in_phase(self.entries[0].recording.episode, "rest")
+        # Means of a few stretches: neighbouring readings are not independent.
         parts = np.array([part.mean(axis=0) for part in np.array_split(readings, min(BATCHES, len(readings)))])
         return {k: mean(parts[:, k]) for k in range(readings.shape[1])}
 
@@ -110,6 +111,7 @@ class Visit:
             groups[press.key].append(np.abs(press.hold))
         repeats = [np.array(group) for group in groups.values() if len(group) > 1]
         strong = [group[:, group.mean(axis=0) > STRONG * group.mean(axis=0).max()].sum(axis=1) for group in repeats]
+        # In logarithms the spread is relative, whatever the strength of the press.
         repeated = [np.log(group) for group in strong if len(group) and group.min() > 0]
         freedom = sum(len(group) - 1 for group in repeated)
         if not freedom:

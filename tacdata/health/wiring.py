@@ -70,6 +70,7 @@ def wiring(
     silent = _silent(sample, expected)
     dead = tuple(sorted({*stuck, *silent} - set(undefined)))
     swaps = misplaced(sample) if reference is None else exchanged(likelihood(sample, expected))
+    # A dead channel fits anywhere.
     swapped = tuple((k, j) for k, j in swaps.items() if k not in dead and j not in dead)
     return Wiring(dead, swapped, tied, undefined, saturated)
 
@@ -85,6 +86,7 @@ def _scaled(reference: Sequence[PressResponse], sample: Answers) -> np.ndarray:
     expected = np.array([press.hold for press in reference])
     strong = expected > 0.2 * expected.max(axis=1, keepdims=True)
     ratio = sample.response[strong] / expected[strong]
+    # Dead channels would pull the median down.
     alive = ratio[ratio > SHARE]
     return expected * (float(np.median(alive)) if len(alive) else 1.0)
 

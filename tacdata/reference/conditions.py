@@ -113,6 +113,7 @@ def _span(course: Course, rows: np.ndarray) -> _Span:
     start, end = float(time[first]), float(time[last])
     level = low + HALF * (high - low)
     if first > 0 and depth[first] > depth[first - 1]:
+        # Between two readings: else presses would be aligned to whole periods only.
         start -= (depth[first] - level) / (depth[first] - depth[first - 1]) * (time[first] - time[first - 1])
     return _Span(high - low, float(start), end - start)
 

@@ -252,6 +252,7 @@ def _solved(condition: PressKind, columns: list[Shape], of: tuple[int, ...], cha
     is_determined = np.linalg.matrix_rank(matrix[steady], tol=FAINT * np.abs(matrix).max()) == matrix.shape[1]
     rows = steady if is_determined and visible else np.ones(len(matrix), dtype=bool)
     gram = matrix[rows].T @ matrix[rows]
+    # A little ridge, since shapes may be nearly collinear in one condition.
     solver = scales[:, None] * np.linalg.solve(gram + FAINT**2 * np.trace(gram) * np.eye(len(gram)), matrix[rows].T)
     sides = [(blocks(side) - condition.base)[:, rows, channel].T for side in (condition.healthy, condition.measured)]
     return tuple(solver @ values for values in (condition.difference[rows][:, [channel]], *sides))
@@ -298,6 +299,7 @@ def _mechanisms(
                     )
                 )
     ranges = {c.name: c.range for c in conditions}
+    # Bonferroni, over all sizes that could have been a change.
     tests = max(len({s.mechanism for s in columns[0]}) * len(conditions) * conditions[0].base.shape[1], 1)
     probable = [(columns[0][k], *_with_rival(columns[0][k].mechanism, belief)) for k in selection]
     answer = []

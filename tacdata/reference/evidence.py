@@ -79,6 +79,7 @@ def posterior(conditions: tuple[PressKind, ...], columns: list[list[Shape]]) -> 
             sizes = np.stack([system.evidence(sets) for system in _systems(condition, shapes_of, channel)])
             evidence += logsumexp(sizes, axis=0) - np.log(len(REMAINDERS))
     weights = softmax(evidence + np.log(mass)[:, None], axis=0)
+    # Averaged over draws of the blocks, so that one session's accidents decide less; column 0 is the data themselves.
     of_set = weights[:, 1:].mean(axis=1)
     names = [s.mechanism for s in columns[0]]
     probabilities = {
@@ -103,9 +104,11 @@ class System:
         """Return the log evidence of sets, shape (sets, draws + 1)."""
         log_evidence = np.empty((len(sets), self.target.shape[1]))
         counts = np.array([len(s) for s in sets])
+        # Sets of one size are factorized together.
         for count in np.unique(counts).tolist():
             rows = np.flatnonzero(counts == count)
             columns = np.array([[*sets[r], len(self.gram) - 1] for r in rows])
+            # Sizes are in units of their typical one, whose prior precision is 1.
             matrix = self.gram[columns[:, :, None], columns[:, None]] + np.eye(count + 1)
             lower = np.linalg.cholesky(matrix)
             half = np.linalg.solve(lower, self.target[columns])
@@ -125,6 +128,7 @@ def whitener(condition: PressKind, channel: int, remainder: float) -> np.ndarray
         np.var(side[:, :, channel], axis=0, ddof=1).mean() / len(side)
         for side in (condition.healthy, condition.measured)
     )
+    # Simulated readings have no noise, and the covariance would be singular.
     floor = max(float(noise), (1e-4 * float(condition.range[channel])) ** 2, 1e-300)
     edges = np.where(changing(condition), (EDGE * rms) ** 2, 0.0)
     return np.linalg.cholesky((remainder * rms) ** 2 * kernel + np.diag(floor + edges))
@@ -141,6 +145,7 @@ def changing(condition: PressKind) -> np.ndarray:
 
 def _systems(condition: PressKind, columns: list[Shape], channel: int) -> list[System]:
     """Return the normal equations of a condition and channel, one for each size of the remainder."""
+    # A fixed seed: the same sessions always get the same answer.
     rng = np.random.default_rng(0)
     sides = [blocks(condition.healthy)[:, :, channel], blocks(condition.measured)[:, :, channel]]
     draws = [condition.difference[:, channel]]

@@ -46,8 +46,8 @@ def shapes(condition: PressKind) -> list[Shape]:
     fastest = max(float(np.abs(speed).max()), 1e-12)
     way = np.tanh(speed / (TURN * fastest))
     moving = np.tanh((speed / (TURN * fastest)) ** 2)
-    last = _last_way(speed / fastest)
     # A press begins where the one before ended.
+    last = _last_way(speed / fastest)
     ones = np.ones(base.shape[1])
     slope = _slope(condition.depth, base, speed / fastest)
     baseline = base[np.argsort(condition.depth, kind="stable")[: max(len(time) // 20, 1)]].mean(axis=0)
@@ -112,6 +112,7 @@ def _slope(depth: np.ndarray, base: np.ndarray, speed: np.ndarray) -> np.ndarray
         rows = np.flatnonzero(side)
         if len(rows) < 6:
             continue
+        # Without the ends of each way, where the speed changes.
         inner = rows[len(rows) // 10 : len(rows) - len(rows) // 10]
         for k in range(base.shape[1]):
             fit = np.polynomial.Polynomial.fit(depths[inner], base[inner, k], 3)
