@@ -34,8 +34,8 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
         FormatError: If there is no such column.
     """
     if isinstance(selector, list):
-        found = [name for entry in selector for name in select(table, entry, where)]
-        return list(dict.fromkeys(found))
+        selection = [name for entry in selector for name in select(table, entry, where)]
+        return list(dict.fromkeys(selection))
     if isinstance(selector, str):
         selector = composed(selector)
     names = list(table.columns)
@@ -46,15 +46,15 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
             return [selector]
     plain = {name: split_unit(name)[0] for name in names}
     if isinstance(selector, str):
-        for known in (names, list(plain.values())):
-            if selector in known:
-                return [names[known.index(selector)]]
+        for candidates in (names, list(plain.values())):
+            if selector in candidates:
+                return [names[candidates.index(selector)]]
         if match := re.fullmatch(r"(\d+)\s*-\s*(\d+)", selector):
             return [name for k in range(int(match[1]), int(match[2]) + 1) for name in select(table, k, where)]
-        if found := _inner(table, selector):
-            return found
-        if chosen := [name for name in names if fnmatch.fnmatchcase(name, selector)]:
-            return chosen
+        if selection := _inner(table, selector):
+            return selection
+        if hits := [name for name in names if fnmatch.fnmatchcase(name, selector)]:
+            return hits
     elif 0 <= selector < len(names):
         return [names[selector]]
     left_out = [note for note in table.notes if "left out" in note]
@@ -121,12 +121,12 @@ def axis(
     if table is None:
         raise FormatError(f"{where}: a column without a file", "a number, or a file for the column", "add file: NAME")
     name = single(table, entry["column"], where)
-    given = unit_of(table, entry, where) or unit
+    source_unit = unit_of(table, entry, where) or unit
     values = numbers(table, [name], missing, where)[:, 0]
-    values = values * factor(given, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
-    known = values[np.isfinite(values)]
-    if "zero" in entry and len(known):
-        values = values - {"first": known[0], "lowest": known.min(), "highest": known.max()}[entry["zero"]]
+    values = values * factor(source_unit, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
+    finite = values[np.isfinite(values)]
+    if "zero" in entry and len(finite):
+        values = values - {"first": finite[0], "lowest": finite.min(), "highest": finite.max()}[entry["zero"]]
     return values
 
 
@@ -137,27 +137,27 @@ def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
         FormatError: If the file and the mapping give different units of one quantity.
     """
     name = single(table, entry["column"], where)
-    whole = inner[1] if (inner := INNER.fullmatch(name)) and table.inner(inner[1]) else name
-    inside = split_unit(whole)[1]
-    stated = table.units.get(whole) or ("" if inside.isdigit() else inside)
+    base_name = inner[1] if (inner := INNER.fullmatch(name)) and table.inner(inner[1]) else name
+    inside = split_unit(base_name)[1]
+    stated = table.units.get(base_name) or ("" if inside.isdigit() else inside)
     # The unit belongs to the file's type (a duration), so no mapping can contradict it.
-    if whole in table.typed:
+    if base_name in table.typed:
         return stated
-    given = entry.get("unit", "")
-    if not given and _differ(stated, inside, where):
+    entry_unit = entry.get("unit", "")
+    if not entry_unit and _differ(stated, inside, where):
         raise FormatError(
-            f"{where}: {table.path.name} states {stated} for {whole}, whose name says {inside}",
+            f"{where}: {table.path.name} states {stated} for {base_name}, whose name says {inside}",
             "one unit",
             f"give unit: {stated} or unit: {inside} there in the mapping",
         )
     # Where the file contradicts itself, the mapping decides.
-    if given and _differ(given, stated, where) and not (inside and not _differ(given, inside, where)):
+    if entry_unit and _differ(entry_unit, stated, where) and not (inside and not _differ(entry_unit, inside, where)):
         raise FormatError(
-            f"{where}: {table.path.name} states {stated} for {whole}, and the mapping {given}",
+            f"{where}: {table.path.name} states {stated} for {base_name}, and the mapping {entry_unit}",
             "one unit",
             "leave unit out of the mapping; where the file is wrong, correct its header in a copy",
         )
-    return given or stated
+    return entry_unit or stated
 
 
 def _differ(first: str, second: str, where: str) -> bool:
@@ -170,18 +170,18 @@ def _differ(first: str, second: str, where: str) -> bool:
 
 def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:
     """Return the error of a column of text, which may be numbers in another dress."""
-    known = [str(value).strip() for value in values.tolist() if value is not None]
-    given = f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}"
-    if known and sum(bool(THOUSANDS.fullmatch(text)) for text in known) > len(known) / 2:
+    texts = [str(value).strip() for value in values.tolist() if value is not None]
+    fault = f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}"
+    if texts and sum(bool(THOUSANDS.fullmatch(text)) for text in texts) > len(texts) / 2:
         return FormatError(
-            f"{given}: numbers with a sign between thousands, or with three decimal places, as text",
+            f"{fault}: numbers with a sign between thousands, or with three decimal places, as text",
             "numbers",
             "save it again as numbers, without a sign between thousands",
         )
-    if known and sum(bool(WRITTEN.fullmatch(text)) for text in known) > len(known) / 2:
-        return FormatError(f"{given}: numbers as text", "numbers", "save it again as numbers")
+    if texts and sum(bool(WRITTEN.fullmatch(text)) for text in texts) > len(texts) / 2:
+        return FormatError(f"{fault}: numbers as text", "numbers", "save it again as numbers")
     return FormatError(
-        given, "numbers", "name another column, or add the texts that stand for no value to the file's missing"
+        fault, "numbers", "name another column, or add the texts that stand for no value to the file's missing"
     )
 
 

@@ -202,9 +202,9 @@ def _tick(table: SourceTable, clock: dict[str, Any], time_ns: np.ndarray, name: 
     numbers = table.column(single(table, clock["column"], f"{name}: time"))
     if numbers.dtype == object:
         return 0.0
-    known = time_ns != NEVER
-    span = float(np.ptp(numbers[known].astype(float))) if known.any() else 0.0
-    return float(np.ptp(time_ns[known])) / span if span > 0 else 0.0
+    valid = time_ns != NEVER
+    span = float(np.ptp(numbers[valid].astype(float))) if valid.any() else 0.0
+    return float(np.ptp(time_ns[valid])) / span if span > 0 else 0.0
 
 
 def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[list[Stream], bool]:
@@ -268,11 +268,11 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
         raise FormatError("taxels: long without a time column", "time: {column: NAME}", "add it to the mapping")
     channel = table.column(single(table, entry["long"]["channel"], "taxels: long: channel"))
     value = numbers(table, [single(table, entry["long"]["value"], "taxels: long: value")], [], "taxels: long")[:, 0]
-    known, column = np.unique(channel.astype(str) if channel.dtype == object else channel, return_inverse=True)
+    distinct, column = np.unique(channel.astype(str) if channel.dtype == object else channel, return_inverse=True)
     times_of_rows, first, row, notes = moments(times(table, clock, "taxels: time")[0], column, table.path.name)
-    wide = np.full((len(times_of_rows), len(known)), np.nan)
+    wide = np.full((len(times_of_rows), len(distinct)), np.nan)
     wide[row, column] = value
-    labels = [f"{k:g}" if isinstance(k, float) else str(k) for k in known.tolist()]
+    labels = [f"{k:g}" if isinstance(k, float) else str(k) for k in distinct.tolist()]
     columns = {time: table.column(time)[first], **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
     unit = {time: table.units[time]} if time in table.units else {}
     return SourceTable(table.path, columns, unit, notes=(*table.notes, *notes), rate=table.rate), [
@@ -287,14 +287,14 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     if ("depth" in entry) == ("z" in entry):
         raise FormatError("position with both or neither of z and depth", "one of them", "correct the mapping")
     table = _table(mapping, tables, entry["file"], "position")
-    missing, known = _missing(mapping, entry), mapping.get("press", {})
+    missing, press_entry = _missing(mapping, entry), mapping.get("press", {})
     depth_given = "depth" in entry
     doubts: tuple[str, ...] = ()
     if not entry.get("trusted"):
         table, doubts = _without_codes(table, entry)
     columns = []
     for name in ("x", "y"):
-        fallback = known.get(name, 0.0)
+        fallback = press_entry.get(name, 0.0)
         value = entry.get(name, fallback if isinstance(fallback, int | float) else 0.0)
         columns.append(axis(table, value, "mm", missing, f"position: {name}"))
     down = axis(table, entry["depth" if depth_given else "z"], "mm", missing, "position: depth or z")
@@ -303,9 +303,9 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
     if not entry.get("trusted"):
         values, further = without_codes(values, "position", rails=False)
         doubts += further
-    whole = np.isfinite(values).all(axis=1)
+    complete = np.isfinite(values).all(axis=1)
     stretches = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm", doubts)
-    if not whole.any():
+    if not complete.any():
         raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
     assumed = tuple(_taken_as_mm(table, entry))
     return [
@@ -327,8 +327,8 @@ def _without_codes(table: SourceTable, entry: dict[str, Any]) -> tuple[SourceTab
 def _taken_as_mm(table: SourceTable, entry: dict[str, Any]) -> Iterator[str]:
     """Yield a remark for each column of a position whose unit neither the mapping nor the file gives."""
     for key in ("x", "y", "z", "depth"):
-        if isinstance(given := entry.get(key), dict) and not unit_of(table, given, f"position: {key}"):
-            name = single(table, given["column"], f"position: {key}")
+        if isinstance(axis_entry := entry.get(key), dict) and not unit_of(table, axis_entry, f"position: {key}"):
+            name = single(table, axis_entry["column"], f"position: {key}")
             yield f"position: {name} has no unit and is taken in mm; else give unit under position/{key} in the mapping"
 
 
@@ -337,14 +337,14 @@ def _measured(
 ) -> list[Stream]:
     table = _table(mapping, tables, entry["file"], f"measured: {name}")
     names = select(table, entry["columns"], f"measured: {name}")
-    given = plain(entry.get("unit") or next((table.units[n] for n in names if n in table.units), ""))
-    ours = quantity_of(given) if given else None
+    stated = plain(entry.get("unit") or next((table.units[n] for n in names if n in table.units), ""))
+    ours = quantity_of(stated) if stated else None
     values, doubts = _readings(table, names, _missing(mapping, entry), entry, f"measured: {name}")
     values = values * entry.get("scale", 1.0)
     if ours in ("N", "mm"):
-        values, unit = values * factor(given, ours, f"measured: {name}"), ours
+        values, unit = values * factor(stated, ours, f"measured: {name}"), ours
     else:
-        unit = given
+        unit = stated
     # An array column expands to several, and then names and columns differ in number.
     labels = tuple(split_unit(n)[0] for n in names) if len(names) == values.shape[1] else None
     labels = labels or tuple(str(k) for k in range(values.shape[1]))

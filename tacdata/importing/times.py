@@ -90,23 +90,23 @@ NEVER = np.iinfo(np.int64).min
 
 
 def _shifted(seconds: np.ndarray, clock: dict[str, Any]) -> np.ndarray:
-    known = np.isfinite(seconds)
-    whole = np.floor(np.where(known, seconds, 0.0))
-    part = np.where(known, seconds, 0.0) - whole
+    valid = np.isfinite(seconds)
+    full_seconds = np.floor(np.where(valid, seconds, 0.0))
+    part = np.where(valid, seconds, 0.0) - full_seconds
     # Whole seconds and the rest apart: a float64 resolves Unix nanoseconds to 240 ns only.
-    result = whole.astype(np.int64) * 1_000_000_000 + np.rint(part * 1e9).astype(np.int64)
-    result[~known] = NEVER
+    result = full_seconds.astype(np.int64) * 1_000_000_000 + np.rint(part * 1e9).astype(np.int64)
+    result[~valid] = NEVER
     return _shifted_ns(result, clock)
 
 
 def _shifted_ns(time_ns: np.ndarray, clock: dict[str, Any]) -> np.ndarray:
-    known = time_ns != NEVER
+    valid = time_ns != NEVER
     result = time_ns.copy()
     if drift := clock.get("drift", 0.0):
-        first = time_ns[known].min() if known.any() else 0
-        stretched = (time_ns[known] - first) / (1 + drift * 1e-6)
-        result[known] = first + np.rint(stretched).astype(np.int64)
-    result[known] += round(clock.get("offset", 0.0) * 1e9)
+        first = time_ns[valid].min() if valid.any() else 0
+        stretched = (time_ns[valid] - first) / (1 + drift * 1e-6)
+        result[valid] = first + np.rint(stretched).astype(np.int64)
+    result[valid] += round(clock.get("offset", 0.0) * 1e9)
     return result
 
 
@@ -140,7 +140,7 @@ def _refuse_unsaid(values: np.ndarray, unit: str, where: str) -> None:
     rate, dated = float(1 / (np.median(steps) * FACTORS["s"][unit])), _dated(values)
     if SLOWEST_UNSAID < rate <= (FASTEST_DATE if dated else FASTEST_UNSAID):
         return
-    like = {"datenum": "MATLAB's datenum", "excel": "Excel's serial time"}.get(dated or "", "days, for example")
+    example = {"datenum": "MATLAB's datenum", "excel": "Excel's serial time"}.get(dated or "", "days, for example")
     fitting = [u for u in ("ms", "us", "ns", "min", "h", "d") if 2 < 1 / (np.median(steps) * FACTORS["s"][u]) <= 2000]
     if rate > SLOWEST_UNSAID and dated:
         fitting = [dated]
@@ -148,7 +148,7 @@ def _refuse_unsaid(values: np.ndarray, unit: str, where: str) -> None:
     raise FormatError(
         f"{where}: no unit is given, and read in {unit} {step}",
         f"{SLOWEST_UNSAID:g} to {FASTEST_UNSAID:g} Hz, or a unit"
-        + (f" ({like} counts days)" if rate > SLOWEST_UNSAID and dated else ""),
+        + (f" ({example} counts days)" if rate > SLOWEST_UNSAID and dated else ""),
         f"give unit: {' or '.join([*fitting, *([unit] if rate <= FASTEST else [])])} under time in the mapping; "
         "of a counter of rows give time: {rate: HZ}",
     )
@@ -160,9 +160,9 @@ def _refuse_late(values: np.ndarray, unit: str, scale: float, where: str) -> Non
     Raises:
         FormatError: Saying which unit would fit.
     """
-    known = values.astype(float)
-    known = known[np.isfinite(known)]
-    latest = float(np.abs(known).max(initial=0.0)) * scale
+    finite = values.astype(float)
+    finite = finite[np.isfinite(finite)]
+    latest = float(np.abs(finite).max(initial=0.0)) * scale
     if latest < LATEST:
         return
     fitting = _guessed(values)
@@ -181,14 +181,14 @@ def _refuse_fast(values: np.ndarray, unit: str, scale: float, where: str) -> Non
     Raises:
         FormatError: Saying which unit would fit.
     """
-    known = values.astype(float)
-    known = known[np.isfinite(known)]
-    span = float(known.max() - known.min()) * scale if len(known) else 0.0
-    if span <= 0 or (len(known) - 1) / span <= FASTEST:
+    finite = values.astype(float)
+    finite = finite[np.isfinite(finite)]
+    span = float(finite.max() - finite.min()) * scale if len(finite) else 0.0
+    if span <= 0 or (len(finite) - 1) / span <= FASTEST:
         return
     dated = _dated(values)
     raise FormatError(
-        f"{where}: in {unit} the rows come at {(len(known) - 1) / span:.3g} Hz",
+        f"{where}: in {unit} the rows come at {(len(finite) - 1) / span:.3g} Hz",
         f"times at no more than {FASTEST:.0f} Hz",
         f"correct unit under time in the mapping, to {dated or 'd'} for example",
     )
@@ -204,23 +204,23 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
 
     Excel shows times as 34:56.7 and begins again every hour: seconds are then counted from the first one.
     """
-    known = [str(text).strip() for text in values.tolist() if text is not None]
+    texts = [str(text).strip() for text in values.tolist() if text is not None]
     forms = {
         r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?": 86_400,
         r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?\s*[AaPp]\.?[Mm]\.?": 86_400,
         r"\d{1,2}:\d{2}[.,]\d+": 3600,
     }
-    turn = next((turn for form, turn in forms.items() if all(re.fullmatch(form, text) for text in known)), 0)
-    if not known or not turn:
+    turn = next((turn for form, turn in forms.items() if all(re.fullmatch(form, text) for text in texts)), 0)
+    if not texts or not turn:
         return None
     seconds = np.full(len(values), np.nan)
     for row, text in enumerate(values.tolist()):
         if text is not None:
             digits, half = re.fullmatch(r"([\d:.,]+)\s*(.*)", str(text).strip()).groups()
-            *hours, minutes, rest = digits.replace(",", ".").split(":")
+            *hours, minutes, tail = digits.replace(",", ".").split(":")
             hour = int(hours[0] if hours else 0)
             hour = hour % 12 + 12 * (half[0] in "Pp") if half else hour
-            seconds[row] = 3600 * hour + 60 * int(minutes) + float(rest)
+            seconds[row] = 3600 * hour + 60 * int(minutes) + float(tail)
     # A fall by more than half a turn is midnight (or the hour); a smaller one is a row out of order.
     back = np.diff(seconds, prepend=seconds[0]) < -turn / 2
     return seconds + turn * np.cumsum(back)
@@ -251,9 +251,9 @@ def _joined(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[Sour
     """Return the table with columns of dates and times of day joined into one."""
     names = [single(table, column, f"{where}: column") for column in clock["column"]]
     parts = [_as_texts(table.column(name)) for name in names]
-    whole = [" ".join(row) if all(row) else None for row in zip(*parts, strict=True)]
+    texts = [" ".join(row) if all(row) else None for row in zip(*parts, strict=True)]
     joined = " ".join(names)
-    columns = {**table.columns, joined: np.array(whole, dtype=object)}
+    columns = {**table.columns, joined: np.array(texts, dtype=object)}
     return replace(table, columns=columns), {**clock, "column": joined}
 
 
@@ -309,10 +309,10 @@ def _parsed(text: str, layout: str, where: str) -> datetime | None:
         ) from None
 
 
-def layouts_of(known: list[str]) -> dict[str, list[datetime]]:
+def layouts_of(texts: list[str]) -> dict[str, list[datetime]]:
     """Return every layout of dates that fits texts, with a sample of the times that it makes of them."""
     # Spread over the file and up to its end: only a day above 12 distinguishes days from months.
-    sample = [_pointed(text).replace("T", " ") for text in known[:: max(len(known) // 200, 1)] + known[-1:]]
+    sample = [_pointed(text).replace("T", " ") for text in texts[:: max(len(texts) // 200, 1)] + texts[-1:]]
     fitting = {}
     for layout in (f"{date} {clock}" for date in DATES for clock in CLOCKS):
         try:
@@ -328,10 +328,10 @@ def _layout(texts: list[str], where: str) -> str:
     Raises:
         FormatError: If none fits, or days and months could change places.
     """
-    known = [text for text in texts if text]
-    fitting = layouts_of(known)
+    filled = [text for text in texts if text]
+    fitting = layouts_of(filled)
     different = {tuple(moments) for moments in fitting.values()}
-    example = known[0] if known else ""
+    example = filled[0] if filled else ""
     if len(different) == 1:
         return next(iter(fitting))
     if not different:

@@ -136,29 +136,29 @@ def plain(unit: str) -> str:
     return SPELLED.get(name.lower(), name)
 
 
-def factor(unit: str, wanted: str, origin: str) -> float:
-    """Return the factor from ``unit`` to ``wanted``.
+def factor(unit: str, target: str, origin: str) -> float:
+    """Return the factor from ``unit`` to ``target``.
 
     Raises:
         FormatError: If the unit is none of those that can be converted to it.
     """
-    found = _factor(unit, wanted)
-    if found is None:
-        raise FormatError(f"{origin}: unit {unit!r}", ", ".join(FACTORS[wanted]), "correct the unit in the mapping")
-    return found
+    ratio = _factor(unit, target)
+    if ratio is None:
+        raise FormatError(f"{origin}: unit {unit!r}", ", ".join(FACTORS[target]), "correct the unit in the mapping")
+    return ratio
 
 
-def _factor(unit: str, wanted: str) -> float | None:
-    table, name = FACTORS[wanted], plain(unit)
+def _factor(unit: str, target: str) -> float | None:
+    table, name = FACTORS[target], plain(unit)
     if name in table:
         return table[name]
     # Capitals tell mN from MN and nothing else.
-    if wanted != "N" and (value := {key.lower(): value for key, value in table.items()}.get(name.lower())):
+    if target != "N" and (value := {key.lower(): value for key, value in table.items()}.get(name.lower())):
         return value
     if match := SCALE.fullmatch(name):
-        power, over, number, rest = match.groups()
-        steps = 10.0 ** int(power) if power else 1 / float(number) if over and float(number) else float(number)
-        inner = _factor(rest, wanted)
+        power, divisor, number, remainder = match.groups()
+        steps = 10.0 ** int(power) if power else 1 / float(number) if divisor and float(number) else float(number)
+        inner = _factor(remainder, target)
         return None if inner is None else steps * inner
     return None
 
@@ -184,11 +184,11 @@ def split_unit(name: str) -> tuple[str, str]:
     if match := re.fullmatch(r"(.+?)\s+(?:in|en)\s+(\S+)", name):
         return (match[1], match[2]) if _is_unit(match[2]) else (name, "")
     if match := re.fullmatch(r"(.+?)\s*[/_ ,;|]\s*([A-Za-z\u00b5\u03bc%]+)", name):
-        known = _is_unit(match[2])
+        is_known = _is_unit(match[2])
         if match[2] == "S" and re.fullmatch(CLOCKS, match[1].strip().lower()):
             return match[1].strip(), "s"
         # Without brackets a lone "d" is a name (depth, distance), no unit of days.
-        return (match[1].strip(), match[2]) if known and match[2] != "d" else (name, "")
+        return (match[1].strip(), match[2]) if is_known and match[2] != "d" else (name, "")
     if match := re.fullmatch(r"(.+?)\s*[-.:]\s*([A-Za-z\u00b5]{2,})", name) or re.fullmatch(
         r"(.*[a-z\d])((?:Ms|Us|Ns|Mm|Um|Sec|Msec|Usec|Millis|Micros|Nanos|Seconds))", name
     ):
@@ -209,5 +209,5 @@ def clock_unit(name: str) -> str:
     if _factor(bare := name.strip().removesuffix("()"), "s") and len(bare) > 1:
         return bare
     words = re.findall(r"\d+(?:\.\d+)?[A-Za-z]+|[A-Za-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name))
-    found = [word for word in words if len(word) > 1 and word.lower() != "min" and _factor(word.lower(), "s")]
-    return found[0] if len(found) == 1 else ""
+    matches = [word for word in words if len(word) > 1 and word.lower() != "min" and _factor(word.lower(), "s")]
+    return matches[0] if len(matches) == 1 else ""

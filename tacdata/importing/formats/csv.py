@@ -76,8 +76,8 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
     """
     data = _upright(_with_receipt(data), options, path, notes)
     layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
-    own = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
-    body, comments, headers = _body(data, layout, own)
+    missing_texts = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
+    body, comments, headers = _body(data, layout, missing_texts)
     if comments:
         notes.append(f"{path.name}: {comments} comment lines among the rows are left out")
     if headers:
@@ -86,10 +86,10 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
         notes.append(f"{path.name}: names that are given twice; the later columns are called {', '.join(twice)}")
     if not body.strip():
         raise FormatError(f"{path} has a header and no row", "one row of data or more", "leave it out")
-    columns, skipped, doubts = _parsed(body, layout, [*MISSING, *own], path)
+    columns, skipped, doubts = _parsed(body, layout, [*MISSING, *missing_texts], path)
     if not skipped and _is_cut(body, layout):
-        whole = columns[layout.names[-1]]
-        columns[layout.names[-1]] = np.append(whole[:-1], np.nan)
+        last_column = columns[layout.names[-1]]
+        columns[layout.names[-1]] = np.append(last_column[:-1], np.nan)
         doubts.append(f"{path.name}: the last number is cut off with the file and is missing")
     if skipped:
         notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
@@ -107,8 +107,8 @@ def _stated_rate(data: bytes, skip: int) -> float:
 def _upright(data: bytes, options: dict[str, Any], path: Path, notes: list[str]) -> bytes:
     """Return text with a column for each of its few, very long lines; other text as it is."""
     lines = [line for line in data[:MOST_TURNED].split(b"\n") if line.strip()]
-    few = 2 <= len(lines) <= FEW_LINES and len(data) <= MOST_TURNED
-    if not few or options.get("transpose") is False:
+    is_short = 2 <= len(lines) <= FEW_LINES and len(data) <= MOST_TURNED
+    if not is_short or options.get("transpose") is False:
         return data
     rows = [line.decode("utf-8", "ignore") for line in lines]
     marks = [mark for mark in DELIMITERS if mark != " "] + [" "]
@@ -145,13 +145,13 @@ def _with_receipt(data: bytes) -> bytes:
     cut = [line.partition(b"->")[2].strip() if RECEIPT.match(line) else b"" for line in lines]
     layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), {}, "")
     between = b"\t" if layout.delimiter == " " else layout.delimiter.encode()
-    rest = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]
+    bodies = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]
     begin = [b"received" if number < layout.skip else RECEIPT.match(line) for number, line in enumerate(lines)]
-    made = [
+    rows = [
         (first if isinstance(first, bytes) else first[1]) + between + text if first and text else b""
-        for first, text in zip(begin, rest, strict=True)
+        for first, text in zip(begin, bodies, strict=True)
     ]
-    return b"\n".join(made)
+    return b"\n".join(rows)
 
 
 def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
@@ -221,8 +221,8 @@ def _without_zeros(path: Path, raw: bytes, notes: list[str]) -> bytes:
     Raises:
         FormatError: If zero bytes stand elsewhere: it is another kind of file, or another encoding.
     """
-    if other := kind_of_bytes(raw):
-        raise FormatError(f"{path} is {other}, no text", "a text file of columns", "give it the ending of what it is")
+    if kind := kind_of_bytes(raw):
+        raise FormatError(f"{path} is {kind}, no text", "a text file of columns", "give it the ending of what it is")
     body = raw.rstrip(b"\0")
     if body and b"\0" not in body:
         notes.append(f"{path.name}: {len(raw) - len(body)} zero bytes at its end are left out")
@@ -257,8 +257,8 @@ def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[by
     marks = tuple(mark.encode() for mark in COMMENTS)
     if any(mark in body for mark in marks):
         lines = body.split(b"\n")
-        kept = [line for line in lines if not is_comment(line.decode("utf-8", "ignore"), missing)]
-        body, comments = b"\n".join(kept), len(lines) - len(kept)
+        rows = [line for line in lines if not is_comment(line.decode("utf-8", "ignore"), missing)]
+        body, comments = b"\n".join(rows), len(lines) - len(rows)
     if layout.delimiter == " ":
         body = b"\n".join(b" ".join(line.split()) for line in body.split(b"\n"))
     return body, comments, headers
@@ -343,17 +343,17 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path,
         return values
     grouped = next((row for row in wrong if THOUSANDS.fullmatch((texts[row] or "").strip())), None)
     row = wrong[0] if grouped is None else grouped
-    shown = repr((texts[row] or "").strip()[:SHOWN])
+    cell = repr((texts[row] or "").strip()[:SHOWN])
     if grouped is not None or len(wrong) > UNREADABLE * len(texts):
         raise FormatError(
-            f"{path}: column {name}, row {row + 1} of the data: {shown}",
+            f"{path}: column {name}, row {row + 1} of the data: {cell}",
             f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",
-            f"add {shown} to missing in the mapping if it stands for no value, else correct the file"
+            f"add {cell} to missing in the mapping if it stands for no value, else correct the file"
             if grouped is None
             else "save it again without a sign between thousands",
         )
     doubts.append(
         f"{path.name}: {len(wrong)} cells of {name} hold no number and are missing, the first in row {row + 1} of the "
-        f"data: {shown}"
+        f"data: {cell}"
     )
     return values

@@ -72,53 +72,53 @@ def without_codes(
     return (np.where(missing, np.nan, values) if missing.any() else values), tuple(doubts)
 
 
-def _counted(values: np.ndarray, chosen: np.ndarray, name: str, words: str) -> str:
-    known, counts = np.unique(values[chosen], return_counts=True)
+def _counted(values: np.ndarray, mask: np.ndarray, name: str, words: str) -> str:
+    numbers, counts = np.unique(values[mask], return_counts=True)
     order = np.argsort(-counts)[:3]
-    shown = ", ".join(f"{known[k]:.6g}" for k in order.tolist())
-    return f"{name}: {int(chosen.sum())} numbers ({shown}) {words}: they are missing (trusted: true keeps them)"
+    examples = ", ".join(f"{numbers[k]:.6g}" for k in order.tolist())
+    return f"{name}: {int(mask.sum())} numbers ({examples}) {words}: they are missing (trusted: true keeps them)"
 
 
 def _far(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
     """Return which numbers are codes by their size alone or by their distance from all others, shape (rows,), bool."""
     size = np.abs(column)
     codes = size >= policy.huge
-    rest = np.unique(size[np.isfinite(column) & ~codes & (column != 0)])
-    if len(rest) > policy.few:
-        steps = rest[1:] > policy.far * rest[:-1]
+    sizes = np.unique(size[np.isfinite(column) & ~codes & (column != 0)])
+    if len(sizes) > policy.few:
+        steps = sizes[1:] > policy.far * sizes[:-1]
         if steps[-policy.few :].any():
-            place = len(rest) - 1 - int(np.argmax(steps[::-1]))
-            usual = int((size[np.isfinite(column)] <= rest[place - 1]).sum())
+            place = len(sizes) - 1 - int(np.argmax(steps[::-1]))
+            usual = int((size[np.isfinite(column)] <= sizes[place - 1]).sum())
             # Of two groups of numbers the larger group is the signal.
             if 2 * usual > len(column):
-                codes |= size >= rest[place]
+                codes |= size >= sizes[place]
     return codes
 
 
 def _isolated(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
     """Return which numbers lie apart from all readings, with none between, and mean none, shape (rows,), bool."""
     codes = np.zeros(len(column), dtype=bool)
-    known = np.unique(column[np.isfinite(column)])
-    if len(known) <= policy.levels:
+    distinct = np.unique(column[np.isfinite(column)])
+    if len(distinct) <= policy.levels:
         return codes
-    core = known[policy.few : -policy.few]
-    for sign, outer in ((1, known[-policy.few :]), (-1, known[policy.few - 1 :: -1])):
+    core = distinct[policy.few : -policy.few]
+    for sign, outer in ((1, distinct[-policy.few :]), (-1, distinct[policy.few - 1 :: -1])):
         edge = float(core[-1] if sign > 0 else core[0])
         for value in outer.tolist():
-            here = column == value
+            hits = column == value
             usual = bool(NINES.fullmatch(f"{value:.10g}")) or abs(value) in LIMITS
-            brief = here.sum() >= policy.run and _longest(here) <= policy.stays
-            apart = policy.apart if usual else policy.unusual_apart if brief else np.inf
-            if sign * (value - edge) > apart * np.ptp(core):
-                codes |= here
+            brief = hits.sum() >= policy.run and _longest(hits) <= policy.stays
+            distance = policy.apart if usual else policy.unusual_apart if brief else np.inf
+            if sign * (value - edge) > distance * np.ptp(core):
+                codes |= hits
             else:
                 edge = value
     return codes if codes.mean() <= policy.share else np.zeros_like(codes)
 
 
-def _longest(chosen: np.ndarray) -> int:
+def _longest(mask: np.ndarray) -> int:
     """Return the length of the longest run of True [rows]."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
@@ -136,20 +136,20 @@ def table_without_codes(table: SourceTable, names: list[str], name: str) -> tupl
 
 def _at_rail(values: np.ndarray, policy: CodePolicy) -> np.ndarray:
     """Return which numbers are a converter's largest, shape (rows, k), bool; signed ones have a lower rail, too."""
-    known = values[np.isfinite(values)]
+    finite = values[np.isfinite(values)]
     clipped = np.zeros(values.shape, dtype=bool)
-    if not known.size or (known != np.rint(known)).any():
+    if not finite.size or (finite != np.rint(finite)).any():
         return clipped
-    low, high = float(known.min()), float(known.max())
+    low, high = float(finite.min()), float(finite.max())
     for bits in policy.bits:
         upper = (2.0**bits - 1,) if low >= 0 else (2.0 ** (bits - 1) - 1,)
         rails = [rail for rail in upper if high == rail]
         if low < 0 and low == -(2.0 ** (bits - 1)):
             rails.append(low)
         for rail in rails:
-            here = values == rail
-            share = here.mean(axis=0)
-            clipped |= here & (share <= policy.inside) & (here.sum(axis=0) >= policy.run)
+            hits = values == rail
+            share = hits.mean(axis=0)
+            clipped |= hits & (share <= policy.inside) & (hits.sum(axis=0) >= policy.run)
     levels = [len(np.unique(column[np.isfinite(column)])) for column in values.T]
     # A flag of a few levels may reach 255, too, and is not clipped.
     return clipped & (np.array(levels) > 2 * policy.bits[0])

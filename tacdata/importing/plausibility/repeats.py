@@ -45,8 +45,8 @@ def without_repeats(values: np.ndarray, name: str, policy: RepeatPolicy = POLICY
             f"size never do, the first in row {row + 1}: they are missing (trusted: true keeps them)"
         )
     changed = np.flatnonzero((values[1:] != values[:-1]).any(axis=1))
-    if len(changed) >= policy.updates and (every := int(np.median(np.diff(changed)))) >= policy.every:
-        doubts.append(f"{name}: the readings change every {every} rows only; the rows in between repeat them")
+    if len(changed) >= policy.updates and (interval := int(np.median(np.diff(changed)))) >= policy.every:
+        doubts.append(f"{name}: the readings change every {interval} rows only; the rows in between repeat them")
     return (np.where(old, np.nan, values) if old.any() else values), tuple(doubts)
 
 

@@ -74,45 +74,45 @@ def time_order(time_ns: np.ndarray, where: str, *, tick_ns: float = 0.0, policy:
         FormatError: If time goes back so often that rows of several recordings alternate.
     """
     rows = np.flatnonzero(time_ns != NEVER)
-    known = time_ns[rows]
+    times = time_ns[rows]
     notes = [f"{where}: {len(time_ns) - len(rows)} rows without a time are left out"] * (len(rows) < len(time_ns))
-    steps = np.diff(known)
+    steps = np.diff(times)
     if len(steps) and (steps < 0).mean() > policy.turned:
         notes.append(f"{where}: its first row is the latest; the rows are turned")
-        rows, known, steps = rows[::-1], known[::-1], -steps[::-1]
+        rows, times, steps = rows[::-1], times[::-1], -steps[::-1]
     if not (steps < 0).any():
         return TimeOrder((rows,), time_ns, tuple(notes))
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     if tick_ns:
-        known, words = _unwrapped(known, usual, tick_ns, policy)
+        times, words = _unwrapped(times, usual, tick_ns, policy)
         notes += [f"{where}: {words}"] * bool(words)
-    believed = _believed(known, usual, policy)
+    believed = _believed(times, usual, policy)
     if not believed.all():
         row = int(rows[~believed][0]) + 1
         notes.append(
             f"{where}: {int((~believed).sum())} rows have a time out of line with the rows about them, the first in "
             f"row {row}; they are left out"
         )
-    rows, known = rows[believed], known[believed]
-    steps = np.diff(known)
+    rows, times = rows[believed], times[believed]
+    steps = np.diff(times)
     cuts = np.flatnonzero(steps < -policy.late * usual) + 1
-    late = int((steps < 0).sum()) - len(cuts)
+    late_rows = int((steps < 0).sum()) - len(cuts)
     if (back := np.flatnonzero(steps < 0)).size and (
-        late > max(policy.late_share * len(rows), 1) or (len(cuts) > 1 and len(rows) < policy.shortest * len(cuts))
+        late_rows > max(policy.late_share * len(rows), 1) or (len(cuts) > 1 and len(rows) < policy.shortest * len(cuts))
     ):
-        raise _alternating(rows, known, back, where)
-    if late:
-        notes.append(f"{where}: {late} rows came late by less than {policy.late:g} intervals and are put in order")
+        raise _alternating(rows, times, back, where)
+    if late_rows:
+        notes.append(f"{where}: {late_rows} rows came late by less than {policy.late:g} intervals and are put in order")
     ordered = np.array(time_ns)
-    ordered[rows] = known
+    ordered[rows] = times
     edges = [0, *cuts.tolist(), len(rows)]
     # Stable: rows of one time stay in the order of the file.
-    stretches = tuple(rows[a:b][np.argsort(known[a:b], kind="stable")] for a, b in pairwise(edges))
-    back_words = tuple(_step_back(rows, known, cut) for cut in cuts.tolist())
+    stretches = tuple(rows[a:b][np.argsort(times[a:b], kind="stable")] for a, b in pairwise(edges))
+    back_words = tuple(_step_back(rows, times, cut) for cut in cuts.tolist())
     if back_words:
-        shown = "; ".join(back_words[:3]) + f" and {len(back_words) - 3} times more" * (len(back_words) > 3)
+        listing = "; ".join(back_words[:3]) + f" and {len(back_words) - 3} times more" * (len(back_words) > 3)
         notes.append(
-            f"{where}: time goes back {shown}: a clock that was set back or began again. What follows is a recording "
+            f"{where}: time goes back {listing}: a clock that was set back or began again. What follows is a recording "
             "of its own"
         )
     return TimeOrder(stretches, ordered, tuple(notes), back_words)
@@ -176,22 +176,22 @@ def _believed(time_ns: np.ndarray, usual: float, policy: OrderPolicy) -> np.ndar
     for cut in (np.flatnonzero(np.diff(time_ns) < -policy.late * usual) + 1).tolist():
         if not believed[cut - 1] or not believed[cut]:
             continue
-        ahead = cut - 1
-        while ahead > 0 and cut - ahead < policy.wrong and time_ns[ahead - 1] > time_ns[cut]:
-            ahead -= 1
-        before = time_ns[ahead - 1] if ahead else None
-        if before is not None and 0 <= time_ns[cut] - before <= (cut - ahead + 1 + policy.late) * usual:
-            believed[ahead:cut] = False
+        first = cut - 1
+        while first > 0 and cut - first < policy.wrong and time_ns[first - 1] > time_ns[cut]:
+            first -= 1
+        previous = time_ns[first - 1] if first else None
+        if previous is not None and 0 <= time_ns[cut] - previous <= (cut - first + 1 + policy.late) * usual:
+            believed[first:cut] = False
             continue
-        behind = cut
-        while behind < len(time_ns) and time_ns[behind] < time_ns[cut - 1]:
-            if behind - cut >= policy.wrong and time_ns[behind] != time_ns[cut]:
+        last = cut
+        while last < len(time_ns) and time_ns[last] < time_ns[cut - 1]:
+            if last - cut >= policy.wrong and time_ns[last] != time_ns[cut]:
                 break
-            behind += 1
+            last += 1
         else:
-            constant = (time_ns[cut:behind] == time_ns[cut]).all()
-            if constant or behind < len(time_ns):
-                believed[cut:behind] = False
+            constant = (time_ns[cut:last] == time_ns[cut]).all()
+            if constant or last < len(time_ns):
+                believed[cut:last] = False
     return believed
 
 
@@ -233,8 +233,8 @@ def moments(
         for count, part in enumerate(order.stretches):
             stretch[rows[part]] = count
     keys = np.stack([stretch, time_ns], axis=1)
-    known, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    distinct, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     pairs = np.stack([group.ravel(), channel], axis=1)
     twice = len(pairs) - len(np.unique(pairs, axis=0))
     notes = [f"{name}: {twice} readings have the channel and the time of another; the later one counts"] * bool(twice)
-    return known, first, group.ravel(), notes
+    return distinct, first, group.ravel(), notes

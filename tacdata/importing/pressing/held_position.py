@@ -66,37 +66,37 @@ def held_rows(position: Stream, readings: np.ndarray, span: float, policy: HeldP
     """
     path = position.values
     repeated = np.zeros(len(path), dtype=bool)
-    moved = np.flatnonzero((path[1:] != path[:-1]).any(axis=1)) + 1
-    if len(moved) < policy.rows or span <= 0:
+    updates = np.flatnonzero((path[1:] != path[:-1]).any(axis=1)) + 1
+    if len(updates) < policy.rows or span <= 0:
         return HeldRows(repeated, (), 0)
     answer = _answer(path, readings)
-    runs = list(pairwise([0, *moved.tolist(), len(path)]))
-    every = int(np.quantile(np.diff(moved), 0.25, method="lower"))
+    runs = list(pairwise([0, *updates.tolist(), len(path)]))
+    interval = int(np.quantile(np.diff(updates), 0.25, method="lower"))
     between = [run for run in runs[1:-1] if run[1] - run[0] >= policy.rows]
-    if every >= policy.rows and len(moved) >= policy.updates and _goes_on(path, answer, between, policy):
+    if interval >= policy.rows and len(updates) >= policy.updates and _goes_on(path, answer, between, policy):
         for begin, end in runs[:-1]:
-            repeated[max(begin + 1, end - every + 1) : end] = True
+            repeated[max(begin + 1, end - interval + 1) : end] = True
     else:
-        every = 0
+        interval = 0
         steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
-        least = max(policy.jump * span, policy.faster * float(np.median(steps[steps > 0])))
+        threshold = max(policy.jump * span, policy.faster * float(np.median(steps[steps > 0])))
         for run in between:
-            sharp = steps[run[1] - 1] > least
+            sharp = steps[run[1] - 1] > threshold
             if sharp and _goes_on(path, answer, [run], policy) and _arrived(path, answer, run, span, policy):
                 repeated[run[0] + 1 : run[1]] = True
     stuck = tuple((a, b - 1) for a, b in runs if b - a >= policy.stuck and _returns(answer, a, b, policy))
     for first, last in stuck:
         repeated[first : last + 1] = False
-    return HeldRows(repeated, stuck, every)
+    return HeldRows(repeated, stuck, interval)
 
 
 def _answer(path: np.ndarray, readings: np.ndarray) -> np.ndarray:
     """Return the readings as one number that follows the path [1], shape (rows,), smoothed over three rows."""
-    known = np.nan_to_num(readings - np.nanmedian(readings, axis=0))
+    deviations = np.nan_to_num(readings - np.nanmedian(readings, axis=0))
     axis = int(np.argmax(np.ptp(path, axis=0)))
-    spread = known.std(axis=0)
-    weights = np.where(spread > 0, (known * (path[:, axis] - path[:, axis].mean())[:, None]).mean(axis=0), 0.0)
-    answer = (known / np.where(spread > 0, spread, 1.0)) @ (weights / np.where(spread > 0, spread, 1.0))
+    spread = deviations.std(axis=0)
+    weights = np.where(spread > 0, (deviations * (path[:, axis] - path[:, axis].mean())[:, None]).mean(axis=0), 0.0)
+    answer = (deviations / np.where(spread > 0, spread, 1.0)) @ (weights / np.where(spread > 0, spread, 1.0))
     padded = np.concatenate([answer[:1], answer, answer[-1:]])
     return np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0)
 
@@ -104,15 +104,15 @@ def _answer(path: np.ndarray, readings: np.ndarray) -> np.ndarray:
 def _goes_on(path: np.ndarray, answer: np.ndarray, runs: list[tuple[int, int]], policy: HeldPolicy) -> bool:
     """Return whether the readings go on evenly from one update of the path to the next, as in a motion."""
     axis = int(np.argmax(np.ptp(path, axis=0)))
-    inside = later = whole = 0.0
+    inside = later = total = 0.0
     for begin, end in runs:
         way = np.sign(path[end, axis] - path[end - 1, axis])
         middle = (begin + end - 1) // 2
         inside += way * (answer[end - 1] - answer[begin])
         later += way * (answer[end - 1] - answer[middle])
-        whole += way * (answer[end] - answer[begin])
+        total += way * (answer[end] - answer[begin])
     noise = float(np.median(np.abs(np.diff(answer)))) * len(runs)
-    return whole > policy.noise * noise and inside >= policy.inside * whole and later >= policy.later * inside
+    return total > policy.noise * noise and inside >= policy.inside * total and later >= policy.later * inside
 
 
 def _arrived(path: np.ndarray, answer: np.ndarray, run: tuple[int, int], span: float, policy: HeldPolicy) -> bool:
@@ -121,11 +121,11 @@ def _arrived(path: np.ndarray, answer: np.ndarray, run: tuple[int, int], span: f
     A skin that relaxes in a hold, before a fast way back, is still far from there.
     """
     begin, end = run
-    others = np.ones(len(path), dtype=bool)
-    others[begin:end] = False
+    remainder = np.ones(len(path), dtype=bool)
+    remainder[begin:end] = False
     levels = []
     for place in (path[begin], path[end]):
-        near = others & (np.linalg.norm(path - place, axis=1) <= policy.near * span)
+        near = remainder & (np.linalg.norm(path - place, axis=1) <= policy.near * span)
         if near.sum() < policy.rows:
             return False
         levels.append(float(np.median(answer[near])))
@@ -136,7 +136,7 @@ def _returns(answer: np.ndarray, begin: int, end: int, policy: HeldPolicy) -> bo
     """Return whether the readings leave their values at both ends of a stretch, and come back."""
     inside = answer[begin:end]
     low, high = np.quantile(answer, [0.01, 0.99])
-    least = max(policy.returns * (high - low), policy.noise * float(np.median(np.abs(np.diff(answer)))))
+    threshold = max(policy.returns * (high - low), policy.noise * float(np.median(np.abs(np.diff(answer)))))
     away = np.minimum(np.abs(inside - inside[0]), np.abs(inside - inside[-1]))
     same_side = (inside > max(inside[0], inside[-1])) | (inside < min(inside[0], inside[-1]))
-    return bool((away[same_side] >= least).sum() >= policy.rows)
+    return bool((away[same_side] >= threshold).sum() >= policy.rows)

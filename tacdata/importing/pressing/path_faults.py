@@ -80,25 +80,27 @@ def without_faults(streams: ImportedStreams, policy: PathPolicy = POLICY) -> Imp
 def _without_held(position: Stream, taxels: Stream) -> tuple[Stream, Stream, list[str]]:
     """Return a position without old values, the channels without their rows at a stuck position, and both in words."""
     span = _span(position.values)
-    held = held_rows(position, _readings_at(taxels, position.time_ns), span)
+    stale = held_rows(position, _readings_at(taxels, position.time_ns), span)
     overruled = "(position: {trusted: true} keeps them)"
-    keep, inside, doubts = ~held.repeated, np.zeros(len(taxels.time_ns), dtype=bool), []
+    keep, inside, doubts = ~stale.repeated, np.zeros(len(taxels.time_ns), dtype=bool), []
     time_ns = position.time_ns
-    if held.repeated.any():
+    if stale.repeated.any():
         seconds = float(np.median(np.diff(time_ns))) / 1e9
-        cause = f"a new value comes every {held.every * seconds:.3g} s only" if held.every else "its last value repeats"
-        row = int(np.flatnonzero(held.repeated)[0])
+        cause = (
+            f"a new value comes every {stale.every * seconds:.3g} s only" if stale.every else "its last value repeats"
+        )
+        row = int(np.flatnonzero(stale.repeated)[0])
         doubts.append(
-            f"position: {cause} while the readings go on: {int(held.repeated.sum())} old values are left out, the "
+            f"position: {cause} while the readings go on: {int(stale.repeated.sum())} old values are left out, the "
             f"first at {time_ns[row] / 1e9:.6g} s {overruled}"
         )
-    for first, last in held.stuck:
+    for first, last in stale.stuck:
         inside |= (taxels.time_ns > time_ns[first]) & (taxels.time_ns < time_ns[last])
         keep[first + 1 : last] = False
-    if held.stuck:
-        first, last = held.stuck[0]
+    if stale.stuck:
+        first, last = stale.stuck[0]
         doubts.append(
-            f"position: it stands still while the readings rise and fall, in {len(held.stuck)} stretches, first from "
+            f"position: it stands still while the readings rise and fall, in {len(stale.stuck)} stretches, first from "
             f"{time_ns[first] / 1e9:.6g} s to {time_ns[last] / 1e9:.6g} s: {int(inside.sum())} rows of the channels "
             f"there are left out {overruled}"
         )
@@ -130,12 +132,12 @@ def _dropouts(position: Stream, taxels: Stream, policy: PathPolicy) -> np.ndarra
     if dropped.mean() > policy.rare and not _in_ramps(steps, dropped, policy):
         dropped[:] = False
     # The first or the last rows, as of a logger that begins with zeros.
-    rest = steps[~dropped[1:] & ~dropped[:-1]]
+    regular = steps[~dropped[1:] & ~dropped[:-1]]
     for rows in range(1, policy.longest + 1):
         for edge, outer in ((rows - 1, slice(0, rows)), (len(steps) - rows, slice(len(path) - rows, len(path)))):
             # The fastest steps are left out: the dropout at the edge is among them and must not excuse itself.
-            others = np.sort(rest)[: -policy.longest]
-            fastest = float(others[-1]) if len(others) else 0.0
+            largest = np.sort(regular)[: -policy.longest]
+            fastest = float(largest[-1]) if len(largest) else 0.0
             if steps[edge] > max(policy.share * span, policy.faster * fastest) and fastest > 0:
                 dropped[outer] = True
     return dropped
@@ -146,15 +148,15 @@ def _excursions(
 ) -> list[tuple[int, int]]:
     """Return the rows, from one to before another, in which a path is away by jumps and comes back to where it was."""
     sharp = np.flatnonzero(steps > max(policy.share * span, policy.faster * usual))
-    found = []
+    excursions = []
     for first, second in zip(sharp.tolist(), sharp[1:].tolist(), strict=False):
         begin, end = first + 1, second + 1
         back = float(np.linalg.norm(path[end] - path[first]))
         constant = bool((path[begin:end] == path[begin]).all())
         jump = min(steps[first], steps[second])
         if back <= jump / policy.faster and (end - begin <= policy.longest or constant):
-            found.append((begin, end))
-    return found
+            excursions.append((begin, end))
+    return excursions
 
 
 def _in_ramps(steps: np.ndarray, dropped: np.ndarray, policy: PathPolicy) -> bool:
@@ -171,8 +173,8 @@ def _followed(position: Stream, taxels: Stream, begin: int, end: int, policy: Pa
     # Without readings there, only a long stay away is taken for a motion.
     if end >= len(times) or times[begin - 1] < taxels.time_ns[0] or times[end] > taxels.time_ns[-1]:
         return end - begin > policy.longest
-    before, *inside, behind = _readings_at(taxels, times[begin - 1 : end + 1])
-    change = np.linalg.norm(np.nan_to_num(np.median(inside, axis=0) - (before + behind) / 2))
+    head, *inside, tail = _readings_at(taxels, times[begin - 1 : end + 1])
+    change = np.linalg.norm(np.nan_to_num(np.median(inside, axis=0) - (head + tail) / 2))
     return bool(change > _least(taxels, policy))
 
 
@@ -186,9 +188,9 @@ def _readings_at(taxels: Stream, time_ns: np.ndarray) -> np.ndarray:
     """Return the readings at times [ns], shape (n, channels); missing ones are interpolated."""
     columns = []
     for column in taxels.values.T:
-        known = np.isfinite(column)
-        whole = np.interp(time_ns, taxels.time_ns[known], column[known]) if known.any() else np.zeros(len(time_ns))
-        columns.append(whole)
+        valid = np.isfinite(column)
+        series = np.interp(time_ns, taxels.time_ns[valid], column[valid]) if valid.any() else np.zeros(len(time_ns))
+        columns.append(series)
     return np.stack(columns, axis=1)
 
 

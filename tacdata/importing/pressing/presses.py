@@ -60,7 +60,7 @@ class Refusal:
 
 def presses_of(
     mapping: dict[str, Any],
-    beside: Path,
+    folder: Path,
     tables: dict[str, SourceTable],
     parts: dict[str, str],
     record: dict[str, Any],
@@ -70,7 +70,7 @@ def presses_of(
 
     Args:
         mapping: The mapping's document.
-        beside: Folder of the mapping, to which the sensor file's path is relative.
+        folder: Folder of the mapping, to which the sensor file's path is relative.
         tables: Name under ``files`` -> rows.
         parts: {part} of the paths -> its text.
         record: The import record so far.
@@ -82,10 +82,10 @@ def presses_of(
     stated = dict(mapping.get("press", {}))
     if specimen := stated.pop("specimen", ""):
         record = {**record, "specimen": label_of(specimen, tables, parts, "press: specimen")}
-    known = _known(stated, tables, parts, "press")
+    press_values = _known(stated, tables, parts, "press")
     contact = mapping.get("contact", {})
     resolved = _known({k: v for k, v in contact.items() if k != "known_from"}, tables, parts, "contact")
-    mapping = {**mapping, "press": {**stated, **known}, "contact": {**contact, **resolved}}
+    mapping = {**mapping, "press": {**stated, **press_values}, "contact": {**contact, **resolved}}
     stretches = read_streams(mapping, tables)
     if len(stretches) > 1 and mapping.get("schedule"):
         raise FormatError(
@@ -102,16 +102,16 @@ def presses_of(
             yield Refusal(label, FormatError(note, f"{FEWEST} rows or more", "leave it out"))
             continue
         yield from _of_stretch(
-            mapping, beside, tables, streams, known, centre, {**record, "trial": label, "time_shift_ns": shift}
+            mapping, folder, tables, streams, press_values, centre, {**record, "trial": label, "time_shift_ns": shift}
         )
 
 
 def _of_stretch(
     mapping: dict[str, Any],
-    beside: Path,
+    folder: Path,
     tables: dict[str, SourceTable],
     streams: ImportedStreams,
-    known: dict[str, float],
+    press_values: dict[str, float],
     centre: tuple[float, float],
     record: dict[str, Any],
 ) -> Iterator[ImportedPress | Refusal]:
@@ -141,7 +141,7 @@ def _of_stretch(
             part = replace(part, position=_commanded(planned, begin, end))
         try:
             _check_rows(part, trial)
-            yield _imported(mapping, beside, part, place, planned, known, [*unsaid], {**record, "trial": trial})
+            yield _imported(mapping, folder, part, place, planned, press_values, [*unsaid], {**record, "trial": trial})
         except FormatError as error:
             yield Refusal(trial, error)
 
@@ -165,28 +165,28 @@ def _check_rows(streams: ImportedStreams, trial: str) -> None:
 
 def _imported(
     mapping: dict[str, Any],
-    beside: Path,
+    folder: Path,
     streams: ImportedStreams,
     place: Registration,
     planned: ScheduledPress | None,
-    known: dict[str, float],
+    press_values: dict[str, float],
     stand_ins: list[str],
     record: dict[str, Any],
 ) -> ImportedPress:
     taxels, lost, restarted = _without_counter(streams)
     spans = np.diff(taxels.time_ns)
     rate = float(1e9 / np.median(spans[spans > 0])) if (spans > 0).any() else 1.0
-    sensor, unknown = foreign_sensor(mapping["sensor"], beside, len(taxels.names), round(rate, 3))
+    sensor, unknown = foreign_sensor(mapping["sensor"], folder, len(taxels.names), round(rate, 3))
     position = streams.position
     if position is None:
         raise FormatError("no position", "a position", "add it to the mapping")
     tip = place.to_sensor(position.values)
     path = press_path(position.time_ns, tip)
-    most = DEEPEST if position.assumed else FARTHEST
-    if abs(path.depth) > most:
+    limit = DEEPEST if position.assumed else FARTHEST
+    if abs(path.depth) > limit:
         raise FormatError(
             f"trial {record['trial'] or 'without a name'}: {path.depth:.4g} mm deep, as the mapping has it",
-            f"presses of at most {most:g} mm",
+            f"presses of at most {limit:g} mm",
             "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
         )
     for doubt in filter(None, (restarted, _never_touched(taxels, position, tip[:, 2]))):
@@ -194,11 +194,11 @@ def _imported(
     indenter, name = _indenter(mapping)
     if name == "unknown":
         stand_ins.append("indenter: not said by the source; a sphere of 2 mm stands in")
-    if path.speed is None and "speed" not in known:
+    if path.speed is None and "speed" not in press_values:
         stand_ins.append("speed: the indenter does not move; 1 mm/s stands in")
     angles = {"yaw": 0.0, "tilt_x": 0.0, "tilt_y": 0.0}
     values = {"x": path.x, "y": path.y, "depth": path.depth, "speed": path.speed or 1.0, "hold": path.hold, **angles}
-    values = {key: round(value, 4) for key, value in {**values, **known}.items()}
+    values = {key: round(value, 4) for key, value in {**values, **press_values}.items()}
     press = Press(
         index=0,
         indenter=indenter,
@@ -349,20 +349,20 @@ def _known(
     entries: dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str], section: str
 ) -> dict[str, float]:
     """Return the numbers that a mapping gives for a trial: constant, from the path, or the median of a column."""
-    found = {}
+    values = {}
     for name, entry in entries.items():
         where = f"{section}: {name}"
         if isinstance(entry, int | float):
-            found[name] = float(entry)
+            values[name] = float(entry)
         elif "part" in entry:
-            found[name] = _part(parts, entry, where)
+            values[name] = _part(parts, entry, where)
         else:
             table = tables.get(entry.get("file", next(iter(tables))))
             if table is None:
                 raise FormatError(f"{where}: file {entry.get('file')!r}", ", ".join(tables), "name one under files")
             single(table, entry.get("column", ""), where)
-            found[name] = float(np.nanmedian(axis(table, entry, UNITS[name], [], where)))
-    return found
+            values[name] = float(np.nanmedian(axis(table, entry, UNITS[name], [], where)))
+    return values
 
 
 def _part(parts: dict[str, str], entry: dict[str, Any], where: str) -> float:

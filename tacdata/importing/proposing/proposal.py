@@ -51,10 +51,10 @@ class Proposal:
 
 def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
     """Return a mapping for the kinds of files, as far as names and values allow, and its open questions."""
-    asked: list[str] = []
+    notes: list[str] = []
     bare = {kind: table_without_codes(entry.table, list(entry.table.columns), kind)[0] for kind, entry in kinds.items()}
     kinds = {kind: replace(entry, table=bare[kind]) for kind, entry in kinds.items()}
-    kinds = without_summaries(kinds, asked)
+    kinds = without_summaries(kinds, notes)
     aliases: dict[str, str] = {}
     for kind in kinds:
         path, _, inside = kind.partition(INSIDE)
@@ -65,23 +65,23 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
         aliases[alias] = kind
     tables = {alias: kinds[kind].table for alias, kind in aliases.items()}
     roles = {alias: roles_of(table) for alias, table in tables.items()}
-    if not any(found["channels"] for found in roles.values()):
+    if not any(columns["channels"] for columns in roles.values()):
         # Nothing else was read: the load cell is the sensor.
-        for found in roles.values():
-            found["channels"] = found.pop("force", [])
+        for columns in roles.values():
+            columns["channels"] = columns.pop("force", [])
     wide = max(aliases, key=lambda alias: (varying(tables[alias], roles[alias]["channels"]), "value" in roles[alias]))
-    asked += [question] if (question := stand_in(tables, roles)) else []
-    for alias, found in roles.items():
-        _whole_strokes(tables[alias], found, asked)
+    notes += [question] if (question := stand_in(tables, roles)) else []
+    for alias, columns in roles.items():
+        _whole_strokes(tables[alias], columns, notes)
     document: dict[str, Any] = {
         "version": schemas.version("import_mapping"),
         "name": source.stem,
         "source": "say where the data come from",
-        "files": {alias: _file(kind, kinds[kind], roles[alias], asked) for alias, kind in aliases.items()},
+        "files": {alias: _file(kind, kinds[kind], roles[alias], notes) for alias, kind in aliases.items()},
         "sensor": {"name": source.stem},
         "taxels": {
             "file": wide,
-            "columns": _short(roles[wide]["channels"]) or unread(tables[wide], roles[wide], asked),
+            "columns": _short(roles[wide]["channels"]) or unread(tables[wide], roles[wide], notes),
         },
     }
     if "value" in roles[wide]:
@@ -94,80 +94,80 @@ def proposed_mapping(source: Path, kinds: dict[str, FoundKind]) -> Proposal:
     units = {plain(tables[wide].units.get(name, "")) for name in roles[wide]["channels"]}
     if len(units) == 1 and units != {""}:
         document["taxels"]["unit"] = units.pop()
-    _place(document, tables, roles, asked)
-    for alias, found in roles.items():
-        if "trial" in found:
-            document["trials"] = {"column": found["trial"][0]}
-        if specimen := _specimen(alias, aliases[alias], kinds[aliases[alias]], found, asked):
+    _place(document, tables, roles, notes)
+    for alias, columns in roles.items():
+        if "trial" in columns:
+            document["trials"] = {"column": columns["trial"][0]}
+        if specimen := _specimen(alias, aliases[alias], kinds[aliases[alias]], columns, notes):
             document.setdefault("press", {"specimen": specimen})
     for key, part in _place_in_path(aliases[wide]).items():
         if key not in document.get("position", {}):
             document.setdefault("press", {})[key] = {"part": part}
-    _unnamed(tables[wide], roles[wide], asked)
-    own_clocks(document, tables, roles, asked)
-    leave_unused_out(document, aliases, kinds, roles, asked)
-    return Proposal(document, tuple(asked))
+    _unnamed(tables[wide], roles[wide], notes)
+    own_clocks(document, tables, roles, notes)
+    leave_unused_out(document, aliases, kinds, roles, notes)
+    return Proposal(document, tuple(notes))
 
 
 def _place(
-    document: dict[str, Any], tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]], asked: list[str]
+    document: dict[str, Any], tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]], notes: list[str]
 ) -> None:
     """Add position, gauge, force and temperature; cut trials where one file holds several."""
     # A height that never changes, as of an image, is a position only where nothing else is.
     keys = ("depth", "z", "x", "y")
-    axes = {alias: [name for key in keys for name in found.get(key, [])] for alias, found in roles.items()}
+    axes = {alias: [name for key in keys for name in columns.get(key, [])] for alias, columns in roles.items()}
     for alias in sorted(roles, key=lambda name: (not varying(tables[name], axes[name]), -len(axes[name]))):
-        found, table = roles[alias], tables[alias]
-        if "position" not in document and ("depth" in found or "z" in found):
-            chosen = ("x", "y", "depth") if "depth" in found else ("x", "y", "z")
-            entry = {key: _axis(table, found[key][0]) for key in chosen if key in found}
+        columns, table = roles[alias], tables[alias]
+        if "position" not in document and ("depth" in columns or "z" in columns):
+            axis_keys = ("x", "y", "depth") if "depth" in columns else ("x", "y", "z")
+            entry = {key: _axis(table, columns[key][0]) for key in axis_keys if key in columns}
             document["position"] = {"file": alias} | entry
-            unsaid = [found[key][0] for key in chosen if key in found and "unit" in entry[key]]
-            if "by_shape" in found:
-                asked.append(
-                    f"{found['depth'][0]}: taken for the position by its shape: it is smooth, comes back, and the "
+            unsaid = [columns[key][0] for key in axis_keys if key in columns and "unit" in entry[key]]
+            if "by_shape" in columns:
+                notes.append(
+                    f"{columns['depth'][0]}: taken for the position by its shape: it is smooth, comes back, and the "
                     "readings follow it"
                 )
-            if "error" in found and found.get("depth") == found.get("set_point", [None])[:1]:
-                document["position"]["depth"] = _without_error(table, found, asked)
-            if "stand_in" in found:
-                entry["depth"]["unit"] = length_of(table, found["stand_in"][0])
+            if "error" in columns and columns.get("depth") == columns.get("set_point", [None])[:1]:
+                document["position"]["depth"] = _without_error(table, columns, notes)
+            if "stand_in" in columns:
+                entry["depth"]["unit"] = length_of(table, columns["stand_in"][0])
             elif unsaid:
-                unit = _length(table, entry, found[chosen[-1]][0])
-                asked.append(f"{listed(unsaid)}: no unit is given; {unit} is a guess")
-            _motion(document, table, found, roles[document["taxels"]["file"]]["channels"], asked)
-        lengths = found.get("depth", [])
+                unit = _length(table, entry, columns[axis_keys[-1]][0])
+                notes.append(f"{listed(unsaid)}: no unit is given; {unit} is a guess")
+            _motion(document, table, columns, roles[document["taxels"]["file"]]["channels"], notes)
+        lengths = columns.get("depth", [])
         lengths = lengths[:1] + [name for name in lengths[1:] if not is_copy(table, lengths[0], name)]
         if len(lengths) > 1 and "displacement" not in document.get("measured", {}):
             # A second length is a gauge in addition to the drive; it separates compliance from the skin's deformation.
-            told = {"file": alias, "columns": lengths[1:2], "unit": plain(table.units.get(lengths[1], "")) or "mm"}
-            document.setdefault("measured", {})["displacement"] = told
+            gauge = {"file": alias, "columns": lengths[1:2], "unit": plain(table.units.get(lengths[1], "")) or "mm"}
+            document.setdefault("measured", {})["displacement"] = gauge
         for key in ("force", "temperature"):
-            if key in found and key not in document.get("measured", {}):
-                unit = table.units.get(found[key][0])
-                entry = {"file": alias, "columns": found[key], **({"unit": plain(unit)} if unit else {})}
+            if key in columns and key not in document.get("measured", {}):
+                unit = table.units.get(columns[key][0])
+                entry = {"file": alias, "columns": columns[key], **({"unit": plain(unit)} if unit else {})}
                 document.setdefault("measured", {})[key] = entry
     if "position" not in document:
-        asked.append("no column is named as a position or a depth: give position, or schedule")
+        notes.append("no column is named as a position or a depth: give position, or schedule")
 
 
-def _whole_strokes(table: SourceTable, found: dict[str, list[str]], asked: list[str]) -> None:
+def _whole_strokes(table: SourceTable, columns: dict[str, list[str]], notes: list[str]) -> None:
     """Let no column separate trials that marks halves of strokes."""
-    moving = found.get("depth") or found.get("z")
-    if not moving or "trial" not in found or "[" in moving[0]:
+    moving = columns.get("depth") or columns.get("z")
+    if not moving or "trial" not in columns or "[" in moving[0]:
         return
-    labels = table.column(found["trial"][0]).astype(str)
+    labels = table.column(columns["trial"][0]).astype(str)
     if are_halves(labels, table.column(moving[0]).astype(float)):
-        (name,) = found.pop("trial")[:1]
+        (name,) = columns.pop("trial")[:1]
         words = listed(list(dict.fromkeys(labels.tolist()))[:3])
-        asked.append(f"{name} tells the way in from the way back ({words}): trials are cut by depth instead")
+        notes.append(f"{name} tells the way in from the way back ({words}): trials are cut by depth instead")
 
 
 def _motion(
-    document: dict[str, Any], table: SourceTable, found: dict[str, list[str]], channels: list[str], asked: list[str]
+    document: dict[str, Any], table: SourceTable, columns: dict[str, list[str]], channels: list[str], notes: list[str]
 ) -> None:
     """Set the sign of the pressing axis, tell a machine's height from a depth, and cut trials by pauses or presses."""
-    name, position = found.get("depth", found.get("z", []))[0], document["position"]
+    name, position = columns.get("depth", columns.get("z", []))[0], document["position"]
     clock = document["files"][position["file"]]["time"]
     try:
         time_ns, _ = times(table, clock, "")
@@ -175,7 +175,7 @@ def _motion(
         motion = pressing_axis(time_ns, axis, _deviation(table, channels, axis))
     except (FormatError, ValueError):
         return  # reported where the clock was read
-    is_depth = "depth" in found
+    is_depth = "depth" in columns
     if is_depth and motion.lifted:
         position["z"], is_depth = position.pop("depth"), False
     elif not is_depth and motion.sign > 0 and motion.at_zero and set(position) == {"file", "z"}:
@@ -183,27 +183,27 @@ def _motion(
     if motion.sign * (1 if is_depth else -1) < 0:
         position["depth" if is_depth else "z"]["scale"] = -1.0
         way = "falls" if motion.sign < 0 else "grows"
-        asked.append(f"{name}: it {way} into the skin, so its sign is turned (scale: -1)")
+        notes.append(f"{name}: it {way} into the skin, so its sign is turned (scale: -1)")
     if is_depth:
-        _from_the_lowest(position["depth"], table, name, channels, asked)
+        _from_the_lowest(position["depth"], table, name, channels, notes)
     if not is_depth and motion.at_zero:
         document["contact"] = {"z": 0.0, "known_from": "the zero of the machine"}
-        asked.append(f"{name}: its zero is taken for the height at which the skin is touched (contact: {{z: 0}})")
-    elif not is_depth and "stand_in" in found:
-        asked.append(f"{name}: it does not rest at zero; depth is counted from where each trial is at rest")
+        notes.append(f"{name}: its zero is taken for the height at which the skin is touched (contact: {{z: 0}})")
+    elif not is_depth and "stand_in" in columns:
+        notes.append(f"{name}: it does not rest at zero; depth is counted from where each trial is at rest")
     elif not is_depth:
-        asked.append(
+        notes.append(
             f"{name}: a machine's height; where does it touch the skin? Give contact: {{z: ...}}, else depth is "
             "counted from the highest position of each trial"
         )
-    if "trial" not in found and "trials" not in document:
+    if "trial" not in columns and "trials" not in document:
         entry = position["depth" if is_depth else "z"]
         above = motion.above * _in_mm(table, name, entry)
-        _cut(document, motion, above if is_depth else None, asked)
+        _cut(document, motion, above if is_depth else None, notes)
 
 
 def _from_the_lowest(
-    entry: dict[str, Any], table: SourceTable, name: str, channels: list[str], asked: list[str]
+    entry: dict[str, Any], table: SourceTable, name: str, channels: list[str], notes: list[str]
 ) -> None:
     """Count a depth from its lowest where readings answer on both sides of zero."""
     parts = [table.column(channel) for channel in channels if channel in table.columns]
@@ -213,7 +213,7 @@ def _from_the_lowest(
     readings = np.column_stack(parts).astype(float)
     if low := below_zero([zero_side(depth[rows], readings[rows]) for rows in _each_press(depth)]):
         entry["offset"] = float(np.ceil(1000 * low) / 1000)
-        asked.append(
+        notes.append(
             f"{name}: readings answer on both sides of its zero, so depth is counted from the lowest "
             f"(offset: {entry['offset']:g} mm); do other files go lower? Then take the lowest of all"
         )
@@ -221,12 +221,12 @@ def _from_the_lowest(
 
 def _each_press(depth: np.ndarray) -> list[slice]:
     """Return the rows from each highest point of a path to the next, one press each."""
-    known = np.nan_to_num(depth, nan=np.nanmin(depth))
-    deep = known > known.min() + 0.5 * np.ptp(known)
+    filled = np.nan_to_num(depth, nan=np.nanmin(depth))
+    deep = filled > filled.min() + 0.5 * np.ptp(filled)
     edges = np.flatnonzero(np.diff(deep.astype(np.int8)))
     begins, ends = edges[~deep[edges]], edges[deep[edges]]
-    after = [int(begins[begins > end][0]) for end in ends if (begins > end).any()]
-    middles = [(int(end) + begin) // 2 for end, begin in zip(ends, after, strict=False)]
+    successors = [int(begins[begins > end][0]) for end in ends if (begins > end).any()]
+    middles = [(int(end) + begin) // 2 for end, begin in zip(ends, successors, strict=False)]
     return [slice(a, b) for a, b in pairwise([0, *middles, len(depth)])]
 
 
@@ -238,14 +238,14 @@ def _in_mm(table: SourceTable, name: str, entry: dict[str, Any]) -> float:
         return 1.0
 
 
-def _cut(document: dict[str, Any], motion: PressingAxis, above: float | None, asked: list[str]) -> None:
+def _cut(document: dict[str, Any], motion: PressingAxis, above: float | None, notes: list[str]) -> None:
     """Cut trials by pauses, or above a depth [mm]."""
     if motion.pause:
         document["trials"] = {"gap": motion.pause}
-        asked.append(f"{motion.pauses} pauses of more than {motion.pause:g} s: each is taken for the end of a trial")
+        notes.append(f"{motion.pauses} pauses of more than {motion.pause:g} s: each is taken for the end of a trial")
     elif motion.strokes > 1 and above is not None:
         document["trials"] = {"press_above": float(f"{above:.2g}")}
-        asked.append(
+        notes.append(
             f"{motion.strokes} presses without a pause: each stretch deeper than {above:.2g} mm is taken for a trial"
         )
 
@@ -260,28 +260,28 @@ def _deviation(table: SourceTable, channels: list[str], axis: np.ndarray) -> np.
         return None
     values = np.column_stack(parts).astype(float)
     spread = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
-    known = np.flatnonzero(np.isfinite(axis))
-    way = np.abs(axis - axis[known[:1]].sum())
-    moved = np.flatnonzero(way > CLEAR * np.ptp(axis[known])) if len(known) else known
-    first = np.nanmedian(values[: max(min([len(values) // 50, *moved[:1].tolist()]), 1)], axis=0)
+    rows = np.flatnonzero(np.isfinite(axis))
+    way = np.abs(axis - axis[rows[:1]].sum())
+    departures = np.flatnonzero(way > CLEAR * np.ptp(axis[rows])) if len(rows) else rows
+    first = np.nanmedian(values[: max(min([len(values) // 50, *departures[:1].tolist()]), 1)], axis=0)
     deviation = np.abs(values - first) / np.where(spread > 0, spread, 1.0)
-    known = np.isfinite(deviation)
-    return np.where(known, deviation, 0.0).sum(axis=1) / np.where(known.any(axis=1), known.sum(axis=1), np.nan)
+    rows = np.isfinite(deviation)
+    return np.where(rows, deviation, 0.0).sum(axis=1) / np.where(rows.any(axis=1), rows.sum(axis=1), np.nan)
 
 
-def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
+def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str]], notes: list[str]) -> dict[str, Any]:
     """Return where a file names the pressed specimen: in a column, or in its path; {} if nowhere."""
     for name in roles.get("specimen", []):
         if len({str(value) for value in entry.table.columns[name].tolist() if value is not None}) > 1:
             return {"file": alias, "column": name}
-    before = kind.partition(INSIDE)[0].split("#")[:-1]
-    if found := next(({"part": f"part{k}"} for k, text in enumerate(before) if SPECIMEN.search(text)), None):
-        return found
+    parents = kind.partition(INSIDE)[0].split("#")[:-1]
+    if place := next(({"part": f"part{k}"} for k, text in enumerate(parents) if SPECIMEN.search(text)), None):
+        return place
     for number, words in entry.words.items():
         if 2 * sum(bool(MATERIAL.search(word)) for word in words) >= len(words):
-            asked.append(f"the folders {listed(words)} are taken for specimens")
+            notes.append(f"the folders {listed(words)} are taken for specimens")
             return {"part": f"part{number}"}
-        asked.append(
+        notes.append(
             f"are the folders {listed(words)} specimens? Then write press: {{specimen: {{part: part{number}}}}}"
         )
     return {}
@@ -289,42 +289,42 @@ def _specimen(alias: str, kind: str, entry: FoundKind, roles: dict[str, list[str
 
 def _place_in_path(kind: str) -> dict[str, str]:
     """Return which parts of a path are x and y, as in "x2.0_y-1.5"."""
-    before = kind.partition(INSIDE)[0].split("#")[:-1]
-    found = {k: PLACE.search(text) for k, text in enumerate(before)}
-    return {match[1].lower(): f"part{k}" for k, match in found.items() if match}
+    parents = kind.partition(INSIDE)[0].split("#")[:-1]
+    matches = {k: PLACE.search(text) for k, text in enumerate(parents)}
+    return {match[1].lower(): f"part{k}" for k, match in matches.items() if match}
 
 
-def _unnamed(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) -> None:
+def _unnamed(table: SourceTable, roles: dict[str, list[str]], notes: list[str]) -> None:
     again = [name for name in table.columns if name.endswith("'") and name.rstrip("'") not in roles.get("time", [])]
     if again and not any(name.endswith("'") for name in roles["channels"]):
-        asked.append(
+        notes.append(
             f"{table.path.name}: each name comes again, as in trials side by side; only the first is read. Put the "
             "others below it with a column that numbers them, into sheets or into files"
         )
     if (len(table.columns) == 1 and table.inner(next(iter(table.columns)))) or all(map(str.isdigit, table.columns)):
         time = f", {roles['time'][0]} as the time by its steps" if roles.get("time") else ""
-        asked.append(
+        notes.append(
             f"the columns of {table.path.name} have no names: which are position, force and channels? "
             f"{', '.join(_short(roles['channels']))} stand as channels{time}"
         )
 
 
-def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
+def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], notes: list[str]) -> dict[str, Any]:
     table = entry.table
     outer, _, inside = kind.partition(INSIDE)
     path, parts = pattern(outer) if entry.count > 1 or "#" in inside else (entry.path, 0)
-    found: dict[str, Any] = {"path": path, **entry.options}
+    result: dict[str, Any] = {"path": path, **entry.options}
     if entry.join:
-        found |= _parts(entry, asked)
+        result |= _parts(entry, notes)
     elif "#" in inside:
-        found["table"] = pattern(inside, parts)[0]
+        result["table"] = pattern(inside, parts)[0]
     if not roles.get("time"):
         rate, counter = rate_of(table, roles), counting_column(table, roles)
-        asked.append(
+        notes.append(
             f"{Path(outer).name}: no column of times; {rate:g} rows a second is a guess, by which a press takes some "
             "2 s: give time: {rate: ...}" + f"; {counter} counts the rows" * bool(counter)
         )
-        return found | {"time": {"rate": rate} | ({"column": counter} if counter else {})}
+        return result | {"time": {"rate": rate} | ({"column": counter} if counter else {})}
     if [table.column(name).dtype for name in roles["time"]] == [object, object]:
         # A date and a time of day.
         clock: dict[str, Any] = {"column": roles["time"]}
@@ -332,17 +332,17 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], asked: list[
         unit = plain(table.units.get(roles["time"][0], ""))
         clock = {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}
     if "by_values" in roles:
-        asked.append(f"{roles['time'][0]}: it rises evenly, and is taken for the time, in s where no unit is given")
+        notes.append(f"{roles['time'][0]}: it rises evenly, and is taken for the time, in s where no unit is given")
     try:
         times(table, clock, Path(outer).name)
     except FormatError as error:
-        clock |= _american(table, roles["time"][0], asked)
+        clock |= _american(table, roles["time"][0], notes)
         if "format" not in clock:
-            asked.append(f"{error.given}: {error.remedy}")
-    return found | {"time": clock}
+            notes.append(f"{error.given}: {error.remedy}")
+    return result | {"time": clock}
 
 
-def _parts(entry: FoundKind, asked: list[str]) -> dict[str, Any]:
+def _parts(entry: FoundKind, notes: list[str]) -> dict[str, Any]:
     """Return the keys of a file whose parts are joined."""
     outer = [kind.partition(INSIDE)[0] for kind in entry.parts]
     sheets = [kind.partition(INSIDE)[2] for kind in entry.parts]
@@ -350,29 +350,29 @@ def _parts(entry: FoundKind, asked: list[str]) -> dict[str, Any]:
     places = {"columns": "side by side", "rows": "below each other"}.get(
         entry.join, "below each other, the clock continued"
     )
-    asked.append(f"{listed(sheets if same else outer)} are taken for parts of one trial, {places} (join: {entry.join})")
-    found: dict[str, Any] = {"join": entry.join}
+    notes.append(f"{listed(sheets if same else outer)} are taken for parts of one trial, {places} (join: {entry.join})")
+    result: dict[str, Any] = {"join": entry.join}
     if same:
-        return found | {"table": sheets}
-    return found | {"path": [pattern(kind)[0] for kind in outer]}
+        return result | {"table": sheets}
+    return result | {"path": [pattern(kind)[0] for kind in outer]}
 
 
-def _american(table: SourceTable, name: str, asked: list[str]) -> dict[str, str]:
+def _american(table: SourceTable, name: str, notes: list[str]) -> dict[str, str]:
     """Return the format of dates with AM and PM, where month and day could change places: the month comes first."""
     values = table.column(name)
-    known = [str(text).strip() for text in values.tolist() if text is not None] if values.dtype == object else []
-    layouts = layouts_of(known) if known else []
+    texts = [str(text).strip() for text in values.tolist() if text is not None] if values.dtype == object else []
+    layouts = layouts_of(texts) if texts else []
     layout = next((layout for layout in layouts if layout.startswith("%m/") and "%p" in layout), None)
     if layout is None:
         return {}
-    asked.append(f"{name}: {known[0]!r} is read with the month first (format: {layout!r}); is it?")
+    notes.append(f"{name}: {texts[0]!r} is read with the month first (format: {layout!r}); is it?")
     return {"format": layout}
 
 
-def _without_error(table: SourceTable, found: dict[str, list[str]], asked: list[str]) -> dict[str, Any]:
+def _without_error(table: SourceTable, columns: dict[str, list[str]], notes: list[str]) -> dict[str, Any]:
     """Return the measured depth as the set point minus the position error."""
-    target, error = found["depth"][0], found["error"][0]
-    asked.append(f"the position is taken as {target} - {error}: is the error the set point minus the position?")
+    target, error = columns["depth"][0], columns["error"][0]
+    notes.append(f"the position is taken as {target} - {error}: is the error the set point minus the position?")
     unit = {} if table.units.get(target) and table.units.get(target) == table.units.get(error) else {"unit": "mm"}
     return {"expression": f"`{target}` - `{error}`", **unit}
 
@@ -385,9 +385,9 @@ def _length(table: SourceTable, entry: dict[str, Any], pressing: str) -> str:
     """Set the unit of lengths without one: m where no press would be so short in mm; return it."""
     # A stroke below 0.02 is no press in mm, but 2 mm written in m is.
     unit = "m" if float(np.nanmax(table.column(pressing)) - np.nanmin(table.column(pressing))) < SHORTEST else "mm"
-    for given in entry.values():
-        if "unit" in given:
-            given["unit"] = unit
+    for axis_entry in entry.values():
+        if "unit" in axis_entry:
+            axis_entry["unit"] = unit
     return unit
 
 

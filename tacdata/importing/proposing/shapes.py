@@ -62,13 +62,13 @@ def _reason(table: SourceTable, name: str) -> str:
     values = table.column(name)
     if values.dtype == object or values.ndim > 1:
         return ""
-    known = values[np.isfinite(values.astype(float))]
-    levels = np.unique(known)
+    finite = values[np.isfinite(values.astype(float))]
+    levels = np.unique(finite)
     if len(levels) < 2:
         return "constant"
     if len(levels) == 2 and np.isin(levels, (0, 1)).all():
         return "a flag"
-    return "a counter of rows" if len(known) == len(values) and (np.diff(known) == 1).all() else ""
+    return "a counter of rows" if len(finite) == len(values) and (np.diff(finite) == 1).all() else ""
 
 
 def counting_column(table: SourceTable, roles: dict[str, list[str]], policy: ShapePolicy = POLICY) -> str:
@@ -88,19 +88,19 @@ def drive_by_shape(table: SourceTable, names: list[str], policy: ShapePolicy = P
         Its name, or "" if there is none, or more than one.
     """
     columns = {name: table.column(name) for name in names}
-    known = {name: values.astype(float) for name, values in columns.items() if values.ndim == 1}
-    known = {name: values for name, values in known.items() if np.isfinite(values).all() and np.ptp(values) > 0}
-    if table.rows < policy.rows or len(known) < 2:
+    series = {name: values.astype(float) for name, values in columns.items() if values.ndim == 1}
+    series = {name: values for name, values in series.items() if np.isfinite(values).all() and np.ptp(values) > 0}
+    if table.rows < policy.rows or len(series) < 2:
         return ""
-    roughness = {name: max(_roughness(values), policy.exact) for name, values in known.items()}
+    roughness = {name: max(_roughness(values), policy.exact) for name, values in series.items()}
     name, second = sorted(roughness, key=lambda column: roughness[column])[:2]
     if roughness[second] <= policy.smoother * roughness[name]:
         return ""
-    values = known.pop(name)
+    values = series.pop(name)
     if abs(values[-1] - values[0]) > policy.returns * np.ptp(values):
         return ""
     way = np.abs(values - values[0])
-    changes = [np.abs(reading - np.median(reading[:5])) / np.ptp(reading) for reading in known.values()]
+    changes = [np.abs(reading - np.median(reading[:5])) / np.ptp(reading) for reading in series.values()]
     correlation = float(np.corrcoef(way, np.mean(changes, axis=0))[0, 1])
     return name if correlation >= policy.follows else ""
 

@@ -16,10 +16,7 @@ STEADY = 0.9
 
 
 def own_clocks(
-    document: dict[str, Any],
-    tables: dict[str, SourceTable],
-    roles: dict[str, dict[str, list[str]]],
-    questions: list[str],
+    document: dict[str, Any], tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]], notes: list[str]
 ) -> None:
     """Give a position the clock column before it if the channels of the same file follow another clock column."""
     position, alias = document.get("position", {}), document["taxels"]["file"]
@@ -43,7 +40,7 @@ def own_clocks(
     for name, entry in ((ours, position), (theirs, document["taxels"])):
         unit = plain(table.units.get(name, ""))
         entry["time"] = {"column": name, **({"unit": unit} if unit in SHORT else {})}
-    questions.append(f"{theirs} is taken for the clock of the channels, and {ours} for the one of the position")
+    notes.append(f"{theirs} is taken for the clock of the channels, and {ours} for the one of the position")
 
 
 def _rises(table: SourceTable, name: str) -> bool:

@@ -17,15 +17,15 @@ IDLE = ("idle", "setting", "state", "counter", "orientation", "joint", "derived"
 """Roles of columns that are no channels of a sensor."""
 
 
-def without_summaries(kinds: dict[str, FoundKind], asked: list[str]) -> dict[str, FoundKind]:
-    """Return kinds of files without tables of results, of few rows and no time, which ``asked`` lists."""
+def without_summaries(kinds: dict[str, FoundKind], notes: list[str]) -> dict[str, FoundKind]:
+    """Return kinds of files without tables of results, of few rows and no time, which ``notes`` lists."""
     roles = {kind: roles_of(entry.table) for kind, entry in kinds.items()}
-    timed = [kind for kind, found in roles.items() if found.get("time")]
+    timed = [kind for kind, columns in roles.items() if columns.get("time")]
     if not any(is_whole(roles[kind]) for kind in timed) and len(timed) < 2:
         return kinds
     rows = float(np.median([kinds[kind].table.rows for kind in timed]))
     short = [kind for kind in kinds if kind not in timed and kinds[kind].table.rows < SHORT * rows]
-    asked += [
+    notes += [
         f"{kind.replace(INSIDE, ' ')}: {kinds[kind].table.rows} rows without a time: taken for results, and not used"
         for kind in short
     ]
@@ -37,7 +37,7 @@ def leave_unused_out(
     aliases: dict[str, str],
     kinds: dict[str, FoundKind],
     roles: dict[str, dict[str, list[str]]],
-    asked: list[str],
+    notes: list[str],
 ) -> None:
     """Take files without a role out of the mapping, and list them and the columns that measure nothing."""
     sections = [document["taxels"], document.get("position", {}), *document.get("measured", {}).values()]
@@ -47,18 +47,18 @@ def leave_unused_out(
         del document["files"][alias]
         kind = kinds[aliases[alias]]
         columns = listed((roles[alias]["channels"] or list(kind.table.columns))[:4])
-        asked.append(f"{kind.path} is not used: is {columns} needed?")
+        notes.append(f"{kind.path} is not used: is {columns} needed?")
     idle = [name for role in IDLE for name in roles[document["taxels"]["file"]].get(role, [])]
     if idle:
         more = f" and {len(idle) - 12} more" if len(idle) > 12 else ""
-        asked.append(f"no channels but settings, states, counters or constants: {', '.join(idle[:12])}{more}")
+        notes.append(f"no channels but settings, states, counters or constants: {', '.join(idle[:12])}{more}")
 
 
-def unread(table: SourceTable, roles: dict[str, list[str]], asked: list[str]) -> list[str | int]:
+def unread(table: SourceTable, roles: dict[str, list[str]], notes: list[str]) -> list[str | int]:
     """Return the columns of text that have no role, as channels: the import then says why they are no numbers."""
     used = {name for names in roles.values() for name in names}
     texts = [name for name in table.columns if name not in used and table.column(name).dtype == object]
-    asked.append("no column is a channel: " + (f"{listed(texts[:4])} hold text" if texts else "which are readings?"))
+    notes.append("no column is a channel: " + (f"{listed(texts[:4])} hold text" if texts else "which are readings?"))
     return [*texts] or [0]
 
 
