@@ -20,7 +20,7 @@ from tacdata.recording.clocks.running_clock import nominal_period_ns
 from tacdata.recording.episode import TagStream, TaxelStream
 from tacdata.recording.files import topics
 from tacdata.recording.files.camera_arrays import clock_of, finger_streams
-from tacdata.recording.files.mcap_records import Records, read_records
+from tacdata.recording.files.mcap_records import Records, counted, read_records
 from tacdata.schemas import tacdata_pb2 as pb
 
 UNTIMED = 0.02
@@ -100,7 +100,7 @@ def _recording(records: Records) -> DemoRecording:
     rate = rig.clock.rate if "clock" in rig.document else 1.0
     end = records.metadata.get("episode", {})
     logged = (Log.FromString(message.data) for message in records.of_topic(topics.LOG))
-    notes = [*records.damage, *((end["reason"],) if end.get("reason") else ())]
+    notes = [*counted(records.damage), *((end["reason"],) if end.get("reason") else ())]
     notes += [entry.message for entry in logged if entry.level > Log.Level.INFO]
     views, timing = [], {}
     for camera in rig.cameras:

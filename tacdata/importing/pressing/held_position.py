@@ -36,11 +36,16 @@ class HeldPolicy:
     """Fewest rows of a stuck value [rows]."""
     returns: float = 0.3
     """Smallest rise and fall of the readings while the position is stuck [their range]."""
+    explained: float = 0.7
+    """Smallest share of the readings' variance that the position explains elsewhere [1]. The current of a drive rises
+    and falls at a standstill, too."""
     noise: float = 5.0
     """Smallest change of the readings that is none of noise [its size]."""
 
 
 POLICY = HeldPolicy()
+PLACES = 20
+"""Parts of a path's range in each of which readings are averaged."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,8 @@ def held_rows(position: Stream, readings: np.ndarray, span: float, policy: HeldP
             if sharp and _goes_on(path, answer, [run], policy) and _arrived(path, answer, run, span, policy):
                 repeated[run[0] + 1 : run[1]] = True
     stuck = tuple((a, b - 1) for a, b in runs if b - a >= policy.stuck and _returns(answer, a, b, policy))
+    if _explained(path, answer, stuck) < policy.explained:
+        stuck = ()
     for first, last in stuck:
         repeated[first : last + 1] = False
     return HeldRows(repeated, stuck, interval)
@@ -99,6 +106,22 @@ def _answer(path: np.ndarray, readings: np.ndarray) -> np.ndarray:
     answer = (deviations / np.where(spread > 0, spread, 1.0)) @ (weights / np.where(spread > 0, spread, 1.0))
     padded = np.concatenate([answer[:1], answer, answer[-1:]])
     return np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0)
+
+
+def _explained(path: np.ndarray, answer: np.ndarray, stuck: tuple[tuple[int, int], ...]) -> float:
+    """Return the share of the readings' variance that the position explains outside of some stretches [1]."""
+    others = np.ones(len(path), dtype=bool)
+    for first, last in stuck:
+        others[first : last + 1] = False
+    axis = int(np.argmax(np.ptp(path, axis=0)))
+    place, values = path[others, axis], answer[others]
+    if len(values) < PLACES or np.ptp(place) <= 0:
+        return 0.0
+    part = np.minimum((PLACES * (place - place.min()) / np.ptp(place)).astype(int), PLACES - 1)
+    counts = np.maximum(np.bincount(part, minlength=PLACES), 1)
+    means = np.bincount(part, values, PLACES) / counts
+    whole = float(values.var())
+    return 1.0 - float(np.mean((values - means[part]) ** 2)) / whole if whole > 0 else 0.0
 
 
 def _goes_on(path: np.ndarray, answer: np.ndarray, runs: list[tuple[int, int]], policy: HeldPolicy) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -32,6 +33,10 @@ MESSAGE = struct.Struct("<HIQQ")
 """Channel, sequence, log and publish time before a message's data (MCAP specification, "Message")."""
 CHUNK = struct.Struct("<QQQII")
 """First and last time, size and checksum of a chunk's content, length of its compression's name (same place)."""
+COMPRESSIONS = ("", "lz4", "zstd")
+"""Compressions of chunks that MCAP names."""
+UNKNOWN = "is left out: zstd, lz4 and none are known"
+"""End of the words about a chunk of another compression."""
 KNOWN = frozenset(opcode.value for opcode in Opcode)
 PRIVATE = 0x80
 """Opcodes from here on are private to other programs."""
@@ -97,6 +102,11 @@ def read_records(
             "check the path; measured files of another rig come in by `tacdata import`",
         )
     return records
+
+
+def counted(damage: list[str]) -> list[str]:
+    """Return descriptions of damage, each once, with how often it occurs."""
+    return [f"{words} ({count} times)" if count > 1 else words for words, count in Counter(damage).items()]
 
 
 def take(
@@ -249,7 +259,11 @@ def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterato
                 yield Attachment.read(data)
         case Opcode.CHUNK:
             try:
-                stream, length = get_chunk_data_stream(_chunk(body), validate_crc=True)
+                chunk = _chunk(body)
+                if chunk.compression not in COMPRESSIONS:
+                    damage.append(f"a chunk of the compression {chunk.compression!r} {UNKNOWN}")
+                    return
+                stream, length = get_chunk_data_stream(chunk, validate_crc=True)
                 opened = ChunkContent.split(stream.read(length))
             except Exception as error:  # the errors of zstd, struct and mcap share no base class
                 damage.append(f"a damaged chunk is left out ({type(error).__name__})")

@@ -20,7 +20,7 @@ from tacdata.recording.clocks.running_clock import nominal_period_ns
 from tacdata.recording.episode import CncStream, Episode, TaxelStream
 from tacdata.recording.files import topics
 from tacdata.recording.files.camera_arrays import ImageTimes, cube_stream, finger_streams, image_stamps, image_times
-from tacdata.recording.files.mcap_records import Records, read_records
+from tacdata.recording.files.mcap_records import Records, counted, read_records
 from tacdata.recording.files.quantities import marked_phases, measured_streams
 from tacdata.recording.files.taxel_arrays import TaxelFrames, taxel_frames
 from tacdata.recording.motion import move_times
@@ -184,7 +184,7 @@ def _attachment(records: Records, name: str) -> Any:
 
 
 def _notes(records: Records, complete: bool, moves: list[AnchoredMove], log: tuple[str, ...]) -> tuple[str, ...]:
-    notes, end = [*records.damage], records.metadata.get("episode", {})
+    notes, end = counted(records.damage), records.metadata.get("episode", {})
     if not end:
         notes.append("the recording was never closed; everything up to its last chunk is here")
     elif end.get("reason"):

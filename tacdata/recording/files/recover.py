@@ -13,9 +13,9 @@ from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from tacdata.errors import DeviceError, Exit, FormatError, UsageError
+from tacdata.errors import DeviceError, Exit, FormatError, UsageError, refused_by_system
 from tacdata.provenance import code_version
-from tacdata.recording.files.mcap_records import walk
+from tacdata.recording.files.mcap_records import UNKNOWN, counted, walk
 
 
 @dataclass
@@ -169,12 +169,17 @@ def _nothing(path: Path, result: Recovered) -> NothingRecovered:
             "an MCAP file recorded by tacdata",
             "check the path; for a file of another kind, convert it first",
         )
+    compressed = any(UNKNOWN in words for words in result.damage)
     return NothingRecovered(
-        f"{path} breaks off before its first message: {'; '.join(result.damage) or 'it holds none'}",
+        f"{path} breaks off before its first message: {'; '.join(counted(result.damage)) or 'it holds none'}",
         "a recording with at least one message",
-        "nothing can be restored; record that press again with tacdata record --resume",
+        "write it again with zstd by the program that compressed it"
+        if compressed
+        else "nothing can be restored; record that press again with tacdata record --resume",
     )
 
 
 def _refused(target: Path, error: OSError) -> DeviceError:
-    return DeviceError(f"writing {target} failed: {error}", "a disk with room for the copy", "make room or use --out")
+    known = refused_by_system(error)
+    allowed, remedy = (known.allowed, known.remedy) if known else ("a disk with room for the copy", "use --out")
+    return DeviceError(f"writing {target} failed: {error}", allowed, remedy)

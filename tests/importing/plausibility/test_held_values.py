@@ -108,6 +108,17 @@ def test_a_real_rest_stays(tmp_path, name, every, answer):
     assert not any("old values" in note or "stands still" in note for note in made.notes), name
 
 
+def test_a_drives_current_rises_and_falls_at_a_standstill(tmp_path):
+    rows = table(presses=4)
+    speed = np.gradient(rows[:, 1]) * 20
+    standing = np.flatnonzero(rows[:, 1] == 1.2)
+    speed[standing] += 0.8 * np.hanning(len(standing) // 4 + 1)[np.arange(len(standing)) % (len(standing) // 4)]
+    rows[:, 2:] = 0.1 + speed[:, None] * [1.0, 0.7] + np.random.default_rng(3).normal(0, 0.02, (len(rows), 2))
+    made, episodes = imported(tmp_path, rows)
+    assert sum(len(e.taxels.counts) for e in episodes) == len(rows)
+    assert not any("stands still" in note for note in made.notes)
+
+
 @pytest.mark.parametrize(("rows_back", "share"), [(4, 0.1), (2, 0.3), (6, 0.5)])
 def test_a_hold_before_a_fast_way_back_stays(tmp_path, rows_back, share):
     ramp, hold, back = np.linspace(-9, 1.5, 60), np.full(60, 1.5), np.linspace(1.5, -9, rows_back + 1)[1:]

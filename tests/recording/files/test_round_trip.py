@@ -1,3 +1,4 @@
+import errno
 import os
 import signal
 import subprocess
@@ -320,6 +321,30 @@ def test_recover_saves_every_whole_chunk_behind_a_damaged_one(press, tmp_path):
     assert whole - 3 <= found.messages < whole
     with found.path.open("rb") as stream:
         assert sum(1 for _ in make_reader(stream).iter_messages()) == found.messages
+
+
+@pytest.mark.parametrize(("old", "new"), [(b"zstd", b"brot"), (b"zstd", b"lzma"), (b"zstd", b"ZSTD")])
+def test_a_compression_that_is_not_known_is_no_reason_to_press_again(press, tmp_path, old, new):
+    path = press.write(tmp_path / "episode-000000.mcap")
+    path.write_bytes(path.read_bytes().replace(old, new))
+    with pytest.raises(FormatError, match=f"a chunk of the compression '{new.decode()}' is left out") as refused:
+        recover(path)
+    assert "program that compressed it" in refused.value.remedy and "again with tacdata" not in refused.value.remedy
+    notes = read_recording(path).episode.notes
+    assert len([note for note in notes if "compression" in note]) == 1
+
+
+@pytest.mark.parametrize(("number", "words"), [(errno.ENOTCONN, "a drive that answers"), (errno.ENOSPC, "room")])
+def test_a_copy_that_cannot_be_written_names_the_true_reason(press, tmp_path, monkeypatch, number, words):
+    path = press.write(tmp_path / "episode-000000.mcap")
+
+    def refused(self, mode):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(Path, "open", refused)
+    with pytest.raises(DeviceError) as error:
+        recover(path)
+    assert words in error.value.allowed + error.value.remedy
 
 
 def test_a_copy_that_does_not_read_back_is_no_success(press, tmp_path, monkeypatch):
