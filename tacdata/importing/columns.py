@@ -12,7 +12,7 @@ from tacdata.documents import composed
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.text.layout import THOUSANDS
-from tacdata.importing.units import factor, quantity_of, split_unit
+from tacdata.importing.units import factor, plain, prefixed, quantity_of, split_unit
 
 Selector = str | int | list[Any]
 
@@ -44,9 +44,9 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
         names = [f"{names[0]}[{k}]" for k in range(table.inner(names[0]))]
         if isinstance(selector, str) and selector in table.columns:
             return [selector]
-    plain = {name: split_unit(name)[0] for name in names}
+    bare = {name: split_unit(name)[0] for name in names}
     if isinstance(selector, str):
-        for candidates in (names, list(plain.values())):
+        for candidates in (names, list(bare.values())):
             if selector in candidates:
                 return [names[candidates.index(selector)]]
         if match := re.fullmatch(r"(\d+)\s*-\s*(\d+)", selector):
@@ -152,12 +152,33 @@ def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
         )
     # Where the file contradicts itself, the mapping decides.
     if entry_unit and _differ(entry_unit, stated, where) and not (inside and not _differ(entry_unit, inside, where)):
-        raise FormatError(
-            f"{where}: {table.path.name} states {stated} for {base_name}, and the mapping {entry_unit}",
-            "one unit",
-            "leave unit out of the mapping; where the file is wrong, correct its header in a copy",
-        )
+        raise _contradiction(table, base_name, stated, entry_unit, where)
     return entry_unit or stated
+
+
+def units_of(table: SourceTable, names: list[str], entry: dict[str, Any], where: str) -> list[str]:
+    """Return the unit of each of some columns, by the mapping or the file; "" where neither gives one.
+
+    Raises:
+        FormatError: If the mapping's unit is another one of the same quantity.
+    """
+    units, given = [], entry.get("unit", "")
+    for name in names:
+        inside = split_unit(name)[1]
+        stated = table.units.get(name) or ("" if inside.isdigit() else inside)
+        if given and not quantity_of(stated) and prefixed(given, stated):
+            raise _contradiction(table, name, stated, given, where)
+        array = bool(table.inner(name))
+        units.append(plain(given or stated if array else unit_of(table, {**entry, "column": name}, where)))
+    return units
+
+
+def _contradiction(table: SourceTable, name: str, stated: str, given: str, where: str) -> FormatError:
+    return FormatError(
+        f"{where}: {table.path.name} states {stated} for {name}, and the mapping {given}",
+        "one unit",
+        "leave unit out of the mapping; where the file is wrong, correct its header in a copy",
+    )
 
 
 def _differ(first: str, second: str, where: str) -> bool:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import axis, numbers, select, single, unit_of
+from tacdata.importing.columns import axis, numbers, select, single, unit_of, units_of
 from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.plausibility.codes import table_without_codes, without_codes
 from tacdata.importing.plausibility.repeats import without_repeats
 from tacdata.importing.plausibility.time_order import moments, spread, time_order
 from tacdata.importing.times import NEVER, times
-from tacdata.importing.units import factor, plain, quantity_of, split_unit
+from tacdata.importing.units import factor, quantity_of, split_unit
 
 
 @dataclass(frozen=True)
@@ -216,9 +216,12 @@ def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[li
         table, names = _widened(mapping, table, entry)
     else:
         names = select(table, entry["columns"], "taxels: columns")
-    unit = entry.get("unit") or next((table.units[n] for n in names if n in table.units), "") or "as in the source"
     _refuse_clock(table, names, _clock(mapping, entry))
+    units = units_of(table, names, entry, "taxels")
+    unit = next(filter(None, units), "") or "as in the source"
     values, doubts = _readings(table, names, _missing(mapping, entry), entry, "taxels")
+    if several := _several(units):
+        unit, doubts = "as in the source", (*doubts, f"taxels: {several}")
     values = values * entry.get("scale", 1.0)
     labels = [f"{n}[{k}]" if width else n for n in names for width in (table.inner(n),) for k in range(max(width, 1))]
     if counted := "counter" in entry:
@@ -252,6 +255,12 @@ def _readings(
     values, codes = without_codes(values, name, rails=name == "taxels")
     values, repeats = without_repeats(values, name)
     return values, (*codes, *repeats)
+
+
+def _several(units: list[str]) -> str:
+    """Return a doubt about columns of different units; "" where they have one."""
+    named = list(dict.fromkeys(filter(None, units)))
+    return f"its columns have the units {', '.join(named)}, and each keeps its own" if len(named) > 1 else ""
 
 
 def _label(name: str) -> str:
@@ -337,14 +346,17 @@ def _measured(
 ) -> list[Stream]:
     table = _table(mapping, tables, entry["file"], f"measured: {name}")
     names = select(table, entry["columns"], f"measured: {name}")
-    stated = plain(entry.get("unit") or next((table.units[n] for n in names if n in table.units), ""))
-    ours = quantity_of(stated) if stated else None
+    units = units_of(table, names, entry, f"measured: {name}")
+    unit = next(filter(None, units), "")
     values, doubts = _readings(table, names, _missing(mapping, entry), entry, f"measured: {name}")
     values = values * entry.get("scale", 1.0)
-    if ours in ("N", "mm"):
-        values, unit = values * factor(stated, ours, f"measured: {name}"), ours
-    else:
-        unit = stated
+    ours = {quantity_of(each) for each in units if each}
+    if len(ours) == 1 and ours <= {"N", "mm"}:
+        (unit,) = ours
+        factors = [factor(each, unit, f"measured: {name}") if each else 1.0 for each in units]
+        values = values * np.repeat(factors, [max(table.inner(column), 1) for column in names])
+    elif several := _several(units):
+        unit, doubts = "as in the source", (*doubts, f"measured: {name}: {several}")
     # An array column expands to several, and then names and columns differ in number.
     labels = tuple(split_unit(n)[0] for n in names) if len(names) == values.shape[1] else None
     labels = labels or tuple(str(k) for k in range(values.shape[1]))

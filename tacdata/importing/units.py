@@ -130,6 +130,10 @@ OTHERS = {
 """Units that are recognized behind a column's name but not converted."""
 
 
+PREFIXES = "fpnumkMG"
+"""Letters before a unit that make it larger or smaller."""
+
+
 def plain(unit: str) -> str:
     """Return a unit's name in ASCII, as the tables have it."""
     name = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg").rstrip(".")
@@ -161,6 +165,12 @@ def _factor(unit: str, target: str) -> float | None:
         inner = _factor(remainder, target)
         return None if inner is None else steps * inner
     return None
+
+
+def prefixed(first: str, second: str) -> bool:
+    """Return whether two units differ by their prefix alone, as pF and nF, or mV and V."""
+    bare = {name[1:] if len(name) > 1 and name[0] in PREFIXES else name for name in (plain(first), plain(second))}
+    return plain(first) != plain(second) and len(bare) == 1
 
 
 def quantity_of(unit: str) -> str | None:

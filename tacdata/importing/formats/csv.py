@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import io
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -205,11 +206,13 @@ def _decodes(raw: bytes, encoding: str) -> bool:
 def _whole_cells(head: bytes) -> bytes:
     """Return a file's first lines without breaks inside quotes: a name and its unit, as a rule."""
     lines = head.split(b"\n")
-    odd = [line.count(b'"') % 2 == 1 for line in lines]
+    quotes = [line.count(b'"') for line in lines]
     # An odd number of quotes in a line means that a quoted cell goes on in the next one.
     for number in range(len(lines) - 1):
-        ends = next((k for k in range(number + 1, min(number + 4, len(lines))) if odd[k]), None)
-        if odd[number] and ends:
+        ends = next((k for k in range(number + 1, len(lines)) if quotes[k] % 2), 0) if quotes[number] % 2 else 0
+        # In between, a line ends one cell and begins another, and a cell has up to four lines.
+        with_quotes = [k for k in range(number, ends + 1) if quotes[k]]
+        if ends and max(after - before for before, after in pairwise(with_quotes)) < 4:
             lines[number : ends + 1] = [b" ".join(lines[number : ends + 1])]
             return _whole_cells(b"\n".join(lines))
     return head

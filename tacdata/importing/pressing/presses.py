@@ -35,6 +35,8 @@ FEWEST = 10
 """Fewest rows of a stretch between two steps back of the time that is a recording [rows]."""
 ANSWER = 5.0
 """Smallest change of readings that follow a path [their noise]."""
+LEAST = 0.005
+"""Smallest stroke that needs no question [mm]; tactile sensors feel some hundredths of a millimetre."""
 SLOWEST = 1e-4
 """Smallest speed that a press is given [mm/s]."""
 UNITS = {
@@ -189,7 +191,7 @@ def _imported(
             f"presses of at most {limit:g} mm",
             "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
         )
-    for doubt in filter(None, (restarted, _never_touched(taxels, position, tip[:, 2]))):
+    for doubt in filter(None, (restarted, _path_doubt(taxels, position, tip[:, 2]))):
         record = {**record, "set_aside": [*record["set_aside"], doubt], "notes": [*record["notes"], doubt]}
     indenter, name = _indenter(mapping)
     if name == "unknown":
@@ -225,10 +227,10 @@ def _imported(
     return ImportedPress(press, sensor, registration, taxels, position, streams.measured, phases, {}, record, lost)
 
 
-def _never_touched(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
-    """Return a doubt about the zero of a path that stays above the skin while the readings follow it; "" without."""
+def _path_doubt(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
+    """Return a doubt about the zero or the unit of a path that the readings follow, above the skin or hardly moved."""
     stroke = float(np.ptp(depth))
-    if stroke <= 0 or depth.max() > 0:
+    if stroke <= 0 or (depth.max() > 0 and stroke >= LEAST):
         return ""
     at = np.interp(taxels.time_ns, position.time_ns, depth)
     low, high = at <= at.min() + 0.1 * stroke, at >= at.max() - 0.1 * stroke
@@ -238,6 +240,8 @@ def _never_touched(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
     change = np.abs(np.nanmedian(taxels.values[high], axis=0) - np.nanmedian(taxels.values[low], axis=0))
     if not (change > ANSWER * noise).any():
         return ""
+    if stroke < LEAST:
+        return f"position: it moves by {1000 * stroke:.3g} um in all, and the readings follow it: is its unit another?"
     return (
         f"position: it stays {abs(depth.max()):.4g} mm above the skin, and the readings follow it: correct its zero "
         "(contact, offset, or zero under the position) or its sign (scale: -1)"

@@ -27,9 +27,8 @@ def brought(folder, data, **changes):
     clock = {"path": "wide.csv", "time": {"column": 0}, **changes.pop("file", {})}
     taxels = {"file": "data", "columns": [2, 3], "unit": "pF"}
     depth = {"file": "data", "depth": {"column": 1, "unit": "mm"}}
-    path = mapping(
-        folder, version="1.2", measured=None, files={"data": clock}, taxels=taxels, **{"position": depth, **changes}
-    )
+    usual = {"measured": None, "taxels": taxels, "position": depth}
+    path = mapping(folder, version="1.2", files={"data": clock}, **{**usual, **changes})
     made = import_session(folder, path, Path(f"{folder}.session"))
     return made, read_recording(made.folder / "episode-000000.mcap").episode
 
@@ -286,3 +285,70 @@ def test_a_file_whose_name_and_line_of_units_differ_is_decided_by_the_mapping(tm
         return
     error = refusal(tmp_path, data, position=position)
     assert "disp [mm]" in error.given and ("um" in error.given)
+
+
+def loads(units):
+    """A table with two forces in units of their own, 1 and 2 N at 1 mm."""
+    scales = {"N": 1.0, "mN": 1000.0, "kg": 1 / 9.80665, "Nmm": 1.0}
+    rows = [
+        f"{t:.3f},{d:.4f},{20 + d:.4f},{d * scales[units[0]]:.6f},{2 * d * scales[units[1]]:.6f}"
+        for t, d in zip(TIME, DEPTH, strict=True)
+    ]
+    return "\n".join([f"t [s],disp [mm],cap0,fx [{units[0]}],fz [{units[1]}]", *rows]) + "\n"
+
+
+@pytest.mark.parametrize("units", [("N", "mN"), ("kg", "N"), ("mN", "kg")])
+def test_forces_of_different_units_are_each_converted(tmp_path, units):
+    force = {"force": {"file": "data", "columns": [3, 4]}}
+    _, episode = brought(tmp_path, loads(units), taxels={"file": "data", "columns": [2]}, measured=force)
+    (measured,) = episode.measured
+    np.testing.assert_allclose(measured.values, DEPTH[:, None] * [1.0, 2.0], atol=2e-5)
+    assert measured.unit == "N"
+
+
+def test_a_moment_beside_a_force_keeps_its_unit_and_is_told(tmp_path):
+    force = {"wrench": {"file": "data", "columns": [3, 4]}}
+    made, _ = brought(tmp_path, loads(("N", "Nmm")), taxels={"file": "data", "columns": [2]}, measured=force)
+    assert "measured: wrench: its columns have the units N, Nmm, and each keeps its own" in made.notes
+
+
+@pytest.mark.parametrize("given", ("N", "mN"))
+def test_a_unit_of_a_force_that_the_file_contradicts_is_refused(tmp_path, given):
+    force = {"force": {"file": "data", "columns": [3, 4], "unit": given}}
+    error = refusal(tmp_path, loads(("kg", "kg")), taxels={"file": "data", "columns": [2]}, measured=force)
+    assert f"states kg for fx [kg], and the mapping {given}" in error.given
+
+
+@pytest.mark.parametrize(("stated", "given"), [("pF", "nF"), ("mV", "V"), ("kPa", "Pa"), ("uT", "mT")])
+def test_a_prefix_of_the_channels_unit_that_the_file_contradicts_is_refused(tmp_path, stated, given):
+    header = f"t [s],disp [mm],cap0 [{stated}],cap1 [{stated}]"
+    error = refusal(tmp_path, text(header), taxels={"file": "data", "columns": [2, 3], "unit": given})
+    assert f"states {stated} for cap0" in error.given
+    made, _ = brought(tmp_path, text(header), taxels={"file": "data", "columns": [2, 3], "unit": stated})
+    assert made.recordings == 1
+
+
+@pytest.mark.parametrize(("first", "second"), [("nF", "pF"), ("V", "mV"), ("counts", "V")])
+def test_channels_of_different_units_are_told(tmp_path, first, second):
+    data = text(f"t [s],disp [mm],cap0 [{first}],cap1 [{second}]")
+    made, _ = brought(tmp_path, data, taxels={"file": "data", "columns": [2, 3]})
+    assert f"taxels: its columns have the units {first}, {second}, and each keeps its own" in made.notes
+
+
+@pytest.mark.parametrize("breaks", (1, 2))
+def test_line_breaks_in_the_quoted_names_of_all_columns_are_joined(tmp_path, breaks):
+    names = [f'"{name}{chr(10) * breaks}[{unit}]"' for name, unit in zip("tdab", ("s", "mm", "pF", "pF"), strict=True)]
+    lines = text().split("\n")
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["\t".join(names), *(line.replace(",", "\t") for line in lines[1:])]))
+    table = read_table(path, {})
+    assert [split_unit(name)[0] for name in table.columns] == ["t", "d", "a", "b"] and table.rows == ROWS
+
+
+@pytest.mark.parametrize(("unit", "doubt"), [("um", True), ("mm", False), ("nm", True)])
+def test_a_path_too_short_for_a_tactile_sensor_is_asked_about(tmp_path, unit, doubt):
+    path = 1.2 * np.sin(np.pi * TIME / TIME[-1]) ** 2
+    rows = [f"{t:.3f},{d:.5f},{20 + d:.4f},{30 + d:.4f}" for t, d in zip(TIME, path, strict=True)]
+    data = "\n".join([f"t [s],disp [{unit}],cap0,cap1", *rows]) + "\n"
+    made, _ = brought(tmp_path, data, position={"file": "data", "depth": {"column": 1}})
+    assert any("is its unit another?" in note for note in made.notes) == doubt
