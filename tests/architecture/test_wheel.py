@@ -26,7 +26,7 @@ def contents(tmp_path_factory):
 
 
 def test_the_wheel_carries_every_source_schema_and_description(contents):
-    kinds = (".py", ".json", ".proto", ".yaml", ".yml", ".npz", ".html", ".j2", ".mcap", ".parquet")
+    kinds = (".py", ".json", ".proto", ".yaml", ".yml", ".npz", ".html", ".j2", ".css", ".js", ".mcap", ".parquet")
     wanted = {
         ("" if package == "tacdata" else "tacdata/") + p.relative_to(ROOT).as_posix()
         for package in PACKAGES

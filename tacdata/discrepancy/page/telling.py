@@ -8,7 +8,7 @@ import numpy as np
 
 from tacdata.discrepancy.verdict.residual_table import Residuals
 
-MOST_TOLD = 3
+MOST_TOLD = 24
 """Presses that are shown."""
 
 

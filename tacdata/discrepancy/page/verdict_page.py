@@ -2,45 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tacdata.discrepancy.heading import origin, sentence, sizes
-from tacdata.discrepancy.page import charts
+from tacdata.discrepancy.heading import sentence, sizes
 from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.telling import ToldPress, telling
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.verdict.residual_table import Residuals
 from tacdata.discrepancy.verdict.text import LEAST_CLOSED, between_specimens, unsaid
-from tacdata.effects import Family, load
+from tacdata.effects import load
+from tacdata.pages import Band, Cell, HtmlPage, Items, PageHeader, Plot, Series, Shares, Slider, Table, Tiles
 
 MOST_RIVALS = 4
 """Rivals of an effect that have a line, the nearest."""
-LOOPS = {Family.SKIN_MEMORY.value, Family.FRICTION_AND_PLAY.value, Family.DELAY_AND_FILTER.value}
-"""Families whose effects show as loops over depth."""
-REST, NOISE = "left: a press's own pose and gain, and what has no name", "noise"
+REST = "left: a press's own pose and gain, and what has no name"
 PARTED = ("phase", "depth", "rate")
 """Kinds of slices shown before and after, next to the map."""
 TAKEN_OUT = "each press's own pose and gain taken out"
 FILLED = 0.5
 """Share of its fields in which a map has readings enough, at least."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """One section of the page."""
-
-    title: str
-    pictures: tuple[str, ...] = ()
-    """SVG."""
-    lines: tuple[str, ...] = ()
-    legend: tuple[tuple[str, str], ...] = ()
-    """Class of the style sheet and words."""
-    folded: bool = False
-    """Whether it opens on a click."""
 
 
 def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
@@ -50,22 +34,44 @@ def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
         verdict: `schemas/verdict.schema.json`.
         found: Readings and the model's predictions.
     """
-    presses = telling(found)
-    parts = [
-        Part("What to do next", lines=tuple(verdict["next"])),
-        _presses(verdict, found, presses),
-        _loops(verdict, presses),
-        _shares(verdict),
-        _where(verdict, found),
-        _path(verdict),
-        _rivals(verdict),
-        Part("Of these recordings", lines=tuple(unsaid(verdict))),
-        *_folded(verdict),
-    ]
-    shown = [part for part in parts if part.pictures or part.lines]
+    page = HtmlPage(_header(verdict))
+    page.add("Size of the gap", Tiles(_tiles(verdict)))
+    page.add("Presses, measured and predicted", _presses(verdict, found))
+    page.add("The gap on sealed presses", _shares(verdict))
+    page.add(
+        "Where the gap lives" if verdict["gate"]["gap"] else "Where the residual is largest", *_where(verdict, found)
+    )
+    for title, lines in (
+        ("In which order effects were added, and what each explains beyond the others", _path(verdict)),
+        ("Why not the others", _rivals(verdict)),
+        ("Of these recordings", unsaid(verdict)),
+    ):
+        page.add(title, _items(lines))
+    for title, lines in _folded(verdict):
+        page.add(title, _items(lines), folded=True)
+    return page.text
+
+
+def _items(lines: Sequence[str]) -> Items | None:
+    return Items(lines) if lines else None
+
+
+def _header(verdict: dict[str, Any]) -> PageHeader:
+    heading, stamp = verdict.get("heading", {}), verdict.get("provenance", {})
     first, further = sentence(verdict["why"])
-    head = {"sentence": first, "further": further, "sizes": sizes(verdict), "origin": origin(verdict)}
-    return _template().render(verdict=verdict, head=head, parts=shown, tiles=_tiles(verdict))
+    recorded = f"recorded {heading['recorded']}" if heading.get("recorded") else ""
+    judged = f"judged {stamp['made_at'][:10]}" if "made_at" in stamp else ""
+    return PageHeader(
+        "Verdict",
+        first,
+        of=", ".join(Path(path).name for path in heading.get("recordings", ())),
+        made=", ".join(words for words in (recorded, judged) if words),
+        version=stamp.get("code_version", ""),
+        status=verdict["status"],
+        tone="good" if verdict["status"] == "named" else "",
+        lines=[*sizes(verdict), *([further] if further else [])],
+        next=verdict["next"],
+    )
 
 
 def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
@@ -85,85 +91,100 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
     return tiles
 
 
-def _presses(verdict: dict[str, Any], found: Residuals, presses: list[ToldPress]) -> Part:
+def _presses(verdict: dict[str, Any], found: Residuals) -> Slider | None:
+    """Return the presses under one slider: reading, residual, and what lies beyond the model over depth."""
+    presses = telling(found)
+    if not presses:
+        return None
     added = bool(verdict["effects"]) and not between_specimens(verdict)
-    pictures: list[str] = []
-    for p in presses:
-        level = float(np.nanmedian(p.measured[:5]))
-        lines = [("measured", p.measured - level), ("before", p.before - level)]
-        left = [("before", p.measured - p.before)]
-        if added:
-            lines.append(("after", p.after - level))
-            left.append(("after", p.measured - p.after))
-        pictures.append(charts.curves(f"{p.name}, {p.stream}", p.time, lines, ("time [s]", "reading above idle")))
-        pictures.append(charts.curves("residual; grey: noise", p.time, left, ("time [s]", "residual"), 2 * p.noise))
-    kind = "Sealed presses that tell most" if found.sealed else "Presses that tell most"
-    return Part(kind, tuple(pictures), legend=_legend(added))
+    unit = verdict.get("heading", {}).get("unit", "") or "the stream's unit"
+    kind = "sealed press" if found.sealed else "press"
+    panels = zip(*(_panels(press, unit, added) for press in presses), strict=True)
+    return Slider(f"{kind}, the most telling first", [f"{p.name}, {p.stream}" for p in presses], list(panels))
 
 
-def _legend(added: bool) -> tuple[tuple[str, str], ...]:
-    last = (("after", "model with the effects"),) if added else ()
-    return (("measured", "measured"), ("before", "model as it was"), *last)
+def _panels(p: ToldPress, unit: str, added: bool) -> tuple[Plot, Plot, Plot]:
+    level, noise = (
+        float(np.nanmedian(p.measured[:5])),
+        Band(-2 * p.noise, 2 * p.noise, "noise, two standard deviations"),
+    )
+    reading = [
+        Series("measured", p.measured - level, "ink", width=3.0),
+        Series("model as it was", p.before - level, "vermilion"),
+    ]
+    residual = [Series("model as it was", p.measured - p.before, "vermilion")]
+    beyond = [Series("measured", p.measured - p.before, "ink", x=p.depth)]
+    if added:
+        reading.append(Series("model with the effects", p.after - level, "blue"))
+        residual.append(Series("model with the effects", p.measured - p.after, "blue"))
+        beyond.append(Series("model with the effects", p.after - p.before, "blue", x=p.depth))
+    # On the scale of the readings a loop is too thin to be seen.
+    return (
+        Plot("reading above idle", "time [s]", f"reading [{unit}]", reading, p.time, link="press"),
+        Plot(
+            "residual: measured less model", "time [s]", f"residual [{unit}]", residual, p.time, [noise], link="press"
+        ),
+        Plot("beyond the model as it was, over depth", "depth [mm]", f"difference [{unit}]", beyond, bands=[noise]),
+    )
 
 
-def _loops(verdict: dict[str, Any], presses: list[ToldPress]) -> Part:
-    if not any(e.get("family") in LOOPS for e in verdict["effects"]):
-        return Part("")
-    pictures = []
-    for p in presses:
-        # On the scale of the readings a loop is too thin to be seen.
-        lines = [("measured", p.measured - p.before), ("after", p.after - p.before)]
-        pictures.append(charts.curves(f"{p.name}, {p.stream}", p.depth, lines, ("depth [mm]", "beyond the model")))
-    legend = (("measured", "measured, less the model as it was"), ("after", "what the effects add to it"))
-    return Part("Loops over depth", tuple(pictures), legend=legend)
-
-
-def _shares(verdict: dict[str, Any]) -> Part:
+def _shares(verdict: dict[str, Any]) -> Shares | None:
     """Return the sealed gap as one bar: each name, the remainder."""
     sealed = verdict["sealed"]
     if not sealed["episodes"] or not verdict["effects"] or not sealed["certain"] or sealed["closed"] <= 0:
-        return Part("")
-    named = [(name, share) for name, share in sealed["shares"].items() if share > 0]
-    rest = max(1 - sealed["closed"], 0.0)
-    kinds = [(f"share{k % 4}", load(name).spoken, share) for k, (name, share) in enumerate(named)]
-    every = [*kinds, ("rest", REST, rest)]
-    legend = tuple((kind, f"{name} {100 * share:.0f} %") for kind, name, share in every)
-    return Part("The gap on sealed presses", (charts.shares_bar(every),), legend=legend)
+        return None
+    named = [(load(name).spoken, share) for name, share in sealed["shares"].items() if share > 0]
+    return Shares([*named, (REST, max(1 - sealed["closed"], 0.0))], REST)
 
 
-def _where(verdict: dict[str, Any], found: Residuals) -> Part:
+def _where(verdict: dict[str, Any], found: Residuals) -> list[Any]:
     made = heat_map(found)
-    most = max(float(np.nanmax(made.before, initial=1.0)), 2.0)
     added = bool(verdict["effects"]) and not between_specimens(verdict)
     parts = [part for part in verdict["slices"] if part["by"] in PARTED] if added else []
-    title = "before, each press's own pose and gain left in" if parts else "mean square over the noise"
-    pictures, said = [], verdict["located"]
+    title = "mean square over the noise"
+    blocks: list[Any] = []
+    said = verdict["located"]
     if made.rows and (not parts or np.isfinite(made.before).mean() >= FILLED):
-        pictures.append(charts.map_of(title, made.rows, made.columns, made.before, most))
+        title += ", before; each press's own pose and gain left in" if parts else ""
+        blocks.append(_heated(title, ("phase", *made.columns), made.rows, made.before))
     if parts:
         # Under poses and gains that effects do not explain, the map would hardly change.
         square = np.array([[part["before"], part["after"]] for part in parts])
-        names, most = [part["name"] for part in parts], max(float(square.max()), 2.0)
-        pictures.append(charts.map_of(TAKEN_OUT, names, ("before", "with the effects"), square, most))
+        names = [part["name"] for part in parts]
+        heads = (", ".join(PARTED), "before", "with the effects")
+        blocks.append(_heated(f"mean square over the noise, {TAKEN_OUT}", heads, names, square))
         said = [words for words in said if words.split(":")[0] not in PARTED]
     after = verdict.get("located_after", ())
     rest = [f"without a name yet: {words}" for words in after if list(after) != verdict["located"]]
     beside = "the map holds each press's own pose and gain, too; these mean squares over the noise leave that out"
     located = (*(() if parts else (beside,)), *said) if said else ()
-    title = "Where the gap lives" if verdict["gate"]["gap"] else "Where the residual is largest"
-    return Part(title, tuple(pictures), (*located, *rest))
+    lines = [*located, *rest]
+    return [*blocks, *([Items(lines)] if lines else [])]
 
 
-def _path(verdict: dict[str, Any]) -> Part:
+def _heated(title: str, heads: Sequence[str], names: Sequence[str], squares: np.ndarray) -> Table:
+    """Return mean squares over the noise as a table; its largest value has the deepest colour."""
+    most = max(float(np.nanmax(squares, initial=1.0)), 2.0)
+    rows = [[name, *(_square(float(value), most) for value in row)] for name, row in zip(names, squares, strict=True)]
+    return Table(heads, rows, title)
+
+
+def _square(value: float, most: float) -> Cell:
+    if not np.isfinite(value):
+        return Cell(None)
+    return Cell(plain_number(value, 3), heat=float(np.clip(np.log(max(value, 1.0)) / np.log(most), 0, 1)))
+
+
+def _path(verdict: dict[str, Any]) -> list[str]:
     lines = []
     for step in verdict["path"]:
         title, share = load(step["effect"]).title, step["share"]
         told = "dropped, or replaced by another form" if share is None else f"{100 * share:.0f} %"
         lines.append(f"{title}: {told}")
-    return Part("In which order effects were added, and what each explains beyond the others", lines=tuple(lines))
+    return lines
 
 
-def _rivals(verdict: dict[str, Any]) -> Part:
+def _rivals(verdict: dict[str, Any]) -> list[str]:
     """Return one line a rival: why it is not the name, or why it may be."""
     lines = []
     for e in verdict["effects"]:
@@ -179,7 +200,7 @@ def _rivals(verdict: dict[str, Any]) -> Part:
                 lines.append(f"{other} may stand in for {mine}: {_apart(by)}{form}")
             else:
                 lines.append(f"not {other}: {_apart(by)} than {mine}")
-    return Part("Why not the others", lines=tuple(dict.fromkeys(lines)))
+    return list(dict.fromkeys(lines))
 
 
 def _apart(by: float) -> str:
@@ -188,7 +209,7 @@ def _apart(by: float) -> str:
     return f"it explains the presses better by {-by:.1f} standard errors" if by < 0 else "it explains them as well"
 
 
-def _folded(verdict: dict[str, Any]) -> list[Part]:
+def _folded(verdict: dict[str, Any]) -> list[tuple[str, list[str]]]:
     """Return the effects that cannot be judged, by reason, and those known and not modelled."""
     reasons: dict[str, list[str]] = {}
     for name, reason in verdict["unjudgeable"].items():
@@ -196,16 +217,7 @@ def _folded(verdict: dict[str, Any]) -> list[Part]:
     lines = [f"{reason}: {', '.join(sorted(set(names)))}" for reason, names in reasons.items()]
     untested = "; ".join(words.split(": ", 1)[-1] for words in verdict["untested"])
     return [
-        Part("Limitations of these recordings", lines=tuple(verdict.get("limitations", ())), folded=True),
-        Part("What cannot be judged here, by reason", lines=tuple(lines), folded=True),
-        Part("Known, and not modelled", lines=(untested,) if untested else (), folded=True),
+        ("Limitations of these recordings", list(verdict.get("limitations", ()))),
+        ("What cannot be judged here, by reason", lines),
+        ("Known, and not modelled", [untested] if untested else []),
     ]
-
-
-@cache
-def _template() -> Any:
-    from jinja2 import Environment, PackageLoader
-
-    return Environment(loader=PackageLoader("tacdata.discrepancy.page", "."), autoescape=True).get_template(
-        "verdict.html.j2"
-    )
