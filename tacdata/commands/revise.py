@@ -23,7 +23,7 @@ EXAMPLES = (
 def run(
     verdict: Annotated[Path, typer.Argument(help="Folder that tacdata discrepancy wrote.")],
     recordings: Annotated[list[Path], typer.Argument(help="The recordings or sessions that it was given.")],
-    out: Annotated[Path, typer.Option(help="New folder for spec.json, card.html, gap.png, gap.rrd, next.yaml.")],
+    out: Annotated[Path, typer.Option(help="New folder for spec.json, card.html, gap.rrd, next.yaml.")],
     spec: Annotated[Path | None, typer.Option(help="The model spec that it was given, if one was.")] = None,
     relabel: Annotated[bool, typer.Option("--relabel", help="Make the labels again that the effect moves.")] = False,
     store: Annotated[Path | None, typer.Option(help="Folder of solved presses; else SESSION/labels/store.")] = None,

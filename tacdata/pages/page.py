@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from html import escape
 from importlib.resources import files
 from typing import Any
 
@@ -112,15 +113,14 @@ def _script(drawn: bool) -> str:
 @cache
 def _template(name: str = "page.html.j2") -> Any:
     from jinja2 import Environment, PackageLoader
-    from markupsafe import Markup, escape
 
-    def coded(words: str) -> Markup:
+    def coded(words: object) -> str:
         """Words in backquotes as code; those that begin with the command's name can be copied."""
         pieces = []
         for number, piece in enumerate(str(words).split("`")):
             command = ' class="command"' if piece.startswith("tacdata ") else ""
-            pieces.append(f"<code{command}>{escape(piece)}</code>" if number % 2 else str(escape(piece)))
-        return Markup("".join(pieces))
+            pieces.append(f"<code{command}>{escape(piece)}</code>" if number % 2 else escape(piece))
+        return "".join(pieces)
 
     environment = Environment(
         loader=PackageLoader("tacdata.pages", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True

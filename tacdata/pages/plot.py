@@ -66,6 +66,8 @@ class Plot:
     """Figures of one link share cursor and zoom."""
     least: float | None = None
     """Value that the axis shows at least [the figure's unit]."""
+    most: int = MOST_POINTS
+    """Points of a curve that are kept."""
     kind: ClassVar[str] = "plot"
 
     @property
@@ -89,12 +91,14 @@ class Plot:
                     "as many values as places",
                     "give x to the figure or the series",
                 )
-        pick = None if self.x is None else picked(len(self.x))
+        pick = None if self.x is None else picked(len(self.x), self.most)
         return {
             "title": self.title,
             "x": {"label": self.x_label, "values": None if self.x is None else np.asarray(self.x)[pick]},
             "y": self.y_label,
-            "series": [_series(one, pick if one.x is None else picked(len(one.values))) for one in self.series],
+            "series": [
+                _series(one, pick if one.x is None else picked(len(one.values), self.most)) for one in self.series
+            ],
             "bands": [{"low": b.low, "high": b.high, "name": b.name} for b in self.bands],
             "names": list(self.names),
             "link": self.link,
@@ -125,7 +129,7 @@ class Slider:
         return [as_json([plot.document for plot in panel]) for panel in self.panels]
 
 
-def picked(count: int, most: int = MOST_POINTS) -> np.ndarray:
+def picked(count: int, most: int) -> np.ndarray:
     """Return the indices of the points that are drawn, evenly spread, int, shape (m,)."""
     return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)) if count else np.zeros(0, int)
 

@@ -20,12 +20,11 @@ from tacdata.recording.session import FILE
 from tacdata.revision.additions import Addition, additions, of_verdict, placed_of, suspects
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.corrected import write_corrected
-from tacdata.revision.episodes import Sealed, sealed
+from tacdata.revision.episodes import sealed
 from tacdata.revision.evidence import table
 from tacdata.revision.evidence.card import card
 from tacdata.revision.evidence.curves import EpisodeCurves, curves
 from tacdata.revision.evidence.gap import GapReduction, ResidualChange, gap, noise_of
-from tacdata.revision.evidence.picture import draw
 from tacdata.revision.evidence.worst_slice import sealed_slices
 from tacdata.revision.labels.confirm import Confirmed, confirm, touches_fem
 from tacdata.revision.labels.realised import TipError, tip_error
@@ -35,11 +34,10 @@ from tacdata.revision.next_presses.recommend import recommend
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.pressed import pressed
 
-REVISION, SPEC, CARD, PICTURE, TABLE, CSV, CORRECTED, LABELS = (
+REVISION, SPEC, CARD, TABLE, CSV, CORRECTED, LABELS = (
     "revision.json",
     "spec.json",
     "card.html",
-    "gap.png",
     "gap.md",
     "gap.csv",
     "corrected.csv",
@@ -49,6 +47,8 @@ REVISION, SPEC, CARD, PICTURE, TABLE, CSV, CORRECTED, LABELS = (
 
 KIND = "recording "
 """Prefix of a verdict's recordings among its parents."""
+SHOWN = 8
+"""Episodes whose curves the card shows, at most."""
 NETWORKS = "networks"
 """Folder of the datasets and networks of both models."""
 Note = Callable[[str], None]
@@ -155,17 +155,16 @@ def revise(
         "next": {"plan": None, "presses": [], "remark": ""},
         "provenance": provenance.stamp("tacdata revise", parents, {"confirm": options.confirm}),
     }
-    pictures = _pictures(document, verdict, comparison, answer, change, seal, target, note)
-    _write(document, verdict, target)
+    note("curves, table")
+    shown = tuple(curves(comparison, change, seal.numbers, SHOWN)) if change else ()
+    _write(document, verdict, shown, target)
     if added:
         document |= _about_labels(recordings, comparison, answer, target, options, note)
     document["tips"] = [{"session": s, **asdict(t)} for s, t in _tips(recordings, answer, options, note)]
-    _write(document, verdict, target)
+    _write(document, verdict, shown, target)
     document["next"] = recommend(recordings, comparison, verdict, target, options.presses, note)
-    if document["retrained"]:  # the picture shows the networks, too
-        pictures = _pictures(document, verdict, comparison, answer, change, seal, target, note)
-    _write(document, verdict, target)
-    return Revised(document, target, pictures)
+    _write(document, verdict, shown, target)
+    return Revised(document, target, shown)
 
 
 def _about_labels(
@@ -336,31 +335,10 @@ def _finite(values: dict[str, Any]) -> dict[str, Any]:
     return {k: _or_none(v) if isinstance(v, float) else v for k, v in values.items()}
 
 
-def _pictures(
-    document: dict[str, Any],
-    verdict: dict[str, Any],
-    comparison: Comparison,
-    answer: list[Placed],
-    change: GapReduction | None,
-    seal: Sealed,
-    target: Path,
-    note: Note,
-) -> tuple[EpisodeCurves, ...]:
-    if change is None:
-        return ()
-    note("picture, table")
-    episode_curves = curves(comparison, change, seal.numbers)
-    names = " and ".join(p.effect.title.lower() for p in answer)
-    networks = (document["retrained"] or {}).get("metrics", ())
-    draw(f"{verdict['status']}: {names}", episode_curves, change, target / PICTURE, networks)
-    return tuple(episode_curves)
-
-
-def _write(document: dict[str, Any], verdict: dict[str, Any], target: Path) -> None:
+def _write(document: dict[str, Any], verdict: dict[str, Any], shown: tuple[EpisodeCurves, ...], target: Path) -> None:
     """Write the document, the tables and the card."""
     documents.write(target / REVISION, document, "revision")
     if document["gap"]:
         documents.write_text(target / TABLE, table.markdown(document))
         documents.write_text(target / CSV, table.as_csv(document))
-    picture = target / PICTURE
-    documents.write_text(target / CARD, card(document, verdict, picture if picture.is_file() else None))
+    documents.write_text(target / CARD, card(document, verdict, shown))

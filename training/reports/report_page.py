@@ -1,20 +1,24 @@
-"""The report of several runs as one HTML page: splits, tables, pictures, reliability."""
+"""The report of several runs as one HTML page: summary, tables, maps, splits, reliability."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from tacdata.pages import Cell, HtmlPage, Items, PageHeader, Paragraph, PixelMap, Plot, Prose, Series, Table
 from tacdata.training.frames.frames import Frames
 from tacdata.training.reports.comparison import Group, groups, verdicts
-from tacdata.training.reports.html_page import HtmlPage
-from tacdata.training.reports.score_picture import draw_cases
+from tacdata.training.reports.score_picture import cases_of
 from tacdata.training.reports.score_sheet import markdown, number, title
 from tacdata.training.scoring.evaluate import METRICS, Evaluation
 from tacdata.training.scoring.published import TABLE_1
+
+COLORS = ("blue", "vermilion", "green", "purple", "amber", "sky", "ink", "grey")
+"""Colours of indenters and networks, in their order."""
+MOST_SIGNALS = 150
+"""Points of each signal that a page holds."""
 
 
 @dataclass(frozen=True)
@@ -36,23 +40,14 @@ def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None
         trials: The sheet of the paper's configuration-referenced evaluations, as Markdown; empty for none.
         impossible: Split -> why it could not be made.
     """
-    result = HtmlPage("Scores by split")
     runs, settings = _briefly(runs)
     group_list = groups((run.name, run.evaluation.document) for run in runs)
-    result.paragraph(runs[0].evaluation.document["statement"])
-    _overview(result, group_list, impossible or {})
-    for sentence in settings:
-        result.paragraph(sentence, note=True)
+    result = HtmlPage(_header(runs, group_list))
+    _overview(result, group_list, settings, impossible or {})
     _data(result, runs[0].frames)
-    if any(group.reliability for group in group_list):
-        result.heading("Reliability of the pixels' uncertainty")
-        words = (
-            "Share of errors inside intervals that were calibrated on validation episodes, against what should "
-            "lie there: on the diagonal the uncertainty is right, below it too small."
-        )
-        result.picture(lambda stream: _draw_reliability(stream, group_list), words)
+    _reliability(result, [group for group in group_list if group.reliability])
     if trials:
-        result.markdown(trials)
+        result.add("The paper's trials", Prose(trials))
     shown_pairs: set[tuple[str, str]] = set()
     for run in runs:
         document = run.evaluation.document
@@ -62,6 +57,32 @@ def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None
         shown_pairs.add(key)
         _run(result, run, document)
     return result.text
+
+
+def _header(runs: list[Scored], group_list: list[Group]) -> PageHeader:
+    document = runs[0].evaluation.document
+    stamp, checkpoint = document["provenance"], document["checkpoint"]["hash"][:12]
+    return PageHeader(
+        "Scores by split",
+        summary(group_list),
+        of=f"sensor {document['sensor']['name']}, dataset {document['dataset']['path']}",
+        made=stamp.get("made_at", "")[:10],
+        version=stamp["code_version"],
+        lines=[document["statement"], f"The first network's checkpoint is {checkpoint}."],
+    )
+
+
+def summary(group_list: list[Group]) -> str:
+    """Return the scores in one sentence: the best network's errors, on how many frames."""
+    if not group_list:
+        return "No run has a labelled frame in contact, so there is no score."
+    best = min(group_list, key=lambda group: group.mean("contact_rmse"))
+    where, overlap = best.mean("centroid_error"), best.mean("iou")
+    parts = [f"errs by {number(best.mean('contact_rmse'))} mm in depth where there is contact"]
+    parts += [f"by {number(where, 2)} pixels in its place"] if np.isfinite(where) else []
+    parts += [f"and overlaps it by {100 * overlap:.0f} %"] if np.isfinite(overlap) else []
+    which = f"Of {len(group_list)} networks and splits the best, {best.name}" if len(group_list) > 1 else best.name
+    return f"{which[:1].upper()}{which[1:]}, split {best.split}, {', '.join(parts)} ({best.frames:,} frames)."
 
 
 def _briefly(runs: list[Scored]) -> tuple[list[Scored], list[str]]:
@@ -76,30 +97,34 @@ def _briefly(runs: list[Scored]) -> tuple[list[Scored], list[str]]:
     return [replace(run, name=short[run.name]) for run in runs], recipes
 
 
-def _overview(result: HtmlPage, group_list: list[Group], impossible: dict[str, str]) -> None:
-    result.heading("Splits, networks and seeds")
-    result.paragraph(
-        "Mean over the frames in contact, then mean ± SD over seeds. Bold: better than the paper's mean and than every "
-        "predictor without a network on the same split."
-    )
+def _overview(result: HtmlPage, group_list: list[Group], settings: list[str], impossible: dict[str, str]) -> None:
     heads = ["Network", "Split", "Seeds", "Frames", *(title(m) for m in METRICS), "ms a frame"]
     rows = [
-        [g.name, g.split, str(len(g.seeds)), str(g.frames), *(_cell(g, m) for m in METRICS), f"{g.pace:.2f}"]
-        for g in group_list
+        [
+            group.name,
+            group.split,
+            len(group.seeds),
+            group.frames,
+            *(Cell(_cell(group, m), strong=group.stands_out(m)) for m in METRICS),
+            f"{group.pace:.2f}",
+        ]
+        for group in group_list
     ]
     paper = ["The paper, its own data", "not said", "", "", *(number(TABLE_1[m]["mean"]) for m in METRICS), ""]
-    metrics = list(METRICS)
-    result.table(
-        heads,
-        [*rows, *_baseline_rows(group_list), paper],
-        lambda row, column: (
-            row < len(group_list) and 4 <= column < 9 and group_list[row].stands_out(metrics[column - 4])
+    notes = [
+        *verdicts(group_list),
+        *(f"Split {split} was not possible: {reason}" for split, reason in impossible.items()),
+        *settings,
+    ]
+    result.add(
+        "Splits, networks and seeds",
+        Paragraph(
+            "Mean over the frames in contact, then mean ± SD over seeds. Bold: better than the paper's mean and than "
+            "every predictor without a network on the same split."
         ),
+        Table(heads, [*rows, *_baseline_rows(group_list), paper]),
+        Items(notes, note=True) if notes else None,
     )
-    for sentence in verdicts(group_list):
-        result.paragraph(sentence, note=True)
-    for split, reason in impossible.items():
-        result.paragraph(f"Split {split} was not possible: {reason}", note=True)
 
 
 def _baseline_rows(group_list: list[Group]) -> list[list[str]]:
@@ -125,59 +150,69 @@ def _cell(group: Group, metric: str) -> str:
 
 
 def _data(result: HtmlPage, frames: Frames) -> None:
-    result.heading("Data")
     specimens = sorted({e.specimen for e in frames.episodes if e.specimen})
     speeds = [e.speed for e in frames.episodes if e.speed is not None]
     words = f"{len(frames.episodes)} episodes, {len(frames.taxels)} frames, dataset {frames.dataset_hash[:12]}"
     words += f", sensor {frames.sensor.name} {frames.sensor.content_hash[:12]}"
     words += f", specimens: {', '.join(specimens)}" if specimens else ""
     words += f", {min(speeds):g} to {max(speeds):g} mm/s" if speeds else ""
-    result.paragraph(words + ".")
-    result.picture(lambda stream: _draw_coverage(stream, frames), "Nominal contact centres and depths by indenter.")
+    places, depths = [], []
+    for k, name in enumerate(sorted({e.indenter for e in frames.episodes})):
+        spans = [e for e in frames.episodes if e.indenter == name]
+        labels = [f"episode {e.number}, {e.depth:.2f} mm" for e in spans]
+        color = COLORS[k % len(COLORS)]
+        places.append(Series(name, [e.y for e in spans], color, "points", [e.x for e in spans], labels=labels))
+        depths.append(Series(name, [e.depth for e in spans], color, "points", [e.number for e in spans], labels=labels))
+    result.add(
+        "Data",
+        Paragraph(words + "."),
+        Plot("nominal contact centres", "x [mm]", "y [mm]", places),
+        Plot("nominal depths", "episode", "depth [mm]", depths, least=0.0),
+    )
+
+
+def _reliability(result: HtmlPage, group_list: list[Group]) -> None:
+    if not group_list:
+        return
+    series = [Series("right", [0.4, 1.0], "grey", x=[0.4, 1.0])]
+    for k, group in enumerate(group_list):
+        levels = sorted(group.reliability)
+        inside = [float(np.mean(group.reliability[level])) for level in levels]
+        series.append(Series(f"{group.name}, {group.split}", inside, COLORS[k % len(COLORS)], "both", levels))
+    words = (
+        "Share of errors inside intervals that were calibrated on validation episodes, against the share that should "
+        "be inside: on the diagonal the uncertainty is right, below it too small."
+    )
+    drawn = Plot("share of errors inside their interval", "should be inside [1]", "is inside [1]", series, least=0.0)
+    result.add("Reliability of the pixels' uncertainty", Paragraph(words), drawn)
 
 
 def _run(result: HtmlPage, run: Scored, document: dict[str, Any]) -> None:
     split = document["split"]
-    result.heading(f"{run.name}, split {split['name']}, seed {split['seed']}")
-    result.picture(
-        lambda stream: draw_cases(stream, run.evaluation, run.frames),
-        "Best, median and worst press at full depth: signals, label, prediction, error.",
+    blocks: list[Any] = []
+    cases = cases_of(run.evaluation.episodes)
+    top = max((float(np.max([e.label[k], e.depth[k]])) for _, e, k, _ in cases), default=1.0)
+    frames, pixels = run.frames, run.frames.sensor.map
+    half_x, half_y = (n * pixels.pixel_pitch / 2 for n in pixels.shape)
+    for name, episode, frame, error in cases:
+        span, link = episode.span, f"{run.name} {split['name']} {name}"
+        here = slice(span.start, span.stop)
+        seconds = (frames.time_ns[here] - frames.time_ns[span.start]) * 1e-9
+        for words, values in (
+            ("label", episode.label[frame]),
+            ("prediction", episode.depth[frame]),
+            (f"error, contact RMSE {error:.3f} mm", np.abs(episode.depth[frame] - episode.label[frame])),
+        ):
+            extent = (-half_x, half_x, -half_y, half_y)
+            caption = f"{name}, episode {span.number}: {words}"
+            blocks.append(PixelMap(caption, values.T, "mm", 0.0, top, extent, [(span.x, span.y)], link=link))
+        signals = frames.taxels[here]
+        curves = [Series(f"taxel {k}", signals[:, k], COLORS[k % len(COLORS)]) for k in range(signals.shape[1])]
+        caption = f"{name}, episode {span.number}: {span.indenter}, {span.depth:.2f} mm, at {seconds[frame]:.2f} s"
+        blocks.append(Plot(caption, "time [s]", "signal [counts]", curves, seconds, most=MOST_SIGNALS))
+    result.add(
+        f"{run.name}, split {split['name']}, seed {split['seed']}",
+        *blocks,
+        Prose(markdown(document).split("\n", 2)[2]),
+        Paragraph(f"Test episodes: {', '.join(map(str, split['episodes']))}.", note=True),
     )
-    result.markdown(markdown(document).split("\n", 2)[2])
-    result.paragraph(f"Test episodes: {', '.join(map(str, split['episodes']))}.", note=True)
-
-
-def _draw_coverage(stream: BinaryIO, frames: Frames) -> None:
-    figure = Figure(figsize=(11, 3.6), dpi=90, layout="constrained")
-    plane, depths = figure.subplots(1, 2, width_ratios=[1.3, 1])
-    names = sorted({e.indenter for e in frames.episodes})
-    for name in names:
-        spans = [e for e in frames.episodes if e.indenter == name]
-        plane.scatter(
-            [e.x for e in spans],
-            [e.y for e in spans],
-            s=[8 + 20 * max(e.depth, 0) for e in spans],
-            label=name,
-            alpha=0.7,
-        )
-    half_x, half_y = (n * frames.sensor.map.pixel_pitch / 2 for n in frames.sensor.map.shape)
-    plane.set(xlim=(-half_x, half_x), ylim=(-half_y, half_y), xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    plane.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    depths.hist([[e.depth for e in frames.episodes if e.indenter == n] for n in names], bins=12, stacked=True)
-    depths.set(xlabel="depth [mm]", ylabel="episodes")
-    figure.savefig(stream, format="png")
-
-
-def _draw_reliability(stream: BinaryIO, group_list: list[Group]) -> None:
-    figure = Figure(figsize=(8.4, 4.6), dpi=90, layout="constrained")
-    axes = figure.subplots()
-    axes.plot([0.4, 1], [0.4, 1], color="black", linewidth=0.8, linestyle="--")
-    several = len({group.name for group in group_list}) > 1
-    for group in (g for g in group_list if g.reliability):
-        levels = sorted(group.reliability)
-        inside = [float(np.mean(group.reliability[level])) for level in levels]
-        words = f"{group.name}, {group.split}" if several else group.split
-        axes.plot(levels, inside, "o-", markersize=3.5, label=words)
-    axes.set(xlabel="should lie inside", ylabel="does", xlim=(0.4, 1.01), ylim=(0.0, 1.01))
-    axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(stream, format="png")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ from tacdata.training.scoring.published import TABLE_1
 
 def draw(path: Path, evaluation: Evaluation, frames: Frames) -> None:
     """Write the picture of an evaluation as PNG."""
-    cases = _cases(evaluation.episodes)
+    cases = cases_of(evaluation.episodes)
     figure = Figure(figsize=(12.5, 3.3 + 2.6 * len(cases)), dpi=110, layout="constrained")
     halves = figure.add_gridspec(2, 1, height_ratios=[3.3, max(2.6 * len(cases), 0.1)])
     _draw_table(figure.add_subfigure(halves[0]).subplots(), evaluation.document)
@@ -28,17 +28,7 @@ def draw(path: Path, evaluation: Evaluation, frames: Frames) -> None:
     figure.savefig(path)
 
 
-def draw_cases(path: Path | BinaryIO, evaluation: Evaluation, frames: Frames) -> bool:
-    """Write best, median and worst press alone as PNG; False, and nothing written, if no press touches."""
-    cases = _cases(evaluation.episodes)
-    if cases:
-        figure = Figure(figsize=(12.5, 2.6 * len(cases)), dpi=90, layout="constrained")
-        _draw_cases(figure, cases, frames)
-        figure.savefig(path, format="png")
-    return bool(cases)
-
-
-def _cases(episodes: tuple[EpisodeResult, ...]) -> list[tuple[str, EpisodeResult, int, float]]:
+def cases_of(episodes: tuple[EpisodeResult, ...]) -> list[tuple[str, EpisodeResult, int, float]]:
     """Return name, episode, frame and contact RMSE [mm] of the best, median and worst press at full depth."""
     ranked = []
     for episode in episodes:

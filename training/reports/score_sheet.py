@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from tacdata.training.scoring.evaluate import METRICS
@@ -68,7 +69,7 @@ def markdown(document: dict[str, Any]) -> str:
 
 def number(value: float | None, digits: int = 3) -> str:
     """Return a value in print, or a dash if there is none."""
-    return "–" if value is None else f"{value:.{digits}f}"
+    return "–" if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
 
 
 def spread(summary: dict[str, Any]) -> str:

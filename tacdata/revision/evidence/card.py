@@ -6,31 +6,31 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tacdata.discrepancy.heading import sizes
 from tacdata.discrepancy.verdict.sealed import WIDEST
+from tacdata.pages import Band, HtmlPage, Items, PageHeader, Paragraph, Plot, Series, Slider, Table, Tiles
+from tacdata.revision.evidence.curves import EpisodeCurves
 from tacdata.revision.evidence.table import in_words
-from tacdata.training.reports.html_page import HtmlPage
 
 CHANNELS = 6
 """Number of channels listed, the worst first."""
 
 
-def card(revision: dict[str, Any], verdict: dict[str, Any], picture: Path | None) -> str:
+def card(revision: dict[str, Any], verdict: dict[str, Any], shown: Sequence[EpisodeCurves] = ()) -> str:
     """Return the page.
 
     Args:
         revision: `schemas/revision.schema.json`.
         verdict: `schemas/verdict.schema.json`.
-        picture: A PNG to include, or None.
+        shown: Readings of a few episodes, and the models' predictions.
     """
-    status, answer = verdict["status"], verdict["effects"]
-    title = " and ".join(e["title"] for e in answer) or "No effect"
-    if status == "unknown" and answer:
-        title = f"Suspected, not named: {title}"
-    page = HtmlPage(title, badge=status)
-    page.paragraph(verdict["why"])
-    page.tiles(_tiles(revision, verdict))
-    if picture is not None:
-        page.picture(lambda stream: stream.write(picture.read_bytes()), "Readings and residuals before and after.")
+    answer = verdict["effects"]
+    page = HtmlPage(_header(revision, verdict))
+    page.add("Result", Tiles(_tiles(revision, verdict)))
+    if shown:
+        panels = list(zip(*(_panels(episode) for episode in shown), strict=True))
+        names = [f"{episode.name}, {episode.channel_name}" for episode in shown]
+        page.add("Readings before and after", Slider("episode, the largest change first", names, panels))
     _parameters(page, answer)
     _rivals(page, answer)
     if revision["gap"]:
@@ -47,23 +47,56 @@ def card(revision: dict[str, Any], verdict: dict[str, Any], picture: Path | None
     return page.text
 
 
+def _header(revision: dict[str, Any], verdict: dict[str, Any]) -> PageHeader:
+    status, plan = verdict["status"], revision["next"]["plan"]
+    title = " and ".join(e["title"] for e in verdict["effects"]) or "No effect"
+    if status == "unknown" and verdict["effects"]:
+        title = f"Suspected, not named: {title}"
+    heading, stamp = verdict.get("heading", {}), revision["provenance"]
+    return PageHeader(
+        "Evidence card",
+        title,
+        of=", ".join(Path(path).name for path in heading.get("recordings", ())),
+        made=stamp.get("made_at", "")[:10],
+        version=stamp["code_version"],
+        status=status,
+        tone="good" if status == "named" else "",
+        lines=[*sizes(verdict), verdict["why"]],
+        next=[f"record what is missing: `tacdata record --plan {plan}`"] if plan else (),
+    )
+
+
+def _panels(episode: EpisodeCurves) -> tuple[Plot, Plot]:
+    """Return readings and residuals of an episode on its most telling channel."""
+    c, names = episode.channel, (("model before", "vermilion", episode.before), ("model after", "blue", episode.after))
+    measured = episode.measured[:, c]
+    readings = [Series("measured", measured, "ink", width=3.0)]
+    readings += [Series(name, predicted[:, c], color) for name, color, predicted in names]
+    residuals = [Series(name, (measured - p[:, c]) / episode.noise[c], color) for name, color, p in names]
+    noise = Band(-2.0, 2.0, "noise, two standard deviations")
+    return (
+        Plot("reading", "time [s]", "reading", readings, episode.time, link="card"),
+        Plot("residual over the noise", "time [s]", "residual [1]", residuals, episode.time, [noise], link="card"),
+    )
+
+
 def _number(value: Any, digits: int = 3) -> str:
     return "–" if value is None else f"{value:.{digits}g}"
 
 
 def _tiles(revision: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[str, str]]:
-    tiles = [("episodes judged", str(verdict["data"].get("episodes", "–")))]
+    tiles = [(str(verdict["data"].get("episodes", "–")), "episodes judged")]
     gap = revision["gap"]
     if gap:
         low, high = gap["interval"]
         if gap["closed"] is not None and low is not None and high - low < WIDEST:
             spread = f" ({100 * low:.0f} to {100 * high:.0f} %)"
-            tiles.append((f"of the gap closed{spread}", f"{100 * gap['closed']:.0f} %"))
+            tiles.append((f"{100 * gap['closed']:.0f} %", f"of the gap closed{spread}"))
         sealed = gap["sealed"]
-        tiles.append(("residual before → after (1 is noise)", f"{sealed['before']:.3g} → {sealed['after']:.3g}"))
+        tiles.append((f"{sealed['before']:.3g} → {sealed['after']:.3g}", "residual before → after (1 is noise)"))
     labels = revision["labels"]
     if labels:
-        tiles.append(("largest shift of the tip [mm]", f"{max(m['path_most'] for m in labels):.3g}"))
+        tiles.append((f"{max(m['path_most'] for m in labels):.3g} mm", "largest shift of the tip"))
     return tiles
 
 
@@ -71,10 +104,7 @@ def _table(page: HtmlPage, title: str, head: Sequence[str], rows: Sequence[Seque
     """Add a section with a table; none without rows."""
     if not rows:
         return
-    page.heading(title)
-    if words:
-        page.paragraph(words)
-    page.table(head, rows, words=True)
+    page.add(title, Paragraph(words) if words else None, Table(head or ("what", "hash"), rows))
 
 
 def _parameters(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
@@ -98,9 +128,9 @@ def _rivals(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
             verdict = "could stand in its place" if name in e["alternatives"] or margin < 2.33 else "ruled out"
             rows.append((f"{name} instead of {e['effect']}", f"{margin:.1f}", verdict))
     listed = [f"{', '.join(e['alternatives'])} for {e['mechanism']}" for e in answer if e["alternatives"]]
-    _table(page, "What else it could be", ("rival", "worse by, in standard errors over episodes", ""), rows)
-    if listed:
-        page.paragraph(f"Not separable by these recordings: {'; '.join(listed)}.")
+    heads = ("rival", "worse by, in standard errors over episodes", "")
+    words = Paragraph(f"Not separable by these recordings: {'; '.join(listed)}.") if listed else None
+    page.add("What else it could be", Table(heads, rows) if rows else None, words)
 
 
 def _gap(page: HtmlPage, gap: dict[str, Any]) -> None:
@@ -170,11 +200,9 @@ def _networks(page: HtmlPage, trained: dict[str, Any] | None) -> None:
 def _labels(page: HtmlPage, revision: dict[str, Any]) -> None:
     labels = revision["labels"]
     if not (revision["added"] and labels):
-        page.heading("Labels")
         named = "No label changes: the effect acts on readings alone."
-        page.paragraph(
-            named if revision["added"] else "Nothing was named, so the model and its labels stay as they are."
-        )
+        none = "Nothing was named, so the model and its labels stay as they are."
+        page.add("Labels", Paragraph(named if revision["added"] else none))
         return
     rows = [
         (
@@ -210,19 +238,15 @@ def _refuted(page: HtmlPage, verdict: dict[str, Any], answer: list[dict[str, Any
     missing = verdict["untested"][:6]
     if missing:
         lines.append(f"known, not modelled, so not tested: {'; '.join(missing)}")
-    if lines:
-        page.heading("What would refute it")
-        page.items(lines)
+    page.add("What would refute it", Items(lines) if lines else None)
 
 
 def _next(page: HtmlPage, following: dict[str, Any]) -> None:
     if not (following["presses"] or following["remark"]):
         return
-    page.heading("What to record next")
-    page.paragraph(following["remark"])
-    page.items(following["presses"])
-    if following["plan"]:
-        page.paragraph(f"Plan: tacdata record --plan {following['plan']}")
+    plan = Paragraph(f"Plan: `tacdata record --plan {following['plan']}`") if following["plan"] else None
+    presses = Items(following["presses"]) if following["presses"] else None
+    page.add("What to record next", Paragraph(following["remark"]) if following["remark"] else None, presses, plan)
 
 
 def _data(page: HtmlPage, verdict: dict[str, Any]) -> None:
@@ -231,9 +255,8 @@ def _data(page: HtmlPage, verdict: dict[str, Any]) -> None:
         for name, value in verdict["data"].items()
         if not isinstance(value, list | dict)
     )
-    page.heading("The recordings")
-    page.paragraph(figures, note=True)
-    page.items(verdict["remarks"], note=True)
+    remarks = Items(verdict["remarks"], note=True) if verdict["remarks"] else None
+    page.add("The recordings", Paragraph(figures, note=True), remarks)
 
 
 def _hashes(page: HtmlPage, revision: dict[str, Any], verdict: dict[str, Any]) -> None:
