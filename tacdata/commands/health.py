@@ -32,7 +32,7 @@ def run(
         Path | None, typer.Option(help="Trained network (a run or checkpoint): by how much its error has grown.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for health.html, .json and .png; default: the latest session's.")
+        Path | None, typer.Option(help="Folder for health.html and health.json; default: the latest session's.")
     ] = None,
 ) -> Result:
     """Compare a unit's visits: gains, drift, dead or swapped channels, noise, hysteresis; exit 1 if it needs care.
@@ -40,7 +40,6 @@ def run(
     Record the plan that `tacdata plan health` writes at each visit. Name the first visit after a calibration, too.
     """
     from tacdata import documents
-    from tacdata.health import picture
     from tacdata.health.advice import FIRST, NOTHING
     from tacdata.health.document import document, text
     from tacdata.health.history import history, in_order
@@ -58,7 +57,6 @@ def run(
     print(text(report), flush=True)  # whatever becomes of the files
     place = out or report.last.session.folder
     documents.write(place / "health.json", written, "health")
-    picture.draw(report, place / "health.png")
     documents.write_text(place / "health.html", page(report))
     print(f"page: {place / 'health.html'}")
     well = written["advice"][0]["do"] in (NOTHING, FIRST)

@@ -10,6 +10,8 @@ from tacdata.health.history import History
 from tacdata.health.wiring import Wiring
 
 NOTHING, FIRST, TARE, REGISTER = "nothing", "first visit", "tare again", "register again"
+ALL_WELL = "all well"
+"""Printed where there is nothing to do."""
 RECALIBRATE, WIRING, REPLACE = "recalibrate", "check wiring", "replace"
 MOST_FAULTY = 0.125
 """Share of channels without readings from which a unit is to be replaced [1]; three at least."""
@@ -44,6 +46,11 @@ class Advice:
     """Channels that it concerns; none for the whole unit."""
     why: str
     """In a sentence."""
+
+    @property
+    def spoken(self) -> str:
+        """The advice in print."""
+        return ALL_WELL if self.do == NOTHING else self.do
 
 
 def advice(history: History) -> tuple[Advice, ...]:

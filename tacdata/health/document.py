@@ -169,7 +169,7 @@ def text(history: History) -> str:
 
 def headline(advised: tuple[Advice, ...]) -> list[str]:
     """Return the advice, a line each."""
-    return [f"{a.do.upper()}{': ' + named(a.channels) if a.channels else ''} ({a.why})" for a in advised]
+    return [f"{a.spoken.upper()}{': ' + named(a.channels) if a.channels else ''} ({a.why})" for a in advised]
 
 
 def summary(history: History) -> list[tuple[str, str]]:
