@@ -7,9 +7,9 @@ from shlex import quote
 import numpy as np
 
 from tacdata import provenance
-from tacdata.health.advice import CALLED, FIRST, NOTHING, advice, told
+from tacdata.health.advice import CALLED, FIRST, NOTHING, Advice, advice, named, told
 from tacdata.health.comparison import VisitComparison
-from tacdata.health.document import headline, not_assessed, remarks, summary
+from tacdata.health.document import not_assessed, remarks, summary
 from tacdata.health.figures import figures
 from tacdata.health.history import History
 from tacdata.pages import Cell, HtmlPage, Items, PageHeader, Paragraph, Table, Tiles
@@ -38,7 +38,7 @@ def page(history: History) -> str:
 
 def _header(history: History) -> PageHeader:
     advised, last = advice(history), history.last
-    first, *others = headline(advised)
+    first, *others = (_sentence(one) for one in advised)
     count = len(history.visits)
     well = advised[0].do in (NOTHING, FIRST)
     folders = " ".join(quote(str(visit.session.folder)) for visit in history.visits)
@@ -56,6 +56,11 @@ def _header(history: History) -> PageHeader:
             f"then compare it with these, its folder in place of NEXT: `tacdata health {folders} NEXT`",
         ],
     )
+
+
+def _sentence(one: Advice) -> str:
+    channels = f", {named(one.channels)}" if one.channels else ""
+    return f"{one.spoken.capitalize()}{channels}: {one.why}."
 
 
 def _named(name: str, words: str) -> str:
