@@ -20,52 +20,56 @@ OBSERVER_SCALE = 0.005
 """Calibration: standard deviation of the scale of a camera or a gauge [1]."""
 
 
-def gains_beyond_calibration(found: Findings) -> list[FoundEffect]:
+def gains_beyond_calibration(findings: Findings) -> list[FoundEffect]:
     """Return gains beyond the tolerance of calibration: one common to all channels, or those of some."""
-    setting, known = found.problem.setting, found.gains[np.isfinite(found.gains)]
+    setting, gains = findings.problem.setting, findings.gains[np.isfinite(findings.gains)]
     per_channel = setting.channel_gain
-    if per_channel is None or not np.any(known):
+    if per_channel is None or not np.any(gains):
         return []
-    prior, made = setting.nuisance[per_channel.name], []
-    common = float(np.median(known))
-    if abs(common) > BEYOND * prior / np.sqrt(len(known)) * 2 and _steady(np.nanmedian(found.halves, axis=1), common):
+    prior, effects = setting.nuisance[per_channel.name], []
+    common = float(np.median(gains))
+    if abs(common) > BEYOND * prior / np.sqrt(len(gains)) * 2 and _steady(
+        np.nanmedian(findings.halves, axis=1), common
+    ):
         # Normal gains: the standard error of a median is sqrt(pi / 2) = 1.25 times that of a mean.
-        error = float(1.25 * np.std(known) / np.sqrt(len(known)))
+        error = float(1.25 * np.std(gains) / np.sqrt(len(gains)))
         alike = sorted({e.called for e in library() if e.like_gain is not None})
         rivals = tuple(alike) if setting.course.force is None else ()
         effect = next(e for e in library() if e.gain is GainKind.COMMON)
-        made.append(_finding(effect, np.array(common), error, rivals, abs(common) / max(error, 1e-9)))
-    own = np.nan_to_num(found.gains - common)
-    spread = float(np.sqrt(np.mean(np.square(known - common))))
+        effects.append(_finding(effect, np.array(common), error, rivals, abs(common) / max(error, 1e-9)))
+    deviations = np.nan_to_num(findings.gains - common)
+    spread = float(np.sqrt(np.mean(np.square(gains - common))))
     # If all gains scatter more than the prior, the prior is the measure: the sensor was calibrated worse than assumed.
     # Otherwise a channel must be an outlier among the others.
-    usual = prior if spread > WIDE * prior else max(prior, 1.4826 * float(np.median(np.abs(known - common))))
-    far = np.abs(own) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
+    usual = prior if spread > WIDE * prior else max(prior, 1.4826 * float(np.median(np.abs(gains - common))))
+    far = np.abs(deviations) > (BEYOND if spread > WIDE * prior else OUTLYING) * usual
     # A gain that changes over the session is no calibration error, but swapped channels or a loose contact.
-    far &= _steady(found.halves - np.nanmedian(found.halves, axis=1, keepdims=True), own)
+    far &= _steady(findings.halves - np.nanmedian(findings.halves, axis=1, keepdims=True), deviations)
     if far.any():
-        made.append(_finding(per_channel, np.where(far, own, 0.0), prior, (), float(np.abs(own).max() / prior)))
-    return made
+        effects.append(
+            _finding(per_channel, np.where(far, deviations, 0.0), prior, (), float(np.abs(deviations).max() / prior))
+        )
+    return effects
 
 
-def compliance_of_specimens(found: Findings) -> list[FoundEffect]:
+def compliance_of_specimens(findings: Findings) -> list[FoundEffect]:
     """Return the series compliance common to specimens of different stiffness; empty where they show none.
 
     Its rivals remain: laws of the specimens could differ in the order of their stiffness by chance.
     """
-    shown = series_compliance(found.problem.setting.course) if found.problem.setting.response.fitted else None
-    if shown is None:
+    series = series_compliance(findings.problem.setting.course) if findings.problem.setting.response.fitted else None
+    if series is None:
         return []
     effect = next(e for e in library() if e.in_series)
     rivals = tuple(e.called for e in library() if e.group == effect.group and e.stage == "mechanics")
-    value, error = shown.compliance * shown.largest, shown.error * shown.largest
-    return [_finding(effect, np.array(value), error, rivals, shown.compliance / shown.error)]
+    value, error = series.compliance * series.largest, series.error * series.largest
+    return [_finding(effect, np.array(value), error, rivals, series.compliance / series.error)]
 
 
-def _steady(halves: np.ndarray, whole: np.ndarray | float) -> np.ndarray:
+def _steady(halves: np.ndarray, gain: np.ndarray | float) -> np.ndarray:
     """Return whether a gain is the same in both halves of the session; True where one half does not determine it."""
-    apart = np.abs(np.nan_to_num(halves[1] - halves[0]))
-    return apart < STEADY * np.abs(whole)
+    difference = np.abs(np.nan_to_num(halves[1] - halves[0]))
+    return difference < STEADY * np.abs(gain)
 
 
 def _finding(effect: Effect, value: np.ndarray, error: float, rivals: tuple[str, ...], necessity: float) -> FoundEffect:

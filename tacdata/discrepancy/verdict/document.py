@@ -31,26 +31,26 @@ LARGEST_LIMIT = 1e3
 
 def document(
     decision: Decision,
-    found: Findings,
+    findings: Findings,
     checks: DataChecks,
     sliced: tuple[list[Slice], list[Slice]],
     parents: dict[str, str],
-    shown: Gap | None = None,
+    gap: Gap | None = None,
 ) -> dict[str, Any]:
     """Return the verdict (`schemas/verdict.schema.json`).
 
     Args:
         decision: Status, reason and effects.
-        found: Findings of the search.
+        findings: Findings of the search.
         checks: Limits and contradictions of the recordings.
         sliced: Slices of the residual before and after; empty if they were not computed.
         parents: Name of each input to its content hash.
-        shown: Gap on the sealed episodes.
+        gap: Gap on the sealed episodes.
     """
-    course, placed = found.problem.setting.course, [e.finding.placed for e in decision.effects]
-    told = [p.effect.remark(p.values) for p in placed]
+    course, placed = findings.problem.setting.course, [e.finding.placed for e in decision.effects]
+    remarks_on_effects = [p.effect.remark(p.values) for p in placed]
     if any(p.effect.in_series for p in placed) and (shared := series_compliance(course)) is not None:
-        told.append(str(shared))
+        remarks_on_effects.append(str(shared))
     families = {p.effect.family for p in placed}
     # An effect of the verdict that explains the lag of readings makes the remark on clocks needless.
     clocks = () if Family.DELAY_AND_FILTER in families else checks.clocks
@@ -58,38 +58,46 @@ def document(
     clocks += () if families & leads else checks.early
     spoken = decision.reason in (Reason.ALARM, Reason.UNEXPLAINED)
     alarms = () if spoken else decision.alarms
-    seen = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]
-    remarks = [*checks.wiring, *checks.watched, *seen, *checks.shortcomings, *clocks, *told, *checks.base[1:]]
-    tests, noise, values = found.tests, found.problem.null.noise, max(float(found.values.sum()), 1.0)
+    signs = [f"{alarm.seen}: {alarm.next}" for alarm in alarms]
+    remarks = [
+        *checks.wiring,
+        *checks.watched,
+        *signs,
+        *checks.shortcomings,
+        *clocks,
+        *remarks_on_effects,
+        *checks.base[1:],
+    ]
+    tests, noise, values = findings.tests, findings.problem.null.noise, max(float(findings.values.sum()), 1.0)
     return {
         "version": schemas.version("verdict"),
         "status": decision.status,
-        "why": reason_in_words(decision, found, checks, shown),
+        "why": reason_in_words(decision, findings, checks, gap),
         "effects": [_effect(e) for e in decision.surest_first],
         "gate": {
-            "gap": found.gap,
+            "gap": findings.gap,
             "p": float(tests.p.min(initial=1.0)),
             "p_generic": tests.p_generic,
             "noise": [float(v) for v in noise.scale],
             "memory": noise.memory,
         },
         "left": {
-            "share": float(found.share_left),
-            "t": float(np.clip(found.left.t, -99, 99)),
-            "before": float(2 * found.energy[0].sum() / values),
-            "after": float(2 * found.energy[1].sum() / values),
+            "share": float(findings.share_left),
+            "t": float(np.clip(findings.left.t, -99, 99)),
+            "before": float(2 * findings.energy[0].sum() / values),
+            "after": float(2 * findings.energy[1].sum() / values),
             "floor": 1.0,
             "families": _families(decision),
         },
-        "located": located(sliced[0], found) if sliced[0] else [],
+        "located": located(sliced[0], findings) if sliced[0] else [],
         "slices": beside(*sliced),
         "located_after": in_words(sliced[1]) if decision.status == INCOMPLETE else [],
-        "path": _path(found),
-        "unjudgeable": found.given.board.unjudgeable,
-        "limits": {k: (round(v, 4) if v < LARGEST_LIMIT else None) for k, v in found.limits.items()},
+        "path": _path(findings),
+        "unjudgeable": findings.given.board.unjudgeable,
+        "limits": {k: (round(v, 4) if v < LARGEST_LIMIT else None) for k, v in findings.limits.items()},
         "untested": untested([e.finding for e in decision.effects]),
-        "data": {**data(course), "sealed": list(shown.names) if shown else []},
-        "sealed": shown.document() if shown else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
+        "data": {**data(course), "sealed": list(gap.names) if gap else []},
+        "sealed": gap.document() if gap else {"episodes": 0, "share": 0.0, "rule": "none was sealed"},
         "remarks": [words for words in remarks if words],
         "limitations": [*checks.limitations, *checks.base[:1]],
         "next": following(decision, course, bool(checks.watched), bool(checks.base)),
@@ -101,29 +109,29 @@ def _families(decision: Decision) -> dict[str, dict[str, float]]:
     """Return the lack of fit of each family."""
     return {
         family.value: {
-            "size": round(own.size, 2),
-            "held_out": round(own.gain, 2),
-            "t": round(float(np.clip(own.t, -99, 99)), 2),
+            "size": round(lack.size, 2),
+            "held_out": round(lack.gain, 2),
+            "t": round(float(np.clip(lack.t, -99, 99)), 2),
         }
-        for family, own in decision.lacking.items()
+        for family, lack in decision.lacking.items()
     }
 
 
-def _path(found: Findings) -> list[dict[str, Any]]:
+def _path(findings: Findings) -> list[dict[str, Any]]:
     """Return the effects in the order in which they were added, each with its share of the explained evidence."""
-    bought = {f.placed.effect.name: max(f.bought, 0.0) for f in found.effects if np.isfinite(f.bought)}
-    whole = max(sum(bought.values()) + found.left.gain, 1e-12)
+    evidence = {f.placed.effect.name: max(f.bought, 0.0) for f in findings.effects if np.isfinite(f.bought)}
+    total = max(sum(evidence.values()) + findings.left.gain, 1e-12)
     return [
-        {"effect": name, "share": bought[name] / whole if name in bought else None}
-        for name in dict.fromkeys([*found.path, *bought])
+        {"effect": name, "share": evidence[name] / total if name in evidence else None}
+        for name in dict.fromkeys([*findings.path, *evidence])
     ]
 
 
-def located(before: list[Slice], found: Findings) -> list[str]:
+def located(parts: list[Slice], findings: Findings) -> list[str]:
     """Return sentences on where the residual is large: single episodes, then slices of all."""
-    alone = outstanding(found.problem.setting.course.names, found.energy[1], found.values)
-    whole = 2 * float(found.energy[0].sum()) / max(float(found.values.sum()), 1.0)
-    return in_words(before, alone, whole)
+    outliers = outstanding(findings.problem.setting.course.names, findings.energy[1], findings.values)
+    mean_square = 2 * float(findings.energy[0].sum()) / max(float(findings.values.sum()), 1.0)
+    return in_words(parts, outliers, mean_square)
 
 
 def _effect(decided: Decided) -> dict[str, Any]:

@@ -40,16 +40,16 @@ def lone_press(problem: Problem) -> LonePress | None:
     excess = 0.5 * (float(problem.grams.gram[:, 0, 0].sum()) - float(problem.grams.rows.sum())) - bare
     if excess <= 0 or not problem.candidates:
         return None
-    own = [gain - bare for gain in shape_gains(problem)]
-    best = int(np.argmax(own))
-    chosen = problem.candidates[best]
-    if own[best] < MOST_OF_IT * excess:
+    gains = [gain - bare for gain in shape_gains(problem)]
+    best = int(np.argmax(gains))
+    candidate = problem.candidates[best]
+    if gains[best] < MOST_OF_IT * excess:
         return None
     gram = eliminated(problem.grams.gram, problem.fixed, problem.fixed_ridge(0.0))
-    index = chosen.columns + 1
-    known = gram[:, index, index].sum(axis=1)
-    held = known / max(float(known.sum()), 1e-30)
-    at = int(np.argmax(held))
-    if held[at] <= LARGEST_LEVERAGE:
+    index = candidate.columns + 1
+    information = gram[:, index, index].sum(axis=1)
+    shares = information / max(float(information.sum()), 1e-30)
+    at = int(np.argmax(shares))
+    if shares[at] <= LARGEST_LEVERAGE:
         return None
-    return LonePress(chosen.effect, min(own[best] / excess, 1.0), at, float(held[at]))
+    return LonePress(candidate.effect, min(gains[best] / excess, 1.0), at, float(shares[at]))

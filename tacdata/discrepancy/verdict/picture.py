@@ -21,7 +21,7 @@ TITLE_WIDTH = 120
 """Characters in a line of the title."""
 
 
-def draw(found: Findings, before: list[Slice], after: list[Slice], verdict: dict[str, Any], path: Path) -> None:
+def draw(findings: Findings, base: list[Slice], final: list[Slice], verdict: dict[str, Any], path: Path) -> None:
     """Draw the page into a PNG file."""
     import matplotlib
 
@@ -33,17 +33,17 @@ def draw(found: Findings, before: list[Slice], after: list[Slice], verdict: dict
     title = "\n".join(textwrap.fill(line, TITLE_WIDTH) for line in head if line)
     figure.suptitle(title, fontsize=11)
     added = bool(verdict["effects"])  # without an effect there is no after
-    _streams(axes[0, 0], found, added)
-    _slices(axes[0, 1], before, after, added)
-    _rivals(axes[1, 0], found)
-    _episodes(axes[1, 1], found, added)
+    _streams(axes[0, 0], findings, added)
+    _slices(axes[0, 1], base, final, added)
+    _rivals(axes[1, 0], findings)
+    _episodes(axes[1, 1], findings, added)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
 
-def _streams(axis: Any, found: Findings, added: bool) -> None:
-    course = found.problem.setting.course.reduced
-    first, last = whitened_residual(found.problem), whitened_residual(found.final)
+def _streams(axis: Any, findings: Findings, added: bool) -> None:
+    course = findings.problem.setting.course.reduced
+    first, last = whitened_residual(findings.problem), whitened_residual(findings.final)
     power = np.square(first).mean(axis=1)
     # Sealed episodes have no rows here.
     read = np.unique(course.episode)
@@ -58,35 +58,35 @@ def _streams(axis: Any, found: Findings, added: bool) -> None:
         if added:
             axis.plot(time, last[rows, stream], color="tab:blue", lw=0.8, label="after" if not number else None)
     axis.axhspan(-2, 2, color="0.9", zorder=0)
-    called = Streams.of(course).names(course)[stream]
-    axis.set(title=f"{called} in the three worst episodes", xlabel="time [s]", ylabel="residual / noise")
+    label = Streams.of(course).names(course)[stream]
+    axis.set(title=f"{label} in the three worst episodes", xlabel="time [s]", ylabel="residual / noise")
     if added:
         axis.legend()
 
 
-def _slices(axis: Any, before: list[Slice], after: list[Slice], added: bool) -> None:
-    if not before:  # not asked for
+def _slices(axis: Any, base: list[Slice], final: list[Slice], added: bool) -> None:
+    if not base:  # not asked for
         axis.set_axis_off()
         return
-    shown = [(b, a) for b, a in zip(before, after, strict=True) if b.by != "stream"]
-    names = [f"{b.by}: {b.name}" for b, _ in shown]
-    where = np.arange(len(shown))
-    axis.barh(where - 0.2 * added, [b.mean_square for b, _ in shown], 0.4, color="tab:red", label="before")
+    pairs = [(b, a) for b, a in zip(base, final, strict=True) if b.by != "stream"]
+    names = [f"{b.by}: {b.name}" for b, _ in pairs]
+    where = np.arange(len(pairs))
+    axis.barh(where - 0.2 * added, [b.mean_square for b, _ in pairs], 0.4, color="tab:red", label="before")
     if added:
-        axis.barh(where + 0.2, [a.mean_square for _, a in shown], 0.4, color="tab:blue", label="after")
+        axis.barh(where + 0.2, [a.mean_square for _, a in pairs], 0.4, color="tab:blue", label="after")
     axis.axvline(1.0, color="k", lw=0.8)
     axis.set_yticks(where, names, fontsize=7)
     axis.invert_yaxis()
     axis.set(xscale="log", xlabel="mean square over the noise floor", title="where it lives")
 
 
-def _rivals(axis: Any, found: Findings) -> None:
+def _rivals(axis: Any, findings: Findings) -> None:
     best: dict[str, float] = {}
-    for candidate, gain in zip(found.given.candidates, found.tests.gain, strict=True):
+    for candidate, gain in zip(findings.given.candidates, findings.tests.gain, strict=True):
         best[candidate.effect.name] = max(best.get(candidate.effect.name, 0.0), float(gain))
     order = sorted(best, key=lambda name: -best[name])[:12]
-    chosen = {m.placed.effect.name for m in found.effects}
-    colors = ["tab:blue" if name in chosen else "0.6" for name in order]
+    answer = {m.placed.effect.name for m in findings.effects}
+    colors = ["tab:blue" if name in answer else "0.6" for name in order]
     top = max(best.values(), default=1.0) or 1.0
     # Several forms have the same name.
     forms = [load(name).spoken if load(name).called == name else f"{load(name).spoken} ({name})" for name in order]
@@ -96,10 +96,10 @@ def _rivals(axis: Any, found: Findings) -> None:
     axis.set(xlabel="what each effect alone explains at first sight, over the most", title="candidates")
 
 
-def _episodes(axis: Any, found: Findings, added: bool) -> None:
-    floor = np.maximum(found.values, 1)
-    axis.plot(2 * found.energy[0] / floor, "o", color="tab:red", ms=3, label="before")
+def _episodes(axis: Any, findings: Findings, added: bool) -> None:
+    floor = np.maximum(findings.values, 1)
+    axis.plot(2 * findings.energy[0] / floor, "o", color="tab:red", ms=3, label="before")
     if added:
-        axis.plot(2 * found.energy[1] / floor, "o", color="tab:blue", ms=3, label="after")
+        axis.plot(2 * findings.energy[1] / floor, "o", color="tab:blue", ms=3, label="after")
     axis.axhline(1.0, color="k", lw=0.8)
     axis.set(yscale="log", xlabel="episode", ylabel="mean square over the noise floor", title="every episode")

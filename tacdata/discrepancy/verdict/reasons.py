@@ -40,14 +40,14 @@ MOST_STAND_INS = 3
 """Most rivals that are listed by name; of more, the families are listed."""
 
 
-def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, shown: Gap | None = None) -> str:
+def reason_in_words(decision: Decision, findings: Findings, checks: DataChecks, gap: Gap | None = None) -> str:
     """Return the verdict in a sentence.
 
     Args:
         decision: Status and reason.
-        found: Findings of the search.
+        findings: Findings of the search.
         checks: Limits and contradictions of the recordings.
-        shown: Gap on the sealed episodes.
+        gap: Gap on the sealed episodes.
     """
     answer = [e.finding for e in decision.effects]
     names = _listed([f.placed.effect.spoken for f in answer], "and") if answer else ""
@@ -59,7 +59,7 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
             return f"{checks.episodes} presses cannot carry a verdict{best}"
         case Reason.STOPPED:
             fits = f"; {names} {'fits' if len(answer) == 1 else 'fit'} best, rivals were not tried" if answer else ""
-            return f"stopped after {found.until}: {'a gap' if found.gap else 'no gap'}{fits}"
+            return f"stopped after {findings.until}: {'a gap' if findings.gap else 'no gap'}{fits}"
         case Reason.QUIET:
             if checks.watched:
                 return f"no effect of the library shows, but {'; '.join(checks.watched)}"
@@ -70,33 +70,33 @@ def reason_in_words(decision: Decision, found: Findings, checks: DataChecks, sho
                 )
             return "nothing is missing that these recordings would show; see the detection limits"
         case Reason.NAMED:
-            little = found.left.t < LEFT_T or found.share_left < SPEAKS_FROM
+            little = findings.left.t < LEFT_T or findings.share_left < SPEAKS_FROM
             law = "its law is" if len(answer) == 1 else "their laws are"
-            more = "" if little else f". {100 * found.share_left:.1f} % is left: {law} a little different"
-            said = f"{_there(names, len(answer), decision, shown)}. Nothing else explains the presses as well"
-            return said + _small(len(answer), shown) + more
+            more = "" if little else f". {100 * findings.share_left:.1f} % is left: {law} a little different"
+            sentence = f"{_there(names, len(answer), decision, gap)}. Nothing else explains the presses as well"
+            return sentence + _small(len(answer), gap) + more
         case Reason.RIVALS:
-            return "".join((_undecided(decision, shown), _own_laws(decision), _nameless(found, SHARE_LEFT_ALONE)))
+            return "".join((_undecided(decision, gap), _own_laws(decision), _nameless(findings, SHARE_LEFT_ALONE)))
         case Reason.INCOMPLETE:
-            return _incomplete(decision, shown) + _other_laws(decision, found) + _nameless(found, 0.0)
+            return _incomplete(decision, gap) + _other_laws(decision, findings) + _nameless(findings, 0.0)
         case Reason.SEALED:
             fits = f"{names} {'fits' if len(answer) == 1 else 'fit'} the presses that were judged"
-            return f"{fits}; {_against(shown)}: not the name"
+            return f"{fits}; {_against(gap)}: not the name"
         case Reason.LEFTOVERS:
-            closest = _closest(answer, found.share_left, shown)
-            return f"something is missing that has no name yet; {closest}{_elsewhere(decision, found)}"
+            closest = _closest(answer, findings.share_left, gap)
+            return f"something is missing that has no name yet; {closest}{_elsewhere(decision, findings)}"
         case Reason.ODD:
-            odd = _odd([found.problem.setting.course.names[k] for k in found.problem.null.odd])
-            return odd + _lone(decision, found, "; ")
+            odd = _odd([findings.problem.setting.course.names[k] for k in findings.problem.null.odd])
+            return odd + _lone(decision, findings, "; ")
         case Reason.ALARM:
             return f"no effect of the library shows, but {_seen(decision)}"
         case Reason.LOUD:
-            loud = f"{plain_number(found.loudness, 2)} times the noise's"
-            off = f"the residual's mean square is {loud}, but no effect shows in several presses"
-            return off + (_lone(decision, found, ": ") or ": look at where it lives")
+            loud = f"{plain_number(findings.loudness, 2)} times the noise's"
+            remark = f"the residual's mean square is {loud}, but no effect shows in several presses"
+            return remark + (_lone(decision, findings, ": ") or ": look at where it lives")
         case Reason.UNEXPLAINED:
-            seen = f": {_seen(decision)}" if decision.alarms else ""
-            return "something is missing that no modelled effect explains" + seen + _lone(decision, found, "; ")
+            evidence = f": {_seen(decision)}" if decision.alarms else ""
+            return "something is missing that no modelled effect explains" + evidence + _lone(decision, findings, "; ")
 
 
 def _seen(decision: Decision) -> str:
@@ -104,66 +104,66 @@ def _seen(decision: Decision) -> str:
     return "; ".join(alarm.seen for alarm in decision.alarms)
 
 
-def _against(shown: Gap | None) -> str:
+def _against(gap: Gap | None) -> str:
     """Return the evidence of sealed episodes against an answer as a clause."""
-    if shown is None or shown.ratio is None:
+    if gap is None or gap.ratio is None:
         return "the sealed ones do not bear it out"
-    share, error = 100 * shown.ratio.share, 100 * shown.ratio.error
+    share, error = 100 * gap.ratio.share, 100 * gap.ratio.error
     return f"the sealed ones do not bear it out (they show {share:.0f} % of it, with a standard error of {error:.0f} %)"
 
 
-def _lone(decision: Decision, found: Findings, before: str) -> str:
+def _lone(decision: Decision, findings: Findings, lead: str) -> str:
     """Return a clause on an effect that only one press shows; empty where there is none."""
     if (lone := decision.lone) is None:
         return ""
-    press = found.problem.setting.course.names[lone.episode]
+    press = findings.problem.setting.course.names[lone.episode]
     return (
-        f"{before}{lone.effect.spoken} would explain {100 * lone.share:.0f} % of it, but {press} alone holds "
+        f"{lead}{lone.effect.spoken} would explain {100 * lone.share:.0f} % of it, but {press} alone holds "
         f"{100 * lone.leverage:.0f} % of what shows it, and one press carries no name"
     )
 
 
-def _incomplete(decision: Decision, shown: Gap | None) -> str:
+def _incomplete(decision: Decision, gap: Gap | None) -> str:
     """Return the named effects with their level and the share of the gap that they close, then the suspected ones."""
-    sure = [e for e in decision.effects if e.level is not None]
-    words = _all_called(sure)
+    named = [e for e in decision.effects if e.level is not None]
+    words = _all_called(named)
     open_ones = list(dict.fromkeys(e.finding.placed.effect.spoken for e in decision.effects if e.level is None))
-    said = _there(_listed(words, "and"), len(words), decision, shown)
-    return said + (f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else "")
+    sentence = _there(_listed(words, "and"), len(words), decision, gap)
+    return sentence + (f"; {_listed(open_ones, 'and')} may be there, too" if open_ones else "")
 
 
-def _there(names: str, count: int, decision: Decision, shown: Gap | None) -> str:
+def _there(names: str, count: int, decision: Decision, gap: Gap | None) -> str:
     """Return a clause on the presence of effects, with the share of the sealed gap that they close."""
-    said, closed = f"{names} {'is' if count == 1 else 'are'} there", _closed(decision, shown)
-    return f"{said} and {'closes' if count == 1 else 'close'} {closed}" if closed else said
+    clause, closed = f"{names} {'is' if count == 1 else 'are'} there", _closed(decision, gap)
+    return f"{clause} and {'closes' if count == 1 else 'close'} {closed}" if closed else clause
 
 
-def _small(count: int, shown: Gap | None) -> str:
+def _small(count: int, gap: Gap | None) -> str:
     """Return a remark on small effects, without which sealed presses fit as well; empty for larger ones."""
-    sealed = shown.document() if shown is not None and len(shown.before) else {}
+    sealed = gap.document() if gap is not None and len(gap.before) else {}
     if not sealed or abs(sealed["after"] - sealed["before"]) > SMALL * sealed["before"]:
         return ""
     return f". {'It is' if count == 1 else 'They are'} small: sealed presses fit as well without"
 
 
-def _other_laws(decision: Decision, found: Findings) -> str:
+def _other_laws(decision: Decision, findings: Findings) -> str:
     """Return clauses on the evidence for other laws: of a named family, then of an unnamed one."""
-    return _own_laws(decision) + _elsewhere(decision, found)
+    return _own_laws(decision) + _elsewhere(decision, findings)
 
 
-def _elsewhere(decision: Decision, found: Findings) -> str:
+def _elsewhere(decision: Decision, findings: Findings) -> str:
     """Return a clause on the unnamed family that explains most; empty without one."""
-    others = elsewhere(found, decision.lacking)[:1]
-    return "".join(f"; something of {family.value} shows, too, in {SIGNS[family]}" for family in others)
+    families = elsewhere(findings, decision.lacking)[:1]
+    return "".join(f"; something of {family.value} shows, too, in {SIGNS[family]}" for family in families)
 
 
 def _own_laws(decision: Decision) -> str:
     """Return clauses on the evidence for another law of a named family."""
     shares: dict[Family, float] = {}
     for e in decision.effects:
-        family, own = e.finding.placed.effect.family, of_family(e.finding, decision.lacking)
-        if e.level is not None and own is not None and another_form(e.finding, decision.lacking):
-            shares[family] = min(100 * own.size / max(e.finding.bought, 1e-9), shares.get(family, np.inf))
+        family, lack = e.finding.placed.effect.family, of_family(e.finding, decision.lacking)
+        if e.level is not None and lack is not None and another_form(e.finding, decision.lacking):
+            shares[family] = min(100 * lack.size / max(e.finding.bought, 1e-9), shares.get(family, np.inf))
     return "".join(
         f"; another law of {family.value} would explain {share:.0f} % more, in {SIGNS[family]}"
         for family, share in shares.items()
@@ -181,46 +181,48 @@ def _all_called(effects: Sequence[Decided]) -> list[str]:
     words: list[str] = []
     for e in effects:
         family = e.finding.placed.effect.family
-        own = [o for o in effects if o.level is Level.FAMILY and o.finding.placed.effect.family is family]
-        best = list(dict.fromkeys(o.finding.placed.effect.spoken for o in own))
+        members = [o for o in effects if o.level is Level.FAMILY and o.finding.placed.effect.family is family]
+        best = list(dict.fromkeys(o.finding.placed.effect.spoken for o in members))
         together = e.level is Level.FAMILY and len(best) > 1
         words.append(f"{family.value} ({_listed(best, 'and')} fit best)" if together else _called(e))
     return list(dict.fromkeys(words))
 
 
-def _closed(decision: Decision, shown: Gap | None) -> str:
+def _closed(decision: Decision, gap: Gap | None) -> str:
     """Return the closed share of the sealed gap, by the named effects if there are any; empty if it is uncertain."""
-    sealed = shown.document() if shown is not None and len(shown.before) else {}
+    sealed = gap.document() if gap is not None and len(gap.before) else {}
     if not sealed.get("certain"):
         return ""
-    each, own = sealed["shares"], [e.finding.placed.effect.name for e in decision.effects if e.level is not None]
-    share = sum(each.get(name, 0.0) for name in own) if own and any(each.values()) else sealed["closed"]
-    much = "all" if share >= ALL_CLOSED else f"{100 * share:.0f} %"
-    return f"{much} of the gap on sealed presses" if share >= LEAST_CLOSED else ""
+    each, names = sealed["shares"], [e.finding.placed.effect.name for e in decision.effects if e.level is not None]
+    share = sum(each.get(name, 0.0) for name in names) if names and any(each.values()) else sealed["closed"]
+    part = "all" if share >= ALL_CLOSED else f"{100 * share:.0f} %"
+    return f"{part} of the gap on sealed presses" if share >= LEAST_CLOSED else ""
 
 
-def _nameless(found: Findings, least: float) -> str:
+def _nameless(findings: Findings, least: float) -> str:
     """Return a clause on the unexplained share; empty below ``least`` [1]."""
-    if found.left.t < LEFT_T or found.share_left < least:
+    if findings.left.t < LEFT_T or findings.share_left < least:
         return ""
-    much = f"{100 * found.share_left:.0f} %" if found.share_left >= SPEAKS_FROM else "less than 1 %"
-    return f"; {much} of what could be explained has no name yet"
+    part = f"{100 * findings.share_left:.0f} %" if findings.share_left >= SPEAKS_FROM else "less than 1 %"
+    return f"; {part} of what could be explained has no name yet"
 
 
-def _undecided(decision: Decision, shown: Gap | None) -> str:
+def _undecided(decision: Decision, gap: Gap | None) -> str:
     """Return the open questions (rivals, bounds, too few episodes), and the family if all rivals share it."""
     answer = [e.finding for e in decision.effects]
     shapes = [{p.name for p in f.placed.effect.shapes} & set(f.at_bound) for f in answer]
-    bounds = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if set(f.at_bound) - own]
-    formed = [f.placed.effect.spoken for f, own in zip(answer, shapes, strict=True) if own]
+    bounds = [
+        f.placed.effect.spoken for f, parameters in zip(answer, shapes, strict=True) if set(f.at_bound) - parameters
+    ]
+    formed = [f.placed.effect.spoken for f, parameters in zip(answer, shapes, strict=True) if parameters]
     weak = [f.placed.effect.spoken for f in answer if f.necessity < f.needed]
     words = _best(decision.effects) if any(f.rivals for f in answer) else _needed(decision.effects)
     either = [e for e in decision.effects if e.level is Level.FAMILY and e.status != "named"]
     shared = [e.finding.placed.effect.family.value for e in either]
-    closed = _closed(decision, shown)
-    sure = [f"it is {_listed(list(dict.fromkeys(shared)), 'and')}"] if shared else []
-    sure += [f"{closed} is closed"] if closed else []
-    words += f". Either way {' and '.join(sure)}" if sure else ""
+    closed = _closed(decision, gap)
+    facts = [f"it is {_listed(list(dict.fromkeys(shared)), 'and')}"] if shared else []
+    facts += [f"{closed} is closed"] if closed else []
+    words += f". Either way {' and '.join(facts)}" if facts else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     words += f"; {', '.join(formed)} fits best where its equation ends: the form is another one" if formed else ""
     return words + (f"; more presses must say whether {', '.join(weak)} is needed" if weak else "")
@@ -228,11 +230,11 @@ def _undecided(decision: Decision, shown: Gap | None) -> str:
 
 def _needed(effects: Sequence[Decided]) -> str:
     """Return the certain effects and those that only fit best, of an answer without rivals."""
-    sure = _all_called([e for e in effects if e.status == "named"])
+    names = _all_called([e for e in effects if e.status == "named"])
     fits = list(dict.fromkeys(e.finding.placed.effect.spoken for e in effects if e.status != "named"))
-    words = [f"{_listed(sure, 'and')} {'is' if len(sure) == 1 else 'are'} there"] if sure else []
-    words += [f"{_listed(fits, 'and')} {'fits' if len(fits) == 1 else 'fit'} best"] if fits and not sure else []
-    words += [f"{_listed(fits, 'and')} may be there, too"] if fits and sure else []
+    words = [f"{_listed(names, 'and')} {'is' if len(names) == 1 else 'are'} there"] if names else []
+    words += [f"{_listed(fits, 'and')} {'fits' if len(fits) == 1 else 'fit'} best"] if fits and not names else []
+    words += [f"{_listed(fits, 'and')} may be there, too"] if fits and names else []
     return "; ".join(words)
 
 
@@ -247,37 +249,37 @@ def _odd(names: list[str]) -> str:
     )
 
 
-def _closest(answer: list[FoundEffect], share: float, shown: Gap | None) -> str:
+def _closest(answer: list[FoundEffect], share: float, gap: Gap | None) -> str:
     """Return a clause on the best answer that is no name: the share it leaves, and its failure on sealed episodes."""
     names = list(dict.fromkeys(m.placed.effect.spoken for m in answer))
-    alone, words = len(names) == 1, _listed(names, "and")
-    words += " comes closest and leaves" if alone else " together come closest and leave"
+    single, words = len(names) == 1, _listed(names, "and")
+    words += " comes closest and leaves" if single else " together come closest and leave"
     words += f" {100 * share:.0f} % of what could be explained"
-    it, name = ("it", "it is not the name") if alone else ("them", "they are not the names")
-    if shown is not None and len(shown.before):
-        before, after = float(shown.before.mean()), float(shown.after.mean())
-        against = shown.ratio is None or shown.ratio.observed < 0
-        if against and (worse := worsened(before, after)):
+    it, name = ("it", "it is not the name") if single else ("them", "they are not the names")
+    if gap is not None and len(gap.before):
+        base, final = float(gap.before.mean()), float(gap.after.mean())
+        against = gap.ratio is None or gap.ratio.observed < 0
+        if against and (worse := worsened(base, final)):
             return (
                 f"{words}, but sealed presses fit {worse} with {it} (mean square over the noise "
-                f"{plain_number(before, 3)} without, {plain_number(after, 3)} with): {name}"
+                f"{plain_number(base, 3)} without, {plain_number(final, 3)} with): {name}"
             )
     if instead := list(dict.fromkeys(load(r).spoken for m in answer for r in m.rivals)):
-        few = _listed(instead, "or") if len(instead) <= MOST_STAND_INS else f"{len(instead)} others"
-        return f"{words}, and {few} may stand in for {it}"
+        substitutes = _listed(instead, "or") if len(instead) <= MOST_STAND_INS else f"{len(instead)} others"
+        return f"{words}, and {substitutes} may stand in for {it}"
     return f"{words}, so {name}, or not all of it"
 
 
 def _best(effects: Sequence[Decided]) -> str:
     """Return the effects without rivals, then those that fit best with their rivals."""
-    alone = [e for e in effects if not e.finding.rivals]
-    told = [_called(e) if e.status == "named" else e.finding.placed.effect.spoken for e in alone]
-    clear = list(dict.fromkeys(told))
+    unrivalled = [e for e in effects if not e.finding.rivals]
+    calls = [_called(e) if e.status == "named" else e.finding.placed.effect.spoken for e in unrivalled]
+    clear = list(dict.fromkeys(calls))
     groups: dict[frozenset[str], list[FoundEffect]] = {}
     for m in (e.finding for e in effects):
         if m.rivals:
             groups.setdefault(frozenset((m.placed.effect.called, *m.rivals)), []).append(m)
-    words = "; ".join(_open(own) for own in groups.values())
+    words = "; ".join(_open(group) for group in groups.values())
     if not words:
         return _listed(clear, "and")
     are = "is" if len(clear) == 1 else "are"
@@ -285,17 +287,17 @@ def _best(effects: Sequence[Decided]) -> str:
     return f"{begins}these recordings do not say which effect it is: {words}"
 
 
-def _open(own: list[FoundEffect]) -> str:
+def _open(group: list[FoundEffect]) -> str:
     """Return a clause on effects with the same rivals, and those rivals."""
-    called = {m.placed.effect.called for m in own}
-    names = list(dict.fromkeys(m.placed.effect.spoken for m in own))
-    others = [name for name in dict.fromkeys(r for m in own for r in m.rivals) if name not in called]
+    called = {m.placed.effect.called for m in group}
+    names = list(dict.fromkeys(m.placed.effect.spoken for m in group))
+    rivals = [name for name in dict.fromkeys(r for m in group for r in m.rivals) if name not in called]
     words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
-    if others:
-        families = list(dict.fromkeys(load(name).family.value for name in others))
-        instead = _listed([load(name).spoken for name in others], "or")
-        if len(others) > MOST_STAND_INS:
-            instead = f"{len(others)} others ({_listed(families, 'or')})"
+    if rivals:
+        families = list(dict.fromkeys(load(name).family.value for name in rivals))
+        instead = _listed([load(name).spoken for name in rivals], "or")
+        if len(rivals) > MOST_STAND_INS:
+            instead = f"{len(rivals)} others ({_listed(families, 'or')})"
         return f"{words}, but {instead} may stand in for {'it' if len(names) == 1 else 'any of them'}"
     return f"{words}, but one may stand in for another"
 

@@ -71,11 +71,11 @@ def slices(problem: Problem) -> list[Slice]:
         ("clock", n, (clock >= k / 3) & (clock <= (k + 1) / 3)) for k, n in enumerate(("first", "second", "last"))
     ]
     parts += [("indenter", t.name, course.tool == k) for k, t in enumerate(course.tools) if len(course.tools) > 1]
-    made = [_slice(by, name, each, course.episode, rows) for by, name, rows in parts if rows.sum() > 10]
+    parts_of_residual = [_slice(by, name, each, course.episode, rows) for by, name, rows in parts if rows.sum() > 10]
     kinds = [*course.channel_names, *["force"] * (course.force is not None)]
     for k, name in enumerate(kinds[: square.shape[1]]):
-        made.append(_slice("stream", name, square[:, k], course.episode, np.ones(len(each), dtype=bool)))
-    return made
+        parts_of_residual.append(_slice("stream", name, square[:, k], course.episode, np.ones(len(each), dtype=bool)))
+    return parts_of_residual
 
 
 def figure(value: float) -> str:
@@ -94,11 +94,11 @@ def _slice(by: str, name: str, each: np.ndarray, episode: np.ndarray, rows: np.n
     return Slice(by, name, float(each[rows].mean()), t_value(means - 1))
 
 
-def beside(before: list[Slice], after: list[Slice]) -> list[dict[str, Any]]:
+def beside(base: list[Slice], final: list[Slice]) -> list[dict[str, Any]]:
     """Return slices of the same parts before and after, as in the verdict's file."""
     return [
         {"by": b.by, "name": b.name, "before": b.mean_square, "after": a.mean_square}
-        for b, a in zip(before, after, strict=True)
+        for b, a in zip(base, final, strict=True)
     ]
 
 
@@ -116,18 +116,18 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
         energy: Half the whitened sum of squares of each [1], shape (episodes,).
         values: Whitened values behind each [1], shape (episodes,).
     """
-    there = np.flatnonzero(values > 0)
-    if len(there) < 4:
+    rows = np.flatnonzero(values > 0)
+    if len(rows) < 4:
         return []
-    square = 2 * energy[there] / values[there]
+    square = 2 * energy[rows] / values[rows]
     usual = float(np.median(square))
-    high = there[square > ALONE * max(usual, 1.0)]
-    if not 0 < len(high) <= FEW_ALONE * len(there):
+    high = rows[square > ALONE * max(usual, 1.0)]
+    if not 0 < len(high) <= FEW_ALONE * len(rows):
         return []
     order = sorted(high.tolist(), key=lambda k: -energy[k] / values[k])
     words = ", ".join(f"{names[k]} {2 * energy[k] / values[k]:.3g}" for k in order[:5])
     return [
-        f"episode: {words}, the others {usual:.3g}: {len(high)} of {len(there)} stand out by "
+        f"episode: {words}, the others {usual:.3g}: {len(high)} of {len(rows)} stand out by "
         "themselves; look at them, or record what they did again"
     ]
 
@@ -142,17 +142,17 @@ def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 
     """
     words, alike = list(alone or []), []
     for by in dict.fromkeys(s.by for s in found):
-        own = [s for s in found if s.by == by]
-        high = [s for s in own if s.mean_square > NOTABLE and s.t > NOTABLE_T]
+        members = [s for s in found if s.by == by]
+        high = [s for s in members if s.mean_square > NOTABLE and s.t > NOTABLE_T]
         if not high:
             continue
-        if len(high) == len(own) > 2 and max(s.mean_square for s in high) < 2 * min(s.mean_square for s in high):
+        if len(high) == len(members) > 2 and max(s.mean_square for s in high) < 2 * min(s.mean_square for s in high):
             alike.append((by, float(np.median([s.mean_square for s in high]))))
         else:
             high.sort(key=lambda s: -s.mean_square)
             words.append(f"{by}: {', '.join(f'{s.name} at {figure(s.mean_square)}' for s in high[:4])}")
     if alike:
         usual = [level for _, level in alike]
-        much = _range(min(usual), max(usual))
-        words.append(f"{', '.join(by for by, _ in alike)}: everywhere alike, {much}")
+        extent = _range(min(usual), max(usual))
+        words.append(f"{', '.join(by for by, _ in alike)}: everywhere alike, {extent}")
     return words or [SPREAD.format(whole) if whole > NOTABLE else NOWHERE]

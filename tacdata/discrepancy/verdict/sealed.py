@@ -51,17 +51,17 @@ def chosen(course: Course) -> np.ndarray:
     order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(keys[k].encode()).digest())
     tool = np.array([course.tool[course.episode == k][0] for k in range(course.episodes)])
     depth = np.array([course.tip[course.episode == k, 2].max() for k in range(course.episodes)])
-    left: dict[tuple[int, int], list[int]] = {}
+    candidates: dict[tuple[int, int], list[int]] = {}
     for k in range(course.episodes):
-        left.setdefault((int(course.site[k]), int(tool[k])), []).append(k)
-    found: list[int] = []
+        candidates.setdefault((int(course.site[k]), int(tool[k])), []).append(k)
+    episodes: list[int] = []
     for k in order:
-        others = [other for other in left[int(course.site[k]), int(tool[k])] if other != k]
-        enough = len(others) >= OPEN_EACH and depth[others].max() >= (1 - DEEPER) * depth[k]
-        if len(found) < max(int(SEALED_SHARE * course.episodes), LEAST_SEALED) and enough:
-            found.append(k)
-            left[int(course.site[k]), int(tool[k])] = others
-    return np.sort(np.array(found, dtype=np.int64))
+        siblings = [sibling for sibling in candidates[int(course.site[k]), int(tool[k])] if sibling != k]
+        enough = len(siblings) >= OPEN_EACH and depth[siblings].max() >= (1 - DEEPER) * depth[k]
+        if len(episodes) < max(int(SEALED_SHARE * course.episodes), LEAST_SEALED) and enough:
+            episodes.append(k)
+            candidates[int(course.site[k]), int(tool[k])] = siblings
+    return np.sort(np.array(episodes, dtype=np.int64))
 
 
 def without_readings(course: Course, episodes: np.ndarray) -> Course:
@@ -105,7 +105,7 @@ class Gap:
             return {"episodes": 0, "share": SEALED_SHARE, "rule": f"none of fewer than {FEWEST_TO_SEAL} episodes"}
         best = min(float(self.ceiling.mean()), float(self.after.mean()))
         worst = int(np.argmax(self.after))
-        before, after = self._drawn()
+        base, final = self._drawn()
         closed, (low, high) = _closed(self.before.mean(), self.after.mean()), self.interval
         return {
             "episodes": len(self.before),
@@ -115,8 +115,8 @@ class Gap:
             "after": float(self.after.mean()),
             "floor": FLOOR,
             "ceiling": best,
-            "before_interval": _between(before),
-            "after_interval": _between(after),
+            "before_interval": _between(base),
+            "after_interval": _between(final),
             "closed": float(closed),
             "interval": [low, high],
             "certain": high - low < WIDEST,
@@ -127,9 +127,9 @@ class Gap:
 
     def _shares(self, closed: float) -> dict[str, float]:
         """Return each effect's part of the closed share, in proportion to the rise of the mean square without it."""
-        cost = {name: max(float((own - self.after).mean()), 0.0) for name, own in self.without.items()}
-        whole = sum(cost.values())
-        return {name: closed * by / whole if whole > 0 else 0.0 for name, by in cost.items()}
+        cost = {name: max(float((errors - self.after).mean()), 0.0) for name, errors in self.without.items()}
+        total = sum(cost.values())
+        return {name: closed * by / total if total > 0 else 0.0 for name, by in cost.items()}
 
 
 def _between(draws: np.ndarray) -> list[float]:
@@ -137,59 +137,59 @@ def _between(draws: np.ndarray) -> list[float]:
     return [float(v) for v in np.quantile(draws, [0.05, 0.95])]
 
 
-def _closed(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def _closed(base: np.ndarray, final: np.ndarray) -> np.ndarray:
     """Return the share of the gap above the noise floor that is closed [1]; 0 where there is none."""
-    room = np.asarray(before) - FLOOR
-    return np.where(room > LEAST_GAP, (np.asarray(before) - after) / np.maximum(room, LEAST_GAP), 0.0)
+    room = np.asarray(base) - FLOOR
+    return np.where(room > LEAST_GAP, (np.asarray(base) - final) / np.maximum(room, LEAST_GAP), 0.0)
 
 
-def gap(course: Course, found: Findings, episodes: np.ndarray) -> Gap:
+def gap(course: Course, findings: Findings, episodes: np.ndarray) -> Gap:
     """Return the gap on sealed episodes.
 
     Args:
         course: All recordings, the sealed ones with their readings.
-        found: Findings without the sealed episodes.
+        findings: Findings without the sealed episodes.
         episodes: The sealed ones.
     """
     if not len(episodes):
         return Gap(np.zeros(0), np.zeros(0), np.zeros(0), ())
-    given, response = list(found.problem.setting.given), found.problem.setting.response
+    effects, response = list(findings.problem.setting.given), findings.problem.setting.response
     rows = course.read
     measured = Streams.of(course).measured(course)[:, : course.channels]
-    first = measured - predict(course, response, given).signal[rows]
-    model = found.final
+    first = measured - predict(course, response, effects).signal[rows]
+    model = findings.final
     placed = [*model.setting.given, *model.placed]
-    placed += [f.placed for f in gains_beyond_calibration(found)]
+    placed += [f.placed for f in gains_beyond_calibration(findings)]
     last = measured - predict(course, model.setting.response, placed).signal[rows]
-    rest = first - _predicted(course, np.nan_to_num(first), episodes)
-    noise = found.problem.null.noise
+    remainder = first - _predicted(course, np.nan_to_num(first), episodes)
+    noise = findings.problem.null.noise
     # ``scale`` is that of the innovations of an AR(1) process. Readings scatter by more, by 1 / sqrt(1 - memory^2).
     scale = noise.scale[: course.channels] / np.sqrt(max(1 - noise.memory**2, 0.02))
     number = course.episode[rows]
-    before, after, ceiling = (_squares(r / scale, number, episodes) for r in (first, last, rest))
+    base, final, ceiling = (_squares(r / scale, number, episodes) for r in (first, last, remainder))
     without = {}
-    for one in found.comparisons:
-        others = [*model.setting.given, *one.without.placed]
-        alone = measured - predict(course, one.without.response, others).signal[rows]
-        [name] = {p.effect.name for p in model.placed} - {p.effect.name for p in one.without.placed}
-        without[name] = _squares(alone / scale, number, episodes)
+    for comparison in findings.comparisons:
+        effects_without = [*model.setting.given, *comparison.without.placed]
+        residual = measured - predict(course, comparison.without.response, effects_without).signal[rows]
+        [name] = {p.effect.name for p in model.placed} - {p.effect.name for p in comparison.without.placed}
+        without[name] = _squares(residual / scale, number, episodes)
     names = tuple(course.names[k] for k in episodes)
-    return Gap(before, after, ceiling, names, without, likelihood_ratio(course, found))
+    return Gap(base, final, ceiling, names, without, likelihood_ratio(course, findings))
 
 
 def _squares(residual: np.ndarray, number: np.ndarray, episodes: np.ndarray) -> np.ndarray:
-    made = []
+    squares = []
     for k in episodes:
-        own = residual[number == k]
-        made.append(float(np.nanmean(np.square(own - np.nanmedian(own, axis=0)))))
-    return np.array(made)
+        values = residual[number == k]
+        squares.append(float(np.nanmean(np.square(values - np.nanmedian(values, axis=0)))))
+    return np.array(squares)
 
 
 def _predicted(course: Course, residual: np.ndarray, episodes: np.ndarray) -> np.ndarray:
     """Return the prediction of a residual by a ridge regression on histories of the path, fitted to open episodes."""
-    own = histories(course)[course.read]
+    history = histories(course)[course.read]
     share = np.clip(course.tip[course.read, 2] / course.span, 0.0, None)[:, None]
-    columns = np.column_stack([own * np.minimum(share * 10, 1), own * share, own])
+    columns = np.column_stack([history * np.minimum(share * 10, 1), history * share, history])
     columns = columns / np.maximum(columns.std(axis=0), 1e-9)
     number = course.episode[course.read]
     sealed = np.isin(number, episodes)
@@ -210,11 +210,11 @@ def _ridge(columns: np.ndarray, target: np.ndarray, strength: float) -> np.ndarr
     return np.linalg.solve(gram + weight * np.eye(len(gram)), columns.T @ target)
 
 
-def refuted(shown: Gap | None) -> bool:
+def refuted(sealed: Gap | None) -> bool:
     """Return whether sealed episodes refute an answer (`LikelihoodRatio.refutes`)."""
-    return shown is not None and shown.ratio is not None and shown.ratio.refutes
+    return sealed is not None and sealed.ratio is not None and sealed.ratio.refutes
 
 
-def borne_out(shown: Gap | None) -> bool:
+def borne_out(sealed: Gap | None) -> bool:
     """Return whether sealed episodes alone support an answer (`LikelihoodRatio.bears_out`)."""
-    return shown is not None and shown.ratio is not None and shown.ratio.bears_out
+    return sealed is not None and sealed.ratio is not None and sealed.ratio.bears_out

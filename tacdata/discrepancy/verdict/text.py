@@ -58,16 +58,16 @@ def in_text(verdict: dict[str, Any]) -> str:
 def _short(lines: list[str]) -> list[str]:
     """Return the first lines, `MOST_WORDS` words in all, and where the others are."""
     more = "more: verdict.html"
-    left, shown = MOST_WORDS - len(more.split()), []
+    budget, head = MOST_WORDS - len(more.split()), []
     for line in lines:
-        left -= len(line.split())
-        if left < 0:
+        budget -= len(line.split())
+        if budget < 0:
             # A heading without its lines is none.
-            while shown and (shown[-1].endswith(":") or not shown[-1]):
-                shown.pop()
-            return [*shown, more]
-        shown.append(line)
-    return shown
+            while head and (head[-1].endswith(":") or not head[-1]):
+                head.pop()
+            return [*head, more]
+        head.append(line)
+    return head
 
 
 def _folded(verdict: dict[str, Any]) -> list[str]:
@@ -91,11 +91,11 @@ def unsaid(verdict: dict[str, Any]) -> list[str]:
 
 def _gate(verdict: dict[str, Any]) -> str:
     """Return a line on the gate: whether there is a gap, and its p-values."""
-    gate, there = verdict["gate"], "yes, beyond chance"
+    gate, words = verdict["gate"], "yes, beyond chance"
     if not gate["gap"]:
-        there = "not within a specimen, only between specimens" if between_specimens(verdict) else "none beyond chance"
+        words = "not within a specimen, only between specimens" if between_specimens(verdict) else "none beyond chance"
     return (
-        f"is there a gap? {there}: p = {gate['p']:.3f} along the known effects, {gate['p_generic']:.3f} along patterns "
+        f"is there a gap? {words}: p = {gate['p']:.3f} along the known effects, {gate['p_generic']:.3f} along patterns "
         f"of none of them ({GATE:g} or less is a gap)"
     )
 
@@ -127,8 +127,8 @@ def _effect(entry: dict[str, Any]) -> list[str]:
         meaning = f" ({meanings[name]})" if name in meanings else ""
         if isinstance(p["value"], list):
             ends = dict.fromkeys(plain_number(value, 4) for value in (min(p["value"]), max(p["value"])))
-            over = " over the channels" if len(ends) > 1 else ""
-            lines.append(f"    {name}: {' to '.join(ends)}{unit}{over}{meaning}")
+            scope = " over the channels" if len(ends) > 1 else ""
+            lines.append(f"    {name}: {' to '.join(ends)}{unit}{scope}{meaning}")
         else:
             spread = f" +- {plain_number(p['error'], 2)}" if p["error"] is not None else ""
             spread = "" if name in vague else spread
@@ -137,12 +137,12 @@ def _effect(entry: dict[str, Any]) -> list[str]:
         they = "is not known: other values fit" if len(vague) == 1 else "are not known, each by itself: other pairs fit"
         lines.append(f"    {' and '.join(vague)} {they} as well")
     if entry["alternatives"]:
-        others = ", ".join(load(name).spoken for name in entry["alternatives"])
-        lines.append(f"    these presses leave open whether it is: {others}")
+        spoken_rivals = ", ".join(load(name).spoken for name in entry["alternatives"])
+        lines.append(f"    these presses leave open whether it is: {spoken_rivals}")
     unphysical = entry.get("unphysical", [])
     if unphysical:
-        others = ", ".join(load(name).spoken for name in unphysical)
-        lines.append(f"    does as well only with an unphysical size: {others}")
+        spoken_rivals = ", ".join(load(name).spoken for name in unphysical)
+        lines.append(f"    does as well only with an unphysical size: {spoken_rivals}")
     spoken = {*entry["alternatives"], *unphysical}
     rivals: dict[str, float] = {}
     for name, by in sorted(entry["margins"].items(), key=lambda item: item[1]):
@@ -168,11 +168,11 @@ def _is_vague(parameter: dict[str, Any]) -> bool:
 
 def _standing(entry: dict[str, Any]) -> str:
     """Return the status of an effect in words: with its confidence, or with the family if only that is named."""
-    status, sure = entry["status"], entry["confidence"]
+    status, confidence = entry["status"], entry["confidence"]
     if entry.get("level") == "family":
         family = entry["family"]
         return f"fits best; {family} is named" if status == "named" else f"{status}; either way it is {family}"
-    return status if status != "named" or sure is None else f"named, {100 * sure:.0f} % sure"
+    return status if status != "named" or confidence is None else f"named, {100 * confidence:.0f} % sure"
 
 
 def _by(rivals: list[tuple[str, float]]) -> str:
@@ -181,25 +181,25 @@ def _by(rivals: list[tuple[str, float]]) -> str:
 
 def _sizes(verdict: dict[str, Any]) -> list[str]:
     """Return lines on the mean squares of the residual; before and after only if the answer has effects."""
-    left, sealed, none = verdict["left"], verdict["sealed"], not verdict["effects"]
+    remainder, sealed, none = verdict["left"], verdict["sealed"], not verdict["effects"]
     lines = [f"residual, {MEAN_SQUARE}:"]
-    own = "their own pose and gain"
-    after = "" if none else f" before, {figure(left['after'])} after"
-    over = "" if none or left["after"] > LOW else "; below 1, since part of it had been taken for noise"
-    lines.append(f"  presses that were fitted, {own} taken out: {figure(left['before'])}{after}{over}")
+    nuisances = "their own pose and gain"
+    final = "" if none else f" before, {figure(remainder['after'])} after"
+    remark = "" if none or remainder["after"] > LOW else "; below 1, since part of it had been taken for noise"
+    lines.append(f"  presses that were fitted, {nuisances} taken out: {figure(remainder['before'])}{final}{remark}")
     if sealed["episodes"]:
-        head = f"  {sealed['episodes']} sealed presses, {own} left in: {figure(sealed['before'])}"
+        head = f"  {sealed['episodes']} sealed presses, {nuisances} left in: {figure(sealed['before'])}"
         lines.append(f"{head}{'' if none else _closed(sealed, verdict['status'].startswith('named'))}")
         if sealed["ceiling"] < BEST * sealed["before" if none else "after"]:
             lines.append(
                 f"  a regression on the path's history would bring the sealed ones to {figure(sealed['ceiling'])}"
             )
         lines += [] if none or sealed["certain"] else _borne_out(sealed.get("ratio"))
-    if not none and left["after"] < left["before"]:
-        clear = f"{left['t']:.1f} standard errors from none"
-        beyond = clear if left["t"] >= WITHIN_NOISE else "chance alone may leave as much"
-        much = f"{_percent(left['share'])} of what could be explained ({beyond})"
-        lines.append(f"left without an explanation: {much}")
+    if not none and remainder["after"] < remainder["before"]:
+        clear = f"{remainder['t']:.1f} standard errors from none"
+        beyond = clear if remainder["t"] >= WITHIN_NOISE else "chance alone may leave as much"
+        part = f"{_percent(remainder['share'])} of what could be explained ({beyond})"
+        lines.append(f"left without an explanation: {part}")
     return lines
 
 
@@ -220,21 +220,21 @@ def _closed(sealed: dict[str, Any], named: bool) -> str:
         sealed: Entry ``sealed`` of the verdict.
         named: Whether the effects are named. If the fit is significantly worse, none is.
     """
-    after, ratio = f" before, {figure(sealed['after'])} after", sealed.get("ratio")
+    line, ratio = f" before, {figure(sealed['after'])} after", sealed.get("ratio")
     if (ratio is None or ratio["observed"] < 0) and (worse := worsened(sealed["before"], sealed["after"])):
-        return f"{after}, {worse}{', no more than chance may do' if named and ratio is not None else ''}"
+        return f"{line}, {worse}{', no more than chance may do' if named and ratio is not None else ''}"
     if not sealed["certain"]:
         hidden = "" if sealed["after"] < sealed["before"] else "; pose and gain hide what the effects do"
         low, high = sealed["after_interval"]
-        return f"{after} (90 %: {figure(low)} to {figure(high)}){hidden}"
+        return f"{line} (90 %: {figure(low)} to {figure(high)}){hidden}"
     low, high = sealed["interval"]
     if sealed["closed"] < LEAST_CLOSED:
-        return f"{after}, no better (90 %: {100 * low:.0f} to {100 * high:.0f} % of it closed)"
+        return f"{line}, no better (90 %: {100 * low:.0f} to {100 * high:.0f} % of it closed)"
     each = {load(name).spoken: share for name, share in sealed.get("shares", {}).items() if share > 0}
     parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in each.items()) if len(each) > 1 else ""
     closed, low, high = (round(100 * part) for part in (sealed["closed"], low, high))
-    much = f"{closed} % of the gap closed (90 %: {low} to {high} %)"
-    return f"{after}, {much}: {parts}" if parts else f"{after}, {much}"
+    extent = f"{closed} % of the gap closed (90 %: {low} to {high} %)"
+    return f"{line}, {extent}: {parts}" if parts else f"{line}, {extent}"
 
 
 def _percent(share: float) -> str:
@@ -244,8 +244,8 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %" if share < 0.1 else f"{100 * share:.0f} %"
 
 
-def worsened(before: float, after: float) -> str:
+def worsened(base: float, final: float) -> str:
     """Return in words that a mean square has not become smaller; empty where it has."""
-    if after < before:
+    if final < base:
         return ""
-    return f"worse by {100 * (after / before - 1):.0f} %" if after >= 1.005 * before else "no better"
+    return f"worse by {100 * (final / base - 1):.0f} %" if final >= 1.005 * base else "no better"
