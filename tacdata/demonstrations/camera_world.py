@@ -141,6 +141,7 @@ def pose_matrix(entry: dict[str, Any], origin: str) -> np.ndarray:
     if not 0.99 < np.linalg.norm(turn) < 1.01:
         fault = f"{origin}: quaternion {turn.tolist()} of length {np.linalg.norm(turn):.3f}"
         raise FormatError(fault, "xyzw of length 1", "correct it; no rotation is [0, 0, 0, 1]")
+    # Negated, so that NaN is refused, too.
     if not (away := float(np.linalg.norm(entry["position"]))) <= FARTHEST:
         fault = f"{origin}: a position {away:g} m away: are these millimetres?"
         raise FormatError(fault, f"metres, up to {FARTHEST:g} m", "give it in metres")

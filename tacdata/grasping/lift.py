@@ -144,6 +144,7 @@ def lifting_grip(grip: Grip, lateral: float) -> Grip:
 
 
 def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
+    # At rest MuJoCo's contact is a spring of rate * reduced mass / (1 - impedance) [N/m].
     reduced = FINGER_MASS * grip.mass / (FINGER_MASS + grip.mass)
     rate = grip.skin * (1 - IMPEDANCE) / reduced
     fingers = "".join(

@@ -61,6 +61,7 @@ def clear_of_rim(presses: list[dict[str, Any]], indenters: dict[str, Any], senso
     for press in presses:
         indenter = from_document(indenters[press["indenter"]], press["indenter"])
         deepest = press["depth"] + press.get("overshoot", 0.0)
+        # An indenter that is too wide for its skin can only press the middle.
         rim = np.maximum(half - indenter.footprint(deepest, press.get("yaw", 0.0)) - clearance, 0.0)
         press["x"], press["y"] = (
             round(float(np.clip(press[axis], -limit, limit)), 3) for axis, limit in zip("xy", rim, strict=True)

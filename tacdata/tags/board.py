@@ -127,6 +127,7 @@ def draw_board(board: Board, paper: str = "a4", dpi: int = DPI) -> np.ndarray:
         raise UsageError(f"paper {paper!r}", ", ".join(PAPER), "choose one of them")
     width, height = PAPER[paper]
     breadth, rise = board.columns * board.square, board.rows * board.square
+    # Margins, and below the board the ruler and the instructions.
     if breadth > width - 16 or rise > height - 34:
         raise UsageError(
             f"a board of {breadth:g} x {rise:g} mm",

@@ -76,6 +76,7 @@ def _check_tip(place: np.ndarray, cube: Cube, origin: str) -> None:
     if 0 < np.abs(place).max() < cube.side / 2000:
         where, remedy = f"is inside the cube of {cube.side:g} mm", "give tip/position in mm, from the cube's centre"
         raise FormatError(f"{fault} {where}: is it in metres?", "a place outside of the cube", remedy)
+    # Negated, so that NaN is refused, too.
     if not np.linalg.norm(place) <= FARTHEST:
         where, remedy = "is away from its cube", "give tip/position in mm, from the cube's centre"
         raise FormatError(f"{fault} {where}: is it in micrometres?", f"up to {1000 * FARTHEST:g} mm", remedy)

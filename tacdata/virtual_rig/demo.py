@@ -196,11 +196,13 @@ class VirtualDemo:
 
     def _board(self, finger: str, number: int) -> VirtualBoard:
         layout, seed = self.layouts[finger], 10 * self.seed + number
+        # Ten bits a byte, on a line that is busy for at most 0.8 of the time.
         baud = next((b for b in BAUDS if b >= layout.size * 10 * layout.rate / 0.8), BAUDS[-1])
         timing = draw_timing(seed, self.start_ns, layout.rate)
         return VirtualBoard(self.clock, layout, timing, self._reader(finger, number), baud, seed)
 
     def _reader(self, finger: str, number: int) -> Callable[[int], np.ndarray]:
+        # The hand gives contacts in the pad's own frame: there is no guide to register.
         flat = Registration((0.0, 0.0, 0.0), 0.0)
         world = World(draw(100 * self.seed + number, self.sensors[finger], flat), self.sensors[finger])
         ball = Sphere(self.hand.nub)

@@ -52,6 +52,7 @@ def record_by_hand(rig: Path, folder: Path, task: str, seconds: float | None, co
                     if stop.asked():
                         break
                 return recorder.session
+        # After Ctrl-C, too, a person reads what is on the disk.
         except BaseException as error:
             _forget_if_empty(folder, resume)
             error.add_note(_ending(folder))
@@ -85,6 +86,7 @@ def _enter() -> bool:
 
 def _forget_if_empty(folder: Path, resume: bool) -> None:
     """Delete a new folder without any recording, so that the same command can be repeated."""
+    # The one file is the session's own document.
     if not resume and folder.is_dir() and len(list(folder.iterdir())) == 1:
         for path in folder.iterdir():
             path.unlink()

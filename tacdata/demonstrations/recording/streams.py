@@ -76,6 +76,7 @@ class DemoStreams(DeviceStreams):
     def record_into(self, sink: EpisodeWriter | None) -> None:
         """Send all arrivals from now on to a recording, or to none."""
         super().record_into(sink)
+        # A recording that begins during a silence holds its reason, too.
         for name, why in self.silent.items():
             if sink:
                 sink.note(f"{name}: {why}", "error")
@@ -90,6 +91,7 @@ class DemoStreams(DeviceStreams):
             words = self._health[stream].take(frame.arrival_ns, frame.counts)
             if not words:
                 continue
+            # Begun anew, so that a fault that lasts is found again.
             self._health[stream] = _health_of(self._boards[stream])
             if frame.arrival_ns >= self._quiet_until_ns[stream]:
                 self._quiet_until_ns[stream] = frame.arrival_ns + AGAIN_NS

@@ -170,6 +170,7 @@ def _channels(figures: RecordingFigures) -> list[Judgement]:
     if len(counts) > 1 and (counts == counts[:1]).all() and figures.recording.episode.press.depth >= DEAD_DEPTH:
         judgements.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
     delay = figures.document["cnc"]["contradiction"] / _rate_of_clock(figures)
+    # Off its profile, the controller may have moved where it seems to stand still.
     if values["jumps"] and delay > LATE_MS:
         text = f"jumps while nothing moves are NOT ASSESSED: the controller moved up to {delay:.0f} ms off its profile"
         judgements.append((WARNING, "taxels", text))
@@ -211,6 +212,7 @@ def _together(figures: RecordingFigures) -> list[Judgement]:
         text = f"the controller may have stood still for {still:.0f} ms on its way in or out, and told nothing then"
         judgements.append((UNUSABLE, "cnc", text))
     start_gap, end_gap = missing_ends(figures)
+    # A slow board may miss two and a half periods.
     allowed = max(GAP_MS * rate, 2500 / figures.document["taxels"]["nominal_rate"])
     if start_gap > allowed:
         judgements.append((UNUSABLE, "taxels", f"they begin {start_gap:.0f} ms after the press does"))
@@ -249,6 +251,7 @@ def _cnc(figures: RecordingFigures) -> list[Judgement]:
         if values["contradiction"]:
             text += f": reports contradict the commanded profile by {values['contradiction']:.0f} ms"
         judgements.append((severity, "cnc", text))
+    # A distance in space: the resolution counts on three axes.
     exact = EXACT_MM + np.sqrt(3.0) * figures.recording.height_resolution
     if values["hold_error"] is not None and values["hold_error"] > min(exact, HOLD_MM):
         text = f"the guide stood {values['hold_error']:.3f} mm from the commanded position in the hold"
@@ -265,6 +268,7 @@ def _cameras(figures: RecordingFigures) -> list[Judgement]:
 
 
 def _jumps(entries: list[dict], channels: int, unit: str) -> list[str]:
+    # So many at once have one cause, such as the supply.
     if len(entries) > channels / 2:
         first = min(jump["at"] for jump in entries)
         return [f"{len(entries)} channels jump while nothing moves, from {first:.1f} s on"]

@@ -105,6 +105,7 @@ class ClockModel:
             return arrival_ns - constant
         lines = (*self.earlier, self)
         begins = np.array([line.first_arrival_ns for line in lines])
+        # Frames before the first line are timed by it, too.
         which = np.maximum(np.searchsorted(begins, arrival_ns, side="right") - 1, 0)
         times = np.zeros(len(counter), np.int64)
         for number, line in enumerate(lines):
@@ -127,6 +128,7 @@ class ClockModel:
             "method": "lower envelope of arrival against counter",
             "first_counter": str(self.first_counter),
             "reference_ns": str(self.reference_ns),
+            # All digits: a rounded period would move the times of a long recording.
             "period_ns": repr(self.period_ns),
             "frames": str(self.frames),
             "first_arrival_ns": str(self.first_arrival_ns),

@@ -46,6 +46,7 @@ def mismatch(images: Sequence[np.ndarray], board: Board) -> Mismatch | None:
     evidence = _Seen(images)
     best: tuple[int, Mismatch] | None = None
     nominal, alternatives = _usual([board.dictionary], board), _usual(evidence.dictionaries(board), board)
+    # The likeliest first: a group is tried only where none before it shows corners.
     for candidates in (nominal, alternatives, _other_sizes(evidence, board)):
         for name, candidate in candidates:
             views = evidence.views(name, candidate)
@@ -79,6 +80,7 @@ class _Seen:
 
     def dictionaries(self, board: Board) -> Iterator[str]:
         """Yield other dictionaries whose markers the images show, most frequent first."""
+        # Every second square holds a marker.
         needed = board.columns * board.rows // 2
         names = schemas.load("calibration_board")["properties"]["dictionary"]["enum"]
         names = [name for name in names if name != board.dictionary and int(name.split("_")[1]) >= needed]
@@ -105,6 +107,7 @@ def _usual(dictionaries: Iterable[str], board: Board) -> Iterator[tuple[str, Boa
 
 def _other_sizes(evidence: _Seen, board: Board) -> Iterator[tuple[str, Board]]:
     """Yield boards of other sizes that have as many markers as the images show."""
+    # Markers are numbered over the board from 0, so the largest number gives their count, however many are hidden.
     markers = 1 + max(
         (int(each.ids.max()) for each in evidence.markers("", board.dictionary) if len(each.ids)), default=-1
     )

@@ -187,11 +187,14 @@ class Controller:
             due.append(self._lines[0][0])
         if not due:
             return 0.02
+        # At most 20 ms, since a fault comes without a byte; at least 0.2 ms, so that the loop leaves the host some
+        # time.
         return min(max((min(due) - self.clock.now_ns()) / NS / self.clock.rate, 0.0002), 0.02)
 
     def _take(self, byte: int, now_ns: int) -> None:
         if byte == ord("?") or (byte == TELL_ALL and self.machine.firmware is NAMES["grblHAL"]):
             self.machine.whole |= byte == TELL_ALL
+            # As in the firmware, where a query sets a flag: one report answers all that came before it.
             if self._report_ns is None:
                 step = self.machine.firmware.dwell_step if self.machine.dwell_ns is not None else 0.0
                 self._report_ns = now_ns + int(self._rng.uniform(0.001, max(step, 0.014)) * NS)
@@ -243,6 +246,7 @@ class Controller:
                 text = self.machine.report(due, self.machine.firmware.rx_bytes - self._waiting())
                 self._say(now_ns, text, lag=0.0)
         if self.port.waiting:
+            # An empty write sends what the host had no room for.
             self.port.write(b"")
         while self._out and self._out[0][0] <= now_ns:
             text = self._to_host(self._out.popleft()[1])
@@ -253,4 +257,5 @@ class Controller:
         # The USB bridge passes its bytes on once a millisecond.
         lag = self._rng.uniform(0.0005, 0.0015) if lag is None else lag
         due = now_ns + int((lag + len(text) * BYTE_SECONDS) * NS)
+        # Lines keep their order on the wire, whatever their lags.
         self._out.append((max(due, self._out[-1][0]) if self._out else due, text))

@@ -127,6 +127,7 @@ def interpret(line: str, modal: Modal, position: np.ndarray, offset: np.ndarray,
     words = {**modal.words, **{g: w for g, w in commands.items() if g != "once"}}
     state = replace(modal, words=words)
     once = commands.get("once")
+    # GRBL keeps neither feed nor modes from one jog to the next: each gives its own feed.
     if jog and (set(commands) - {"units", "distance", "once"} or once == "G4" or "F" not in values):
         raise Refused(22 if "F" not in values else 16)
     if "F" in values:

@@ -151,6 +151,7 @@ class Machine:
             new = 100 if change is None else min(max(self.override + change, 10), 200)
             if new != self.override:
                 self.planner.scale(new / self.override, now_ns)
+                # A counter at zero puts the override into the next report.
                 self.override, self.counters.overrides = new, 0
 
     def open_door(self, now_ns: int) -> None:
@@ -182,6 +183,7 @@ class Machine:
         capacity = self.firmware.planner_blocks - self.planner.retire(now_ns), rx_free
         believed = self.planner.position(now_ns) - self.error
         offset = self.offset + self.modal.shift + (0.0, 0.0, self.modal.length)
+        # The alarm's number was asked for once.
         state, self.whole = self.state(now_ns), False
         return texts.report(
             self.settings,
@@ -264,6 +266,7 @@ class Machine:
             return
         self._door = False
         if self.dwell_ns is not None and self._held_at is not None:
+            # A dwell does not go on during a hold.
             self.dwell_ns += now_ns - self._held_at
         self._held_at = None
         self.planner.resume(now_ns)
@@ -320,6 +323,7 @@ class Machine:
             return True
         if action.dwell is not None:
             step = self.firmware.dwell_step
+            # Rounded first: the last bit of a float must not make whole steps one longer.
             self.dwell_ns = now_ns + int(math.ceil(round(action.dwell / step, 6)) * step * NS)
             return False
         if action.target is not None:
@@ -329,12 +333,14 @@ class Machine:
 
     def _move(self, target: np.ndarray, speed: float | None, now_ns: int, kind: str) -> None:
         start, steps = self.planner.target, axis_setting(self.settings, "$10")
+        # Motors make whole steps.
         end = np.round((target + self.error) * steps) / steps
         length = float(np.linalg.norm(end - start))
         if length == 0:
             return
         unit = (end - start) / length
         fastest = axis_limit(unit, axis_setting(self.settings, "$11") / 60)
+        # Grbl's lowest feed is 1 mm/min.
         speed = fastest if speed is None else min(max(speed, 1 / 60), fastest)
         self.planner.add(Block(start, end, speed, axis_limit(unit, axis_setting(self.settings, "$12")), kind), now_ns)
 

@@ -119,6 +119,7 @@ class Planner:
                 seconds = (speed - exit_speed) / block.acceleration
                 self._append(now_ns, elapsed, seconds, block, way, speed, -block.acceleration)
                 elapsed += seconds
+                # A block is finished where braking goes on into the next one, or ends at its very end.
                 if exit_speed > 0 or speed**2 >= 2 * block.acceleration * room - 1e-9:
                     self._ends.append(now_ns + round(elapsed * 1e9))
                 way, speed = 0.0, exit_speed
@@ -227,6 +228,7 @@ class Planner:
             last = self._past[-1]
             seconds = min(last.seconds, (now_ns - last.start_ns) * 1e-9)
             self._past[-1] = Stretch(last.start_ns, seconds, last.block, last.way, last.speed, last.acceleration)
+        # The last stretch that began before the memory does stays: it holds the position there.
         while len(self._past) > 1 and self._starts[1] < now_ns - MEMORY_NS:
             self._past.pop(0)
             self._starts.pop(0)
@@ -242,6 +244,7 @@ class Planner:
 
     def _plan(self, now_ns: int, way: float, speed: float) -> None:
         blocks, self._ends, elapsed = self.blocks, [], 0.0
+        # From the end: no block is entered faster than the blocks after it can brake from.
         entry = [0.0] * (len(blocks) + 1)
         for i in range(len(blocks) - 1, 0, -1):
             in_line = float(blocks[i - 1].unit @ blocks[i].unit) > 1 - 1e-6

@@ -75,6 +75,7 @@ class Hand:
         away = REACH * (1 - _blend(t, TIMES[0], TIMES[1]) + _blend(t, TIMES[6], TIMES[7]))
         outward = self._out(finger)
         normal = -outward
+        # Fingers point down, as far as the pad's normal allows.
         axis = np.array([0.0, 0.0, -1.0]) - (-normal[2]) * normal
         axis /= np.linalg.norm(axis)
         # The whole hand sways a little, so that no pose is ever at rest.

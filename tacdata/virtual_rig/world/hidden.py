@@ -77,12 +77,13 @@ class HiddenWorld(World):
         return self._carriage
 
     def _pushed_back(self, tip: np.ndarray, indenter: IndenterProfile | None, yaw: float) -> np.ndarray:
-        """Return the tip position at which the frame's compliance balances the skin's force, by secant steps."""
+        """Return the tip position at which the frame's compliance balances the skin's force, by bisection."""
         give = self._hidden.get("give", 0.0)
         if give == 0.0:
             return tip
         lift = np.array([0.0, 0.0, 1.0])
         low, high = 0.0, give * float(self.taxel_force(tip, indenter, yaw).sum())
+        # The force falls as the tip is lifted, so one balance lies between no lift and that of the full force.
         for _ in range(24):
             middle = 0.5 * (low + high)
             pushed = give * float(self.taxel_force(tip + middle * lift, indenter, yaw).sum())
@@ -95,6 +96,7 @@ class HiddenWorld(World):
         if delay == 0:
             return frame
         self._frames.append((time_ns, frame))
+        # One frame before the delayed time stays, to interpolate from.
         while len(self._frames) > 2 and self._frames[1][0] <= time_ns - delay:
             self._frames.popleft()
         (first, old), (second, new) = self._frames[0], self._frames[min(1, len(self._frames) - 1)]

@@ -48,6 +48,7 @@ class LowerFace:
         surface = indenter.surface()
         turn = Rotation.from_euler("XYZ", [tilt_x, tilt_y, yaw], degrees=True)
         corners = turn.apply(np.asarray(surface.vertices))[np.asarray(surface.faces)]
+        # A tilt changes which point is the lowest.
         corners[..., 2] -= corners[..., 2].min()
         extent = float(np.linalg.norm(corners[..., :2], axis=-1).max())
         x, y = _places(extent)
@@ -82,6 +83,7 @@ def _places(extent: float) -> tuple[np.ndarray, np.ndarray]:
 def _over(a: np.ndarray, b: np.ndarray, c: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the height of a triangle at positions, `FAR` outside it."""
     twice = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    # From above, an upright triangle has no area; its neighbours give the height.
     if abs(twice) < 1e-12:
         return np.full(x.shape, FAR)
     s = ((x - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (y - a[1])) / twice
