@@ -53,13 +53,14 @@ def without_repeats(values: np.ndarray, name: str, policy: RepeatPolicy = POLICY
 def _old(column: np.ndarray, policy: RepeatPolicy) -> np.ndarray:
     """Return which readings are copies in a long run of equal ones, shape (rows,), bool.
 
-    Elsewhere readings of about the same size must have noise: a channel at rest may be quiet.
+    Elsewhere readings of about the same size must have noise: a channel at rest may be quiet. At its largest or
+    smallest reading it may saturate.
     """
     equal = np.concatenate([[False], column[1:] == column[:-1]])
     edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(np.int8)))
     old = np.zeros(len(column), dtype=bool)
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if end - begin + 1 < policy.run:
+        if end - begin + 1 < policy.run or column[begin] in (np.nanmin(column), np.nanmax(column)):
             continue
         near = np.abs(column - column[begin]) <= policy.near * (np.nanmax(column) - np.nanmin(column))
         near[begin - 1 : end] = False

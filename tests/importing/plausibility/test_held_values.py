@@ -148,6 +148,8 @@ def test_readings_that_freeze_are_missing(tmp_path, begin, end):
         ("counts of a quiet converter", lambda depth: np.rint(520 + 100 * depth)),
         ("a tared force, cut at zero", lambda depth: np.maximum(depth - 0.1, 0.0)),
         ("a channel that saturates", lambda depth: np.minimum(depth, 0.9)),
+        ("a noisy one that saturates", lambda depth: np.minimum(depth + 1e-3 * np.sin(np.arange(len(depth))), 0.9)),
+        ("a noisy one that is cut below", lambda depth: np.maximum(depth + 1e-3 * np.sin(np.arange(len(depth))), 0.4)),
     ],
 )
 def test_a_quiet_channel_stays(tmp_path, name, reading):
