@@ -9,19 +9,32 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Protocol
 
 import tacdata.errors
+from tacdata import answers, provenance, registry
 from tacdata.errors import SolveError, TacdataError, UsageError
 from tacdata.extras import missing_package
 from tacdata.label_farm import environment
 from tacdata.label_farm.presses.job import Job
 from tacdata.labels import PathSolution
+from tacdata.paths import cache_folder
 from tacdata.sensor import Sensor
+from tacdata.skin import code_version
+from tacdata.skin.code_version import PLUGGABLE
 
 FACTORY = "tacdata.label_farm.presses.fem:FemModel"
 """Dotted path of the function that builds the model of a sensor."""
 
+_CODE = tuple(
+    f"tacdata.{name}" for name in ("provenance", "sensor", "surfaces", "indenters", "skin", "label_farm.presses")
+)
+"""Modules and packages that decide the version of the project's model, or its remarks."""
+
+_PACKAGES = ("numpy", "scipy", "torch", "warp")
+"""Packages without which no model is built."""
 
 _TRIES = 3
 """How often a process that is killed is started again."""
@@ -96,13 +109,37 @@ class Version:
 
 
 def version(factory: str, sensor: Sensor) -> Version:
-    """Return the model's version, found by a process of its own.
+    """Return the model's version, found by a process of its own, or kept from an earlier one of the project's model.
 
     The caller stays free of the solver's libraries, and the mesh is cached before the workers ask for it.
 
     Raises:
         SolveError: If the sensor cannot be modelled.
     """
+    if factory != FACTORY:
+        return _found(factory, sensor)
+    match answers.recall("versions", _deciding(sensor)):
+        case {"version": str(version), "remarks": [*remarks]}:
+            return Version(version, tuple(remarks))
+    found = _found(factory, sensor)
+    # Only now is there a mesh, which is part of what decides a version.
+    answers.keep("versions", _deciding(sensor), {"version": found.content_hash, "remarks": found.remarks})
+    return found
+
+
+def _deciding(sensor: Sensor) -> str:
+    """Return a hash of all that decides the version of the project's model of a sensor."""
+    # fTetWild makes another mesh at every run, so that files that are made again count as others.
+    folders = (Path(code_version.__file__).parent / "mesh" / "shipped", cache_folder() / "meshes")
+    states = [(path, path.stat()) for folder in folders for path in sorted(folder.glob("[!.]*.npz"))]
+    meshes = [(path.name, state.st_size, state.st_mtime_ns) for path, state in states]
+    plug_ins = [provenance.file_hash(path) for room in PLUGGABLE for path in registry.plug_ins(room).values()]
+    installed = [find_spec(name) is not None for name in _PACKAGES]
+    return provenance.content_hash([sensor.document, provenance.source_hash(*_CODE), meshes, plug_ins, installed])
+
+
+def _found(factory: str, sensor: Sensor) -> Version:
+    """Return the model's version, found by a process of its own."""
     request = json.dumps({"factory": factory, "sensor": sensor.document})
     for _ in range(_TRIES):
         finished = subprocess.run(

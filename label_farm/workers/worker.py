@@ -31,6 +31,9 @@ from tacdata.label_farm.workers.desk import Desk, LocalDesk
 from tacdata.labels import PathSolution
 
 IDLE_SECONDS = 0.1
+FIRST_ALONE = 16
+"""Largest batch before which one press goes alone [1]: a CPU's, which solves two one by one at the cost of both
+together (benchmarks/first_label.py). A GPU's would take as long for one as for all."""
 OTHER_CODE = 14
 """Exit code of a worker whose model has another version than the one that it was started for."""
 BROKEN = 15
@@ -86,16 +89,23 @@ class Worker:
         self.desk, self._factory, self._strict = desk, factory, strict
         self._models: dict[str, Model] = {}
         self._refused: dict[str, str] = {}
+        self._begun: set[str] = set()
 
     def step(self) -> bool:
         """Take one batch of jobs and settle it; False without jobs."""
         for version in self.desk.offers():
             # Before a job is claimed: a model that cannot be built here is no fault of the press.
             model = self._model(version)
-            if model is not None and (leases := self.desk.claim(version, batch_size(model))):
+            if model is not None and (leases := self.desk.claim(version, self._count(version, model))):
                 self._settle(leases, model)
+                self._begun.add(version)
                 return True
         return False
+
+    def _count(self, version: str, model: Model) -> int:
+        """Return how many jobs to take: the first goes alone, so that there is a label early."""
+        count = batch_size(model)
+        return 1 if version not in self._begun and count <= FIRST_ALONE else count
 
     def _settle(self, leases: list[Lease], model: Model) -> None:
         todo = {lease.job.key: lease for lease in leases if self._is_open(lease)}

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tacdata import provenance
+from tacdata.paths import cache_folder
 from tacdata.surfaces.closed import read_closed
-from tacdata.surfaces.store import cache_folder
 
 if TYPE_CHECKING:
     import trimesh

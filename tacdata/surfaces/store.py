@@ -8,12 +8,7 @@ from pathlib import Path
 
 from tacdata import provenance
 from tacdata.errors import FormatError, UsageError
-
-
-def cache_folder() -> Path:
-    """Return the folder of data made from a user's files: ``TACDATA_CACHE``, or the user's cache folder."""
-    root = os.environ.get("TACDATA_CACHE")
-    return Path(root) if root else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "tacdata"
+from tacdata.paths import cache_folder
 
 
 def keep(path: Path) -> str:

@@ -14,10 +14,10 @@ import numpy as np
 from tacdata import provenance
 from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
+from tacdata.paths import cache_folder
 from tacdata.replacement import replacement as written
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.surfaces.store import cache_folder
 from tacdata.surrogate.shipped import Shipped
 from tacdata.surrogate.solved import Solved
 from tacdata.transduction import Loads

@@ -16,7 +16,7 @@ from tacdata.skin.contact.mortar import Mortar
 from tacdata.skin.linear.rest_stiffness import rest_stiffness
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.mesh import elements
-from tacdata.skin.mesh.build import quadratic
+from tacdata.skin.mesh.generation.quadratic import quadratic
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.model import ModelSettings
 from tacdata.skin.solve.settings import SolverSettings

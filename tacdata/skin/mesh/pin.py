@@ -10,8 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from tacdata.sensor import default_sensor
-from tacdata.skin.mesh.build import PINNED, MeshSettings, make_mesh, mesh_key
+from tacdata.skin.mesh.build import PINNED, MeshSettings, mesh_key
 from tacdata.skin.mesh.coarser import LEAST_RATIO, RATIOS, coarser, edge_ratio
+from tacdata.skin.mesh.generation.make import make_mesh
 from tacdata.skin.mesh.skin_mesh import SkinMesh, quality
 
 ATTEMPTS = 5

@@ -135,3 +135,25 @@ def test_a_label_of_an_equal_version_stays_current(tmp_path, solves, monkeypatch
     episodes = [press_episode(tmp_path, frames=6, depth=0.4)]
     summary = label_episodes(tmp_path / "labels", episodes, sensor=COARSE, ladder=THEN)
     assert (summary.current, summary.written, solves()) == ([0], [], []) and path.read_bytes() == before
+
+
+@pytest.mark.parametrize("damage", [None, b"", b"half a checksum", b"0\n12"])
+def test_a_version_from_the_cache_is_the_one_that_parsing_gives(copied, tmp_path, monkeypatch, damage):
+    monkeypatch.setenv("TACDATA_CACHE", str(tmp_path / "cache"))
+    parsed = version(copied)
+    [entry] = (tmp_path / "cache" / "answers" / "code").iterdir()
+    if damage is not None:
+        entry.write_bytes(damage)
+    assert version(copied) == parsed
+    solver = copied / "solve" / "settings.py"
+    solver.write_text(reworded(solver.read_text()))
+    assert version(copied) == parsed
+    solver.write_text(solver.read_text().replace("patience: int = 12", "patience: int = 13"))
+    assert version(copied) != parsed
+
+
+def test_a_cache_that_cannot_be_written_leaves_the_version(copied, tmp_path, monkeypatch):
+    parsed = version(copied)
+    (tmp_path / "a file").touch()
+    monkeypatch.setenv("TACDATA_CACHE", str(tmp_path / "a file"))
+    assert version(copied) == parsed

@@ -12,9 +12,12 @@ from tacdata.errors import SolveError
 from tacdata.sensor import default_sensor
 from tacdata.sensor.sensor import ContactProperties, Skin
 from tacdata.skin.contact.contact_surface import face_quadrature
-from tacdata.skin.mesh import build, elements
-from tacdata.skin.mesh.build import PINNED, MeshSettings, build_mesh, make_mesh, mesh_key, surface
+from tacdata.skin.mesh import elements
+from tacdata.skin.mesh.build import PINNED, MeshSettings, build_mesh, mesh_key
 from tacdata.skin.mesh.coarser import RATIOS, coarser
+from tacdata.skin.mesh.generation import make
+from tacdata.skin.mesh.generation.make import make_mesh
+from tacdata.skin.mesh.generation.surface import surface
 from tacdata.skin.mesh.skin_mesh import SkinMesh, quality
 from tacdata.skin.model import ModelSettings, SkinModel
 
@@ -112,6 +115,17 @@ def test_a_mesh_comes_back_from_the_cache_as_it_was(slab, user_cache):
     assert kept.stat().st_mtime_ns == before
 
 
+@pytest.mark.parametrize("damaged", [lambda b: b"", lambda b: b[:1000], lambda b: b[:300] + bytes(50) + b[350:]])
+def test_a_damaged_mesh_in_the_cache_is_made_again(slab, tmp_path, monkeypatch, damaged):
+    monkeypatch.setenv("TACDATA_CACHE", str(tmp_path))
+    path = tmp_path / "meshes" / f"{mesh_key(slab.sensor, slab.settings.mesh)}.npz"
+    slab.mesh.save(path)
+    path.write_bytes(damaged(path.read_bytes()))
+    monkeypatch.setattr(make, "make_mesh", lambda *_: slab.mesh)
+    assert build_mesh(slab.sensor, slab.settings.mesh).content_hash == slab.mesh.content_hash
+    assert SkinMesh.load(path).content_hash == slab.mesh.content_hash
+
+
 def test_figures_of_this_room_come_from_meshes_that_are_kept(slab, fine_slab, bumps):
     """A mesh made anew differs at every run, and with it every figure that a test is held to."""
     for model in (slab, fine_slab, bumps):
@@ -142,7 +156,7 @@ def test_the_surface_given_to_the_mesher_is_closed():
 
 def test_a_skin_whose_faces_collapse_is_refused_with_its_volume(monkeypatch):
     """At the first refusal; that others are tried first stands in test_skin_meshing.py."""
-    monkeypatch.setattr(build, "_REFUSALS", 1)
+    monkeypatch.setattr(make, "_REFUSALS", 1)
     sensor = replace(slab_sensor(), skin=Skin(6.0, 6.0, 0.05, 0.0))
     with pytest.raises(SolveError, match=r"the skin 1.8 mm\^3") as failure:
         SkinModel(sensor, ModelSettings(mesh=MeshSettings(outer=0.9, interior=1.5)))

@@ -10,8 +10,9 @@ from skin_examples import box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.errors import FormatError, SolveError, UsageError
 from tacdata.sensor import Sensor, Skin, read_sensor
-from tacdata.skin.mesh import build
-from tacdata.skin.mesh.build import MeshSettings, make_mesh, mesh_key
+from tacdata.skin.mesh.build import MeshSettings, mesh_key
+from tacdata.skin.mesh.generation import make
+from tacdata.skin.mesh.generation.make import make_mesh
 from tacdata.skin.mesh.generation.protrusion import Protrusion
 from tacdata.skin.mesh.generation.true_volume import true_volume, volume_error
 from tacdata.skin.mesh.skin_mesh import quality
@@ -241,8 +242,8 @@ def test_a_mesh_that_does_not_take_the_true_faces_is_made_again(monkeypatch):
             raise SolveError("element 7 is flat", "positive volumes", "refine")
         return box_mesh(sensor, 2, 2, 2)
 
-    monkeypatch.setattr(build, "quadratic", quadratic)
-    monkeypatch.setattr(build, "tetrahedralize", lambda *_: (None, None))
+    monkeypatch.setattr(make, "quadratic", quadratic)
+    monkeypatch.setattr(make, "tetrahedralize", lambda *_: (None, None))
     wanted = 3
     assert len(make_mesh(sensor, COARSE).tets) == 48 and len(calls) == 3
     wanted = 99
