@@ -24,7 +24,7 @@ import tacdata
 
 SESSION = Path(tacdata.__path__[0]) / "example" / "session"
 PHASES = ("verb", "version", "first label", "other label")
-_POLL = 0.02
+_POLL = 0.25
 """Time between two looks [s]."""
 
 
