@@ -27,8 +27,15 @@ class LabelVersionError(FormatError):
 
 
 def _column(values: np.ndarray) -> pa.Array:
-    flat = pa.array(np.ascontiguousarray(values).reshape(-1))
+    flat = _flat(np.ascontiguousarray(values).reshape(-1))
     return flat if values.ndim == 1 else pa.FixedSizeListArray.from_arrays(flat, int(np.prod(values.shape[1:])))
+
+
+def _flat(values: np.ndarray) -> pa.Array:
+    if values.dtype == bool:
+        return pa.array(values)  # packed, eight in a byte
+    # By its buffer, as `pa.array` would import pandas to ask whether the values are a series of it.
+    return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, pa.py_buffer(values)])
 
 
 def write(path: StrPath, label: Label) -> None:
@@ -54,7 +61,9 @@ def write(path: StrPath, label: Label) -> None:
     }
     documents.check(header, "label", str(path))
     arrays = {name: _column(np.asarray(getattr(label, name), dtype=columns.ALL[name].dtype)) for name in names}
-    table = pa.table(arrays).replace_schema_metadata({HEADER: json.dumps(header)})
+    table = pa.Table.from_arrays([*arrays.values()], names=[*arrays]).replace_schema_metadata(
+        {HEADER: json.dumps(header)}
+    )
     with replacement(path) as stream:
         # Digits of maps hardly repeat: dictionaries of them took as long again and made files half as large again.
         pq.write_table(table, stream, compression="zstd", use_dictionary=False, write_page_checksum=True)
