@@ -87,12 +87,12 @@ def _trained(sensor: Sensor, run: Path, epochs: int, seed: int, threads: int | N
     origin = provenance.content_hash([provenance.file_hash(path), seed])
     frames = _frames(lessons(read_presses(path, sensor), sensor, FingertipSpread(), seed), sensor, origin)
 
-    def told(progress: Progress) -> None:
+    def show_epoch(progress: Progress) -> None:
         if (line := progress.finished) is not None:
             say(f"epoch {progress.epoch} of {progress.epochs}: validation loss {line['validation_loss']:.5f}")
 
     begun = (run / "last.safetensors").is_file()
-    train(frames, TrainingSettings(seed=seed, epochs=epochs), run, "auto", begun, threads, told)
+    train(frames, TrainingSettings(seed=seed, epochs=epochs), run, "auto", begun, threads, show_epoch)
     return run
 
 

@@ -61,12 +61,12 @@ def run(
         return Result(figures)
     with console.status("solving") as status:
 
-        def told(done: int, of: int, seconds: float) -> None:
+        def show_press(done: int, of: int, seconds: float) -> None:
             status.update(f"press {done} of {of}, about {clock_face(seconds)} left")
             if not console.is_terminal and done:
                 say(f"  press {done} of {of}, about {clock_face(seconds)} left")
 
-        table, error = ready.done(told)
+        table, error = ready.done(show_press)
     if error:
         print(
             f"{error.presses} presses left out: loads off by {100 * error.load:.1f} % rms, "

@@ -201,6 +201,7 @@ def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Pa
         )
     spec_hash = verdict["provenance"].get("parents", {}).get("spec")
     major, minor = schemas.version("model_spec").split(".")
+    # The number of an earlier minor version makes no other model.
     versions = [f"{major}.{k}" for k in range(int(minor) + 1)]
     same = {provenance.content_hash({**spec.document, "version": version}) for version in versions}
     if spec_hash is not None and spec_hash not in same | {spec.content_hash}:
@@ -227,7 +228,9 @@ def _labels(
             shifts.append((session.name, paths_moved(session, answer)))
         else:
             folder = target / LABELS / session.name
-            shift = relabelled(session, answer, folder, options.relabel, options.store, _told(note, session.name))
+            shift = relabelled(
+                session, answer, folder, options.relabel, options.store, _progress_note(note, session.name)
+            )
             shifts.append((session.name, shift))
     return shifts
 
@@ -259,7 +262,7 @@ def _retrained(
     )
 
 
-def _told(note: Note, name: str) -> Callable[[str, int, int], None]:
+def _progress_note(note: Note, name: str) -> Callable[[str, int, int], None]:
     return lambda stage, done, of: note(f"labels of {name}: {stage} {done} of {of}")
 
 

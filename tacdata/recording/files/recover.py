@@ -61,6 +61,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
     target = target or path.with_name(path.name.removesuffix(".mcap") + ".recovered.mcap")
     result = Recovered(target)
     try:
+        # By the system, not by a look before: the file may appear in between.
         stream = target.open("xb")
     except FileExistsError:
         raise UsageError(
@@ -77,6 +78,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
     except OSError as error:
         target.unlink(missing_ok=True)
         raise _refused(target, error) from error
+    # No half copy stays, not even after Ctrl-C.
     except BaseException:
         target.unlink(missing_ok=True)
         raise

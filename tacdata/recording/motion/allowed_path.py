@@ -77,6 +77,7 @@ class AllowedPath:
             if self._legs and np.allclose(self._legs[-1].profile.target, place, atol=1e-6):
                 return
             self._since_ns = now_ns
+            # A move without length allows reports of this one place.
             self._legs = [_Leg(self._limits.straight_move(place, place, 1.0), now_ns, now_ns)]
 
     def forget(self) -> None:
@@ -98,6 +99,7 @@ class AllowedPath:
             if not self._legs:
                 return
             leg, previous = self._legs[-1], self._legs[-2] if len(self._legs) > 1 else None
+            # The controller queues moves: one that was taken early begins when the one before it ends.
             waits = previous is not None and previous.ended_ns is None and (previous.expected_ns or 0) > now_ns
             begins = previous.expected_ns if waits and previous else now_ns
             leg.chain = leg.profile.duration + (previous.chain if waits and previous else 0.0)
@@ -108,6 +110,7 @@ class AllowedPath:
         with self._lock:
             for leg in self._legs:
                 leg.ended_ns = leg.ended_ns or now_ns
+            # Without the older moves, reports from their time cannot be judged.
             for leg in self._legs[:-KEPT]:
                 self._since_ns = max(self._since_ns, leg.ended_ns or now_ns)
             self._legs = self._legs[-KEPT:]

@@ -97,6 +97,7 @@ def _apart(original: Episode, update: Episode, time_ns: np.ndarray, view: np.nda
     """Return the tip error before and after while it touches [mm], each of shape (n, 3)."""
     nominal, revised = original.tip_at(time_ns), update.tip_at(time_ns)
     good = (nominal[:, 2] > 0) & np.isfinite(view[:, 2])
+    # Beyond its ends the path would be extrapolated.
     good &= (time_ns >= original.tip_ns[0] - NEAR_NS) & (time_ns <= original.tip_ns[-1] + NEAR_NS)
     return view[good] - nominal[good], view[good] - revised[good]
 

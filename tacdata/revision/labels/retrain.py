@@ -94,13 +94,14 @@ def retrained(
             effects = placed if side == "after" else []
             episodes = [replace(e, taxels=replace(e.taxels, counts=simulated(e, effects))) for e in episodes]
         sides[side] = _frames(folder / side, episodes, [pair.label(side) for pair in pairs])
+    # One truth for both networks, or their scores would differ by the labels alone.
     judge = sides["after"]
     if simulated is not None:
         judge = _frames(folder / "measured", [p.episode("before") for p in pairs], [p.label("before") for p in pairs])
     scored = {}
     for side, frames in sides.items():
         scored[side] = _scored(frames, judge, folder / f"network-{side}", recipe, lambda t, s=side: note(f"{s}: {t}"))
-    return _told(by, recipe, scored["before"], scored["after"])
+    return _outcome(by, recipe, scored["before"], scored["after"])
 
 
 @dataclass(frozen=True)
@@ -150,11 +151,13 @@ class _Simulated:
             self._predicted[key] = self._held.predicted(model.response, list(model.placed))
         counts = episode.taxels.counts.astype(float).copy()
         seconds = (episode.taxels.sample_ns - episode.taxels.sample_ns[0]) * 1e-9
+        # By the recording's name: both sides get the same noise, so the models alone differ.
         rng = np.random.default_rng(int.from_bytes(hashlib.sha256(episode.path.name.encode()).digest()[:8]))
         k = self._names.index(episode.path.stem)
         rows = np.flatnonzero(course.episode == k)
         read = rows[course.averaged[rows] > 0]
         when = course.time[rows] - course.time[read[0]]
+        # The model predicts changes; a recording has a level of its own.
         level = np.nanmedian(course.readings[read] - self._predicted[key][read], axis=0)
         noise = self._held.null.noise.scale
         for c, number in enumerate(course.numbers or range(course.channels)):
@@ -179,11 +182,11 @@ def _scored(frames: Frames, judge: Frames, folder: Path, recipe: Recipe, note: C
 
     settings = TrainingSettings(network=recipe.network, epochs=recipe.epochs, seed=recipe.seed)
 
-    def told(progress: Any) -> None:
+    def note_epoch(progress: Any) -> None:
         if progress.finished is not None:
             note(f"epoch {progress.epoch} of {progress.epochs}")
 
-    trained = train(frames, settings, folder, "auto", False, recipe.threads, told)
+    trained = train(frames, settings, folder, "auto", False, recipe.threads, note_epoch)
     return evaluate(trained, _part(judge, trained.split.test), "auto", recipe.threads).document
 
 
@@ -202,7 +205,7 @@ def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
     return replace(frames, **values, episodes=tuple(spans), dataset_hash=digest)
 
 
-def _told(by: str, recipe: Recipe, initial: dict[str, Any], final: dict[str, Any]) -> Retrained:
+def _outcome(by: str, recipe: Recipe, initial: dict[str, Any], final: dict[str, Any]) -> Retrained:
     from tacdata.training.scoring.evaluate import METRICS
 
     rows = [

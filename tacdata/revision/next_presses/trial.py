@@ -117,6 +117,7 @@ def trials(course: Course, machine: MachineLimits) -> list[CandidatePress]:
                 common = (tool, int(site), float(at[0]), float(at[1]))
                 presses.append(CandidatePress(*common, share * deepest, speed, hold, 0.0, 0.0))
                 if share == DEPTHS[-1] and hold == HOLDS[-1]:
+                    # Recovery shows most after the longest hold at full depth.
                     presses.append(CandidatePress(*common, deepest, speed, hold, RECOVERY, 0.0))
                 if share == DEPTHS[-1] and hold != HOLDS[-1]:
                     overshoot = (1 - OVERSHOOT) * deepest
@@ -159,6 +160,7 @@ def laid_out(course: Course, trial: CandidatePress, machine: MachineLimits) -> C
         )
     inside = course.reduced.step[~course.reduced.first]
     frame = float(np.clip(np.median(inside), 1e-3, 0.1)) if len(inside) else FRAME
+    # Rounded alike, so that a corner that falls on a frame makes one row.
     at, frames = np.round(at, 9), np.round(np.arange(0.0, at[-1], frame), 9)
     time = np.unique(np.concatenate([frames, at]))
     tip = np.column_stack([np.full(len(time), trial.x), np.full(len(time), trial.y), np.interp(time, at, depth)])
