@@ -88,7 +88,7 @@ def _opened(path: Path) -> Iterator[Any]:
             f"{path} is no bag of ROS 2 that can be read: {str(error) or type(error).__name__}",
             "a bag in MCAP or SQLite, its message types described in it or standard",
             "if types are missing, record to MCAP (ros2 bag record -s mcap), or ros2 bag convert it there; a recording "
-            "of tacdata needs no import",
+            "of tacdata needs no import, and examples/to_rosbag.py makes a bag of it",
         ) from error
 
 

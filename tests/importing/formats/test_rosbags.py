@@ -1,5 +1,6 @@
 """Bags of ROS 2: every topic at its own rate, in both storages, with the types that the bag describes."""
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from running.in_process import tacdata
 
 from tacdata.errors import FormatError, UsageError
+from tacdata.example import copy_session
 from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.imported_session import import_session
 from tacdata.recording.files.reader import read_episode
@@ -154,3 +156,16 @@ def test_parts_of_a_message_that_are_not_taken_are_counted(tmp_path):
     table = read_table(next((tmp_path / "bag").glob("*.mcap")), {"table": "/tf"})
     assert "transforms[31].transform.translation.x" in table.columns
     assert table.notes == ("bag.mcap: 1 messages of /tf have more than 32 parts in transforms: the first 32 are taken",)
+
+
+def test_a_recording_becomes_a_bag_that_comes_back_as_it_was(tmp_path):
+    example = runpy.run_path(str(Path(__file__).resolve().parents[3] / "examples" / "to_rosbag.py"))
+    episode = read_episode(copy_session(tmp_path / "session") / "episode-000000.mcap")
+    counts = example["write"](episode, tmp_path / "bag")
+    assert counts == {"/taxels": len(episode.taxels.counts), "/tip": len(episode.tip)}
+    (path,) = (tmp_path / "bag").glob("*.mcap")
+    board = read_table(path, {"table": "/taxels"})
+    np.testing.assert_array_equal(board.columns["data"], episode.taxels.counts)
+    np.testing.assert_array_equal(board.columns["received"], episode.taxels.sample_ns)
+    tip = read_table(path, {"table": "/tip"})
+    np.testing.assert_allclose(tip.columns["point.z"], -episode.tip[:, 2] / 1000, atol=1e-9)
