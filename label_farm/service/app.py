@@ -22,6 +22,7 @@ from tacdata.label_farm.service.receiving import add_receiving
 from tacdata.label_farm.service.results import add_results
 from tacdata.label_farm.service.submission import Submission
 from tacdata.label_farm.service.work import add_work
+from tacdata.pages import HtmlPage, PageHeader, Paragraph, Table, live_page
 
 SHOWN = 20
 """Of how many submissions, the newest, labels and failures are shown."""
@@ -80,8 +81,12 @@ def application(foreman: Foreman, token: str = "") -> Guard:
 
     @api.get("/", response_class=HTMLResponse, include_in_schema=False)
     def page() -> HTMLResponse:
-        text = (files("tacdata.label_farm.service") / "page.html").read_text()
-        return HTMLResponse(text, headers={"Content-Security-Policy": POLICY, "X-Frame-Options": "DENY"})
+        body = (files("tacdata.label_farm.service") / "page.html").read_text()
+        return _answered(live_page("tacdata label farm", body))
+
+    @api.get("/docs", response_class=HTMLResponse, include_in_schema=False)
+    def docs() -> HTMLResponse:
+        return _answered(_requests(api))
 
     _add_submissions(api, foreman)
     add_receiving(api, foreman)
@@ -89,6 +94,24 @@ def application(foreman: Foreman, token: str = "") -> Guard:
     add_work(api, foreman)
     add_metrics(api, lambda: _farm(foreman), lambda: [submission.state for submission, _ in foreman.states()])
     return Guard(api, token)
+
+
+def _answered(page: str) -> HTMLResponse:
+    return HTMLResponse(page, headers={"Content-Security-Policy": POLICY, "X-Frame-Options": "DENY"})
+
+
+def _requests(api: FastAPI) -> str:
+    """Return the page of the interface: every request with its meaning."""
+    rows = [
+        (method.upper(), path, request.get("description") or request["summary"])
+        for path, methods in api.openapi()["paths"].items()
+        for method, request in methods.items()
+    ]
+    page = HtmlPage(PageHeader("Label farm", "Requests that programs can send to this service.", version=api.version))
+    page.add(
+        "Requests", Table(("method", "path", "answer"), rows), Paragraph("Their fields: `/openapi.json`.", note=True)
+    )
+    return page.text
 
 
 def _add_submissions(api: FastAPI, foreman: Foreman) -> None:

@@ -16,7 +16,7 @@ Application = Callable[[Message, Receive, Send], Awaitable[None]]
 SMALL, LARGE = 64 * 1024, 64 * 1024 * 1024
 """Most bytes of a request's body; the large one for results of workers and pieces of recordings."""
 ROOMY = ("/api/work/results/", "/api/recordings")
-OPEN_PATHS = ("/", "/openapi.json", "/favicon.ico")
+OPEN_PATHS = ("/", "/docs", "/openapi.json", "/favicon.ico")
 """Content that needs no token: it does not come from the store."""
 LOOPBACK = re.compile(r"(localhost|127\.\d+\.\d+\.\d+|\[::1\])(:\d+)?", re.IGNORECASE)
 

@@ -55,6 +55,7 @@ tacdata.figures = (() => {
       this.read.replaceChildren(...(this.frame.series.length > 12 ? [] : this.buttons), ...bands, this.at);
       if (this.chart) this.build();
     }
+    update(frames) { this.frames = frames; this.show(0); }
     get own() { return this.frame.x.values === null || this.frame.series.some(s => s.x); }
     places(s) { return s.x || this.frame.x.values; }
     fit() {

@@ -88,16 +88,16 @@ class HtmlPage:
         )
 
 
-def live_page(title: str, body: str, script: str) -> str:
-    """Return a page that a server fills: its body and script within the style of the others.
+def live_page(title: str, body: str) -> str:
+    """Return a page that a server fills: its body within the style of the others.
 
     Args:
         title: Title of the window.
-        body: Elements of the page, as HTML.
-        script: Script of the page; `tacdata` in it is the kit's (`page.js`, `figures.js`).
+        body: Elements of the page and its script, as HTML. Its script finds the kit's under `tacdata`.
     """
-    scripts = f"{_script(drawn=True)}\n{script}"
-    return _template("live.html.j2").render(title=title, body=body, style=_read("style.css"), script=scripts)
+    return _template("live.html.j2").render(
+        title=title, body=body, style=_read("style.css"), script=_script(drawn=True)
+    )
 
 
 @cache

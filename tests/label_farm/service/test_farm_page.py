@@ -109,11 +109,19 @@ def test_a_person_submits_watches_and_cancels(busy_page, gate):
     page.wait_for_selector("#workers tbody td:nth-child(7):has-text('MB')")
     page.wait_for_selector("#workers tbody td:nth-child(6):has-text('%')")
     page.wait_for_selector("#throughput-words:has-text('5 presses solved and 1 failed')")
-    assert page.locator("#throughput rect.solved").count() >= 1
+    page.wait_for_selector("#throughput canvas")
+    over = page.locator("#throughput .u-over").bounding_box()
+    page.mouse.move(over["x"] + over["width"] - 3, over["y"] + 20)
+    page.wait_for_selector("#throughput .read:has-text('minutes from now')")
     page.wait_for_selector("#failures img.press[src^=blob]")
     page.wait_for_function("document.querySelector('#failures img.press').naturalWidth > 900")
     if folder := os.environ.get("TACDATA_SCREENSHOTS"):
         page.screenshot(path=f"{folder}/farm.png", full_page=True)
+    page.click("#submissions a:text-is('000002')")
+    page.wait_for_selector("#one:visible")
+    assert page.locator("#submissions tbody tr").count() == 1 and not page.locator("#failures details").count()
+    page.goto(page.url.split("#")[0] + "docs")
+    assert "/api/submissions/{number}/cancel" in page.inner_text("table")
 
 
 def test_what_is_refused_is_said_on_the_page(idle_page, idle):
