@@ -68,6 +68,8 @@ OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
     "<": lambda a, b: a < b,
     ">": lambda a, b: a > b,
 }
+MOST_NAMED = 12
+"""Values of a column that a remark names, at most."""
 WORDS = frozenset(("file", "indenter", "shape", "label", "part", "flag"))
 
 

@@ -24,6 +24,7 @@ from pydantic import BaseModel, Field
 from tacdata.dataset.flags import Flag, read_flags, read_history
 from tacdata.dataset.notes import Note, read_notes
 from tacdata.errors import TacdataError
+from tacdata.pages import live_page
 from tacdata.viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
 from tacdata.viewers.browse.flagging import flag_episode, unflag_episode
 from tacdata.viewers.browse.noting import note_stretch, notes_of, unnote_stretch
@@ -91,7 +92,7 @@ class Pages:
 
     def page(self) -> str:
         """Return the page."""
-        return files("tacdata.viewers.browse").joinpath("page.html").read_text()
+        return live_page("Episodes", files("tacdata.viewers.browse").joinpath("page.html").read_text())
 
     def entries(self) -> dict[str, Any]:
         """Return the list, with the flags as they are now."""

@@ -162,6 +162,25 @@ def test_a_typo_in_a_filter_is_named_and_hides_nothing(page, typed, words):
     assert not page.is_visible("#wrong") and page.locator("tbody tr").count() == 11
 
 
+def test_a_filter_that_finds_nothing_says_which_values_there_are_and_values_are_offered(page):
+    write(page, "#filter", "indenter=ring depth>9")
+    page.wait_for_function("document.querySelector('#wrong').innerText.includes('no episode fits')")
+    assert "indenter is ball, pin" in page.inner_text("#wrong")
+    assert "depth is 0.4 to 1.85 mm" in page.inner_text("#wrong")
+    write(page, "#filter", "depth>0.8 ")
+    offered = page.eval_on_selector_all("#conditions option", "options => options.map(o => o.value)")
+    assert {"depth>0.8 indenter=pin", "depth>0.8 error<=0.29"} <= set(offered)
+
+
+@pytest.mark.parametrize("width", [360, 1000, 2000])
+def test_no_column_is_out_of_reach(page, width):
+    page.set_viewport_size({"width": width, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.locator("tbody tr:first-child td").last.scroll_into_view_if_needed()
+    box, side = (page.locator(q).first.bounding_box() for q in ("tbody tr:first-child td:last-child", "#side"))
+    assert box["x"] + box["width"] <= side["x"] + side["width"] + 1
+
+
 def test_the_flag_is_seen_at_1400_px_and_columns_are_chosen(page, tmp_path):
     write(page, "#reason", "the tool slipped")
     page.click("#flag")

@@ -49,6 +49,12 @@ def test_conditions(listed, condition, kept):
     assert numbers(listed.where(condition)) == kept
 
 
+def test_a_condition_that_no_episode_fits_says_which_values_there_are(listed):
+    assert listed.where("depth>5").remarks == ("no episode fits depth>5: depth is 0.4 to 1.2 mm",)
+    assert listed.where("indenter=ring").remarks == ("no episode fits indenter=ring: indenter is ball, pin",)
+    assert not listed.where("depth>1").remarks
+
+
 def test_the_worst_comes_first_and_the_unknown_last(listed):
     assert numbers(listed.by("error")) == [1, 0, 2]
     assert numbers(listed.by("depth")) == [0, 2, 1]
