@@ -93,7 +93,18 @@ class EpisodeList:
         key, sign, value = _parsed(condition)
         test = OPERATORS[sign]
         entries = tuple(e for e in self.entries if getattr(e, key) is not None and test(getattr(e, key), value))
-        return replace(self, entries=entries)
+        missing = bool(self.entries) and not entries
+        remark = (f"no episode fits {condition}: {self.present(key)}",) if missing else ()
+        return replace(self, entries=entries, remarks=(*self.remarks, *remark))
+
+    def present(self, key: str) -> str:
+        """Return the values of a column in words: the ends of numbers, the words that there are."""
+        values = {getattr(e, key) for e in self.entries} - {None, ""}
+        if not values:
+            return f"no episode has a value of {key}"
+        if key in WORDS:
+            return f"{key} is {', '.join(sorted(values)[:MOST_NAMED])}"
+        return f"{key} is {min(values):g} to {max(values):g} {UNITS.get(key, '')}".rstrip()
 
     def by(self, key: str) -> EpisodeList:
         """Return them sorted by a column; ``-key`` or an error sorts the greatest first, unknown values last.
