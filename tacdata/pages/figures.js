@@ -91,7 +91,8 @@ tacdata.figures = (() => {
         }))];
       }
       const axis = {stroke: () => color("dim"), grid: {stroke: () => color("line"), width: .5}, ticks: {stroke: () => color("line"), width: .5}, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 20, labelGap: 2};
-      const place = free ? (u, a, b) => { const room = 0.04 * (b - a || 1); return [a - room, b + room]; } : names ? () => [-0.4, names - 0.6] : (u, a, b) => a === b ? [a - .5, b + .5] : [a, b];
+      const place = free ? (u, a, b) => { const room = 0.04 * (b - a || 1); return [a - room, b + room]; } : names ? () => [-0.4, names - 0.6]
+        : f.series.some(s => s.style === "bars") ? (u, a, b) => { const step = (b - a) / Math.max(f.x.values.length - 1, 1) || 1; return [a - .6 * step, b + .6 * step]; } : (u, a, b) => a === b ? [a - .5, b + .5] : [a, b];
       const key = f.link || undefined;
       this.chart = new uPlot({
         width: this.area.clientWidth, height: this.area.clientHeight, legend: {show: false}, series,
