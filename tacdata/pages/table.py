@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from tacdata.pages.number import in_print
 
+NUMBER = re.compile(r"[<+−-]? ?\d[\d.,]*(e[-+]?\d+)?( |$)")
+"""Beginning of a cell that is a number, with a unit or an interval behind it."""
 FILTERED = 9
 """Rows from which a table has a field to filter them."""
 
@@ -79,4 +82,4 @@ class Table:
 
 
 def _numeric(words: str) -> bool:
-    return words[:1].isdigit() or words in ("", "–") or (words[:1] in "+-−<" and words[1:2].strip().isdigit())
+    return words in ("", "–") or bool(NUMBER.match(words))

@@ -29,6 +29,12 @@ def test_a_number_that_is_none_is_a_dash_and_never_nan():
     assert "nan" not in re.sub(r"<(script|style)>.*?</\1>", "", text, flags=re.S).lower()
 
 
+@pytest.mark.parametrize("words", ["5f21e34420e3", "1-2 sheets", "none"])
+def test_a_column_of_words_that_begin_with_digits_is_one_of_words(words):
+    values = [(words, "−1.5 mm (−2 to 0)", "< 0.001", 3.5)]
+    assert Table("abcd", values).numeric == [False, True, True, True]
+
+
 def test_words_of_others_are_words_and_commands_are_code():
     text = page(Paragraph("a <b> `tacdata check x<y`"), Items(["`plain`"]), of="<i>", next=["run `tacdata view v`"])
     assert "a &lt;b&gt;" in text and "&lt;i&gt;" in text

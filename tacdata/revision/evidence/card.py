@@ -28,7 +28,9 @@ def card(revision: dict[str, Any], verdict: dict[str, Any], shown: Sequence[Epis
     page = HtmlPage(_header(revision, verdict))
     page.add("Result", Tiles(_tiles(revision, verdict)))
     if shown:
-        panels = list(zip(*(_panels(episode) for episode in shown), strict=True))
+        panels = list(
+            zip(*(_panels(episode, verdict.get("heading", {}).get("unit", "")) for episode in shown), strict=True)
+        )
         names = [f"{episode.name}, {episode.channel_name}" for episode in shown]
         page.add("Readings before and after", Slider("episode, the largest change first", names, panels))
     _parameters(page, answer)
@@ -66,7 +68,7 @@ def _header(revision: dict[str, Any], verdict: dict[str, Any]) -> PageHeader:
     )
 
 
-def _panels(episode: EpisodeCurves) -> tuple[Plot, Plot]:
+def _panels(episode: EpisodeCurves, unit: str) -> tuple[Plot, Plot]:
     """Return readings and residuals of an episode on its most telling channel."""
     c, names = episode.channel, (("model before", "vermilion", episode.before), ("model after", "blue", episode.after))
     measured = episode.measured[:, c]
@@ -75,7 +77,7 @@ def _panels(episode: EpisodeCurves) -> tuple[Plot, Plot]:
     residuals = [Series(name, (measured - p[:, c]) / episode.noise[c], color) for name, color, p in names]
     noise = Band(-2.0, 2.0, "noise, two standard deviations")
     return (
-        Plot("reading", "time [s]", "reading", readings, episode.time, link="card"),
+        Plot("reading", "time [s]", f"reading [{unit}]" if unit else "reading", readings, episode.time, link="card"),
         Plot("residual over the noise", "time [s]", "residual [1]", residuals, episode.time, [noise], link="card"),
     )
 
