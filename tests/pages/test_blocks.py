@@ -61,6 +61,11 @@ def test_shares_fill_the_bar():
     assert [width for _, _, width in Shares([("a", 0.6), ("b", 0.3)]).widths] == pytest.approx([66.67, 33.33], abs=0.01)
 
 
+def test_a_page_without_data_is_small():
+    assert len(page(Paragraph("x"))) < 25_000
+    assert len(page(Plot("t", "x", "y", [Series("s", [1.0])], [0.0]))) < 100_000
+
+
 def test_a_page_has_its_contents_listed_where_it_is_long():
     made = HtmlPage(PageHeader("Kind", "It is so."))
     for k in range(5):
