@@ -34,6 +34,8 @@ class CodePolicy:
     """Fewest different readings from which numbers can lie apart [count]; a column of fewer tells states."""
     share: float = 0.2
     """Largest share of codes in a column [1]; above it they are the signal."""
+    rare: float = 0.01
+    """Largest share of numbers far from all others that are called spikes [1]."""
     stays: int = 3
     """Longest run of rows of a code that is no usual one [rows]."""
 
@@ -69,14 +71,20 @@ def without_codes(
     if clipped.any():
         doubts.append(_counted(values, clipped, name, "are the largest that its converter has, and so no readings"))
     missing = codes | clipped
+    if (spikes := _spikes(np.where(missing, np.nan, values), policy)).any():
+        doubts.append(_counted(values, spikes, name, "lie far from all others", "they count as measured"))
     return (np.where(missing, np.nan, values) if missing.any() else values), tuple(doubts)
 
 
-def _counted(values: np.ndarray, mask: np.ndarray, name: str, words: str) -> str:
+MISSING = "they are missing (trusted: true keeps them)"
+"""Fate of numbers that are no readings."""
+
+
+def _counted(values: np.ndarray, mask: np.ndarray, name: str, words: str, fate: str = MISSING) -> str:
     numbers, counts = np.unique(values[mask], return_counts=True)
     order = np.argsort(-counts)[:3]
     examples = ", ".join(f"{numbers[k]:.6g}" for k in order.tolist())
-    return f"{name}: {int(mask.sum())} numbers ({examples}) {words}: they are missing (trusted: true keeps them)"
+    return f"{name}: {int(mask.sum())} numbers ({examples}) {words}: {fate}"
 
 
 def _far(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
@@ -114,6 +122,20 @@ def _isolated(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
             else:
                 edge = value
     return codes if codes.mean() <= policy.share else np.zeros_like(codes)
+
+
+def _spikes(values: np.ndarray, policy: CodePolicy) -> np.ndarray:
+    """Return which numbers stand for a few rows far outside of all others, shape (rows, k), bool."""
+    spikes = np.zeros(values.shape, dtype=bool)
+    for number, column in enumerate(values.T):
+        if np.isfinite(column).sum() <= 1 / policy.rare:
+            continue
+        low, high = np.nanquantile(column, [policy.rare, 1 - policy.rare])
+        away = policy.unusual_apart * (high - low)
+        far = (column > high + away) | (column < low - away)
+        if high > low and 0 < far.mean() <= policy.rare and _longest(far) <= policy.stays:
+            spikes[:, number] = far
+    return spikes
 
 
 def _longest(mask: np.ndarray) -> int:

@@ -34,6 +34,8 @@ class PathPolicy:
     """The same [noise of the readings]."""
     gap: float = 10.0
     """Shortest gap [usual intervals]."""
+    late: float = 2.5
+    """Shortest gap of a position with slow updates of its own [their interval]."""
     gap_seconds: float = 0.5
     """Shortest gap [s]."""
     rows: int = 3
@@ -63,9 +65,9 @@ def without_faults(streams: ImportedStreams, policy: PathPolicy = POLICY) -> Imp
             "{trusted: true} keeps them)"
         )
         position = position.chosen(np.flatnonzero(~dropped))
-    position, taxels, words = _without_held(position, taxels)
+    position, taxels, words, update_ns = _without_held(position, taxels)
     doubts += words
-    inside, gaps = _in_gaps(position, taxels, policy)
+    inside, gaps = _in_gaps(position, taxels, update_ns, policy)
     if inside.any():
         doubts.append(
             f"position: it stops {len(gaps)} times while the channels run on, for up to {max(gaps):.3g} s, and the "
@@ -77,18 +79,19 @@ def without_faults(streams: ImportedStreams, policy: PathPolicy = POLICY) -> Imp
     return replace(streams, position=position, taxels=taxels, doubts=(*streams.doubts, *doubts))
 
 
-def _without_held(position: Stream, taxels: Stream) -> tuple[Stream, Stream, list[str]]:
-    """Return a position without old values, the channels without their rows at a stuck position, and both in words."""
+def _without_held(position: Stream, taxels: Stream) -> tuple[Stream, Stream, list[str], float]:
+    """Return a position without old values and the channels without their rows at a stuck position.
+
+    Both come in words as well, with the time between two updates of the position [ns].
+    """
     span = _span(position.values)
     stale = held_rows(position, _readings_at(taxels, position.time_ns), span)
     overruled = "(position: {trusted: true} keeps them)"
     keep, inside, doubts = ~stale.repeated, np.zeros(len(taxels.time_ns), dtype=bool), []
     time_ns = position.time_ns
+    update_ns = stale.every * float(np.median(np.diff(time_ns)))
     if stale.repeated.any():
-        seconds = float(np.median(np.diff(time_ns))) / 1e9
-        cause = (
-            f"a new value comes every {stale.every * seconds:.3g} s only" if stale.every else "its last value repeats"
-        )
+        cause = f"a new value comes every {update_ns / 1e9:.3g} s only" if stale.every else "its last value repeats"
         row = int(np.flatnonzero(stale.repeated)[0])
         doubts.append(
             f"position: {cause} while the readings go on: {int(stale.repeated.sum())} old values are left out, the "
@@ -104,7 +107,7 @@ def _without_held(position: Stream, taxels: Stream) -> tuple[Stream, Stream, lis
             f"{time_ns[first] / 1e9:.6g} s to {time_ns[last] / 1e9:.6g} s: {int(inside.sum())} rows of the channels "
             f"there are left out {overruled}"
         )
-    return position.chosen(np.flatnonzero(keep)), taxels.chosen(np.flatnonzero(~inside)), doubts
+    return position.chosen(np.flatnonzero(keep)), taxels.chosen(np.flatnonzero(~inside)), doubts, update_ns
 
 
 def _span(values: np.ndarray) -> float:
@@ -194,13 +197,17 @@ def _readings_at(taxels: Stream, time_ns: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def _in_gaps(position: Stream, taxels: Stream, policy: PathPolicy) -> tuple[np.ndarray, list[float]]:
-    """Return which rows of the channels lie in a gap of the position, shape (rows,), bool, and the gaps [s]."""
+def _in_gaps(position: Stream, taxels: Stream, update_ns: float, policy: PathPolicy) -> tuple[np.ndarray, list[float]]:
+    """Return which rows of the channels lie in a gap of the position, shape (rows,), bool, and the gaps [s].
+
+    A position with a slow update of its own, every ``update_ns`` [ns], has no gap between two of them.
+    """
     inside, gaps = np.zeros(len(taxels.time_ns), dtype=bool), []
     steps = np.diff(position.time_ns)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
     span = max(_span(position.values), 1e-12)
-    for row in np.flatnonzero(steps > max(policy.gap * usual, policy.gap_seconds * 1e9)).tolist():
+    longest = max(policy.gap * usual, policy.gap_seconds * 1e9, policy.late * update_ns)
+    for row in np.flatnonzero(steps > longest).tolist():
         first, last = np.searchsorted(taxels.time_ns, [position.time_ns[row] + 1, position.time_ns[row + 1]])
         way = float(np.linalg.norm(position.values[row + 1] - position.values[row]))
         if last - first >= policy.rows and way > policy.still * span:

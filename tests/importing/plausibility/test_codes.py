@@ -109,3 +109,21 @@ def test_a_clock_is_no_channel_and_text_is_named_as_such(tmp_path):
     write(tmp_path, "npz", rows)
     with pytest.raises(FormatError, match=r"t of run\.npz is the time, and among the channels"):
         imported(tmp_path, tmp_path / "run.npz", taxels={"file": "run", "columns": [0, 2]})
+
+
+@pytest.mark.parametrize("rows", [(40,), (40, 140), (40, 41, 140)])
+def test_spikes_of_different_size_are_told_and_kept(tmp_path, rows):
+    columns = table(presses=4)
+    columns[list(rows), 2] += 600 + 50 * np.arange(len(rows))
+    made, (episode,) = imported(tmp_path, write(tmp_path, "npz", columns))
+    np.testing.assert_allclose(episode.taxels.counts, columns[:, 2:])
+    assert any(note.startswith(f"taxels: {len(rows)} numbers") and "count as measured" in note for note in made.notes)
+
+
+@pytest.mark.parametrize("scale", (1.0, 1e-12, -40.0))
+def test_short_taps_and_rare_presses_are_no_spikes(scale):
+    depth = np.zeros(3000)
+    depth[1000:1012] = depth[2000:2012] = 1.2
+    reading = scale * (depth + np.random.default_rng(0).normal(0, 1e-3, len(depth)))
+    cleaned, words = without_codes(reading[:, None], "taxels", rails=False)
+    assert not words and np.isfinite(cleaned).all()

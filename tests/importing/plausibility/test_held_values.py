@@ -37,6 +37,18 @@ def test_a_position_that_is_updated_slowly_is_taken_at_its_updates(tmp_path, eve
     assert np.abs(depth - rows[: len(depth), 1]).max() < 0.55 * stale
 
 
+@pytest.mark.parametrize(("rate", "step"), [(20.0, 0.05), (50.0, 0.1)])
+def test_a_coarse_position_in_a_slow_motion_costs_no_reading(tmp_path, rate, step):
+    time = np.arange(0, 120, 1 / rate)
+    path = np.interp(time, [0, 5, 29, 40, 64, 120], [0, 0, 1.2, 1.2, 0, 0])
+    noise = np.random.default_rng(0).normal(0, 0.002, (len(time), 2))
+    rows = np.column_stack([time, np.floor(path / step + 1e-9) * step, 10 + path[:, None] * [1.0, 0.6] + noise])
+    made, (episode,) = imported(tmp_path, rows)
+    assert len(episode.taxels.counts) == len(rows) and any("a new value comes every" in note for note in made.notes)
+    depth = np.interp(episode.taxels.sample_ns, episode.tip_ns, episode.tip[:, 2])
+    assert np.abs(depth - path).max() < 1.05 * step and np.abs(depth - path).mean() < 0.3 * step
+
+
 def test_a_slow_position_is_kept_where_it_is_trusted(tmp_path):
     rows = table(presses=3)
     rows[:, 1] = held(rows[:, 1], 10)
