@@ -7,7 +7,7 @@ import pytest
 
 from tacdata.clock import Clock
 from tacdata.demonstrations.recording.streams import DemoStreams
-from tacdata.devices.device import StreamCounts, TaxelBoard, TaxelFrame
+from tacdata.devices.device import Camera, ImageFrame, StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError
 
 
@@ -107,6 +107,41 @@ def test_a_board_that_falls_silent_may_speak_again(monkeypatch):
         board.quiet = False
         until(lambda: not streams.silent)
     assert "nothing received for 0.05 s; check cable and power" in said[0] and "speaks again" in said[1]
+
+
+class Eye(Camera):
+    """A camera of 500 images a second that may repeat its latest one."""
+
+    def __init__(self, clock):
+        super().__init__(clock)
+        self.number, self.frozen = 0, False
+
+    def describe(self):
+        return {}
+
+    def open(self):
+        pass
+
+    def close(self):
+        pass
+
+    def read(self, timeout):
+        time.sleep(0.002)
+        self.number += not self.frozen
+        return [ImageFrame(self.clock.now_ns(), self.number, np.zeros((2, 2), np.uint8), b"image %d" % self.number)]
+
+
+def test_a_camera_that_repeats_one_image_is_lost(monkeypatch):
+    monkeypatch.setattr(DemoStreams, "silence", 1.5)
+    clock, said = Clock.start(), []
+    eye = Eye(clock)
+    with DemoStreams({}, {"left": eye}, {}, {}, None, said.append) as streams:
+        until(lambda: eye.number > 40)
+        assert not streams.lost_cameras
+        eye.frozen = True
+        until(lambda: streams.lost_cameras)
+    assert streams.lost_cameras == {"camera left": "camera left repeats one image: it hangs"}
+    assert said[0].startswith("camera left: the same image again and again for 1.5 s")
 
 
 IMPOSSIBLE = [(9001.0, "no channel has changed for"), (65535.0, "have read 65535 counts")]

@@ -39,7 +39,8 @@ class SimulatedCamera(Camera):
         self._look()
         while self._next * PERIOD_NS + LATENCY_NS <= now and now >= self.device.hangs_until_ns:
             number = self._next - self._first
-            frames.append(ImageFrame(now, number, np.zeros((2, 2), np.uint8), b"image %d" % number))
+            shown = number if self.device.frozen_at is None else self.device.frozen_at
+            frames.append(ImageFrame(now, number, np.zeros((2, 2), np.uint8), b"image %d" % shown))
             self._next += 1
         return frames
 
@@ -57,4 +58,4 @@ class CameraDevice:
 
     def repair(self):
         """Be well again."""
-        self.unplugged, self.hangs_until_ns = False, 0
+        self.unplugged, self.hangs_until_ns, self.frozen_at = False, 0, None

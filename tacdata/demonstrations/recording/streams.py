@@ -99,7 +99,9 @@ class DemoStreams(DeviceStreams):
 
     def _silent(self, name: str) -> None:
         if name not in self._why:
-            self._fall_silent(name, f"nothing received for {self.silence:g} s; check cable and power")
+            if self._hangs(name):
+                self._lost[name] = f"{name} repeats one image: it hangs"
+            self._fall_silent(name, f"{self._what(name)} for {self.silence:g} s; check cable and power")
 
     def _broken(self, name: str, error: TacdataError) -> None:
         if name in self._cameras:

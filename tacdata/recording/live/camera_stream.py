@@ -13,6 +13,8 @@ from tacdata.recording.files.writer import CubePoseRecord, EpisodeWriter
 from tacdata.recording.live.detection_process import Detect
 
 JPEG_QUALITY = 90
+LIVED = 20
+"""Images that must have differed before a repeated one counts as a camera that hangs [count]."""
 
 
 class CameraStream:
@@ -37,6 +39,10 @@ class CameraStream:
         self._fingers = fingers if self._cube is None else None
         self._detect = detect if self._cube is not None or self._fingers is not None else None
         self._remarks: set[str] = set()
+        self._image: tuple[bytes, np.ndarray] | None = None
+        self._changes = 0
+        self.is_frozen = False
+        """Whether the latest image repeats the one before, of a camera whose images differed."""
         self._search: tuple[Future, ImageFrame, int, EpisodeWriter | None] | None = None
         self._last, self._asked = None, False
         self.ready = self._detect is None
@@ -57,6 +63,19 @@ class CameraStream:
         if self._detect is not None and self._search is None and (sink or not self._asked):
             search = self._detect(frame.image, self._intrinsics, self._fingers or self._cube, self._last)
             self._search, self._asked = (search, frame, sample_ns, sink), True
+
+    def is_new(self, frame: ImageFrame) -> bool:
+        """Return whether an image is a new one.
+
+        A driver that hangs repeats its last image with fresh time stamps. A sensor never does, for its noise.
+        """
+        before, self._image = self._image, (frame.jpeg, frame.image)
+        if before is None:
+            return True
+        same = frame.jpeg == before[0] if frame.jpeg else np.array_equal(frame.image, before[1])
+        self._changes += not same
+        self.is_frozen = bool(same) and self._changes >= LIVED
+        return not self.is_frozen
 
     def collect(self, patience: float) -> None:
         """Write the pose of the search under way if it ends within ``patience`` [s of real time].

@@ -75,6 +75,14 @@ class DeviceStreams(ABC):
         self._readers: dict[str, Lateness] = {}
         self._threads: list[threading.Thread] = []
 
+    def _what(self, name: str) -> str:
+        """Describe what a silent stream delivers."""
+        return "the same image again and again" if self._hangs(name) else "nothing received"
+
+    def _hangs(self, name: str) -> bool:
+        """Return whether a camera repeats one image."""
+        return any(view.is_frozen for view in self._views if name == f"camera {view.name}")
+
     def _busy(self, name: str) -> str:
         """Name this computer's own lateness in a stream's silence, as part of a sentence; empty if it was in time."""
         return while_late(self._late(name))
@@ -224,7 +232,7 @@ class DeviceStreams(ABC):
                 if self._feed:
                     self._feed.image(view.name, frame.arrival_ns, frame.image)
             view.collect(SEARCH if self._ending else 0.0)
-            return len(frames)
+            return sum(view.is_new(frame) for frame in frames)
 
         return read
 

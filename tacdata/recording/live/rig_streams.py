@@ -182,7 +182,7 @@ class RigStreams(DeviceStreams):
             raise self._no_frames(self._board_silence)
         unreadable = "" if name.startswith("camera") else self._cnc.unreadable
         busy = self._busy(name)
-        what = f"only reports that cannot be read, the latest {unreadable!r}," if unreadable else "nothing received"
+        what = f"only reports that cannot be read, the latest {unreadable!r}," if unreadable else self._what(name)
         raise DeviceError(
             f"{name}: {what} for {self.silence:g} s{busy}",
             "a stream that goes on",
