@@ -11,6 +11,8 @@ from schedule import SECOND
 
 LIVED = 3.0
 """Time after which the recorder has seen readings that live [s]."""
+SEEN_LIVING = 3.0
+"""Time in which a camera of ten images a second shows that its images differ [s]."""
 SILENT = 3.0
 """Time after which a silent camera is a fault [s]."""
 OVERRIDDEN = 6.0
@@ -39,7 +41,7 @@ class Faults:
         for _ in range(number):
             name = self.random.choice(kinds)
             self.names.append(name)
-            self.at(self.random.uniform(0.0, COURSE), lambda act={**KINDS, **MORE, **LATEST}[name]: act(self))
+            self.at(self.random.uniform(0.0, COURSE), lambda act={**KINDS, **MORE, **LATEST, **NEWEST}[name]: act(self))
         later = random.Random(f"more faults {seed}")  # of its own, so that seeds keep what they drew before
         if not only and later.random() < 0.25:
             name = later.choice(tuple(MORE))
@@ -50,6 +52,11 @@ class Faults:
             newest = latest.choice(tuple(LATEST))
             self.names.append(newest)
             self.at(latest.uniform(0.0, COURSE), lambda: LATEST[newest](self))
+        last = random.Random(f"newest faults {seed}")
+        if not only and last.random() < 0.15:
+            kind = last.choice(tuple(NEWEST))
+            self.names.append(kind)
+            self.at(last.uniform(0.0, COURSE), lambda: NEWEST[kind](self))
         if self.random.random() < 0.3:
             world.computer.lateness = ((0.02, self.random.choice((0.02, 0.1, 0.4))),)
             self.names.append(f"busy computer {world.computer.lateness}")
@@ -445,5 +452,25 @@ LIFT = re.compile(r"(G1Z-\d)(\d)")
 """A line of a lift: it names no x and y."""
 PRESS = re.compile(r"(Y\S+Z-3)(8)")
 """A line of motion to a place in the skin."""
+
+
+def camera_freezes(faults):
+    """Let the camera repeat its image with fresh time stamps; it must have lived."""
+    camera, schedule = faults.world.camera, faults.world.schedule
+    if camera and camera.frozen_at is None:
+        camera.frozen_at = 10 * int(schedule.now)
+        if schedule.now > LIVED + SEEN_LIVING:
+            faults.see("camera freezes", SILENT + 0.3)
+
+
+def reader_starves(faults):
+    """Let one thread that reads a port not run for a while: what arrives waits."""
+    now, seconds = faults.world.schedule.now_ns, faults.random.choice((0.3, 1.5, 2.5, 4.0, 8.0))
+    thread = faults.random.choice(("grbl-listen", "taxel-board"))
+    faults.world.computer.starved.append((thread, now, now + round(seconds * SECOND)))
+
+
+NEWEST = {"camera_freezes": camera_freezes, "reader_starves": reader_starves}
+"""Kinds that came last, drawn by numbers of their own."""
 LATEST = {"damaged_lift": damaged_lift, "damaged_press": damaged_press}
 """Kinds that came later still."""

@@ -11,9 +11,16 @@ from simulated_line import LINES, SimulatedLine
 
 from tacdata.clock import Clock
 from tacdata.plans import Plan
+from tacdata.recording.live.ending import ending
+from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.recording.live.interruption import Interruption
+from tacdata.recording.live.lost_position import PositionGuard
+from tacdata.recording.live.machine_state import MachineState
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
+from tacdata.registration import RegistrationSettings
+from tacdata.registration.guarded_probe import guarded_probe
+from tacdata.registration.procedure import register
 from tacdata.rig.rig import from_document
 from tacdata.sensor import default_sensor
 from tacdata.virtual_rig.board import Timing, VirtualBoard
@@ -25,19 +32,24 @@ ORIGIN, PARKED = (-96.0, -61.5, -38.0), 12.0
 CLEARANCE = 3.0
 ENVELOPE = {"min": [-106.0, -76.5, -41.0], "max": [-86.0, -46.5, -20.0]}
 SITES = [(1.0, 0.5), (-2.0, 1.5), (3.0, -2.0), (0.0, 0.0)]
+SPREAD = 3.0
+"""Distance from the tip at which a taxel answers with 0.6 of its greatest answer [mm]."""
 WATCHED = 0.01
 """How often the true position is noted [s]."""
 LIMIT = 180.0
 """Time after which a run counts as hung [s]; one without faults takes about 25 s."""
 
 
-def plan(presses, **entries):
-    """Return a plan of some seconds a press, with further entries."""
+def plan(presses, tools=False, **entries):
+    """Return a plan of some seconds a press, each by another tool if there are ``tools``, with further entries."""
+    spheres = ("ball", "pin") if tools else ("ball",)
     return Plan.from_document(
         {
             "version": "1.0",
             "name": "simulated",
-            "indenters": {"ball": {"shape": "sphere", "radius": 3.0}},
+            "indenters": {
+                name: {"shape": "sphere", "radius": radius} for name, radius in zip(spheres, (3.0, 2.0), strict=False)
+            },
             "motion": {
                 "clearance": CLEARANCE,
                 "standoff": 0.3,
@@ -48,7 +60,7 @@ def plan(presses, **entries):
                 "rest": 1.0,
             },
             "presses": [
-                {"indenter": "ball", "x": x, "y": y, "depth": 0.8 + 0.1 * k}
+                {"indenter": spheres[k % len(spheres)], "x": x, "y": y, "depth": 0.8 + 0.1 * k}
                 for k, (x, y) in enumerate((SITES * presses)[:presses])
             ],
             **entries,
@@ -83,6 +95,7 @@ class World:
         camera=False,
         zero=False,
         speed=1.0,
+        tools=False,
         **entries,
     ):
         """Switch everything on; with ``zero`` the place where a controller counts from lies in the envelope.
@@ -90,7 +103,8 @@ class World:
         The rig's clock runs ``speed`` times as fast as the computers'.
         """
         self.envelope = {**ENVELOPE, "max": [1.0, 1.0, 1.0]} if zero else ENVELOPE
-        self.seed, self.folder, self.plan = seed, folder, plan(presses, **entries)
+        self.tools = tools
+        self.seed, self.folder, self.plan = seed, folder, plan(presses, tools, **entries)
         self.schedule = Schedule(seed, LIMIT)
         self.bench = SimulatedHost(self.schedule)
         self.clock = Clock(EPOCH + START, START, speed, self.bench)
@@ -105,11 +119,14 @@ class World:
         timing = Timing(self.clock.now_ns(), 1 / 30, 20.0, 0.0003, 600.0, 0.001, 0.016)
         self.board = VirtualBoard(self.clock, default_format(), timing, self._read, 115200, seed, self.board_line)
         self._noise = np.random.default_rng([seed, 1])
+        self._taxels = np.array([self.rig().registration.to_machine(x, y, 0.0)[:2] for x, y in SENSOR.taxels.centers])
         self.path = []
         """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
         self.stops = []
         """Times at which the recorder stopped the motion [s]."""
-        self._awaited = []
+        self._awaited, self.mounted = [], []
+        self.raised = 0.0
+        """Height of the skin above the registered one [mm]."""
         self.camera = CameraDevice() if camera else None
         self.asked, self.answer, self.said = [], lambda question: False, []
         self.controller.start()
@@ -129,6 +146,42 @@ class World:
         for line in (self.cnc_line, self.board_line):
             line.attach(self.computer)
         self.schedule.extend(seconds)
+
+    def register(self):
+        """Register the sensor as `tacdata register` does; return what was found, or raise what it raises."""
+        rig = self.rig()
+
+        def work():
+            with Interruption(self.computer) as interruption:
+                devices = RigDevices.of(rig)
+                state = MachineState(rig, devices.cnc)
+                guard = PositionGuard(state, devices.cnc, self._asked)
+                motion = self._noting_stops(GuardedMotion(devices.cnc, rig.clock, interruption, state))
+                try:
+                    guard.before_homing(resumed=False)
+                    with guard.opened(devices):
+                        guard.require_known(ORIGIN[2] + CLEARANCE)
+                        where = rig, devices, ORIGIN[2] + CLEARANCE, 5.0, interruption, motion, self.said.append
+                        with guarded_probe(*where) as probe:
+                            return register(probe, SENSOR, rig.registration, RegistrationSettings())
+                except BaseException as error:
+                    interruption.last_words()
+                    data = ("nothing was written",)
+                    error.add_note(ending(motion, guard.loss(), data, "the same command", error))
+                    raise
+
+        return self.computer.run(work)
+
+    def _noting_stops(self, motion):
+        stop = motion.stop
+        motion.stop = lambda: (self.stops.append(self.schedule.now), stop())
+        return motion
+
+    def _mount(self, press):
+        """Change the tool, as a person does; the guide stands still meanwhile."""
+        begun = self.position()
+        self.computer.sleep(4.0)
+        self.mounted.append((press.indenter_name, begun, self.position()))
 
     def record(self, resume=False, sync_tap=False, confirmed="", prove=None, **controller):
         """Run the recorder, with settings of the controller; return the session, or raise what it raises."""
@@ -152,9 +205,9 @@ class World:
                     sync_tap=sync_tap,
                     confirmed=confirmed,
                     prove=prove,
+                    mount=self._mount if self.tools else None,
                 )
-                stop = recorder._motion.stop
-                recorder._motion.stop = lambda: (self.stops.append(self.schedule.now), stop())
+                self._noting_stops(recorder._motion)
                 return recorder.run(lambda summary: True)
 
         return self.computer.run(work)
@@ -223,8 +276,10 @@ class World:
         return self.answer(question)
 
     def _read(self, sampled_ns):
-        depth = max(ORIGIN[2] - self.controller.position_at(sampled_ns)[2], 0.0)
-        return np.round(9000 + 800 * depth + self._noise.normal(0, 5, 24))
+        tip = self.controller.position_at(sampled_ns)
+        depth = max(ORIGIN[2] + self.raised - tip[2], 0.0)
+        far = ((self._taxels - tip[:2]) ** 2).sum(axis=1) / SPREAD**2
+        return np.round(9000 + 800 * depth * np.exp(-far / 2) + self._noise.normal(0, 5, 24))
 
     def when_down_at(self, height, action, after=0.0):
         """Do something so many seconds after the tip is first down at a machine height [mm]."""

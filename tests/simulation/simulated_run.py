@@ -17,6 +17,7 @@ from simulated_rig import CLEARANCE, ORIGIN, World
 from tacdata.errors import TacdataError
 from tacdata.recording.files import file_names
 from tacdata.recording.files.reader import read_recording
+from tacdata.registration.evidence import prove_zero
 
 NEAR = 0.02
 """Difference of two positions that are the same [mm]: reports have three decimals."""
@@ -30,6 +31,12 @@ OFF = 0.06
 """Distance between the true path and the plan in a file that is complete [mm]: steps, reports, the judge's interval."""
 UNLOCKED = (None, 2)
 """Alarms that a reset and ``$X`` end without a loss of the position: a soft limit is raised after braking to rest."""
+COURSES = ("", "", "", "", "sync tap", "tools", "touch", "registration")
+"""Courses that a seed draws: plain presses, or what may come before and between them."""
+BUMP, TOUCHED = 1.0, 0.4
+"""Rise of a sensor's stand that was bumped, and depth of a touch that notices it at most [mm]."""
+LONG = 900.0
+"""Time after which a course with a registration or a sync tap counts as hung [s]."""
 LIFTABLE = {
     "board_freezes",
     "board_saturates",
@@ -44,6 +51,8 @@ LIFTABLE = {
     "camera_unplugged",
     "computer_stalls",
     "damaged_lift",
+    "camera_freezes",
+    "reader_starves",
 }
 """Faults that leave a controller able to lift the tip."""
 OUTSIDE = 1.0
@@ -53,13 +62,18 @@ OUTSIDE = 1.0
 class Run:
     """One attempt to record."""
 
-    def __init__(self, world, resume=False):
-        """Record until it ends by itself, or is killed."""
+    def __init__(self, world, resume=False, course=""):
+        """Record, or carry out another ``course`` of `COURSES`, until it ends by itself or is killed."""
+        self.course, self.is_registration = course, course == "registration"
         self.world, self.begin = world, world.schedule.now
         self.before = set(world.folder.glob("*.mcap")) if world.folder.exists() else set()
         self.session, self.error, self.hung = None, None, ""
         try:
-            self.session = world.record(resume)
+            if self.is_registration:
+                world.register()
+            else:
+                prove = prove_zero if course == "touch" else None
+                self.session = world.record(resume, sync_tap=course == "sync tap", prove=prove)
         except Hung as error:
             self.hung = str(error)
         except (Exception, KeyboardInterrupt) as error:  # judged below
@@ -88,6 +102,7 @@ def broken(run, faults):
         yield f"not an error for a person: {_traced(run.error)}"
     yield from _threads(run)
     yield from _motion(run, faults)
+    yield from _tools(run)
     if not run.killed:
         yield from _words(run, faults)
         yield from _lifted(run, faults)
@@ -103,6 +118,8 @@ def _threads(run):
         if task.error is not None and task.name != "main":
             yield f"the thread {task.name} died: {_traced(task.error)}"
     left = [task.name for task in run.world.computer.tasks if not task.ended]
+    starved = {thread for thread, *_ in run.world.computer.starved}  # ended by themselves once they run again
+    left = [name for name in left if name not in starved]
     if left and not run.killed and not isinstance(run.error, KeyboardInterrupt):  # a second one ends all waiting
         yield f"threads that go on after the end: {left}"
 
@@ -131,6 +148,13 @@ def _motion(run, faults):
         goes = np.flatnonzero(late & ((sideways > NEAR / 10) | (down > NEAR / 10)))
         if len(goes):
             yield f"a fault could be seen at {seen:.2f} s; it still went on at {times[goes[0]]:.2f} s"
+
+
+def _tools(run):
+    """Yield where the guide moved, or stood too low, while a person changed the tool."""
+    for name, begun, ended in run.world.mounted:
+        if begun[2] < ORIGIN[2] + CLEARANCE - NEAR or np.abs(ended - begun).max() > NEAR / 10:
+            yield f"{name} was mounted between {begun} and {ended}"
 
 
 def _lifted(run, faults):
@@ -183,6 +207,8 @@ def _words(run, faults):
 
 def _files(run, faults):
     folder = run.world.folder
+    if run.is_registration:
+        return
     if not folder.exists():
         if run.error is None and not run.killed:
             yield "there is no session"
@@ -257,19 +283,23 @@ def play(seed, only=()):
         more = {"echo": echo, "camera": camera}
         later = random.Random(f"later {seed}")  # of its own, so that seeds keep what they drew before
         more["zero"] = later.random() < 0.5
-        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, **more)
+        course = random.Random(f"course {seed}").choice(COURSES)
+        tools = course == "tools"
+        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, tools=tools, **more)
+        if course in ("sync tap", "registration"):
+            world.schedule.extend(LONG)
         faults = Faults(world, seed, only)
         try:
-            found = list(_play(world, faults, later.random() < 0.5, later.random() < 0.5))
+            found = list(_play(world, faults, later.random() < 0.5, later.random() < 0.5, course))
         finally:
             faults.end()
             world.end()
         kind = [firmware, *(["no homing"] if settings else []), *(name for name, on in more.items() if on)]
-        return [*kind, *faults.names], found, world.schedule.now
+        return [*kind, *([course] if course else []), *faults.names], found, world.schedule.now
 
 
-def _play(world, faults, anew=False, unlocks=False):
-    run = Run(world)
+def _play(world, faults, anew=False, unlocks=False, course=""):
+    run = Run(world, course=course)
     faults.end()
     yield from (f"first run: {words}" for words in broken(run, faults))
     if run.hung or (run.error is None and not run.killed):
@@ -293,10 +323,24 @@ def _play(world, faults, anew=False, unlocks=False):
         if lost:
             world.home()
     world.answer = lambda question: True
+    if course == "touch" and world.folder.exists():
+        yield from _bumped(world, calm)
     run = Run(world, world.folder.exists())
     yield from (f"resumed: {words}" for words in broken(run, calm))
     if run.error is not None:
         yield f"does not resume: {run.words}"
+
+
+def _bumped(world, calm):
+    """Yield what does not hold where somebody bumped the sensor's stand before the session goes on."""
+    world.raised = BUMP
+    run = Run(world, True, "touch")
+    yield from (f"bumped: {words}" for words in broken(run, calm))
+    deepest = ORIGIN[2] + BUMP - run.path[1][:, 2].min(initial=np.inf)
+    if run.error is None or deepest > TOUCHED:
+        yield f"the skin is {BUMP} mm higher, and the tip went {deepest:.2f} mm into it; its words:\n{run.words}"
+    world.raised = 0.0
+    world.reboot()
 
 
 def main(first, last):

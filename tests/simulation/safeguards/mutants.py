@@ -10,12 +10,13 @@ from unittest import mock
 from tacdata.devices.grbl import Grbl
 from tacdata.recording import recorder
 from tacdata.recording.live import guarded_motion, rig_streams
+from tacdata.recording.live.camera_stream import CameraStream
 from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.recording.live.lost_position import PositionGuard
 from tacdata.recording.live.machine_state import MachineState
 from tacdata.recording.motion.allowed_path import AllowedPath
 from tacdata.wire.grbl import link as grbl_link
-from tacdata.wire.grbl import owed, watch
+from tacdata.wire.grbl import owed, silence, watch
 
 
 def _without_state(*names):
@@ -61,6 +62,11 @@ MUTANTS = {
         rig_streams.ReadingHealth, "take", lambda self, arrival_ns, counts: ""
     ),
     "a motion leaves no mark": lambda: mock.patch.object(MachineState, "moving", lambda self: None),
+    "no touch before the first press": lambda: mock.patch.object(
+        recorder.Recorder, "_touch_first", lambda self, prove, press, position, streams: position
+    ),
+    "what waits unread is silence": lambda: mock.patch.object(silence, "bytes_waiting", lambda line: 0),
+    "a camera may repeat one image": lambda: mock.patch.object(CameraStream, "is_new", lambda self, frame: True),
 }
 """Safeguard that is missing -> a context in which it is."""
 
@@ -81,6 +87,9 @@ KINDS = {
     "an alarm keeps the position": ("alarm",),
     "bad readings are ignored": ("board_freezes", "board_saturates"),
     "a motion leaves no mark": ("killed",),
+    "no touch before the first press": ("board_unplugged",),
+    "what waits unread is silence": ("reader_starves",),
+    "a camera may repeat one image": ("camera_freezes",),
 }
 """Missing safeguard -> kinds of faults that show it soonest."""
 
