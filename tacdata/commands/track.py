@@ -49,6 +49,8 @@ def run(
     from tacdata.demonstrations.recording.session import read_demo_session
     from tacdata.errors import UsageError
 
+    if not path.exists():
+        raise UsageError(f"no {path}", "a folder that record --demo wrote, or one of its recordings", "check the path")
     recordings = read_demo_session(path).episodes if path.is_dir() else (path,)
     if not recordings:
         raise UsageError(f"no finished demonstration in {path}", "one or more", "record with tacdata record --demo")

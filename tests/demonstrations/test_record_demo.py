@@ -212,6 +212,8 @@ def test_arguments_that_do_not_fit_are_refused(tmp_path, capsys):
     assert run(["record", "--demo", *common, "--seconds", "1"]) == 2
     assert run(["record", "--demo", *common, "--seconds", "1", "--resume"]) == 2
     assert run(["track", str(tmp_path / "demos")]) == 2
+    assert run(["track", str(tmp_path / "none")]) == 2
+    assert "a folder that record --demo wrote" in capsys.readouterr().err
 
 
 def test_a_virtual_demonstration_is_refused_what_it_cannot_do(tmp_path, capsys):

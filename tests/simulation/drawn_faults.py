@@ -455,12 +455,16 @@ PRESS = re.compile(r"(Y\S+Z-3)(8)")
 
 
 def camera_freezes(faults):
-    """Let the camera repeat its image with fresh time stamps; it must have lived."""
-    camera, schedule = faults.world.camera, faults.world.schedule
-    if camera and camera.frozen_at is None:
-        camera.frozen_at = 10 * int(schedule.now)
-        if schedule.now > LIVED + SEEN_LIVING:
+    """Let the camera repeat its image with fresh time stamps, once it has been seen to live."""
+    camera = faults.world.camera
+
+    def freeze():
+        if camera.frozen_at is None:
+            camera.frozen_at = 0
             faults.see("camera freezes", SILENT + 0.3)
+
+    if camera:
+        faults.after(max(LIVED + SEEN_LIVING - faults.world.schedule.now, 0.0), freeze)
 
 
 def reader_starves(faults):

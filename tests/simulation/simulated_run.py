@@ -33,6 +33,8 @@ UNLOCKED = (None, 2)
 """Alarms that a reset and ``$X`` end without a loss of the position: a soft limit is raised after braking to rest."""
 COURSES = ("", "", "", "", "sync tap", "tools", "touch", "registration")
 """Courses that a seed draws: plain presses, or what may come before and between them."""
+STEP = 0.002
+"""Way sideways that is none [mm]: half a motor step, on which a machine that lost its power need not stand."""
 BUMP, TOUCHED = 1.0, 0.4
 """Rise of a sensor's stand that was bumped, and depth of a touch that notices it at most [mm]."""
 LONG = 900.0
@@ -81,6 +83,8 @@ class Run:
         self.end = world.schedule.now
         self.killed = world.computer.killed
         self.words = "\n".join([str(self.error or ""), *getattr(self.error, "__notes__", ())])
+        if self.is_registration and not self.hung:  # its devices are closed at once: a hold still brakes
+            world.schedule.run_for(BRAKING, world.bench)
         self.here = world.position()
         self.moves_at_the_end = world.controller.planner.moving(world.clock.now_ns())
 
@@ -140,7 +144,8 @@ def _motion(run, faults):
     low = places[:-1, 2] < ORIGIN[2] + CLEARANCE - NEAR
     begun = np.flatnonzero(~low)
     first = begun[0] if len(begun) else len(low)
-    if np.any(sideways[:first] > 1e-6) or np.any(down[:first] > 1e-6):
+    astray = np.linalg.norm(places[: first + 1, :2] - places[0, :2], axis=1)
+    if astray.max() > STEP or np.any(down[:first] > 1e-6):
         yield "the first move was not straight up"
     seen = faults.seen()  # in the sense of `Faults.see`
     if seen is not None and not faults.deaf:

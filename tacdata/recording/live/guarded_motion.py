@@ -181,7 +181,10 @@ class GuardedMotion:
                 else:
                     # Entered before it is sent, as another thread may read a report of it at once.
                     self._allowed.move(step.target, step.speed, self._clock.now_ns())
-                    done, position = self._cnc.move(step.target, step.speed), step.target
+                    # Outside of a press a way up names no x and y, so that a wrong report moves nothing sideways.
+                    is_rise = not step.phase and step.target[:2] == position[:2] and step.target[2] > position[2]
+                    go = self._cnc.rise if is_rise else self._cnc.move
+                    done, position = go(step.target, step.speed), step.target
                     self._allowed.taken(done.acknowledged_ns)
                 if writer:
                     times = done.sent_ns, done.acknowledged_ns
