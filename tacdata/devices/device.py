@@ -215,6 +215,13 @@ class MotionController(Device):
     def statuses(self) -> list[CncStatus]:
         """Return the status reports received since the last call (the driver polls in its own thread)."""
 
+    def check(self) -> None:
+        """Raise the error that occurred since the last call, if any.
+
+        Raises:
+            DeviceError: On a hold from outside, an alarm or a reset.
+        """
+
     @abstractmethod
     def feed_hold(self) -> None:
         """Stop the motion now, keeping the position (real-time command); safe in any thread and signal handler.

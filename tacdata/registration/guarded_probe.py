@@ -161,9 +161,7 @@ class GuardedProbe(Probe):
             rows = [counts for sample_ns, counts in list(self._sink.frames) if sample_ns >= self._rested_ns]
             if len(rows) >= frames:
                 break
-            self._interruption.check()
-            if self._streams.fault:
-                raise self._streams.fault
+            self._look()
             if patience.over():
                 raise DeviceError(
                     f"{len(rows)} of {frames} frames within the time", "a board that keeps its rate", "check the board"
@@ -179,10 +177,19 @@ class GuardedProbe(Probe):
         """Wait on the rig's clock, watching for faults; see the base."""
         until = self._rig.clock.now_ns() + round(seconds * 1e9)
         while self._rig.clock.now_ns() < until:
-            self._interruption.check()
-            if self._streams.fault:
-                raise self._streams.fault
+            self._look()
             self._rig.clock.host.sleep(LOOK)
+
+    def _look(self) -> None:
+        """Raise a fault of a guide at rest; one that the controller reports ends the motion first."""
+        self._interruption.check()
+        if self._streams.fault:
+            raise self._streams.fault
+        try:
+            self._devices.cnc.check()
+        except DeviceError:
+            self._drive(self._position, LIFT_SPEED)  # raises it, with the guide stopped and ready for a lift
+            raise
 
 
 @contextmanager

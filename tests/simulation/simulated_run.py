@@ -341,7 +341,9 @@ def _bumped(world, calm):
     world.raised = BUMP
     run = Run(world, True, "touch")
     yield from (f"bumped: {words}" for words in broken(run, calm))
-    deepest = ORIGIN[2] + BUMP - run.path[1][:, 2].min(initial=np.inf)
+    heights = run.path[1][:, 2]  # a tip that was left in the skin is first lifted
+    clear = np.flatnonzero(heights > ORIGIN[2] + BUMP)
+    deepest = ORIGIN[2] + BUMP - heights[clear[0] if len(clear) else 0 :].min(initial=np.inf)
     if run.error is None or deepest > TOUCHED:
         yield f"the skin is {BUMP} mm higher, and the tip went {deepest:.2f} mm into it; its words:\n{run.words}"
     world.raised = 0.0
