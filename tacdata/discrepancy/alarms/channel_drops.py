@@ -1,90 +1,88 @@
 """A channel that drops, or jumps, in several presses and comes back: a contact that is loose, a cable that breaks.
 
-Each press's gain of each channel is divided by the median of all channels: a common part (a depth error) cancels.
-Large deviations that gather on one channel are the statistic. For the null distribution, channels change places within
-each press. So the effects of a single press, as a spike frame, and of all channels together are in it.
+Presses that are far off gather on one channel. Under the null hypothesis, that channel has as many as the others let
+expect, by their beta-binomial distribution. A spike frame counts once a channel, whatever its size. What all channels
+share is taken off.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import betabinom
 
-from tacdata.chain import predict
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
-from tacdata.discrepancy.alarms.randomization import DRAWS, largest
-from tacdata.discrepancy.data.single_channels import press_gains, risen
+from tacdata.discrepancy.alarms.press_gains import FEWEST_CHANNELS, press_gains
+from tacdata.discrepancy.alarms.randomization import rarest
 
-FEWEST_PRESSES, FEWEST_CHANNELS = 12, 3
-"""Presses and channels, at least."""
+FEWEST_PRESSES = 12
+"""Presses, at least."""
 FAR_Z = 6.0
 """A press of a channel is far off from so many times its usual scatter on [1]..."""
 LEAST = 0.08
 """...and from this change of its gain on [1]."""
-SEVERAL = 3
+CALM = 0.3
+"""Share of a channel's presses that its usual scatter is estimated from [1]: more of them may have dropped."""
+NORMAL = 0.385
+"""Size that this share of normal numbers stays below, over their standard deviation [1]."""
+SEVERAL = 4
 """Presses that are far off, at least."""
+RARE = 200
+"""Beforehand, a press of a channel is far off for other reasons, as a spike, once in so many, known as by one such."""
+MOST_NAMED = 3
 MOST = 0.5
 """Share of the presses that are far off, at most [1]: more are no drops."""
 
 
 def channel_drops(cleaned: Cleaned) -> list[Alarm]:
     """Return the alarm of a channel that drops or jumps in several presses, or none."""
-    course, setting = cleaned.course, cleaned.problem.setting
+    course = cleaned.problem.setting.course
     if course.channels < FEWEST_CHANNELS or len(cleaned.episodes) < FEWEST_PRESSES:
         return []
-    placed = [*setting.given, *cleaned.problem.placed]
-    predicted = predict(setting.course, setting.response, placed).signal[setting.course.read]
-    rows = [np.flatnonzero(course.episode == e) for e in cleaned.episodes]
-    gains = press_gains([risen(course.readings[r]) for r in rows], [risen(predicted[r]) for r in rows])
-    drop = drops(gains)
-    if drop is None:
+    found = drops(press_gains(cleaned))
+    if found is None:
         return []
-    channel, far, change = drop
-    names = ", ".join(setting.course.names[int(cleaned.episodes[k])] for k in far[:SEVERAL])
+    channel, far, change = found
+    names = ", ".join(course.names[int(cleaned.episodes[k])] for k in far[:MOST_NAMED])
     way = "less" if change < 0 else "more"
     return [
         Alarm(
-            f"{setting.course.channel_names[channel]} reads about {100 * abs(change):.0f} % {way} in {len(far)} "
+            f"{course.channel_names[channel]} reads about {100 * abs(change):.0f} % {way} in {len(far)} "
             f"presses ({names}, ...), and as before between them",
             "look at its contact and its cable; move the cable by hand while a weight rests on the sensor",
         )
     ]
 
 
-def drops(gains: np.ndarray, seed: int = 0) -> tuple[int, np.ndarray, float] | None:
+def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
     """Return which channel drops or jumps, in which presses, and by which share of its gain; None if none does.
 
     Args:
-        gains: Of each press and channel, over the channel's median [1], shape (presses, channels); NaN where a press
-            hardly stirs it.
-        seed: Of the draws.
+        logs: Logarithm of the gain of each press and channel, beside what is common to channels and usual at its place
+            [1], shape (presses, channels); NaN where it is not known.
     """
-    valid = np.isfinite(gains) & (gains > 0)
-    with np.errstate(invalid="ignore"):
-        logs = np.where(valid, np.log(np.where(valid, gains, 1.0)), np.nan)
-    rows = np.count_nonzero(valid, axis=1) >= FEWEST_CHANNELS
-    if np.count_nonzero(rows) < FEWEST_PRESSES:
+    known = np.isfinite(logs)
+    known &= known.sum(axis=1, keepdims=True) >= FEWEST_CHANNELS
+    known &= known.sum(axis=0) >= FEWEST_PRESSES
+    if np.count_nonzero(known.any(axis=0)) < FEWEST_CHANNELS:
         return None
-    logs = np.where(rows[:, None], logs, np.nan)
-    logs[rows] -= np.nanmedian(logs[rows], axis=1, keepdims=True)
-    enough = np.isfinite(logs).sum(axis=0) >= FEWEST_PRESSES
-    if np.count_nonzero(enough) < FEWEST_CHANNELS:
-        return None
-    logs[:, ~enough] = np.nan
-    logs[:, enough] -= np.nanmedian(logs[:, enough], axis=0)
-    scatter = np.full(gains.shape[1], np.inf)
-    scatter[enough] = 1.4826 * np.nanmedian(np.abs(logs[:, enough]), axis=0)
-    deviation = np.nan_to_num(logs)
-    far = np.abs(deviation) > np.maximum(LEAST, FAR_Z * scatter)
-    table = np.empty((DRAWS + 1, gains.shape[1]))
-    # Counts are compared as they are: the harness takes cube roots, as of sums of squares.
-    table[0] = far.sum(axis=0) ** 3.0
-    rng = np.random.default_rng([seed, 37])
-    for draw in range(1, DRAWS + 1):
-        table[draw] = np.sum(rng.permuted(far, axis=1), axis=0) ** 3.0
-    count = far.sum(axis=0)
-    test = largest(table, (count >= SEVERAL) & (count <= MOST * np.maximum(np.isfinite(logs).sum(axis=0), 1)))
+    off = np.where(known, logs, 0.0)
+    scatter = np.array([_scatter(own[seen]) for own, seen in zip(off.T, known.T, strict=True)])
+    shares = np.abs(off) / np.maximum(LEAST, FAR_Z * scatter)
+    far = known & (shares > 1)
+    count, seen = far.sum(axis=0), known.sum(axis=0)
+    others, watched = far.sum() - count, known.sum() - seen
+    tails = betabinom.sf(count - 1, seen, 1 + others, RARE + watched - others)
+    test = rarest(np.where((count >= SEVERAL) & (count <= MOST * seen), tails, 1.0))
     if not test.alarms:
         return None
-    presses = np.flatnonzero(far[:, test.at])
-    return test.at, presses, float(np.expm1(np.median(deviation[presses, test.at])))
+    presses, own = np.flatnonzero(far[:, test.at]), off[:, test.at]
+    # Where most presses of a place have dropped, the others seem to be the odd ones: the usual way is that of most.
+    way = 1.0 if np.sum(np.sign(own[presses])) > 0 else -1.0
+    presses = presses[np.sign(own[presses]) == way]
+    return test.at, presses, float(np.expm1(np.median(own[presses])))
+
+
+def _scatter(off: np.ndarray) -> float:
+    """Return the usual scatter of a channel [1]; infinite where it has no presses."""
+    return float(np.quantile(np.abs(off), CALM)) / NORMAL if len(off) else np.inf

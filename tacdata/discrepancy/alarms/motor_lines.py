@@ -1,4 +1,4 @@
-"""Lines in the spectrum while the path moves, and not at rest: noise of a motor's drive.
+"""Lines in the spectrum: hum while the path stands; noise of a motor's drive while it moves, and not at rest.
 
 Periodograms of a whole session are summed over channels, whatever their phases. Without a line the sum is a gamma
 variable. Its level is estimated around the line, its shape from quartiles. So channels that share noise make no lines.
@@ -6,18 +6,22 @@ variable. Its level is estimated around the line, its shape from quartiles. So c
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from scipy.stats import gamma
 
 from tacdata.chain import Course
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
+from tacdata.discrepancy.alarms.randomization import rarest
 from tacdata.discrepancy.plain_number import plain_number
 
-CHANCE = 1e-4
-"""Probability that noise makes one of all lines as large [1]."""
 STANDS = 0.01
-"""A line at rest, too, is hum: it is distinguished by idle readings [the same]."""
+"""A line is there at rest, too, if noise makes one of all lines as large with this probability [1]."""
+LEAST = 0.003
+"""A smaller line at rest, over the largest rise of the readings, is left alone [1]."""
 BESIDE = 1.0
 """A line so near counts [Hz]; also the width over which the level is estimated."""
 LOWEST = 1.0
@@ -40,47 +44,97 @@ MOST_NAMED = 4
 def motor_lines(cleaned: Cleaned) -> list[Alarm]:
     """Return the alarm of a line that is there only while the path moves, or none."""
     course = cleaned.course
-    inside = ~course.first
-    if not inside.any() or _even(cleaned):
+    if _even(cleaned):
         return []
-    interval, moving = float(np.median(course.step[inside])), _moving(course)
-    motion, standstill = _periodogram(cleaned, moving, interval), _periodogram(cleaned, ~moving, interval)
+    motion, standstill = _periodogram(cleaned, _moving(course)), _periodogram(cleaned, ~_moving(course))
     if motion is None or standstill is None:
         return []
-    frequency, power, values = motion
-    chance = _chance(frequency, power)
-    best = int(np.argmin(chance))
-    near = np.abs(frequency - frequency[best]) < BESIDE
-    if chance[best] > CHANCE or _chance(frequency, standstill[1])[near].min() < STANDS:
+    best = rarest(motion.tails)
+    near = np.abs(motion.frequency - motion.frequency[best.at]) < BESIDE
+    if not best.alarms or standstill.tails[near].min() * np.count_nonzero(standstill.counted) < STANDS:
         return []
-    # Power of a channel's line over its sum of squares, n a^2 / 4 over n.
-    share = np.maximum(power[:, best] - 1.0, 0.0) / values
-    decay = np.abs(1 - cleaned.noise.memory * np.exp(-2j * np.pi * frequency[best] * interval))
-    size = 2 * np.sqrt(share) * cleaned.noise.scale / max(float(decay), 1e-3)
-    order = np.argsort(-size)[:MOST_NAMED]
-    names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
-    peak = float(size[order[0]])
-    share = plain_number(100 * peak / cleaned.largest, 2)
-    large = f"by up to about {plain_number(peak, 2)}, {share} % of the largest rise"
+    hertz, large = _told(cleaned, motion, best.at)
     return [
         Alarm(
-            f"while the path moves, and not while it stands, readings swing at {frequency[best]:.3g} "
-            "Hz, or an alias of "
-            f"it, {large}; most on {names}: a motor's drive is heard",
+            f"while the path moves, and not while it stands, readings swing at {hertz}, {large}: a motor's drive is "
+            "heard",
             "move the rig beside the skin, in the air, with motors on and off; look at the ground "
             "and at cables near them",
         )
     ]
 
 
+def hum(cleaned: Cleaned) -> list[Alarm]:
+    """Return the alarm of a line while the path stands, or none."""
+    standstill = None if _even(cleaned) else _periodogram(cleaned, ~_moving(cleaned.course))
+    if standstill is None:
+        return []
+    best = rarest(standstill.tails)
+    if not best.alarms or _size(cleaned, standstill, best.at).max() < LEAST * cleaned.largest:
+        return []
+    hertz, large = _told(cleaned, standstill, best.at)
+    return [
+        Alarm(
+            f"while the path stands, readings swing at {hertz}, {large}: hum of the mains, or a beat with it",
+            "record without contact with motors and lamps off and on; look at the ground and at the cables' shields",
+        )
+    ]
+
+
 def hums(cleaned: Cleaned) -> bool:
     """Return whether readings have a line while the path rests: channels hum together, each with its own phase."""
-    course = cleaned.course
-    inside = ~course.first
-    if not inside.any():
-        return False
-    stood = _periodogram(cleaned, ~_moving(course), float(np.median(course.step[inside])))
-    return stood is not None and bool(_chance(stood[0], stood[1]).min() < STANDS)
+    standstill = _periodogram(cleaned, ~_moving(cleaned.course))
+    return standstill is not None and rarest(standstill.tails).p < STANDS
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Periodograms of a session."""
+
+    frequency: np.ndarray
+    """[Hz], shape (frequencies,)."""
+    power: np.ndarray
+    """About 1 for noise [1], shape (channels, frequencies)."""
+    values: float
+    """Readings of a channel in a window."""
+    interval: float
+    """Interval of readings [s]."""
+
+    @property
+    def counted(self) -> np.ndarray:
+        """Frequencies that may be a line, shape (frequencies,), bool."""
+        return self.frequency > LOWEST
+
+    @cached_property
+    def tails(self) -> np.ndarray:
+        """Probability that noise alone makes a line as large [1], shape (frequencies,); 1 where none is counted."""
+        total = self.power.sum(axis=0)
+        band = (self.frequency / BESIDE).astype(int)
+        level = np.array([np.median(total[band == k]) for k in range(band.max() + 1)])
+        middle = np.interp(self.frequency / BESIDE, np.arange(len(level)) + 0.5, level)
+        ratio = total / np.maximum(middle, 1e-12)
+        low, high = np.quantile(ratio[self.counted], [0.25, 0.75])
+        # The quartiles are 1.349 standard deviations apart; the shape of a gamma variable is (mean / deviation)^2.
+        shape = (1.349 / max(float(high - low), 1e-6)) ** 2
+        return np.where(self.counted, gamma.sf(ratio * gamma.median(shape), shape), 1.0)
+
+
+def _size(cleaned: Cleaned, lines: _Lines, at: int) -> np.ndarray:
+    """Return each channel's amplitude of a line [its unit], shape (channels,)."""
+    # Power of a channel's line over its sum of squares, n a^2 / 4 over n.
+    share = np.maximum(lines.power[:, at] - 1.0, 0.0) / lines.values
+    decay = np.abs(1 - cleaned.noise.memory * np.exp(-2j * np.pi * lines.frequency[at] * lines.interval))
+    return 2 * np.sqrt(share) * cleaned.noise.scale / max(float(decay), 1e-3)
+
+
+def _told(cleaned: Cleaned, lines: _Lines, at: int) -> tuple[str, str]:
+    """Return a line's frequency, and its size with its channels, in words."""
+    size = _size(cleaned, lines, at)
+    order = np.argsort(-size)[:MOST_NAMED]
+    names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
+    share = plain_number(100 * float(size[order[0]]) / cleaned.largest, 2)
+    large = f"by up to about {plain_number(float(size[order[0]]), 2)}, {share} % of the largest rise"
+    return f"{lines.frequency[at]:.3g} Hz, or an alias of it", f"{large}; most on {names}"
 
 
 def _moving(course: Course) -> np.ndarray:
@@ -92,15 +146,16 @@ def _moving(course: Course) -> np.ndarray:
 
 def _even(cleaned: Cleaned) -> bool:
     """Return whether presses come so evenly that whatever they share has lines."""
-    intervals = np.diff(cleaned.course.time[cleaned.begins])
-    return len(intervals) < 2 or float(np.std(intervals)) < EVEN * float(np.mean(intervals))
+    apart = np.diff(cleaned.course.time[cleaned.begins])
+    return len(apart) < 2 or float(np.std(apart)) < EVEN * float(np.mean(apart))
 
 
-def _periodogram(
-    cleaned: Cleaned, rows: np.ndarray, interval: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return frequencies [Hz], periodograms (channels, frequencies) about 1, and values of a channel; None if few."""
+def _periodogram(cleaned: Cleaned, rows: np.ndarray) -> _Lines | None:
+    """Return the lines of some rows, shape (m,), bool; None if they are few."""
     course = cleaned.course
+    if course.first.all():
+        return None
+    interval = float(np.median(course.step[~course.first]))
     bins = int(2 ** np.ceil(np.log2(WINDOW * FINER / interval)))
     power, count, number = np.zeros((cleaned.residual.shape[1], bins // (2 * FINER))), 0, 0
     for window in _windows(cleaned):
@@ -123,7 +178,7 @@ def _periodogram(
     if not count:
         return None
     frequency = np.fft.rfftfreq(bins, interval / FINER)[: bins // (2 * FINER)]
-    return frequency, power / count, np.full(cleaned.residual.shape[1], number / count)
+    return _Lines(frequency, power / count, number / count, interval)
 
 
 def _windows(cleaned: Cleaned) -> list[np.ndarray]:
@@ -137,16 +192,3 @@ def _windows(cleaned: Cleaned) -> list[np.ndarray]:
             result.append(np.arange(edges[first], edges[k]))
             first = k
     return result
-
-
-def _chance(frequency: np.ndarray, power: np.ndarray) -> np.ndarray:
-    """Return of each frequency how many of all lines noise alone makes as large [1]."""
-    total = power.sum(axis=0)
-    band = (frequency / BESIDE).astype(int)
-    level = np.array([np.median(total[band == k]) for k in range(band.max() + 1)])
-    ratio = total / np.maximum(np.interp(frequency / BESIDE, np.arange(len(level)) + 0.5, level), 1e-12)
-    counted = frequency > LOWEST
-    low, high = np.quantile(ratio[counted], [0.25, 0.75])
-    # The quartiles are 1.349 standard deviations apart, and the shape of a gamma variable is (mean / deviation)^2.
-    shape = (1.349 / max(float(high - low), 1e-6)) ** 2
-    return np.where(counted, gamma.sf(ratio * gamma.median(shape), shape) * counted.sum(), 1.0)

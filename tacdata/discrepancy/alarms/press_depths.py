@@ -12,7 +12,7 @@ from scipy.stats import chi2_contingency
 from tacdata.chain import Course
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.alarms.cleaned import Cleaned
-from tacdata.discrepancy.alarms.randomization import DRAWS, RATE
+from tacdata.discrepancy.alarms.randomization import DRAWS, RATE, highest
 from tacdata.discrepancy.noise.nuisances import FITTED_DEPTH_PRIOR, POSE_PRIOR
 from tacdata.discrepancy.noise.variance_components import one_by_one
 from tacdata.discrepancy.search.problem import Problem
@@ -126,9 +126,9 @@ def stretch(depth: np.ndarray, place: np.ndarray, seed: int = 0) -> tuple[int, i
     residual_power = np.maximum(np.square(drawn).sum(axis=1, keepdims=True) - np.square(by), 1e-12)
     z = np.abs(by) / np.sqrt(residual_power / freedom)
     fair = z - np.sqrt(2 * np.log(count / np.minimum(long, count - long)))
-    best = int(np.argmax(fair[0]))
-    p = (1 + (fair[1:].max(axis=1) >= fair[0, best]).sum()) / (DRAWS + 1)
-    if p > RATE or z[0, best] < LEAST_Z:
+    test = highest(fair)
+    best = test.at
+    if test.p > RATE or z[0, best] < LEAST_Z:
         return None
     return int(begin[best]), int(end[best]), float(by[0, best] / np.sqrt(power[mask][best]))
 

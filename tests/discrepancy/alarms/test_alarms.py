@@ -108,6 +108,17 @@ def test_hum_that_never_stops_is_no_motor():
     assert not any("while the path moves" in words for words in seen(hummed(np.ones_like)))
 
 
+@pytest.mark.parametrize("hertz", [1.3, 4.3])
+def test_hum_of_two_hundredths_of_full_scale_on_one_channel_is_seen_at_rest(hertz):
+    def hum(rows, speed):
+        full = np.ptp(rows.readings[:, 1])
+        return rows.readings + 0.02 * full * np.sin(2 * np.pi * hertz * rows.time[:, None]) * [0.0, 1.0, 0.0]
+
+    words = [said for said in seen(changed(course(episodes=40, rates=(0.3, 0.6, 1.3)), hum)) if "stands" in said]
+    assert len(words) == 1 and words[0].startswith("while the path stands") and "most on channel 1" in words[0]
+    assert float(words[0].split("swing at ")[1].split()[0]) == pytest.approx(hertz, abs=0.1)
+
+
 def test_presses_that_lost_depth_and_found_it_are_told_with_their_size():
     made = course(episodes=40, rates=(0.5, 1.0))
     lost = (made.episode >= 14) & (made.episode < 24)
