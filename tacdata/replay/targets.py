@@ -171,7 +171,7 @@ def doubts(targets: FingertipTargets) -> list[str]:
         longest = max(np.split(rows, 1 + np.flatnonzero(np.diff(rows) > 1)), key=len)
         begin = (targets.time_ns[longest[0]] - targets.time_ns[0]) * 1e-9
         words.append(
-            f"{name}: {bridged.mean():.0%} of the targets bridge gaps without a sighting, the longest "
+            f"{name}: {bridged.sum()} of {len(bridged)} targets bridge gaps without a sighting, the longest "
             f"{len(longest) / targets.rate:.1f} s from {begin:.1f} s on, where they are known to "
             f"{1000 * spread[rows].max():.1f} mm"
         )

@@ -166,7 +166,9 @@ def test_a_stretch_that_nobody_saw_is_said_and_refused_where_it_is_a_guess():
     known = targets_of(made, None)
     check_guesses(known)  # a bridge that is known to 0.1 mm
     (words,) = doubts(known)
-    assert words.startswith("index: 11% of the targets") and "0.1 s from 0.3 s on" in words and "0.1 mm" in words
+    assert (
+        words.startswith("index: 4 of 38 targets bridge gaps") and "0.1 s from 0.3 s on" in words and "0.1 mm" in words
+    )
     covariance = made.tracks["index"].covariance.copy()
     covariance[11:13, 3:, 3:] = 0.08**2 * np.eye(3)
     unsure = replace(made, tracks={**made.tracks, "index": replace(made.tracks["index"], covariance=covariance)})
