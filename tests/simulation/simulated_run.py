@@ -83,7 +83,7 @@ class Run:
         self.end = world.schedule.now
         self.killed = world.computer.killed
         self.words = "\n".join([str(self.error or ""), *getattr(self.error, "__notes__", ())])
-        if self.is_registration and not self.hung:  # its devices are closed at once: a hold still brakes
+        if course in ("touch", "registration") and not self.hung:  # no file is closed first: a hold still brakes
             world.schedule.run_for(BRAKING, world.bench)
         self.here = world.position()
         self.moves_at_the_end = world.controller.planner.moving(world.clock.now_ns())
