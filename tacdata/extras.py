@@ -11,7 +11,12 @@ from packaging.requirements import Requirement
 
 from tacdata.errors import PackageError
 
-IMPORTED_AS = {"markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "warp": "warp-lang"}
+IMPORTED_AS = {
+    "cv2": "opencv-contrib-python-headless",
+    "markdown_it": "markdown-it-py",
+    "rerun": "rerun-sdk",
+    "warp": "warp-lang",
+}
 """Packages that are imported by another name than they are installed by."""
 ALL = "all"
 """The extra that brings everything: never the least that is needed."""
