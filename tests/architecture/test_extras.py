@@ -158,6 +158,7 @@ def test_a_first_look_works_without_the_extras(beyond, tmp_path):
         (["train", "dataset", "--out", "run"], "torch", "learn"),
         (["view", "first", "--save", "x.rrd"], "rerun", "view"),
         (["farm", "up"], "uvicorn", "farm"),
+        (["calibrate-camera", "--board", "board.yaml", "--draw", "board.pdf"], "cv2", "camera"),
     ],
 )
 def test_a_verb_says_the_install_line_of_what_it_lacks(arguments, module, extra, beyond, tmp_path):
