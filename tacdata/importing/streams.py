@@ -347,10 +347,10 @@ def _measured(
     table = _table(mapping, tables, entry["file"], f"measured: {name}")
     names = select(table, entry["columns"], f"measured: {name}")
     units = units_of(table, names, entry, f"measured: {name}")
-    unit = next(filter(None, units), "")
+    unit = next((each for each in units if each), "")
     values, doubts = _readings(table, names, _missing(mapping, entry), entry, f"measured: {name}")
     values = values * entry.get("scale", 1.0)
-    ours = {quantity_of(each) for each in units if each}
+    ours = {quantity_of(each) or "" for each in units if each}
     if len(ours) == 1 and ours <= {"N", "mm"}:
         (unit,) = ours
         factors = [factor(each, unit, f"measured: {name}") if each else 1.0 for each in units]

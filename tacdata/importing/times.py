@@ -216,7 +216,8 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
     seconds = np.full(len(values), np.nan)
     for row, text in enumerate(values.tolist()):
         if text is not None:
-            digits, half = re.fullmatch(r"([\d:.,]+)\s*(.*)", str(text).strip()).groups()
+            digits = str(text).strip().rstrip(" .AaMmPp")
+            half = str(text).strip()[len(digits) :].lstrip()
             *hours, minutes, tail = digits.replace(",", ".").split(":")
             hour = int(hours[0] if hours else 0)
             hour = hour % 12 + 12 * (half[0] in "Pp") if half else hour

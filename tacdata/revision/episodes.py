@@ -73,7 +73,7 @@ def part(course: Course, numbers: np.ndarray) -> Course:
         session=course.session[keep],  # ty: ignore[invalid-argument-type]
         recording=None if course.recording is None else np.unique(course.recording[keep], return_inverse=True)[1],  # ty: ignore[invalid-argument-type]
         # A clock that began with an episode left out begins with the next one.
-        restarts=None if course.restarts is None else np.diff(np.cumsum(course.restarts)[keep], prepend=0) > 0,
+        restarts=None if course.restarts is None else np.diff(np.cumsum(course.restarts)[keep], prepend=0) > 0,  # ty: ignore[invalid-argument-type]
         site=course.site[keep],  # ty: ignore[invalid-argument-type]
         names=tuple(course.names[k] for k in keep),
         specimens=tuple(course.specimens[k] for k in keep) if course.specimens else (),
