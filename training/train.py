@@ -17,6 +17,8 @@ from tacdata.errors import TacdataError, UsageError
 from tacdata.training.frames.channel_calibration import calibrate
 from tacdata.training.frames.frames import Frames
 from tacdata.training.frames.label_tensor import label_tensor
+from tacdata.training.frames.normalization import normalization
+from tacdata.training.frames.peak_regression import fit_peaks
 from tacdata.training.frames.variation import Variation
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference import checkpoint
@@ -184,7 +186,7 @@ def train(
             }
             _keep(run, line, out)
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
-        best = checkpoint.load(out, place)
+        best = _corrected(checkpoint.load(out, place), frames, split)
         if len(split.validation) > 1:
             conformal_intervals.write(out, _calibrated(best, windows, frames, split))
         known = novelty.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
@@ -204,14 +206,12 @@ def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, s
     return conformal_intervals.calibrate(maps, labels, grid.pixel_pitch, best.content_hash)
 
 
-def normalization(taxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and deviation of each channel [counts or N], (taxels,), float32, of readings (n, taxels).
-
-    A channel that never moves gets a deviation of 1, so that it stays at 0 instead of becoming noise.
-    """
-    mean, sd = taxels.mean(axis=0, dtype=np.float64), taxels.std(axis=0, dtype=np.float64)
-    still = sd <= 1e-6 * np.maximum(np.abs(mean), 1.0)
-    return mean.astype(np.float32), np.where(still, 1.0, sd).astype(np.float32)
+def _corrected(best: checkpoint.Checkpoint, frames: Frames, split: Split) -> checkpoint.Checkpoint:
+    """Return the best epoch with its maxima corrected, and write it so; validation presses stay unseen."""
+    if peaks := fit_peaks(best.network, frames, split.train):
+        best.network.set_peak(peaks.mean, peaks.scale, peaks.weight)
+        checkpoint.save(best.path, best.network, None, {**best.document, "peak": peaks.document})
+    return best
 
 
 def _started(

@@ -8,12 +8,13 @@ import pytest
 import torch
 
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.training.frames.normalization import normalization
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference import checkpoint
 from tacdata.training.inference.predictor import predict
 from tacdata.training.loss import WeightedLoss
 from tacdata.training.settings import TrainingSettings
-from tacdata.training.train import normalization, train
+from tacdata.training.train import train
 
 SMALL = TrainingSettings(arguments={"hidden": 24, "channels": 8}, epochs=3)
 

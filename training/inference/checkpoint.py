@@ -23,6 +23,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 from tacdata.sensor import Sensor
 from tacdata.training.frames.channel_calibration import ChannelCalibration
+from tacdata.training.frames.peak_regression import PeakRegression
 from tacdata.training.networks.network import Network, create
 from tacdata.training.settings import TrainingSettings
 from tacdata.training.splits.split import Split
@@ -151,6 +152,9 @@ def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
     if calibration := document.get("calibration"):
         channel_calibration = ChannelCalibration.from_document(calibration, sensor.taxels)
         network.set_calibration(channel_calibration.gain, channel_calibration.exponent, channel_calibration.mixing)
+    if peak := document.get("peak"):
+        regression = PeakRegression.from_document(peak)
+        network.set_peak(regression.mean, regression.scale, regression.weight)
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
     return Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from tacdata.training.scoring.baselines import ahead
 from tacdata.training.scoring.evaluate import METRICS
 from tacdata.training.scoring.published import TABLE_1
 
@@ -19,6 +20,7 @@ def markdown(document: dict[str, Any]) -> str:
     """Return the page of a scores document (`schemas/scores.schema.json`)."""
     frames, split = document["frames"], document["split"]
     lines = [
+        *_ahead(document),
         f"# Scores of network `{document['checkpoint']['name']}`",
         "",
         document["statement"],
@@ -100,6 +102,15 @@ def _agreement(table: dict[str, Any], with_paper: bool) -> list[str]:
         published = [number(theirs["median"]), number(theirs["p90"]), spread(theirs)] if with_paper else []
         lines.append(row(cells + published))
     return lines
+
+
+def _ahead(document: dict[str, Any]) -> list[str]:
+    """Return a first line that names the baselines that are ahead of the network; empty if none is."""
+    words = []
+    for name, table in ahead(document).items():
+        cells = [f"{title(metric)} {number(its)} for {number(own)}" for metric, (its, own) in table.items()]
+        words.append(f"{name} in {', '.join(cells)}")
+    return [f"**A predictor without a network is ahead (median):** {'; '.join(words)}.", ""] if words else []
 
 
 def _baselines(document: dict[str, Any]) -> list[str]:

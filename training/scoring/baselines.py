@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from tacdata.training.frames.frames import Frames
@@ -30,6 +33,24 @@ def predictions(frames: Frames, split: Split, indices: np.ndarray) -> dict[str, 
     shape = (len(indices), *frames.sensor.map.shape)
     maps = {"mean": np.broadcast_to(mean, (len(indices), len(mean))), "linear": linear}
     return {name: np.clip(values, 0.0, top).reshape(shape).astype(np.float32) for name, values in maps.items()}
+
+
+def ahead(document: Mapping[str, Any], larger: tuple[str, ...] = ("iou",)) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return the medians in which a baseline is better than the network: by baseline and metric, its and the network's.
+
+    Args:
+        document: Scores (`schemas/scores.schema.json`).
+        larger: Metrics of which the larger value is the better one.
+    """
+    found: dict[str, dict[str, tuple[float, float]]] = {}
+    for name, table in document["baselines"].items():
+        for metric, values in table.items():
+            its, own = values["median"], document["contact_frames"][metric]["median"]
+            # Where the network sees no contact in any frame, it has no centroid at all.
+            better = its is not None and (own is None or (its > own if metric in larger else its < own))
+            if better:
+                found.setdefault(name, {})[metric] = its, float("nan") if own is None else own
+    return found
 
 
 def _moments(frames: Frames, learned: np.ndarray, signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -74,8 +74,13 @@ class Evaluation(Displayed):
             "none" if (median := scores[name]["median"]) is None else f"{median:.3f}{unit}"
             for name, unit in (("peak_error", " mm"), ("contact_rmse", " mm"), ("centroid_error", " px"), ("iou", ""))
         )
+        warnings = [
+            f"{name}, without a network, is ahead in {', '.join(METRICS[metric][1].lower() for metric in table)}"
+            for name, table in baselines.ahead(self.document).items()
+        ]
         return [
             f"Evaluation of {network} on {len(self.episodes)} episodes of the part {self.part}",
+            *warnings,
             f"{frames['in_contact']} of {frames['scored']} frames in contact; medians over these:",
             f"peak error {peak}, contact RMSE {rmse}, centroid error {centroid}, IoU {iou}",
         ]
