@@ -1,0 +1,94 @@
+"""Error of the deepest pixel: ridge regression, the fitted network without and with its maxima corrected.
+
+    tacdata simulate benchmarks/learning_curve/rig_presses.yaml --solved SOLVED --presses 420 --seed 11
+    python benchmarks/learning_curve/peaks.py SOLVED --out OUT --rig 40 [--presses 3,8,30,96]
+
+Rigs and shapes as in `run.py`. A fifth of the presses inside is held out; the others are drawn from in one order.
+Medians over every fourth frame in contact of the presses held out, over every sixth of unseen shapes and of the edge.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+import run
+
+from tacdata.training.frames.frames import EpisodeSpan, Frames
+from tacdata.training.frames.windows import Windows
+from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics.depth_maps import score_frames, summarize
+from tacdata.training.networks.network import Network
+from tacdata.training.pretraining.recipe import recipe
+from tacdata.training.pretraining.shipped import NAME, pretrained
+from tacdata.training.scoring import baselines
+from tacdata.training.splits.split import VALIDATION_SHARE, Split, share
+from tacdata.training.train import train
+
+STREAM = 99
+"""Separates the draw of presses from the rig's own random numbers."""
+
+
+def frames_of(spans: list[EpisodeSpan], step: int) -> np.ndarray:
+    """Return every ``step``-th frame of some presses, shape (m,)."""
+    return np.concatenate([np.arange(span.start, span.stop)[::step] for span in spans])
+
+
+def maps_of(network: Network, frames: Frames, chosen: np.ndarray) -> np.ndarray:
+    """Return the depth maps of some frames [mm]."""
+    return predict(network, Windows(frames, network.offsets), chosen, frames.sensor.map.depth_max)
+
+
+def row(maps: np.ndarray, label: np.ndarray) -> dict[str, float | None]:
+    """Return median and 90th percentile of the peak error, and the medians of the other metrics."""
+    scores = score_frames(maps, label)
+    scores = scores.where(scores.labelled)
+    peak = summarize(scores.peak_error)
+    names = ("pixel_rmse", "contact_rmse", "centroid_error", "iou")
+    return {"peak": peak.median, "peak_p90": peak.p90} | {n: summarize(getattr(scores, n)).median for n in names}
+
+
+def main() -> None:
+    """Print and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("solved", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--from", dest="start", default=NAME)
+    parser.add_argument("--rig", type=int, default=40)
+    parser.add_argument("--presses", default="3,8,30,96")
+    given = parser.parse_args()
+    frames, start, found = run.rig_frames(given.solved, given.rig), pretrained(given.start), []
+    unseen = [span for span in frames.episodes if span.indenter in run.UNSEEN]
+    edge = [span for span in frames.episodes if span not in unseen and run.at_edge(span, frames.sensor)]
+    rest = [span.number for span in frames.episodes if span not in unseen and span not in edge]
+    order = np.random.default_rng([given.rig, STREAM]).permutation(rest).tolist()
+    held, pool = set(order[: len(order) // 5]), order[len(order) // 5 :]
+    places = {
+        "held out": frames_of([span for span in frames.episodes if span.number in held], 4),
+        "unseen shapes": frames_of(unseen, 6),
+        "edge": frames_of(edge, 6),
+    }
+    for count in map(int, given.presses.split(",")):
+        numbers, validated = pool[:count], share(count, VALIDATION_SHARE)
+        train_on, validation = (tuple(sorted(part)) for part in (numbers[validated:], numbers[:validated]))
+        division = Split("episode", given.rig, train_on, validation, tuple(sorted(held)))
+        every = Split("episode", given.rig, tuple(sorted(numbers)), (), division.test)
+        settings, out = recipe({"seed": given.rig}, start), given.out / f"rig-{given.rig}-{count}"
+        network = train(frames, settings, out, "cpu", threads=1, pretrained=start, split=division).network
+        for place, chosen in places.items():
+            label = np.clip(frames.depth[chosen], 0.0, frames.sensor.map.depth_max)
+            maps, peak = {"ridge": baselines.predictions(frames, every, chosen)["linear"]}, network.peak
+            maps["network"] = maps_of(network, frames, chosen)
+            network.peak = None
+            maps["network, not corrected"] = maps_of(network, frames, chosen)
+            network.peak = peak
+            for name, predicted in maps.items():
+                found.append({"presses": count, "on": place, "predictor": name, **row(predicted, label)})
+                print(found[-1], flush=True)
+    (given.out / "peaks.json").write_text(json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
