@@ -208,7 +208,9 @@ def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, s
 
 def _corrected(best: checkpoint.Checkpoint, frames: Frames, split: Split) -> checkpoint.Checkpoint:
     """Return the best epoch with its maxima corrected, and write it so; validation presses stay unseen."""
-    if peaks := fit_peaks(best.network, frames, split.train):
+    peaks = fit_peaks(best.network, frames, split.train)
+    # A finished run that is resumed has this correction: its file must not change.
+    if peaks and peaks.document != best.document.get("peak"):
         best.network.set_peak(peaks.mean, peaks.scale, peaks.weight)
         checkpoint.save(best.path, best.network, None, {**best.document, "peak": peaks.document})
     return best
