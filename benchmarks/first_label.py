@@ -39,7 +39,8 @@ def processes(root: int) -> dict[int, tuple[str, float]]:
         except OSError:
             continue
         number, parent = int(folder.name), int(fields[1])
-        if number == root or parent in parents:
+        # A process that has ended and is not yet waited for has no command.
+        if command and (number == root or parent in parents):
             parents.add(number)
             found[number] = (command, (int(fields[11]) + int(fields[12])) / ticks)
     return found
