@@ -63,6 +63,8 @@ class NullModel:
     """Episodes that err by far more than the others, shape (k,), int64."""
     draws: np.ndarray
     """White noise, drawn [noise scales], shape (m, streams, draws)."""
+    reduced: Course
+    """The rows read."""
     sizes: np.ndarray | None = None
     """Of errors of pose, over their priors [1], shape (kinds,); None: as their priors."""
     spread: float = 0.0
@@ -101,6 +103,7 @@ class NullModel:
             known or Whitener(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
             white,
+            reduced,
             sizes,
             spread,
         )
@@ -160,6 +163,11 @@ class NullModel:
         shared = None if features is None else features[kept]
         some = Whitener(fewer.reduced, noise.of(kept), context[kept], shared, errors[kept])
         return Whitener(reduced, noise, context, features, errors), some
+
+    @cached_property
+    def beside_grams(self) -> np.ndarray:
+        """Gram matrices of `beside` [1], shape (episodes, k, k)."""
+        return episode_grams(self.beside, self.reduced).gram
 
     def projected_draws(self, whitener: Whitener) -> np.ndarray:
         """Return the cleaned draws [noise scales], shape (m, streams, draws), float32."""

@@ -121,7 +121,8 @@ def prepare(
     first = last + (numerics is not None)
     more = [moving.values, errors.values, errors.parts, *([] if numerics is None else [numerics])]
     values = side_by_side([*board.columns, *(column for each in more for column in apart(each))])
-    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, beside)
+    inner = null.beside_grams if tested else null.inner
+    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, beside, inner)
     second = first + len(null.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + beside.shape[2])
     board = replace(board, columns=board.columns[:1])

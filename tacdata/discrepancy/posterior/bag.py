@@ -1,0 +1,119 @@
+"""The posterior over sets, averaged over bootstrap samples of presses (BayesBag).
+
+Huggins & Miller (Bayesian Analysis 18, 2023, 1): a posterior that is averaged over bootstrap samples stays honest where
+no model is true. A set that one press alone supports loses its probability where that press is not drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tacdata.discrepancy.evidence.optimum import Optimum
+from tacdata.discrepancy.posterior.laplace import largest_information, log_evidence
+from tacdata.discrepancy.posterior.policy import Policy
+from tacdata.discrepancy.posterior.priors import SetPrior
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Probabilities of sets of effects and of the remainder's size."""
+
+    models: tuple[Optimum, ...]
+    """The sets; the empty one is among them."""
+    weights: np.ndarray
+    """Probability of each set with each size of the remainder [1], shape (sets, sizes)."""
+    logs: np.ndarray
+    """Logarithm of each set's evidence on all presses, its prior included, shape (sets,)."""
+    sizes: tuple[float, ...]
+    """Sizes of the remainder."""
+
+    @property
+    def sets(self) -> np.ndarray:
+        """Probability of each set [1], shape (sets,)."""
+        return self.weights.sum(axis=1)
+
+    @property
+    def best(self) -> Optimum:
+        """The most probable set."""
+        return self.models[int(np.argmax(self.sets))]
+
+    @property
+    def nothing(self) -> float:
+        """Probability that there is neither an effect nor a remainder [1]."""
+        at = [k for k, model in enumerate(self.models) if not model.placed]
+        still = [k for k, size in enumerate(self.sizes) if size == 0]
+        return float(self.weights[np.ix_(at, still)].sum())
+
+    @property
+    def empty(self) -> float:
+        """Probability that there is no effect [1]."""
+        return float(sum(w for w, model in zip(self.sets, self.models, strict=True) if not model.placed))
+
+    @property
+    def remainder(self) -> float:
+        """Probability of a remainder [1]."""
+        return float(self.weights[:, [k for k, size in enumerate(self.sizes) if size > 0]].sum())
+
+    def _shares(self, names: Sequence[set[str]]) -> dict[str, float]:
+        shares: dict[str, float] = {}
+        for weight, own in zip(self.sets, names, strict=True):
+            for name in own:
+                shares[name] = shares.get(name, 0.0) + float(weight)
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+    @property
+    def mechanisms(self) -> dict[str, float]:
+        """Mechanism -> its probability [1], the largest first."""
+        return self._shares([{p.effect.called for p in model.placed} for model in self.models])
+
+    @property
+    def families(self) -> dict[str, float]:
+        """Family -> the probability that any of its mechanisms is there [1]."""
+        return self._shares([{p.effect.family.value for p in model.placed} for model in self.models])
+
+    @property
+    def forms(self) -> dict[str, float]:
+        """Effect (a form of a mechanism) -> its probability [1]."""
+        return self._shares([{p.effect.name for p in model.placed} for model in self.models])
+
+
+def bagged(models: Sequence[Optimum], prior: SetPrior, policy: Policy) -> Posterior:
+    """Return the posterior over sets at their optimum.
+
+    Args:
+        models: Sets, the empty one among them, all beside one null model.
+        prior: Of sets.
+        policy: Number of bootstrap samples, and priors.
+    """
+    empty = next(model for model in models if not model.placed)
+    largest = largest_information(empty)
+    presses = np.flatnonzero(np.einsum("eii->e", empty.gram) > 0)
+    drawn = _drawn(len(presses), policy)
+    counts = np.zeros((policy.bags + 1, len(empty.gram)))
+    counts[0, presses] = 1.0
+    counts[1:, presses] = drawn
+    logs = np.stack(
+        [log_evidence(m, counts, largest, policy) + prior.of_set(p.effect for p in m.placed) for m in models], axis=1
+    )
+    shifted = np.exp(logs - logs.max(axis=(1, 2), keepdims=True))
+    weights = shifted / shifted.sum(axis=(1, 2), keepdims=True)
+    top = logs[0].max(axis=1, keepdims=True)
+    whole = (top + np.log(np.exp(logs[0] - top).sum(axis=1, keepdims=True)))[:, 0]
+    return Posterior(tuple(models), weights[1 if policy.bags else 0 :].mean(axis=0), whole, policy.sizes)
+
+
+def _drawn(presses: int, policy: Policy) -> np.ndarray:
+    """Return how often each press is in each sample, shape (samples, presses).
+
+    A share below 1 is drawn without repeats; a share of 1 is the bootstrap.
+    """
+    random = np.random.default_rng([policy.seed, 23])
+    if policy.share >= 1:
+        return random.multinomial(presses, np.full(presses, 1 / max(presses, 1)), size=policy.bags)
+    made, kept = np.zeros((policy.bags, presses)), max(round(policy.share * presses), 1)
+    for sample in made:
+        sample[random.permutation(presses)[:kept]] = 1.0
+    return made

@@ -1,0 +1,65 @@
+"""Every number of the posterior and of the statuses: one record, hashed with the verdict."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from tacdata import provenance
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Priors, sizes of the search, and probabilities from which something has a name."""
+
+    effects: float = 0.5
+    """Prior: effects in a world, on average [1]."""
+    freedom: float = 4.0
+    """Prior of an amplitude: degrees of freedom of its t distribution about 0, one typical size wide [1]."""
+    sizes: tuple[float, ...] = (0.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+    """Remainder: its prior's standard deviation [root of the largest information]."""
+    quiet: float = 0.5
+    """Remainder: prior probability that there is none [1]; the other sizes share the rest."""
+    numerics: float = 3.0
+    """Prior of the response's own error, over the difference of two grids [1]."""
+    most: int = 4
+    """Effects in a set, at most."""
+    beam: int = 15
+    """Beam: sets that are extended."""
+    shapes: int = 2
+    """Beam: shapes of one set of mechanisms that are extended."""
+    first: int = 8
+    """Sets that are refined on the chain in the first round..."""
+    refined: int = 10
+    """...and in every later one."""
+    rounds: int = 3
+    """Rounds of proposals about the best set."""
+    bags: int = 24
+    """Bootstrap samples of presses."""
+    share: float = 0.63
+    """Presses of a sample, as a share of all [1]; 1: a bootstrap."""
+    named: float = 0.95
+    """Probability from which on an effect or a family has a name [1]."""
+    none: float = 0.5
+    """Probability of nothing at all from which on the status is none [1]."""
+    remainder: float = 0.5
+    """Probability of a remainder from which on a name is incomplete [1]."""
+    least: float = 0.01
+    """Probability from which on an alternative is listed [1]."""
+    forms: float = 1.0
+    """Prior of form errors, over what the effects' files state [1]."""
+    seed: int = 0
+    """Of the bootstrap."""
+
+    def document(self) -> dict[str, Any]:
+        """Return it as in the verdict."""
+        return asdict(self)
+
+    @property
+    def content_hash(self) -> str:
+        """What names this policy (hex)."""
+        return provenance.content_hash(self.document())
+
+
+POLICY = Policy()
+"""As it is shipped."""
