@@ -1,13 +1,16 @@
-"""The posterior over sets, averaged over bootstrap samples of presses (BayesBag).
+"""The posterior over sets, averaged over samples of presses (as BayesBag).
 
-Huggins & Miller (Bayesian Analysis 18, 2023, 1): a posterior that is averaged over bootstrap samples stays honest where
-no model is true. A set that one press alone supports loses its probability where that press is not drawn.
+Huggins & Miller (Bayesian Analysis 18, 2023, 1): a posterior that is averaged over samples stays honest where no model
+is true. A set that one press alone supports loses its probability where that press is not drawn.
+
+Samples are drawn without repeats. A bootstrap sample doubles presses, and the square of each score grows by its own
+variance: among a hundred columns of a remainder, noise alone then makes one probable.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +60,23 @@ class Posterior:
         """Probability of a remainder [1]."""
         return float(self.weights[:, [k for k, size in enumerate(self.sizes) if size > 0]].sum())
 
+    def with_empty(self, first: Posterior) -> Posterior:
+        """Return the posterior with the probability of the empty set taken from another one, if that is larger.
+
+        Noise that was estimated given effects is smaller than noise without: beside it the empty set loses unfairly.
+        """
+        own, other = self._empty, first._empty
+        if first.sets[other] <= self.sets[own]:
+            return self
+        share = (1 - first.sets[other]) / max(1 - self.sets[own], 1e-300)
+        weights = self.weights * share
+        weights[own] = first.weights[other]
+        return replace(self, weights=weights)
+
+    @property
+    def _empty(self) -> int:
+        return next(k for k, model in enumerate(self.models) if not model.placed)
+
     def _shares(self, names: Sequence[set[str]]) -> dict[str, float]:
         shares: dict[str, float] = {}
         for weight, own in zip(self.sets, names, strict=True):
@@ -80,18 +100,19 @@ class Posterior:
         return self._shares([{p.effect.name for p in model.placed} for model in self.models])
 
 
-def bagged(models: Sequence[Optimum], prior: SetPrior, policy: Policy) -> Posterior:
+def bagged(models: Sequence[Optimum], prior: SetPrior, policy: Policy, share: float | None = None) -> Posterior:
     """Return the posterior over sets at their optimum.
 
     Args:
         models: Sets, the empty one among them, all beside one null model.
         prior: Of sets.
-        policy: Number of bootstrap samples, and priors.
+        policy: Number of samples, and priors.
+        share: Presses of a sample [1]; that of the policy, unless given.
     """
     empty = next(model for model in models if not model.placed)
     largest = largest_information(empty)
     presses = np.flatnonzero(np.einsum("eii->e", empty.gram) > 0)
-    drawn = _drawn(len(presses), policy)
+    drawn = _drawn(len(presses), policy, policy.share if share is None else share)
     counts = np.zeros((policy.bags + 1, len(empty.gram)))
     counts[0, presses] = 1.0
     counts[1:, presses] = drawn
@@ -105,15 +126,15 @@ def bagged(models: Sequence[Optimum], prior: SetPrior, policy: Policy) -> Poster
     return Posterior(tuple(models), weights[1 if policy.bags else 0 :].mean(axis=0), whole, policy.sizes)
 
 
-def _drawn(presses: int, policy: Policy) -> np.ndarray:
+def _drawn(presses: int, policy: Policy, share: float) -> np.ndarray:
     """Return how often each press is in each sample, shape (samples, presses).
 
     A share below 1 is drawn without repeats; a share of 1 is the bootstrap.
     """
     random = np.random.default_rng([policy.seed, 23])
-    if policy.share >= 1:
+    if share >= 1:
         return random.multinomial(presses, np.full(presses, 1 / max(presses, 1)), size=policy.bags)
-    made, kept = np.zeros((policy.bags, presses)), max(round(policy.share * presses), 1)
+    made, kept = np.zeros((policy.bags, presses)), max(round(share * presses), 1)
     for sample in made:
         sample[random.permutation(presses)[:kept]] = 1.0
     return made

@@ -36,8 +36,10 @@ class Policy:
     """Rounds of proposals about the best set."""
     bags: int = 24
     """Bootstrap samples of presses."""
-    share: float = 0.63
-    """Presses of a sample, as a share of all [1]; 1: a bootstrap."""
+    share: float = 0.8
+    """Presses of a sample, as a share of all [1]: each sample leaves out a fold; 1: a bootstrap."""
+    coarse: float = 0.5
+    """The same where a remainder is probable: the model is known to be wrong there, and its evidence counts less [1]."""
     named: float = 0.95
     """Probability from which on an effect or a family has a name [1]."""
     none: float = 0.5

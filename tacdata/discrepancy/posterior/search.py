@@ -28,6 +28,8 @@ class Search:
     """The posterior, and what it rests on."""
 
     posterior: Posterior
+    coarse: Posterior
+    """The same from smaller samples: names beside a remainder."""
     null: NullModel
     """Noise and nuisances beside the best set."""
     given: Problem
@@ -52,7 +54,7 @@ def posterior_of(
     proposed = _proposed(given, prior, policy)
     proposed += [Proposal((late,), -np.inf) for late in delays(setting)]
     made: dict[tuple[str, ...], Optimum] = {}
-    posterior = _posterior(setting, null, made, proposed, prior, policy)
+    first = posterior = _posterior(setting, null, made, proposed, prior, policy)
     seen: set[tuple[str, ...]] = set()
     for turn in range(policy.rounds):
         best = posterior.best
@@ -70,7 +72,10 @@ def posterior_of(
             proposed = []
         proposed += _about(prepare(there, null, best.placed), prior, policy)
         posterior = _posterior(setting, null, made, proposed, prior, policy)
-    return Search(posterior, null, given, prior)
+    coarse = bagged(posterior.models, prior, policy, policy.coarse).with_empty(
+        bagged(first.models, prior, policy, policy.coarse)
+    )
+    return Search(posterior.with_empty(first), coarse, null, given, prior)
 
 
 def _posterior(

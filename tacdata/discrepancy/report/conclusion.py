@@ -63,20 +63,24 @@ class Conclusion:
     effects: tuple[Named, ...]
 
 
-def conclude(posterior: Posterior, policy: Policy) -> Conclusion:
+def conclude(posterior: Posterior, policy: Policy, coarse: Posterior | None = None) -> Conclusion:
     """Return status and names.
+
+    Where a remainder is probable, the model is known to be wrong, and evidence is worth less than it seems (the
+    coarsened posterior: Miller & Dunson, J. Am. Stat. Assoc. 114, 2019, 1113). Names are then those of smaller samples.
 
     Args:
         posterior: Probabilities of sets of effects, and of the remainder.
+        coarse: The same from smaller samples.
         policy: Probabilities from which on something has a name.
     """
-    best = posterior.best
-    effects = tuple(_named(posterior, best, at, policy) for at in range(len(best.placed)))
-    return Conclusion(_status(posterior, effects, policy), best, effects)
+    names = coarse if coarse is not None and posterior.remainder > policy.remainder else posterior
+    effects = tuple(_named(names, names.best, at, policy) for at in range(len(names.best.placed)))
+    return Conclusion(_status(posterior, names, effects, policy), names.best, effects)
 
 
-def _status(posterior: Posterior, effects: tuple[Named, ...], policy: Policy) -> Status:
-    """Return the status."""
+def _status(posterior: Posterior, names: Posterior, effects: tuple[Named, ...], policy: Policy) -> Status:
+    """Return the status; `names`: the posterior that names are read off."""
     if posterior.nothing >= policy.none:
         return Status.NONE
     levels = [e.level for e in effects]
@@ -86,7 +90,7 @@ def _status(posterior: Posterior, effects: tuple[Named, ...], policy: Policy) ->
             return Status.AMBIGUOUS if Level.FAMILY in levels else Status.NAMED
         fine = any(level in (Level.MECHANISM, Level.FORM) for level in levels)
         return Status.INCOMPLETE if fine or remainder else Status.AMBIGUOUS
-    if 1 - posterior.empty >= policy.named:
+    if 1 - names.empty >= policy.named:
         return Status.AMBIGUOUS
     return Status.UNKNOWN if 1 - posterior.nothing >= policy.named else Status.NONE
 
