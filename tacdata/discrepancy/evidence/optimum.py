@@ -11,7 +11,6 @@ from tacdata.chain import Response, predict
 from tacdata.discrepancy.data.streams import Streams
 from tacdata.discrepancy.evidence.form_errors import form_errors
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.noise.gram import episode_grams
 from tacdata.discrepancy.noise.null_model import NullModel
 from tacdata.discrepancy.regressors.stack import apart, side_by_side
 from tacdata.discrepancy.regressors.tangent import Knob, tangents

@@ -141,10 +141,16 @@ class _Linear:
             result[single, size] = score * value - 0.5 * (information + 1) * value**2 - 0.5 * np.log1p(information)
             for k in set(range(len(self.index))) - set(single.tolist()):
                 own = self.index[k]
-                matrix, pull = rest[np.ix_(own, own)] + np.eye(len(own)), rest[own, 0]
-                log = np.linalg.slogdet(matrix)[1]
-                result[k, size] = 0.5 * pull @ np.linalg.solve(matrix, pull) - 0.5 * log
+                result[k, size] = self._several(rest[np.ix_(own, own)], rest[own, 0])
         return result
+
+    def _several(self, information: np.ndarray, score: np.ndarray) -> float:
+        """Return the log-evidence of columns with a common width of their prior, which is summed over."""
+        power, axes = np.linalg.eigh(information)
+        power, turned = np.maximum(power, 0.0), np.square(axes.T @ score)
+        variance = np.square(self.policy.scales)[:, None]
+        each = 0.5 * (turned * variance / (1 + variance * power) - np.log1p(variance * power)).sum(axis=1)
+        return _total(each) - float(np.log(len(each)))
 
     def placed(self, key: Sequence[int]) -> list[Placed]:
         """Return a set's effects with the numbers that fit best to first order, inside their bounds."""

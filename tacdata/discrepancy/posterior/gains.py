@@ -31,7 +31,12 @@ def channel_gains(model: Optimum, setting: Setting, presses: np.ndarray, policy:
     gram = model.gram[presses].sum(axis=0)
     index = np.arange(1, last)
     precision = np.concatenate(
-        [np.full(knobs, 1e-6), np.full(forms, 1 / policy.forms**2), np.full(numerics, 1 / policy.numerics**2), model.ridge]
+        [
+            np.full(knobs, 1e-6),
+            np.full(forms, 1 / policy.forms**2),
+            np.full(numerics, 1 / policy.numerics**2),
+            model.ridge,
+        ]
     )
     values = np.linalg.solve(gram[np.ix_(index, index)] + np.diag(precision + 1e-12), gram[index, 0])
     own = values[first - 1 : first - 1 + channels] * effect.amplitudes[0].typical

@@ -23,16 +23,27 @@ TURNS = 4
 def log_evidence(model: Optimum, counts: np.ndarray, largest: float, policy: Policy) -> np.ndarray:
     """Return the logarithm of a set's evidence, shape (samples, sizes of the remainder).
 
+    Amplitudes that each channel has of its own share a width, which is summed over.
+
     Args:
         model: The set at its optimum.
         counts: How often each press is drawn, shape (samples, presses).
         largest: Largest information of a remainder's column, in the model without effects [1].
         policy: With the priors.
     """
+    scales = policy.scales if any(knob.channel is not None for knob in model.knobs) else (1.0,)
+    each = np.stack([_of_width(model, counts, largest, policy, scale) for scale in scales])
+    return np.logaddexp.reduce(each, axis=0) - float(np.log(len(scales)))
+
+
+def _of_width(model: Optimum, counts: np.ndarray, largest: float, policy: Policy, scale: float) -> np.ndarray:
+    """Return the logarithm of the evidence given the width of amplitudes that each channel has of its own."""
     knobs, forms, numerics, nuisances, rest = model.counts
-    prior = NumberPrior.of(model.knobs, model.placed, policy)
+    prior = NumberPrior.of(model.knobs, model.placed, policy, scale)
     beside = knobs + forms + numerics + nuisances
-    others = np.concatenate([np.full(forms, 1 / policy.forms**2), np.full(numerics, 1 / policy.numerics**2), model.ridge])
+    others = np.concatenate(
+        [np.full(forms, 1 / policy.forms**2), np.full(numerics, 1 / policy.numerics**2), model.ridge]
+    )
     precision = np.concatenate([prior.precision, others])
     constant = prior.log + 0.5 * float(np.log(np.maximum(others, 1e-12)).sum()) - 0.5 * model.freedom
     columns, remainder = np.arange(1, beside + 1), np.arange(beside + 1, beside + 1 + rest)
@@ -45,17 +56,17 @@ def log_evidence(model: Optimum, counts: np.ndarray, largest: float, policy: Pol
         held, moved = _held(matrix, slope, model.rooms)
         edge = float(slope[held] @ moved - 0.5 * moved @ matrix[np.ix_(held, held)] @ moved)
         free = np.setdiff1d(np.arange(beside), held)
-        factor, scale = _factor(matrix[np.ix_(free, free)])
+        factor, spread = _factor(matrix[np.ix_(free, free)])
         target = slope[free] - matrix[np.ix_(free, held)] @ moved
         right = np.concatenate([target[:, None], gram[np.ix_(free + 1, remainder)]], axis=1)
-        solved = solve_triangular(factor, right / scale[:, None], lower=True)
+        solved = solve_triangular(factor, right / spread[:, None], lower=True)
         if len(held):
             # Beyond a bound the density falls like an exponential: its area is one over the slope there.
-            inside = solve_triangular(factor, solved[:, 0], lower=True, trans="T") / scale
+            inside = solve_triangular(factor, solved[:, 0], lower=True, trans="T") / spread
             outward = slope[held] - matrix[np.ix_(held, held)] @ moved - matrix[np.ix_(held, free)] @ inside
             edge -= float(np.log(np.maximum(np.abs(outward), 1.0)).sum())
         fixed = constant + edge - 0.5 * gram[0, 0] + 0.5 * float(solved[:, 0] @ solved[:, 0])
-        fixed -= float(np.log(np.diag(factor) * scale).sum())
+        fixed -= float(np.log(np.diag(factor) * spread).sum())
         information = gram[np.ix_(remainder, remainder)] - solved[:, 1:].T @ solved[:, 1:]
         score = gram[remainder, 0] - gram[np.ix_(remainder, held + 1)] @ moved - solved[:, 1:].T @ solved[:, 0]
         result[sample] = fixed + _remainder(information, score, largest, policy)

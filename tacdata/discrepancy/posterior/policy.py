@@ -16,6 +16,8 @@ class Policy:
     """Prior: effects in a world, on average [1]."""
     freedom: float = 4.0
     """Prior of an amplitude: degrees of freedom of its t distribution about 0, one typical size wide [1]."""
+    scales: tuple[float, ...] = (1.0, 0.3, 0.1, 0.03)
+    """Prior of amplitudes that each channel has of its own: common widths, equally probable [typical sizes]."""
     sizes: tuple[float, ...] = (0.0, 3.0, 10.0, 30.0, 100.0, 300.0)
     """Remainder: its prior's standard deviation [root of the largest information]."""
     quiet: float = 0.5
@@ -39,7 +41,7 @@ class Policy:
     share: float = 0.8
     """Presses of a sample, as a share of all [1]: each sample leaves out a fold; 1: a bootstrap."""
     coarse: float = 0.5
-    """The same where a remainder is probable: the model is known to be wrong there, and its evidence counts less [1]."""
+    """The same where a remainder is probable, as the model is known to be wrong there [1]."""
     named: float = 0.95
     """Probability from which on an effect or a family has a name [1]."""
     none: float = 0.5

@@ -62,11 +62,17 @@ class NumberPrior:
     """Its precision [1 / step^2], shape (k,)."""
 
     @classmethod
-    def of(cls, knobs: Sequence[Knob], placed: Sequence[Placed], policy: Policy) -> NumberPrior:
+    def of(cls, knobs: Sequence[Knob], placed: Sequence[Placed], policy: Policy, scale: float = 1.0) -> NumberPrior:
         """Return the prior about values.
 
         An amplitude has a t distribution, as wide as its typical size, inside its physical bounds. A shape's logarithm
         is normal about the middle of its grid.
+
+        Args:
+            knobs: The numbers.
+            placed: Effects with values.
+            policy: With the degrees of freedom.
+            scale: Width of amplitudes that each channel has of its own [typical sizes].
         """
         log, slope, precision = 0.0, np.zeros(len(knobs)), np.ones(len(knobs))
         for k, knob in enumerate(knobs):
@@ -77,10 +83,11 @@ class NumberPrior:
                 slope[k], precision[k] = -off / spread**2, 1 / spread**2
                 log += -0.5 * (off / spread) ** 2 - float(np.log(spread))
                 continue
-            nu, size = policy.freedom, (value - p.default) / p.typical
-            precision[k] = (nu + 1) / (nu + size**2)
-            slope[k] = -precision[k] * size
-            log += _t_log(size, nu) - float(np.log(_inside(p, nu)))
+            width = scale if knob.channel is not None else 1.0
+            nu, size = policy.freedom, (value - p.default) / (p.typical * width)
+            precision[k] = (nu + 1) / (nu + size**2) / width**2
+            slope[k] = -precision[k] * size * width
+            log += _t_log(size, nu) - float(np.log(width * _inside(p, nu, width)))
         return cls(log, slope, precision)
 
 
@@ -90,9 +97,9 @@ def _t_log(size: float, nu: float) -> float:
     return float(norm - 0.5 * (nu + 1) * np.log1p(size**2 / nu))
 
 
-def _inside(p: Parameter, nu: float) -> float:
+def _inside(p: Parameter, nu: float, width: float) -> float:
     """Return the probability that an amplitude lies inside its bounds."""
-    low, high = (p.low - p.default) / p.typical, (p.high - p.default) / p.typical
+    low, high = ((bound - p.default) / (p.typical * width) for bound in (p.low, p.high))
     return max(float(student.cdf(high, nu) - student.cdf(low, nu)), 1e-6)
 
 
