@@ -22,6 +22,7 @@ ALL = "all"
 """The extra that brings everything: never the least that is needed."""
 ROOMS = {
     "tacdata.revision": "fem",
+    "tacdata.studio": "view",
     "tacdata.training": "learn",
     "tacdata.pipeline.evaluate": "learn",
     "tacdata.pipeline.train": "learn",

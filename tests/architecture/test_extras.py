@@ -39,6 +39,8 @@ ROOMS = {
     "tacdata.pipeline.trained_network": "learn",
     "tacdata.training": "learn",
     "tacdata.viewers.browse.catalogue": "view",
+    "tacdata.studio.server": "view",
+    "tacdata.viewers.browse.loopback": "view",
     "tacdata.viewers.browse.server": "view",
     "tacdata.viewers.rerun": "view",
     "tacdata.label_farm.service": "farm",

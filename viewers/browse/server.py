@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import secrets
-import socket
 import tempfile
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from http import HTTPStatus
 from importlib.resources import files
 from pathlib import Path
-from threading import Lock, Thread
+from threading import Lock
 from typing import Any
 from urllib.parse import quote
 
-import uvicorn
-from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi import APIRouter, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from pydantic import BaseModel, Field
 
 from tacdata.dataset.flags import Flag, read_flags, read_history
 from tacdata.dataset.notes import Note, read_notes
-from tacdata.errors import TacdataError
 from tacdata.pages import live_page
+from tacdata.viewers.browse import loopback
 from tacdata.viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
 from tacdata.viewers.browse.flagging import flag_episode, unflag_episode
+from tacdata.viewers.browse.loopback import guard
 from tacdata.viewers.browse.noting import note_stretch, notes_of, unnote_stretch
 from tacdata.viewers.rerun.shield import LOOPBACK, shielded
 from tacdata.viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
@@ -178,23 +177,7 @@ def application(pages: Pages) -> FastAPI:
     api = FastAPI(openapi_url=None)
     routes = APIRouter(prefix=f"/{pages.token}")
 
-    @api.middleware("http")
-    async def guarded(request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
-        """Answer only whoever knows the address and comes under this machine's own name."""
-        token = request.url.path.strip("/").split("/")[0]
-        # By DNS rebinding a foreign page can reach this port under its own name. The token is compared in constant
-        # time, as the time of an answer must not reveal a part of it.
-        if request.url.hostname not in (LOOPBACK, "localhost") or not secrets.compare_digest(
-            token.encode(), pages.token.encode()
-        ):
-            return JSONResponse({"error": "no such page"}, HTTPStatus.NOT_FOUND)
-        response = await answer(request)
-        response.headers.update({"Cache-Control": "no-store", "Access-Control-Allow-Origin": pages.viewer})
-        return response
-
-    @api.exception_handler(TacdataError)
-    async def in_words(_: Request, error: TacdataError) -> JSONResponse:
-        return JSONResponse({"error": str(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
+    guard(api, pages.token, {"Access-Control-Allow-Origin": pages.viewer})
 
     @api.exception_handler(RequestValidationError)
     async def unfit(_: Request, error: RequestValidationError) -> JSONResponse:
@@ -242,15 +225,6 @@ def application(pages: Pages) -> FastAPI:
 @contextmanager
 def serving(pages: Pages, port: int) -> Iterator[None]:
     """Answer requests on a port of the loopback while the context lasts; 0 takes any that is free."""
-    with socket.create_server((LOOPBACK, port)) as listener:  # before the address is printed: early requests wait
-        pages.address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/{pages.token}"
-        # An open page keeps its connection: without a limit the server would wait for the browser to close.
-        config = uvicorn.Config(application(pages), log_config=None, lifespan="off", timeout_graceful_shutdown=1)
-        server = uvicorn.Server(config)
-        thread = Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            server.should_exit = True
-            thread.join()
+    with loopback.serving(application(pages), port) as address:
+        pages.address = f"{address}/{pages.token}"
+        yield

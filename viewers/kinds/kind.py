@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any, ClassVar
@@ -74,14 +75,25 @@ DEEPEST = 2
 def contents(folder: Path) -> dict[Path, Kind]:
     """Return the viewable contents of a folder that holds no recordings itself, by path."""
     members = kinds()
-    paths = [path for level in range(1, DEEPEST + 1) for path in sorted(folder.glob("/".join(["*"] * level)))]
     entries: dict[Path, Kind] = {}
-    for path in paths:
-        if path.is_dir() and not path.name.startswith(".") and not set(path.parents) & entries.keys():
+    level = [folder]
+    for _ in range(DEEPEST):
+        # What lies inside an entry is part of it: a session of thousands of files is not walked through.
+        level = [child for parent in level if parent not in entries for child in _folders(parent)]
+        for path in level:
             kind = next((kind for kind in members if kind.claims(path) and kind.holds(path)), None)
             if kind is not None:
                 entries[path] = kind
     return entries
+
+
+def _folders(parent: Path) -> list[Path]:
+    """Return the folders in a folder, by name; none of a folder that may not be read."""
+    try:
+        with os.scandir(parent) as found:
+            return sorted(parent / entry.name for entry in found if entry.is_dir() and not entry.name.startswith("."))
+    except OSError:
+        return []
 
 
 def refuse(options: Asked, noun: str, *allowed: str) -> None:

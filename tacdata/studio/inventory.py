@@ -1,0 +1,125 @@
+"""Everything that a lab has under a folder, read anew where a file has changed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tacdata.errors import TacdataError, UsageError
+from tacdata.studio.entry import Entry, local_minute
+from tacdata.studio.farm import LOCK, farm_entry
+from tacdata.studio.results import (
+    dataset_entry,
+    health_entry,
+    network_entry,
+    other_entry,
+    revision_entry,
+    verdict_entry,
+)
+from tacdata.studio.sessions import RUNNING, SECTION, session_entry
+from tacdata.viewers.kinds.kind import Kind, contents, kind_of
+
+SECTIONS = (
+    RUNNING,
+    SECTION,
+    "Datasets",
+    "Networks",
+    "Verdicts",
+    "Revisions",
+    "Health",
+    "Label farm",
+    "Pages",
+    "Others",
+)
+"""Headings of the page, in this order."""
+MAKERS: dict[str, tuple[str, Callable[[Path, Path], Entry]]] = {
+    "SessionKind": (SECTION, session_entry),
+    "DatasetKind": ("Datasets", dataset_entry),
+    "PredictionsKind": ("Networks", network_entry),
+    "VerdictKind": ("Verdicts", verdict_entry),
+    "RevisionKind": ("Revisions", revision_entry),
+}
+"""Class of a kind that `tacdata view` knows -> section, function of its entry."""
+WATCHED = ("", "labels", "meta", "scores", "submissions", "session.json", "check.json", LOCK)
+"""Parts of an entry's folder whose change makes its entry be read anew."""
+SEARCH = 10.0
+"""Time between two searches for new entries [s]."""
+LEVELS = ("", "*/", "*/*/")
+"""Places of health pages, farms and pages, from the folder on."""
+
+Task = tuple[str, Path, Callable[[Path, Path], Entry]]
+
+
+class Inventory:
+    """The entries of a folder."""
+
+    def __init__(self, root: Path) -> None:
+        """Take a folder.
+
+        Raises:
+            UsageError: If there is none.
+        """
+        if not root.is_dir():
+            raise UsageError(f"no folder {root}", "a folder with sessions, datasets, verdicts", "name one")
+        self.root = root.resolve()
+        self._tasks: list[Task] = []
+        self._searched = -SEARCH
+        self._kept: dict[tuple[str, Path], tuple[tuple[int, ...], Entry]] = {}
+
+    def entries(self) -> list[Entry]:
+        """Return the entries by section, the newest first; a damaged one has its error as its sentence."""
+        if time.monotonic() - self._searched >= SEARCH:
+            self._tasks, self._searched = self._found(), time.monotonic()
+        found = [self._entry(task) for task in self._tasks if task[1].exists()]
+        return sorted(found, key=lambda entry: (SECTIONS.index(entry.section), -entry.order, entry.path))
+
+    def _found(self) -> list[Task]:
+        own = kind_of(self.root)
+        kinds = {self.root: own} if own.holds(self.root) else contents(self.root)
+        tasks = [_task(path, kind) for path, kind in kinds.items()]
+        for section, name, make in (("Health", "health.json", health_entry), ("Label farm", LOCK, farm_entry)):
+            tasks += [(section, path.parent, make) for path in self._placed(name)]
+        told = {folder for _, folder, _ in tasks}
+        loose = [path for path in self._placed("*.html") if not told & set(path.parents) - {self.root}]
+        return tasks + [("Pages", path, page_entry) for path in loose]
+
+    def _placed(self, pattern: str) -> list[Path]:
+        """Return files near the folder, none in hidden folders."""
+        files = [path for level in LEVELS for path in sorted(self.root.glob(level + pattern))]
+        return [path for path in files if not any(part.startswith(".") for part in path.relative_to(self.root).parts)]
+
+    def _entry(self, task: Task) -> Entry:
+        section, path, make = task
+        state = tuple(_changed(path / part) for part in WATCHED)
+        kept = self._kept.get((section, path))
+        if kept is not None and kept[0] == state and not kept[1].running:
+            return kept[1]
+        try:
+            entry = make(self.root, path)
+        except Exception as error:  # whatever is damaged, the others are listed
+            words = f"{error.given}; {error.remedy}" if isinstance(error, TacdataError) else f"not readable: {error!r}"
+            words = words.replace(f"{self.root}/", "")
+            entry = Entry(section, path.relative_to(self.root).as_posix(), words, "bad")
+        self._kept[section, path] = state, entry
+        return entry
+
+
+def page_entry(root: Path, file: Path) -> Entry:
+    """Return the entry of a page that belongs to no other."""
+    name, changed = file.relative_to(root).as_posix(), file.stat().st_mtime
+    return Entry("Pages", name, "", date=local_minute(changed), pages=(name,), order=changed)
+
+
+def _task(path: Path, kind: Kind) -> Task:
+    noun = kind.NOUN
+    section, make = MAKERS.get(type(kind).__name__, ("Others", lambda root, folder: other_entry(root, folder, noun)))
+    return section, path, make
+
+
+def _changed(path: Path) -> int:
+    """Return when a file was changed [ns since 1970]; 0 without it."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0

@@ -1,0 +1,87 @@
+"""The page of a lab's folder, served on this computer."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from importlib.resources import files
+from pathlib import Path
+from threading import Lock
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import APIRouter, FastAPI
+from fastapi.responses import FileResponse, HTMLResponse
+
+from tacdata.errors import UsageError
+from tacdata.pages import live_page
+from tacdata.studio.entry import PAGES
+from tacdata.studio.inventory import SECTIONS, Inventory
+from tacdata.viewers.browse import loopback
+
+PORT = 9097
+"""Where the page is offered; another where it is in use."""
+SEALED = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; form-action 'none'"
+"""Policy of every file from the folder: a page in it asks nothing of any address, this one included."""
+
+
+@contextmanager
+def studio_server(inventory: Inventory, port: int) -> Iterator[str]:
+    """Serve the page while the context lasts, on the loopback, to whoever knows its address.
+
+    Yields:
+        The address to open.
+    """
+    token = secrets.token_urlsafe(16)
+    with loopback.serving(application(inventory, token), port) as address:
+        yield f"{address}/{token}/"
+
+
+def application(inventory: Inventory, token: str) -> FastAPI:
+    """Return the application: page, list, files that a browser shows."""
+    api = FastAPI(openapi_url=None)
+    routes = APIRouter(prefix=f"/{token}")
+    loopback.guard(api, token, {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"})
+    one_at_a_time = Lock()  # requests run in threads of their own, the list has one memory
+
+    @routes.get("/")
+    def page() -> HTMLResponse:
+        body = files("tacdata.studio").joinpath("page.html").read_text(encoding="utf-8")
+        return HTMLResponse(live_page(f"{inventory.root.name}: studio", body))
+
+    @routes.get("/list")
+    def entries() -> dict[str, Any]:
+        with one_at_a_time:
+            found = inventory.entries()
+        return {"root": str(inventory.root), "sections": SECTIONS, "entries": [_plain(entry) for entry in found]}
+
+    @routes.get("/file/{name:path}")
+    def file(name: str) -> FileResponse:
+        path = shown_file(inventory.root, name)
+        kind = {"media_type": "text/plain; charset=utf-8"} if path.suffix == ".md" else {}
+        return FileResponse(path, headers={"Content-Security-Policy": SEALED}, **kind)
+
+    api.include_router(routes)
+    return api
+
+
+def shown_file(root: Path, name: str) -> Path:
+    """Return a file under the folder that a browser shows.
+
+    Args:
+        root: The folder, resolved.
+        name: Path from it on.
+
+    Raises:
+        UsageError: If it is no such file, or lies elsewhere, links followed.
+    """
+    path = (root / name).resolve() if "\0" not in name else root
+    if not path.is_relative_to(root) or path.suffix not in PAGES or not path.is_file():
+        raise UsageError(f"no page {name!r}", f"{', '.join(PAGES)} under {root.name}", "open it from the list")
+    return path
+
+
+def _plain(entry: Any) -> dict[str, Any]:
+    return {**asdict(entry), "pages": [{"name": page, "href": "file/" + quote(page)} for page in entry.pages]}
