@@ -31,7 +31,8 @@ def run(
     if once:
         entries = inventory.entries()
         for entry in entries:
-            print(f"{entry.section}: {entry.path}: {'; '.join(filter(None, (entry.sentence, *entry.facts, *entry.faults)))}")
+            words = filter(None, (entry.sentence, *entry.facts, *entry.faults))
+            print(f"{entry.section}: {entry.path}: {'; '.join(words)}")
             for line in entry.commands[:1]:
                 print(f"  {line}")
         if not entries:

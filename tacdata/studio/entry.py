@@ -17,7 +17,7 @@ MOST_PAGES = 8
 
 
 @dataclass(frozen=True)
-class Entry:
+class LabEntry:
     """What is known of one entry, in words."""
 
     section: str

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from tacdata import documents
-from tacdata.studio.entry import Entry, command, local_minute
+from tacdata.studio.entry import LabEntry, command, local_minute
 
 LOCK = "service.lock"
 """File of a store that names the service's address and process."""
@@ -16,7 +16,7 @@ OPEN = ("waiting", "planning", "running")
 """States of a submission that is not finished."""
 
 
-def farm_entry(root: Path, store: Path) -> Entry:
+def farm_entry(root: Path, store: Path) -> LabEntry:
     """Return the entry of a farm's store. Raises as `documents.read`."""
     submissions = [documents.read(path, "submission") for path in sorted((store / "submissions").glob("*.json"))]
     pending = [one for one in submissions if one["state"] in OPEN]
@@ -26,15 +26,15 @@ def farm_entry(root: Path, store: Path) -> Entry:
     words = f"runs at {address}" if address else "does not run"
     words += f"; {len(pending)} of {len(submissions)} submissions open" if submissions else "; no submissions"
     words += f", {done} of {wanted} presses labelled" if pending else ""
-    begin = command("farm", "up", "--root", store.parent.relative_to(root))
-    return Entry(
+    start = command("farm", "up", "--root", store.parent.relative_to(root))
+    return LabEntry(
         "Label farm",
         store.relative_to(root).as_posix(),
         words,
         "good" if address else "bad" if pending else "",
         faults=(f"{failed} presses without a label",) if failed else (),
         date=local_minute((store / LOCK).stat().st_mtime),
-        commands=(command("farm", "status", "--url", address),) if address else (begin,),
+        commands=(command("farm", "status", "--url", address),) if address else (start,),
         running=bool(address),
         address=address,
         share=done / wanted if wanted else None,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tacdata.errors import TacdataError, UsageError
-from tacdata.studio.entry import Entry, local_minute
+from tacdata.studio.entry import LabEntry, local_minute
 from tacdata.studio.farm import LOCK, farm_entry
 from tacdata.studio.results import (
     dataset_entry,
@@ -33,7 +33,7 @@ SECTIONS = (
     "Others",
 )
 """Headings of the page, in this order."""
-MAKERS: dict[str, tuple[str, Callable[[Path, Path], Entry]]] = {
+MAKERS: dict[str, tuple[str, Callable[[Path, Path], LabEntry]]] = {
     "SessionKind": (SECTION, session_entry),
     "DatasetKind": ("Datasets", dataset_entry),
     "PredictionsKind": ("Networks", network_entry),
@@ -48,7 +48,7 @@ SEARCH = 10.0
 LEVELS = ("", "*/", "*/*/")
 """Places of health pages, farms and pages, from the folder on."""
 
-Task = tuple[str, Path, Callable[[Path, Path], Entry]]
+Task = tuple[str, Path, Callable[[Path, Path], LabEntry]]
 
 
 class Inventory:
@@ -65,9 +65,9 @@ class Inventory:
         self.root = root.resolve()
         self._tasks: list[Task] = []
         self._searched = -SEARCH
-        self._kept: dict[tuple[str, Path], tuple[tuple[int, ...], Entry]] = {}
+        self._kept: dict[tuple[str, Path], tuple[tuple[int, ...], LabEntry]] = {}
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[LabEntry]:
         """Return the entries by section, the newest first; a damaged one has its error as its sentence."""
         if time.monotonic() - self._searched >= SEARCH:
             self._tasks, self._searched = self._found(), time.monotonic()
@@ -75,21 +75,21 @@ class Inventory:
         return sorted(found, key=lambda entry: (SECTIONS.index(entry.section), -entry.order, entry.path))
 
     def _found(self) -> list[Task]:
-        own = kind_of(self.root)
-        kinds = {self.root: own} if own.holds(self.root) else contents(self.root)
+        kind = kind_of(self.root)
+        kinds = {self.root: kind} if kind.holds(self.root) else contents(self.root)
         tasks = [_task(path, kind) for path, kind in kinds.items()]
         for section, name, make in (("Health", "health.json", health_entry), ("Label farm", LOCK, farm_entry)):
             tasks += [(section, path.parent, make) for path in self._placed(name)]
-        told = {folder for _, folder, _ in tasks}
-        loose = [path for path in self._placed("*.html") if not told & set(path.parents) - {self.root}]
-        return tasks + [("Pages", path, page_entry) for path in loose]
+        folders = {folder for _, folder, _ in tasks}
+        pages = [path for path in self._placed("*.html") if not folders & set(path.parents) - {self.root}]
+        return tasks + [("Pages", path, page_entry) for path in pages]
 
     def _placed(self, pattern: str) -> list[Path]:
         """Return files near the folder, none in hidden folders."""
         files = [path for level in LEVELS for path in sorted(self.root.glob(level + pattern))]
         return [path for path in files if not any(part.startswith(".") for part in path.relative_to(self.root).parts)]
 
-    def _entry(self, task: Task) -> Entry:
+    def _entry(self, task: Task) -> LabEntry:
         section, path, make = task
         state = tuple(_changed(path / part) for part in WATCHED)
         kept = self._kept.get((section, path))
@@ -100,15 +100,15 @@ class Inventory:
         except Exception as error:  # whatever is damaged, the others are listed
             words = f"{error.given}; {error.remedy}" if isinstance(error, TacdataError) else f"not readable: {error!r}"
             words = words.replace(f"{self.root}/", "")
-            entry = Entry(section, path.relative_to(self.root).as_posix(), words, "bad")
+            entry = LabEntry(section, path.relative_to(self.root).as_posix(), words, "bad")
         self._kept[section, path] = state, entry
         return entry
 
 
-def page_entry(root: Path, file: Path) -> Entry:
+def page_entry(root: Path, file: Path) -> LabEntry:
     """Return the entry of a page that belongs to no other."""
     name, changed = file.relative_to(root).as_posix(), file.stat().st_mtime
-    return Entry("Pages", name, "", date=local_minute(changed), pages=(name,), order=changed)
+    return LabEntry("Pages", name, "", date=local_minute(changed), pages=(name,), order=changed)
 
 
 def _task(path: Path, kind: Kind) -> Task:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from tacdata.recording.files import file_names
@@ -55,8 +56,8 @@ def recording_state(folder: Path, wanted: int) -> RecordingState:
     is_partial, is_interrupted = newest.name.endswith(file_names.PARTIAL), ".interrupted-" in newest.name
     remaining = wanted - len(finished)
     running = age < QUIET and remaining > 0 and not is_interrupted
-    steps = [after - before for before, after in zip(ended, ended[1:], strict=False)][-RECENT:]
-    left = remaining * statistics.median(steps) - (time.time() - ended[-1]) if running and steps else None
+    steps = [after - before for before, after in pairwise(ended)][-RECENT:]
+    seconds = remaining * statistics.median(steps) - (time.time() - ended[-1]) if running and steps else None
     cut = [path for path in changes if path.name.endswith(file_names.PARTIAL) and not (running and path == newest)]
     interrupted = [path for path in changes if ".interrupted-" in path.name]
     return RecordingState(
@@ -64,7 +65,7 @@ def recording_state(folder: Path, wanted: int) -> RecordingState:
         wanted,
         newest if running and is_partial else None,
         running,
-        None if left is None else max(left, 0.0),
+        None if seconds is None else max(seconds, 0.0),
         max(cut, key=changes.__getitem__, default=None),
         broken_off(max(interrupted, key=changes.__getitem__)) if interrupted else "",
         changes[newest],

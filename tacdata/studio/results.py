@@ -9,14 +9,14 @@ from tacdata import documents
 from tacdata.dataset.format.metadata import MAIN
 from tacdata.discrepancy.heading import sentence
 from tacdata.health.advice import ALL_WELL, FIRST, NOTHING
-from tacdata.studio.entry import COMMAND, Entry, command, local_minute, pages_in
+from tacdata.studio.entry import COMMAND, LabEntry, command, local_minute, pages_in
 from tacdata.viewers.kinds.predictions import CHECKPOINT
 
 ERRORS = {"pixel_rmse": "pixel RMSE", "peak_error": "peak error"}
 """Errors of a network that an entry names: key in its scores -> words."""
 
 
-def dataset_entry(root: Path, folder: Path) -> Entry:
+def dataset_entry(root: Path, folder: Path) -> LabEntry:
     """Return the entry of a dataset."""
     name, info = folder.relative_to(root), json.loads((folder / "meta" / "info.json").read_text(encoding="utf-8"))
     episodes, frames = int(info["total_episodes"]), int(info["total_frames"])
@@ -32,15 +32,13 @@ def dataset_entry(root: Path, folder: Path) -> Entry:
     )
 
 
-def network_entry(root: Path, folder: Path) -> Entry:
+def network_entry(root: Path, folder: Path) -> LabEntry:
     """Return the entry of a training run, or of predictions alone."""
     name, file = folder.relative_to(root), folder / "scores" / "scores.json"
     if not file.is_file():
         trained = (folder / CHECKPOINT).is_file()
         words, after = (
-            ("not evaluated", command("evaluate", name))
-            if trained
-            else ("predictions", command("view", name, "--web"))
+            ("not evaluated", command("evaluate", name)) if trained else ("predictions", command("view", name, "--web"))
         )
         return _entry(root, folder, "Networks", words, commands=(after,))
     scores = documents.read(file, "scores")
@@ -57,7 +55,7 @@ def network_entry(root: Path, folder: Path) -> Entry:
     )
 
 
-def verdict_entry(root: Path, folder: Path) -> Entry:
+def verdict_entry(root: Path, folder: Path) -> LabEntry:
     """Return the entry of a verdict."""
     name, verdict = folder.relative_to(root), documents.read(folder / "verdict.json", "verdict")
     recordings = verdict.get("heading", {}).get("recordings", ())
@@ -73,7 +71,7 @@ def verdict_entry(root: Path, folder: Path) -> Entry:
     )
 
 
-def revision_entry(root: Path, folder: Path) -> Entry:
+def revision_entry(root: Path, folder: Path) -> LabEntry:
     """Return the entry of a revision."""
     name, revision = folder.relative_to(root), documents.read(folder / "revision.json", "revision")
     added, gap = ", ".join(revision["added"]), (revision["gap"] or {}).get("sealed")
@@ -83,7 +81,7 @@ def revision_entry(root: Path, folder: Path) -> Entry:
     return _entry(root, folder, "Revisions", words, "good" if added else "", commands=(command("view", name, "--web"),))
 
 
-def health_entry(root: Path, folder: Path) -> Entry:
+def health_entry(root: Path, folder: Path) -> LabEntry:
     """Return the entry of a unit's health."""
     health = documents.read(folder / "health.json", "health")
     first, visits = health["advice"][0], health["visits"]
@@ -99,7 +97,7 @@ def health_entry(root: Path, folder: Path) -> Entry:
     )
 
 
-def other_entry(root: Path, folder: Path, noun: str) -> Entry:
+def other_entry(root: Path, folder: Path, noun: str) -> LabEntry:
     """Return the entry of something that `tacdata view` opens, by its noun."""
     return _entry(root, folder, "Others", noun, commands=(command("view", folder.relative_to(root), "--web"),))
 
@@ -113,9 +111,9 @@ def _entry(
     facts: tuple[str, ...] = (),
     commands: tuple[str, ...] = (),
     pages: tuple[str, ...] | None = None,
-) -> Entry:
+) -> LabEntry:
     changed = folder.stat().st_mtime
-    return Entry(
+    return LabEntry(
         section,
         folder.relative_to(root).as_posix(),
         words,

@@ -8,13 +8,13 @@ from pathlib import Path
 from tacdata import documents
 from tacdata.labels import file_names as label_names
 from tacdata.recording.session import FILE
-from tacdata.studio.entry import Entry, command, local_minute, pages_in
+from tacdata.studio.entry import LabEntry, command, local_minute, pages_in
 from tacdata.studio.recording_state import RecordingState, recording_state
 
 SECTION, RUNNING = "Sessions", "Recording now"
 
 
-def session_entry(root: Path, folder: Path) -> Entry:
+def session_entry(root: Path, folder: Path) -> LabEntry:
     """Return the entry of a session. Raises as `documents.read`."""
     document = documents.read(folder / FILE, "session")
     name = folder.relative_to(root)
@@ -26,7 +26,7 @@ def session_entry(root: Path, folder: Path) -> Entry:
         faults.append("the machine's position was lost")
     if state.cut is not None:
         faults.append(f"{state.cut.name} has no end")
-    return Entry(
+    return LabEntry(
         RUNNING if state.running else SECTION,
         name.as_posix(),
         sentence,
@@ -54,8 +54,8 @@ def checked(folder: Path, finished: int) -> tuple[str, str]:
     report = documents.content_of(folder / "check.json", "check")
     # The figures of each recording are not shown; to validate those of hundreds takes a tenth of a second.
     documents.check({**report, "episodes": []}, "check", str(folder / "check.json"))
-    grave = [finding for finding in report["findings"] if finding["severity"] == "unusable"]
-    named = grave or report["findings"]
+    reasons = [finding for finding in report["findings"] if finding["severity"] == "unusable"]
+    named = reasons or report["findings"]
     words = "usable" if report["usable"] else "NOT usable as it is"
     if named:
         first = named[0]
@@ -64,8 +64,8 @@ def checked(folder: Path, finished: int) -> tuple[str, str]:
         words += f"; {len(named) - 1} more" if len(named) > 1 else ""
     else:
         words += ", nothing to remark"
-    later = finished - len(report["episodes"])
-    words += f"; {later} recorded since" if later > 0 and not grave else ""
+    unchecked = finished - len(report["episodes"])
+    words += f"; {unchecked} recorded since" if unchecked > 0 and not reasons else ""
     return words, "good" if report["usable"] else "bad"
 
 
@@ -75,8 +75,8 @@ def _live(state: RecordingState) -> tuple[str, str]:
     if state.seconds_left is None:
         return f"{writes}; time left unknown before the second press", "good"
     minutes = round(state.seconds_left / 60)
-    left = f"{minutes} min" if minutes else "less than a minute"
-    return f"{writes}; {left} left, until {local_minute(state.newest + state.seconds_left)[11:]}", "good"
+    duration = f"{minutes} min" if minutes else "less than a minute"
+    return f"{writes}; {duration} left, until {local_minute(state.newest + state.seconds_left)[11:]}", "good"
 
 
 def _next(name: Path, state: RecordingState, labels: int, tone: str) -> tuple[str, ...]:

@@ -133,6 +133,9 @@ def looked_at(monkeypatch):
             return
         address = re.search(r"open (\S+)/\n", said)[1]
         for path in ("/", "/list", "/episode/7.rrd"):
+            if path.startswith("/episode") and "entries" in json.loads(found["/list"]):
+                found["studio"] = json.loads(found["/list"])["entries"]
+                return
             with urllib.request.urlopen(address + path, timeout=60) as answer:
                 found[path] = answer.read()
 
@@ -174,5 +177,6 @@ def test_every_command_of_the_page_runs(folder, looked_at):
         assert done.returncode == 0, f"tacdata {shlex.join(words)}: {done.stdout}{done.stderr}"
         assert not opens or shown.stat().st_size > 5_000, shlex.join(words)
         said[shlex.join(words)] = done.stdout
+    assert {"Sessions", "Datasets", "Networks", "Verdicts"} <= {entry["section"] for entry in looked_at["studio"]}
     assert "session" in looked_at["catalogue"], "what Rerun's server holds, by its own answer"
-    assert len(said) == 24 and looked_at["/episode/7.rrd"][:4] == b"RRF2" and b"<title>" in looked_at["/"]
+    assert len(said) == 26 and looked_at["/episode/7.rrd"][:4] == b"RRF2" and b"<title>" in looked_at["/"]
