@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import re
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,9 @@ import numpy as np
 from tacdata.documents import composed
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import INNER, SourceTable
+from tacdata.importing.mapping import Axis, Known, Quantity, Selector
 from tacdata.importing.text.layout import THOUSANDS
 from tacdata.importing.units import factor, plain, prefixed, quantity_of, split_unit
-
-Selector = str | int | list[Any]
-
 
 WRITTEN = re.compile(r"[-+]?\d*[.,]?\d+([eE][-+]?\d+)?")
 """A number in a text."""
@@ -88,7 +87,7 @@ def single(table: SourceTable, selector: Selector, where: str) -> str:
     return names[0]
 
 
-def numbers(table: SourceTable, names: list[str], missing: list[float], where: str) -> np.ndarray:
+def numbers(table: SourceTable, names: list[str], missing: Iterable[float], where: str) -> np.ndarray:
     """Return columns as numbers [as in the file], shape (rows, n), NaN where a value is missing.
 
     Raises:
@@ -109,67 +108,65 @@ def numbers(table: SourceTable, names: list[str], missing: list[float], where: s
 
 
 def axis(
-    table: SourceTable | None, entry: float | dict[str, Any], unit: str, missing: list[float], where: str
+    table: SourceTable | None, entry: Quantity, unit: str, where: str, missing: Iterable[float] = ()
 ) -> np.ndarray:
     """Return one quantity in ``unit``, shape (rows,), or shape () if the mapping gives a number.
 
     Raises:
         FormatError: If the column or its unit is not known.
     """
-    if isinstance(entry, int | float):
+    if not isinstance(entry, Axis):
         return np.array(float(entry))
     if table is None:
         raise FormatError(f"{where}: a column without a file", "a number, or a file for the column", "add file: NAME")
-    name = single(table, entry["column"], where)
-    source_unit = unit_of(table, entry, where) or unit
+    name = single(table, entry.column, where)
+    source_unit = unit_of(table, name, where, entry.unit) or unit
     values = numbers(table, [name], missing, where)[:, 0]
-    values = values * factor(source_unit, unit, where) * entry.get("scale", 1.0) + entry.get("offset", 0.0)
+    values = values * factor(source_unit, unit, where) * entry.scale + entry.offset
     finite = values[np.isfinite(values)]
-    if "zero" in entry and len(finite):
-        values = values - {"first": finite[0], "lowest": finite.min(), "highest": finite.max()}[entry["zero"]]
+    if entry.zero and len(finite):
+        values = values - {"first": finite[0], "lowest": finite.min(), "highest": finite.max()}[entry.zero]
     return values
 
 
-def unit_of(table: SourceTable, entry: dict[str, Any], where: str) -> str:
-    """Return the unit of a column, by the mapping or the file; "" if neither gives one.
+def unit_of(table: SourceTable, column: Selector, where: str, given: str = "") -> str:
+    """Return the unit of a column, ``given`` by the mapping or by the file; "" if neither gives one.
 
     Raises:
         FormatError: If the file and the mapping give different units of one quantity.
     """
-    name = single(table, entry["column"], where)
+    name = single(table, column, where)
     base_name = inner[1] if (inner := INNER.fullmatch(name)) and table.inner(inner[1]) else name
     inside = split_unit(base_name)[1]
     stated = table.units.get(base_name) or ("" if inside.isdigit() else inside)
     # The unit belongs to the file's type (a duration), so no mapping can contradict it.
     if base_name in table.typed:
         return stated
-    entry_unit = entry.get("unit", "")
-    if not entry_unit and _differ(stated, inside, where):
+    if not given and _differ(stated, inside, where):
         raise FormatError(
             f"{where}: {table.path.name} states {stated} for {base_name}, whose name says {inside}",
             "one unit",
             f"give unit: {stated} or unit: {inside} there in the mapping",
         )
     # Where the file contradicts itself, the mapping decides.
-    if entry_unit and _differ(entry_unit, stated, where) and not (inside and not _differ(entry_unit, inside, where)):
-        raise _contradiction(table, base_name, stated, entry_unit, where)
-    return entry_unit or stated
+    if given and _differ(given, stated, where) and not (inside and not _differ(given, inside, where)):
+        raise _contradiction(table, base_name, stated, given, where)
+    return given or stated
 
 
-def units_of(table: SourceTable, names: list[str], entry: dict[str, Any], where: str) -> list[str]:
+def units_of(table: SourceTable, names: list[str], where: str, given: str = "") -> list[str]:
     """Return the unit of each of some columns, by the mapping or the file; "" where neither gives one.
 
     Raises:
         FormatError: If the mapping's unit is another one of the same quantity.
     """
-    units, given = [], entry.get("unit", "")
+    units = []
     for name in names:
         inside = split_unit(name)[1]
         stated = table.units.get(name) or ("" if inside.isdigit() else inside)
         if given and not quantity_of(stated) and prefixed(given, stated):
             raise _contradiction(table, name, stated, given, where)
-        array = bool(table.inner(name))
-        units.append(plain(given or stated if array else unit_of(table, {**entry, "column": name}, where)))
+        units.append(plain((given or stated) if table.inner(name) else unit_of(table, name, where, given)))
     return units
 
 
@@ -210,11 +207,11 @@ def _example(values: np.ndarray) -> Any:
     return next((value for value in values.tolist() if value is not None), None)
 
 
-def label_of(entry: str | dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str], where: str) -> str:
+def label_of(entry: str | Known, tables: dict[str, SourceTable], parts: dict[str, str], where: str) -> str:
     """Return a word of a trial: constant, from the path, or the most frequent one of a column.
 
     Args:
-        entry: As in the mapping: a word, {part: name, pattern: ...} or {column: name, file: name}.
+        entry: The word, or its place.
         tables: Name under ``files`` -> rows of the trial.
         parts: {part} of the paths -> its text.
         where: The mapping's key, for messages.
@@ -224,12 +221,10 @@ def label_of(entry: str | dict[str, Any], tables: dict[str, SourceTable], parts:
     """
     if isinstance(entry, str):
         return entry
-    if "part" in entry:
-        return _from_path(entry, parts, where)
-    table = tables.get(entry.get("file", next(iter(tables))))
-    if table is None:
-        raise FormatError(f"{where}: file {entry.get('file')!r}", ", ".join(tables), "name one under files")
-    values = table.column(single(table, entry.get("column", ""), where))
+    if entry.part:
+        return part_of(entry, parts, where)
+    table = table_of(entry, tables, where)
+    values = table.column(single(table, entry.column, where))
     if values.dtype == object:
         words = [str(value).strip() for value in values.tolist() if value is not None and str(value).strip()]
     else:
@@ -240,20 +235,34 @@ def label_of(entry: str | dict[str, Any], tables: dict[str, SourceTable], parts:
     return max(dict.fromkeys(words), key=words.count)
 
 
-def _from_path(entry: dict[str, Any], parts: dict[str, str], where: str) -> str:
-    name, pattern = entry["part"], entry.get("pattern")
-    if name not in parts:
-        raise FormatError(f"{where}: part {name!r}", ", ".join(parts) or "none: no path has a {part}", "correct part")
-    if pattern is None:
-        return parts[name]
+def table_of(entry: Known, tables: dict[str, SourceTable], where: str) -> SourceTable:
+    """Return the file in which a trial's number or word is; raises FormatError if there is none of that name."""
+    name = entry.file or next(iter(tables))
+    if name not in tables:
+        raise FormatError(f"{where}: file {name!r}", ", ".join(tables), "name one under files")
+    return tables[name]
+
+
+def part_of(entry: Known, parts: dict[str, str], where: str) -> str:
+    """Return a {part} of the path, or the piece of it that a pattern finds.
+
+    Raises:
+        FormatError: If there is no such part, or the pattern is wrong or finds nothing.
+    """
+    if entry.part not in parts:
+        listed = ", ".join(parts) or "none: no path has a {part}"
+        raise FormatError(f"{where}: part {entry.part!r}", listed, "correct part")
+    text, pattern = parts[entry.part], entry.pattern
+    if not pattern:
+        return text
     try:
-        match = re.search(pattern, parts[name])
+        match = re.search(pattern, text)
     except re.error as error:
         raise FormatError(f"{where}: pattern {pattern!r}: {error}", "a regular expression", "correct it") from None
     if match is None or not match.groups():
         raise FormatError(
-            f"{where}: {pattern!r} finds nothing in {parts[name]!r}",
-            "a pattern with one group, as in ([A-Za-z]+)",
+            f"{where}: {pattern!r} finds nothing in {text!r}",
+            "a pattern with one group, as in ([A-Za-z]+) or x([-0-9.]+)",
             "correct pattern",
         )
     return match[1]

@@ -18,10 +18,11 @@ from tacdata.chain.at_rest import ZeroSide, below_zero, zero_side
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.mapping import Mapping
 from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
+from tacdata.importing.pressing.trials import split_tables
 from tacdata.importing.recording_file import ImportedPress
-from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash, without_expressions
-from tacdata.importing.trials import split_tables
+from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
 from tacdata.recording import session
 from tacdata.recording.files import file_names
 from tacdata.recording.session import FILE
@@ -64,15 +65,15 @@ def import_session(
         >>> made.refused
         ()
     """
-    document = without_expressions(documents.read(mapping, "import_mapping"))
+    described = Mapping.from_document(documents.read(mapping, "import_mapping"), mapping.parent)
     if target.exists():
         raise UsageError(f"{target} exists", "a new session folder", "choose another --out")
-    sets = file_sets(source, document["files"])
+    sets = file_sets(source, described.files)
     target.parent.mkdir(parents=True, exist_ok=True)
     # On the same drive, so that the rename at the end is atomic.
     work = Path(mkdtemp(dir=target.parent, prefix=f".{target.name}."))
     try:
-        run = _Import(document, mapping.parent, source, work, progress)
+        run = _Import(described, source, work, progress)
         for files in sets:
             run.add(files)
         if not run.presses:
@@ -90,11 +91,9 @@ def import_session(
 class _Import:
     """An import in progress."""
 
-    def __init__(
-        self, mapping: dict[str, Any], folder: Path, source: Path, work: Path, progress: Callable[[str], None]
-    ) -> None:
-        self.mapping, self.beside, self.source, self.work, self.progress = mapping, folder, source, work, progress
-        self.hash = provenance.content_hash(mapping)
+    def __init__(self, mapping: Mapping, source: Path, work: Path, progress: Callable[[str], None]) -> None:
+        self.mapping, self.source, self.work, self.progress = mapping, source, work, progress
+        self.hash = mapping.content_hash
         self.presses: list[ImportedPress] = []
         self.failures: list[tuple[str, TacdataError]] = []
         self.notes: list[str] = []
@@ -111,11 +110,7 @@ class _Import:
             self.notes.append(copied)
             return
         try:
-            tables = files.tables(self.mapping)
-        except TacdataError as error:
-            self.failures.append((files.label or self.source.name, error))
-            return
-        try:
+            tables = files.tables()
             trials = list(split_tables(tables, self.mapping))
         except TacdataError as error:
             self.failures.append((files.label or self.source.name, error))
@@ -136,10 +131,9 @@ class _Import:
 
         A copy is no second measurement: counted as one, it would make every error look smaller.
         """
-        tables = [str(files.options(name, self.mapping).get("table")) for name in files.paths]
-        same = zip(map(source_hash, files.paths.values()), tables, strict=True)
-        name = ", ".join(path.name for path in files.paths.values())
-        first = self.seen.setdefault(tuple(same), name)
+        contents = tuple((source_hash(file.paths[0]), str(file.entry.table)) for file in files.files.values())
+        name = ", ".join(file.paths[0].name for file in files.files.values())
+        first = self.seen.setdefault(contents, name)
         return f"{name} is the same, byte by byte, as {first} and is left out" if first != name else ""
 
     def _presses(
@@ -148,8 +142,8 @@ class _Import:
         below = self.source.parent if is_one(self.source) else self.source
         record = {
             "version": schemas.version("import_record"),
-            "name": self.mapping["name"],
-            "source": self.mapping.get("source", ""),
+            "name": self.mapping.name,
+            "source": self.mapping.source,
             "trial": label,
             "files": [
                 {
@@ -157,22 +151,22 @@ class _Import:
                     "sha256": source_hash(path),
                     "rows": full_tables[name].rows,
                 }
-                for name, first in files.paths.items()
-                for path in (first, *files.more.get(name, ()))
+                for name, file in files.files.items()
+                for path in file.paths
             ],
-            "mapping": self.mapping,
+            "mapping": self.mapping.document,
             "mapping_hash": self.hash,
             "code_version": provenance.code_version(),
         }
         if self.centre is None:
-            self.centre = centre_of(self.mapping, full_tables)
-        yield from presses_of(self.mapping, self.beside, rows, files.parts, record, self.centre)
+            self.centre = centre_of(self.mapping.position, full_tables)
+        yield from presses_of(self.mapping, rows, files.parts, record, self.centre)
 
     def _write(self, imported: ImportedPress) -> None:
         number = len(self.presses)
         imported = replace(imported, record=_in_unicode(imported.record))
         press = replace(imported.press, index=number)
-        plan = plan_of(self.mapping["name"], [press])
+        plan = plan_of(self.mapping.name, [press])
         imported = replace(imported, press=press, plan=plan)
         documents.check(imported.record, "import_record", "import record")
         path = file_names.episode(self.work, number)
@@ -185,7 +179,7 @@ class _Import:
         # At the end only the press is needed, and the rows of all recordings would fill the memory.
         self.presses.append(replace(imported, taxels=None, position=None, measured=()))
         rows = len(imported.taxels.time_ns)
-        self.progress(f"  {path.name}  {trial or self.mapping['name']}: {rows} rows, {press.depth:.2f} mm deep")
+        self.progress(f"  {path.name}  {trial or self.mapping.name}: {rows} rows, {press.depth:.2f} mm deep")
 
     def finish(self) -> None:
         """Write the session's document."""
@@ -196,7 +190,7 @@ class _Import:
                 f"Then count depth from the lowest (offset: {lowest:g} under depth, or contact); else it is no contact"
             )
         first = self.presses[0]
-        plan = plan_of(self.mapping["name"], [imported.press for imported in self.presses])
+        plan = plan_of(self.mapping.name, [imported.press for imported in self.presses])
         document = {
             "version": "1.0",
             "code_version": provenance.code_version(),

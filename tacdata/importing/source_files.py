@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,43 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.importing.columns import single
 from tacdata.importing.expression import with_derived
 from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
+from tacdata.importing.mapping import FileEntry, Selector
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """One kind of file in a set: a file, or several that are joined."""
+
+    entry: FileEntry
+    paths: tuple[Path, ...]
+
+    def read(self, where: str) -> SourceTable:
+        """Return its rows, with those of further files and sheets joined, and the derived columns.
+
+        Args:
+            where: Names the file in errors of derived columns.
+
+        Raises:
+            FormatError: If a file cannot be read, or parts have no column in common.
+        """
+        entry = self.entry
+        sheets = entry.table if isinstance(entry.table, list) else [entry.table]
+        parts = [
+            read_table(path, entry.options | ({"table": sheet} if sheet else {}))
+            for path in self.paths
+            for sheet in sheets
+        ]
+        clock = entry.clock.column if entry.clock else None
+        if len(parts) == 1:
+            (table,) = parts
+        elif entry.join == "columns":
+            names = titles_of(entry.paths) if len(entry.paths) == len(self.paths) else [p.stem for p in self.paths]
+            titles = names if len(self.paths) > 1 else ("",)
+            labels = [" ".join(filter(None, (title, sheet))) for title in titles for sheet in sheets]
+            table = side_by_side(parts, labels, clock)
+        else:
+            table = joined(parts, clock if entry.join == "continued" else None)
+        return with_derived(table, entry.derived, where)
 
 
 @dataclass(frozen=True)
@@ -23,54 +60,14 @@ class FileSet:
 
     parts: dict[str, str]
     """Value of each {part} of the paths."""
-    paths: dict[str, Path] = field(default_factory=dict)
-    """Name under ``files`` -> path."""
+    files: dict[str, SourceFile]
+    """Name in the mapping -> its file."""
     fault: FormatError | None = None
     """Why the files are not complete."""
-    more: dict[str, tuple[Path, ...]] = field(default_factory=dict)
-    """Name under ``files`` -> the further files of the set, whose rows follow."""
-    titles: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    """Name under ``files`` -> title of each of its files."""
 
-    def options(self, name: str, mapping: dict[str, Any]) -> dict[str, Any]:
-        """Return how a mapping has a file read, with the {parts} of its table filled in."""
-        entry: dict[str, Any] = mapping["files"][name]
-        filled = isinstance(entry.get("table"), str) and "{" in entry["table"]
-        return {**entry, "table": entry["table"].format(**self.parts)} if filled else entry
-
-    def tables(self, mapping: dict[str, Any]) -> dict[str, SourceTable]:
-        """Return the rows of every file, with those of further files and sheets below each other.
-
-        Raises:
-            FormatError: If a file cannot be read, or parts have no column in common.
-        """
-        tables = {}
-        for name, path in self.paths.items():
-            options = self.options(name, mapping)
-            table = options.get("table")
-            sheets: list[str | None] = table if isinstance(table, list) else [table]
-            parts = [
-                read_table(part, {**options, "table": sheet} if sheet else options)
-                for part in (path, *self.more.get(name, ()))
-                for sheet in sheets
-            ]
-            table = parts[0] if len(parts) == 1 else self._joined(name, parts, sheets, options)
-            tables[name] = with_derived(table, options.get("derived", {}), f"files: {name}: derived")
-        return tables
-
-    def _joined(
-        self, name: str, parts: list[SourceTable], sheets: list[str | None], options: dict[str, Any]
-    ) -> SourceTable:
-        """Return the parts of a file as one table."""
-        if options.get("join") != "columns":
-            return joined(parts, options)
-        several = len(parts) > len(sheets)
-        titles = [
-            " ".join(filter(None, (title if several else "", sheet)))
-            for title in self.titles.get(name, ("",))
-            for sheet in sheets
-        ]
-        return side_by_side(parts, titles, options)
+    def tables(self) -> dict[str, SourceTable]:
+        """Return the rows of every file; raises FormatError if one cannot be read."""
+        return {name: file.read(f"files: {name}: derived") for name, file in self.files.items()}
 
     @property
     def label(self) -> str:
@@ -120,121 +117,85 @@ def source_hash(path: Path) -> str:
     return provenance.content_hash({p.relative_to(path).as_posix(): provenance.file_hash(p) for p in inside})
 
 
-def file_sets(source: Path, files: dict[str, dict[str, Any]]) -> list[FileSet]:
+def file_sets(source: Path, files: dict[str, FileEntry]) -> list[FileSet]:
     """Return every set of files below a folder, or the one file that was given.
 
     Args:
         source: A folder, or a file if the mapping names one kind of file only, however many tables in it.
-        files: ``files`` of the mapping.
+        files: Name -> kind of file.
 
     Raises:
         UsageError: If the source does not exist or no file fits.
     """
     check_source(source)
-    if is_one(source):
-        if len({path for entry in files.values() for path in _patterns(entry)}) != 1:
-            raise UsageError(
-                f"{source} is one file, the mapping names {len(files)} ({', '.join(files)})",
-                "the folder that holds them",
-                "give the folder",
-            )
-        matches: dict[str, list[tuple[dict[str, str], Path]]] = {name: [({}, source)] for name in files}
-    else:
-        matches = {}
-        for name, entry in files.items():
-            each = {path: _matches(source, path) for path in _patterns(entry)}
-            matches[name] = [match for path, fitting in each.items() for match in fitting]
-            if lacking := [path for path, fitting in each.items() if not fitting and len(each) > 1]:
-                matches[name] = []
-                files = {**files, name: {**entry, "path": lacking[0]}}
-    for name, hits in matches.items():
-        if not hits:
-            raise UsageError(
-                f"no file fits {files[name]['path']} below {source}",
-                "one or more",
-                f"correct files/{name}/path in the mapping; there is {_listing(source)}",
-            )
-        if isinstance(table := files[name].get("table"), str) and "{" in table:
-            matches[name] = _in_tables(hits, files[name])
+    if is_one(source) and len({path for entry in files.values() for path in entry.paths}) != 1:
+        raise UsageError(
+            f"{source} is one file, the mapping names {len(files)} ({', '.join(files)})",
+            "the folder that holds them",
+            "give the folder",
+        )
+    matches = {name: _hits(source, name, entry) for name, entry in files.items()}
     keys = {name: tuple(hits[0][0]) for name, hits in matches.items()}
     # The kind of file with the most parts defines the trials; others are shared by those whose parts agree.
     leading = max(keys, key=lambda name: len(keys[name]))
-    sets = []
     led = [parts for parts, _ in matches[leading]]
-    if files[leading].get("join"):
+    if files[leading].join:
         # Files that are joined repeat the parts of their trial: each trial counts once.
         led = [parts for number, parts in enumerate(led) if parts not in led[:number]]
-    for parts in led:
-        paths, more, titles, fault = {}, {}, {}, None
-        for name in files:
-            fitting = [
-                p for values, p in matches[name] if all(parts.get(key, value) == value for key, value in values.items())
-            ]
-            required = len(_patterns(files[name]))
-            if files[name].get("join") and len(fitting) >= required:
-                paths[name], more[name] = fitting[0], tuple(fitting[1:])
-                titles[name] = _titles(fitting, files[name])
-                continue
-            if len(fitting) != 1 or required > 1:
-                fault = FormatError(
-                    f"{len(fitting)} files {' and '.join(_patterns(files[name]))} for {parts or 'the source'}",
-                    "exactly one" if required == 1 else "one of each, and join: rows, continued or columns",
-                    "complete the source, or narrow the path with a {part} in the mapping",
-                )
-                break
-            paths[name] = fitting[0]
-        sets.append(FileSet(parts, paths, fault, more, titles))
-    return sets
+    return [_set(parts, files, matches) for parts in led]
 
 
-def _patterns(entry: dict[str, Any]) -> list[str]:
-    """Return the paths of a kind of file: one, or the parts of a trial in their order."""
-    return entry["path"] if isinstance(entry["path"], list) else [entry["path"]]
+Hit = tuple[dict[str, str], Path]
+"""A file, with the value of each {part} of its path."""
 
 
-def _titles(paths: list[Path], entry: dict[str, Any]) -> tuple[str, ...]:
-    """Return a title for each file: its pattern's name without {parts}, or its own name where one pattern fits all."""
-    patterns = _patterns(entry)
-    return titles_of(patterns) if len(patterns) == len(paths) else tuple(path.stem for path in paths)
+def _hits(source: Path, name: str, entry: FileEntry) -> list[Hit]:
+    """Return the files of one kind; raises UsageError if there is none."""
+    hits: list[Hit] = [({}, source)] if is_one(source) else []
+    for path in entry.paths if not hits else ():
+        fitting = _matches(source, path)
+        if not fitting:
+            raise UsageError(
+                f"no file fits {path} below {source}",
+                "one or more",
+                f"correct files/{name}/path in the mapping; there is {_listing(source)}",
+            )
+        hits += fitting
+    return _in_tables(hits, entry.table) if isinstance(entry.table, str) and "{" in entry.table else hits
 
 
-def titles_of(patterns: list[str]) -> tuple[str, ...]:
+def _set(parts: dict[str, str], files: dict[str, FileEntry], matches: dict[str, list[Hit]]) -> FileSet:
+    """Return the files whose parts agree with those of a trial, or why they are not complete."""
+    chosen: dict[str, SourceFile] = {}
+    for name, entry in files.items():
+        agreeing = (path for values, path in matches[name] if all(parts.get(k, v) == v for k, v in values.items()))
+        fitting, required = tuple(agreeing), len(entry.paths)
+        incomplete = len(fitting) < required if entry.join else len(fitting) != 1 or required > 1
+        if incomplete:
+            fault = FormatError(
+                f"{len(fitting)} files {' and '.join(entry.paths)} for {parts or 'the source'}",
+                "exactly one" if required == 1 else "one of each, and join: rows, continued or columns",
+                "complete the source, or narrow the path with a {part} in the mapping",
+            )
+            return FileSet(parts, chosen, fault)
+        if isinstance(entry.table, str):
+            entry = replace(entry, table=entry.table.format(**parts) if "{" in entry.table else entry.table)
+        chosen[name] = SourceFile(entry, fitting)
+    return FileSet(parts, chosen)
+
+
+def titles_of(patterns: Sequence[str]) -> tuple[str, ...]:
     """Return the names in paths without their folders, endings, {parts} and #."""
     names = [Path(pattern).stem for pattern in patterns]
     return tuple(re.sub(r"\{\w+\}|#", "", name).strip("_- ") or name for name in names)
 
 
-def without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
-    """Return a mapping in which each axis with an expression names a derived column of its file.
-
-    Raises:
-        FormatError: If an axis has both a column and an expression, or neither.
-    """
-    result = {**mapping, "files": {name: dict(entry) for name, entry in mapping["files"].items()}}
-    for section in ("position", "schedule"):
-        axes = dict(mapping.get(section, {}))
-        for key, axis in axes.items():
-            if not isinstance(axis, dict) or key == "time":
-                continue
-            if ("column" in axis) == ("expression" in axis):
-                fault = f"{section}: {key} with both or neither of column and expression"
-                raise FormatError(fault, "one of them", "correct the mapping")
-            if "expression" in axis:
-                entry, name = result["files"].get(axes.get("file", ""), {}), f"{section} {key}"
-                entry["derived"] = {**entry.get("derived", {}), name: axis["expression"]}
-                axes[key] = {**{k: v for k, v in axis.items() if k != "expression"}, "column": name}
-        if axes:
-            result[section] = axes
-    return result
-
-
-def side_by_side(parts: list[SourceTable], titles: list[str], options: dict[str, Any]) -> SourceTable:
+def side_by_side(parts: list[SourceTable], titles: Sequence[str], clock: Selector | None) -> SourceTable:
     """Return tables next to each other, as of two boards with one clock. Names that repeat get a title in front.
 
     Raises:
         FormatError: If their clocks differ, or they have no column of times.
     """
-    clock = options.get("time", {}).get("column")
     first, time = parts[0].path.name, None
     if clock is not None:
         time = single(parts[0], clock, "files: time: column")
@@ -283,8 +244,8 @@ def _check_clocks(parts: list[SourceTable], time: str) -> None:
         )
 
 
-def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
-    """Return tables below each other, with their common columns.
+def joined(parts: list[SourceTable], continued: Selector | None = None) -> SourceTable:
+    """Return tables below each other, with their common columns; the clock ``continued`` goes on from part to part.
 
     Raises:
         FormatError: If they have none in common, or the clock of a part is no number where it is to be continued.
@@ -296,8 +257,8 @@ def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
         raise FormatError(f"parts without a column in common ({listed})", "the same columns", "leave join out")
     columns = {name: [part.column(name) for part in parts] for name in shared}
     notes = [f"{parts[0].path.name}: the rows of {len(parts)} parts stand below each other"]
-    if options.get("join") == "continued" and isinstance(clock := options.get("time", {}).get("column"), str):
-        name = single(parts[0], clock, "files: time: column")
+    if isinstance(continued, str):
+        name = single(parts[0], continued, "files: time: column")
         if any(values.dtype == object for values in columns.get(name, [np.empty(0, object)])):
             raise FormatError(f"{name} is no number in all parts", "a clock of numbers", "write join: rows")
         pieces = [np.asarray(columns[name][0], float)]
@@ -318,21 +279,21 @@ def joined(parts: list[SourceTable], options: dict[str, Any]) -> SourceTable:
     return replace(parts[0], columns=result, notes=tuple(notes), doubts=doubts)
 
 
-def _in_tables(files: list[tuple[dict[str, str], Path]], entry: dict[str, Any]) -> list[tuple[dict[str, str], Path]]:
-    """Return each table of the files that fits the entry's, as "Run {n}" does, with its parts added to the path's."""
+def _in_tables(files: list[Hit], pattern: str) -> list[Hit]:
+    """Return each table of the files that fits a pattern, as "Run {n}" does, with its parts added to the path's."""
     fitting = [
         ({**parts, **match.groupdict()}, path)
         for parts, path in files
         for table in tables_in(path)
-        if (match := re.fullmatch(_regex(entry["table"]), composed(table)))
+        if (match := re.fullmatch(_regex(pattern), composed(table)))
     ]
     if not fitting:
         tables = ", ".join(filter(None, tables_in(files[0][1]))) or "no table of its own: leave table out"
-        raise UsageError(f"{files[0][1]}: no table fits {entry['table']}", tables, "correct table in the mapping")
+        raise UsageError(f"{files[0][1]}: no table fits {pattern}", tables, "correct table in the mapping")
     return fitting
 
 
-def _matches(source: Path, pattern: str) -> list[tuple[dict[str, str], Path]]:
+def _matches(source: Path, pattern: str) -> list[Hit]:
     # Names are compared in composed form: macOS stores an accent as a character of its own.
     regex, hits = _regex(pattern), []
     for path in files_below(source):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis, numbers, select, single, unit_of, units_of
 from tacdata.importing.formats.source_format import INNER, SourceTable
+from tacdata.importing.mapping import Clock, ColumnsEntry, Mapping, PositionEntry, StreamEntry
 from tacdata.importing.plausibility.codes import table_without_codes, without_codes
 from tacdata.importing.plausibility.repeats import without_repeats
 from tacdata.importing.plausibility.time_order import moments, spread, time_order
@@ -79,19 +79,24 @@ class ImportedStreams:
         return replace(self, taxels=self.taxels.within(begin_ns, end_ns), position=position, measured=measured)
 
 
-def read_streams(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> list[ImportedStreams]:
+def read_streams(
+    mapping: Mapping, tables: dict[str, SourceTable], place: tuple[float, float] = (0.0, 0.0)
+) -> list[ImportedStreams]:
     """Return the streams that a mapping describes, for each stretch in which time never goes back.
 
     Args:
-        mapping: The mapping's document.
+        mapping: The mapping.
         tables: Name under ``files`` -> its table.
+        place: x and y of the press [mm], for a position without them.
 
     Raises:
         FormatError: If a column, unit or clock is wrong, clocks have no zero in common, or not all of them begin again.
     """
-    taxels, counted = _taxels(mapping, tables)
-    position, depth_given = _position(mapping, tables)
-    measured = [_measured(mapping, name, entry, tables) for name, entry in mapping.get("measured", {}).items()]
+    taxels = _taxels(mapping.taxels, tables[mapping.taxels.file])
+    path = mapping.position
+    position = _position(path, tables[path.file], place) if path else []
+    counted, depth_given = mapping.taxels.counter is not None, path is not None and path.depth_given
+    measured = [_measured(name, entry, tables[entry.file]) for name, entry in mapping.measured.items()]
     _check_stretches([taxels, *([position] if position else []), *measured])
     stretches = []
     for number, readings in enumerate(taxels):
@@ -124,31 +129,8 @@ def _check_stretches(streams: list[list[Stream]]) -> None:
         )
 
 
-def _clock(mapping: dict[str, Any], entry: dict[str, Any]) -> dict[str, Any]:
-    clock = entry.get("time") or mapping["files"][entry["file"]].get("time")
-    if not clock:
-        raise FormatError(
-            f"no clock for {entry['file']}",
-            "time: {column: NAME} or time: {rate: HZ}",
-            f"add time under files/{entry['file']} in the mapping",
-        )
-    return clock
-
-
-def _table(mapping: dict[str, Any], tables: dict[str, SourceTable], alias: str, where: str) -> SourceTable:
-    if alias not in tables:
-        raise FormatError(f"{where}: file {alias!r}", ", ".join(mapping["files"]), "name one under files")
-    return tables[alias]
-
-
-def _missing(mapping: dict[str, Any], entry: dict[str, Any]) -> list[float]:
-    common = mapping["files"][entry["file"]].get("missing", [])
-    return [value for value in (*common, *entry.get("missing", [])) if not isinstance(value, str)]
-
-
 def _timed(
-    mapping: dict[str, Any],
-    entry: dict[str, Any],
+    entry: StreamEntry,
     table: SourceTable,
     name: str,
     values: np.ndarray,
@@ -157,16 +139,16 @@ def _timed(
     doubts: tuple[str, ...] = (),
 ) -> list[Stream]:
     """Return a stream for each stretch of a file in which time never goes back."""
-    clock = _clock(mapping, entry)
+    clock = entry.clock
     # Wraps and restarts are recognized by the clock's own numbers: the offset follows after they are undone.
-    bare = {key: value for key, value in clock.items() if key != "offset"}
+    bare = replace(clock, offset=None)
     time_ns, zero = times(table, bare, f"{name}: time")
     tick_ns = 0.0 if zero == "unix" else _tick(table, bare, time_ns, name)
-    zero = "aligned" if "offset" in clock else f"own: {entry['file']}" if zero == "own" else zero
+    zero = "aligned" if clock.offset is not None else f"own: {entry.file}" if zero == "own" else zero
     order = time_order(time_ns, f"{table.path.name}: {_clock_name(clock)}", tick_ns=tick_ns)
-    offset_ns, stretches = round(clock.get("offset", 0.0) * 1e9), []
+    stretches = []
     for rows in order.stretches:
-        apart_ns, shared = spread(order.time_ns[rows] + offset_ns)
+        apart_ns, shared = spread(order.time_ns[rows] + clock.offset_ns)
         notes = [*table.notes]
         if shared:
             notes.append(
@@ -190,16 +172,16 @@ def _timed(
     return stretches
 
 
-def _clock_name(clock: dict[str, Any]) -> str:
-    column = clock.get("column", "time")
+def _clock_name(clock: Clock) -> str:
+    column = "time" if clock.column is None else clock.column
     return " ".join(map(str, column)) if isinstance(column, list) else str(column)
 
 
-def _tick(table: SourceTable, clock: dict[str, Any], time_ns: np.ndarray, name: str) -> float:
+def _tick(table: SourceTable, clock: Clock, time_ns: np.ndarray, name: str) -> float:
     """Return one step of a clock's numbers [ns]; 0 where no column of numbers holds the times."""
-    if not isinstance(clock.get("column"), str | int):
+    if not isinstance(clock.column, str | int):
         return 0.0
-    numbers = table.column(single(table, clock["column"], f"{name}: time"))
+    numbers = table.column(single(table, clock.column, f"{name}: time"))
     if numbers.dtype == object:
         return 0.0
     valid = time_ns != NEVER
@@ -207,37 +189,32 @@ def _tick(table: SourceTable, clock: dict[str, Any], time_ns: np.ndarray, name: 
     return float(np.ptp(time_ns[valid])) / span if span > 0 else 0.0
 
 
-def _taxels(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[list[Stream], bool]:
-    entry = mapping["taxels"]
-    table = _table(mapping, tables, entry["file"], "taxels")
-    if ("long" in entry) == ("columns" in entry):
-        raise FormatError("taxels with both or neither of columns and long", "one of them", "correct the mapping")
-    if "long" in entry:
-        table, names = _widened(mapping, table, entry)
+def _taxels(entry: ColumnsEntry, table: SourceTable) -> list[Stream]:
+    if entry.long:
+        table, names = _widened(table, entry.clock, **entry.long)
     else:
-        names = select(table, entry["columns"], "taxels: columns")
-    _refuse_clock(table, names, _clock(mapping, entry))
-    units = units_of(table, names, entry, "taxels")
+        names = select(table, entry.columns, "taxels: columns")
+    _refuse_clock(table, names, entry.clock)
+    units = units_of(table, names, "taxels", entry.unit)
     unit = next(filter(None, units), "") or "as in the source"
-    values, doubts = _readings(table, names, _missing(mapping, entry), entry, "taxels")
+    values, doubts = _readings(table, names, entry, "taxels")
     if several := _several(units):
         unit, doubts = "as in the source", (*doubts, f"taxels: {several}")
-    values = values * entry.get("scale", 1.0)
+    values = values * entry.scale
     labels = [f"{n}[{k}]" if width else n for n in names for width in (table.inner(n),) for k in range(max(width, 1))]
-    if counted := "counter" in entry:
-        name = single(table, entry["counter"], "taxels: counter")
+    if entry.counter is not None:
+        name = single(table, entry.counter, "taxels: counter")
         values = np.concatenate([values, numbers(table, [name], [], "taxels: counter")], axis=1)
-    stretches = _timed(mapping, entry, table, "taxels", values, tuple(map(_label, labels)), unit, doubts)
-    return stretches, counted
+    return _timed(entry, table, "taxels", values, tuple(map(_label, labels)), unit, doubts)
 
 
-def _refuse_clock(table: SourceTable, names: list[str], clock: dict[str, Any]) -> None:
+def _refuse_clock(table: SourceTable, names: list[str], clock: Clock) -> None:
     """Refuse channels among which is their own clock.
 
     Raises:
         FormatError: Naming it.
     """
-    if isinstance(column := clock.get("column"), str | int) and (time := single(table, column, "time")) in names:
+    if isinstance(clock.column, str | int) and (time := single(table, clock.column, "time")) in names:
         raise FormatError(
             f"taxels: {time} of {table.path.name} is the time, and among the channels",
             "columns that the sensor reads",
@@ -246,11 +223,11 @@ def _refuse_clock(table: SourceTable, names: list[str], clock: dict[str, Any]) -
 
 
 def _readings(
-    table: SourceTable, names: list[str], missing: list[float], entry: dict[str, Any], name: str
+    table: SourceTable, names: list[str], entry: ColumnsEntry, name: str
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """Return columns as numbers without codes, unless the mapping trusts them; and notes on missing values."""
-    values = numbers(table, names, missing, name)
-    if entry.get("trusted"):
+    values = numbers(table, names, entry.missing, name)
+    if entry.trusted:
         return values, ()
     values, codes = without_codes(values, name, rails=name == "taxels")
     values, repeats = without_repeats(values, name)
@@ -268,19 +245,19 @@ def _label(name: str) -> str:
     return name if INNER.fullmatch(name) else split_unit(name)[0]
 
 
-def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any]) -> tuple[SourceTable, list[str]]:
+def _widened(table: SourceTable, clock: Clock, channel: str | int, value: str | int) -> tuple[SourceTable, list[str]]:
     """Turn a table with one row per channel into one with one column per channel; missing values are NaN."""
-    clock = _clock(mapping, entry)
-    time = single(table, clock["column"], "taxels: time") if "column" in clock else None
-    if time is None:
+    if clock.column is None:
         # A rate would count rows, and here a row is one channel and not one moment.
         raise FormatError("taxels: long without a time column", "time: {column: NAME}", "add it to the mapping")
-    channel = table.column(single(table, entry["long"]["channel"], "taxels: long: channel"))
-    value = numbers(table, [single(table, entry["long"]["value"], "taxels: long: value")], [], "taxels: long")[:, 0]
-    distinct, column = np.unique(channel.astype(str) if channel.dtype == object else channel, return_inverse=True)
+    time = single(table, clock.column, "taxels: time")
+    labels_of_rows = table.column(single(table, channel, "taxels: long: channel"))
+    readings = numbers(table, [single(table, value, "taxels: long: value")], [], "taxels: long")[:, 0]
+    labels_of_rows = labels_of_rows.astype(str) if labels_of_rows.dtype == object else labels_of_rows
+    distinct, column = np.unique(labels_of_rows, return_inverse=True)
     times_of_rows, first, row, notes = moments(times(table, clock, "taxels: time")[0], column, table.path.name)
     wide = np.full((len(times_of_rows), len(distinct)), np.nan)
-    wide[row, column] = value
+    wide[row, column] = readings
     labels = [f"{k:g}" if isinstance(k, float) else str(k) for k in distinct.tolist()]
     columns = {time: table.column(time)[first], **{f"channel {label}": wide[:, k] for k, label in enumerate(labels)}}
     unit = {time: table.units[time]} if time in table.units else {}
@@ -289,31 +266,22 @@ def _widened(mapping: dict[str, Any], table: SourceTable, entry: dict[str, Any])
     ]
 
 
-def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[list[Stream], bool]:
-    entry = mapping.get("position")
-    if entry is None:
-        return [], False
-    if ("depth" in entry) == ("z" in entry):
-        raise FormatError("position with both or neither of z and depth", "one of them", "correct the mapping")
-    table = _table(mapping, tables, entry["file"], "position")
-    missing, press_entry = _missing(mapping, entry), mapping.get("press", {})
-    depth_given = "depth" in entry
+def _position(entry: PositionEntry, table: SourceTable, place: tuple[float, float]) -> list[Stream]:
     doubts: tuple[str, ...] = ()
-    if not entry.get("trusted"):
-        table, doubts = _without_codes(table, entry)
-    columns = []
-    for name in ("x", "y"):
-        fallback = press_entry.get(name, 0.0)
-        value = entry.get(name, fallback if isinstance(fallback, int | float) else 0.0)
-        columns.append(axis(table, value, "mm", missing, f"position: {name}"))
-    down = axis(table, entry["depth" if depth_given else "z"], "mm", missing, "position: depth or z")
-    columns.append(-down if depth_given else down)
+    if not entry.trusted:
+        # A unit would hide codes: they are found in the numbers of the file.
+        selected = [single(table, each.column, "position") for each in entry.columns.values()]
+        table, doubts = table_without_codes(table, selected, "position")
+    axes = {"x": place[0], "y": place[1]} | entry.axes
+    columns = [axis(table, axes[name], "mm", f"position: {name}", entry.missing) for name in ("x", "y")]
+    down = axis(table, axes["depth" if entry.depth_given else "z"], "mm", "position: depth or z", entry.missing)
+    columns.append(-down if entry.depth_given else down)
     values = np.stack(np.broadcast_arrays(*columns, np.zeros(table.rows))[:3], axis=1)
-    if not entry.get("trusted"):
+    if not entry.trusted:
         values, further = without_codes(values, "position", rails=False)
         doubts += further
     complete = np.isfinite(values).all(axis=1)
-    stretches = _timed(mapping, entry, table, "position", values, ("x", "y", "z"), "mm", doubts)
+    stretches = _timed(entry, table, "position", values, ("x", "y", "z"), "mm", doubts)
     if not complete.any():
         raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
     assumed = tuple(_taken_as_mm(table, entry))
@@ -324,32 +292,23 @@ def _position(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[
             notes=(*stream.notes, *assumed),
         )
         for stream in stretches
-    ], depth_given
+    ]
 
 
-def _without_codes(table: SourceTable, entry: dict[str, Any]) -> tuple[SourceTable, tuple[str, ...]]:
-    """Return a table without codes in the columns of a position, as the file has them: a unit would hide them."""
-    axes = [axis for key in ("x", "y", "z", "depth") if isinstance(axis := entry.get(key), dict)]
-    return table_without_codes(table, [single(table, axis["column"], "position") for axis in axes], "position")
-
-
-def _taken_as_mm(table: SourceTable, entry: dict[str, Any]) -> Iterator[str]:
+def _taken_as_mm(table: SourceTable, entry: PositionEntry) -> Iterator[str]:
     """Yield a remark for each column of a position whose unit neither the mapping nor the file gives."""
-    for key in ("x", "y", "z", "depth"):
-        if isinstance(axis_entry := entry.get(key), dict) and not unit_of(table, axis_entry, f"position: {key}"):
-            name = single(table, axis_entry["column"], f"position: {key}")
+    for key, column in entry.columns.items():
+        name = single(table, column.column, f"position: {key}")
+        if not unit_of(table, name, f"position: {key}", column.unit):
             yield f"position: {name} has no unit and is taken in mm; else give unit under position/{key} in the mapping"
 
 
-def _measured(
-    mapping: dict[str, Any], name: str, entry: dict[str, Any], tables: dict[str, SourceTable]
-) -> list[Stream]:
-    table = _table(mapping, tables, entry["file"], f"measured: {name}")
-    names = select(table, entry["columns"], f"measured: {name}")
-    units = units_of(table, names, entry, f"measured: {name}")
+def _measured(name: str, entry: ColumnsEntry, table: SourceTable) -> list[Stream]:
+    names = select(table, entry.columns, f"measured: {name}")
+    units = units_of(table, names, f"measured: {name}", entry.unit)
     unit = next((each for each in units if each), "")
-    values, doubts = _readings(table, names, _missing(mapping, entry), entry, f"measured: {name}")
-    values = values * entry.get("scale", 1.0)
+    values, doubts = _readings(table, names, entry, f"measured: {name}")
+    values = values * entry.scale
     ours = {quantity_of(each) or "" for each in units if each}
     if len(ours) == 1 and ours <= {"N", "mm"}:
         (unit,) = ours
@@ -360,7 +319,7 @@ def _measured(
     # An array column expands to several, and then names and columns differ in number.
     labels = tuple(split_unit(n)[0] for n in names) if len(names) == values.shape[1] else None
     labels = labels or tuple(str(k) for k in range(values.shape[1]))
-    stretches = _timed(mapping, entry, table, name, values, labels, unit, doubts)
+    stretches = _timed(entry, table, name, values, labels, unit, doubts)
     return [stream.chosen(np.flatnonzero(np.isfinite(stream.values).any(axis=1))) for stream in stretches]
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
 
 import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import single, unit_of
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.mapping import Clock
 from tacdata.importing.units import FACTORS, clock_unit, factor, plain
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
@@ -30,7 +30,7 @@ NO_UNIT = {"", "unix", "epoch", "posix", "utc", "gmt", "local", "time", "timesta
 """Words in brackets behind a clock's name that are no unit (compared in lower case)."""
 
 
-def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.ndarray, str]:
+def times(table: SourceTable, clock: Clock, where: str) -> tuple[np.ndarray, str]:
     """Return each row's time and the zero of the clock.
 
     Args:
@@ -44,52 +44,52 @@ def times(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[np.nda
     Raises:
         FormatError: If the column or unit is wrong, or a Unix clock shows no Unix times.
     """
-    if "column" not in clock:
-        if "rate" not in clock:
+    column = clock.column
+    if column is None:
+        if clock.rate is None:
             raise FormatError(f"{where}: neither column nor rate", "one of them", "say where the times are")
-        return _shifted(np.arange(table.rows) / clock["rate"], clock), clock.get("zero", "own")
-    if isinstance(clock["column"], list):
-        table, clock = _joined(table, clock, where)
-    name = single(table, clock["column"], f"{where}: column")
-    if "rate" in clock:  # the column counts rows, so that its restarts and lost rows are seen
-        clock = {"zero": "own", **clock, "unit": f"1/{clock['rate']:.12g} s"}
-    unit = plain(unit_of(table, clock, where) or clock_unit(name))
+        return _shifted(np.arange(table.rows) / clock.rate, clock), clock.zero or "own"
+    if isinstance(column, list):
+        table, column = _joined(table, column, where)
+    name = single(table, column, f"{where}: column")
+    if clock.rate is not None:  # the column counts rows, so that its restarts and lost rows are seen
+        clock = replace(clock, zero=clock.zero or "own", unit=f"1/{clock.rate:.12g} s")
+    unit = plain(unit_of(table, name, where, clock.unit) or clock_unit(name))
     values = table.column(name)
     if values.dtype == object and (clocked := _times_of_day(values)) is not None:
-        return _shifted(clocked, clock), clock.get("zero", "shared")
+        return _shifted(clocked, clock), clock.zero or "shared"
     if values.dtype == object or unit == "datetime":
-        return _shifted_ns(_datetimes(values, clock.get("format"), f"{where}: {name}"), clock), "unix"
+        return _shifted_ns(_datetimes(values, clock.format, f"{where}: {name}"), clock), "unix"
     if unit in DAY_ZERO:
-        return _of_days(values, unit, clock), clock.get("zero", "unix")
+        return _of_days(values, unit, clock), clock.zero or "unix"
     if unit.lower() in NO_UNIT:
         unit = _guessed(values)
         _refuse_unsaid(values, unit, f"{where}: {name}")
-    zero = clock.get("zero")
     scale = factor(unit, "s", f"{where}: {name}")
     if scale == DAY and (dated := _dated(values)):
-        return _of_days(values, dated, clock), clock.get("zero", "unix")
+        return _of_days(values, dated, clock), clock.zero or "unix"
     _refuse_late(values, unit, scale, f"{where}: {name}")
     _refuse_fast(values, unit, scale, f"{where}: {name}")
     middle = float(np.nanmedian(values.astype(float))) * scale if len(values) else 0.0
     looks_unix = YEAR_2000 < middle < YEAR_2100
-    if zero == "unix" and not looks_unix:
+    if clock.zero == "unix" and not looks_unix:
         raise FormatError(
             f"{where}: {name} shows {middle:.6g} s in {unit}, no Unix time of this century",
             "seconds since 1970 in the unit that is given",
             "correct unit, or give zero: shared or zero: own",
         )
+    zero = clock.zero or ("unix" if looks_unix else "shared")
     # Integers stay exact: Unix nanoseconds need 61 bits, a float64 has 53.
-    if values.dtype.kind in "iu" and "drift" not in clock and scale < 1:
-        nanoseconds = values.astype(np.int64) * round(scale * 1e9)
-        return nanoseconds + round(clock.get("offset", 0.0) * 1e9), zero or ("unix" if looks_unix else "shared")
-    return _shifted(values.astype(float) * scale, clock), zero or ("unix" if looks_unix else "shared")
+    if values.dtype.kind in "iu" and not clock.drift and scale < 1:
+        return values.astype(np.int64) * round(scale * 1e9) + clock.offset_ns, zero
+    return _shifted(values.astype(float) * scale, clock), zero
 
 
 NEVER = np.iinfo(np.int64).min
 """Time of a row that has none [ns]."""
 
 
-def _shifted(seconds: np.ndarray, clock: dict[str, Any]) -> np.ndarray:
+def _shifted(seconds: np.ndarray, clock: Clock) -> np.ndarray:
     valid = np.isfinite(seconds)
     full_seconds = np.floor(np.where(valid, seconds, 0.0))
     part = np.where(valid, seconds, 0.0) - full_seconds
@@ -99,14 +99,14 @@ def _shifted(seconds: np.ndarray, clock: dict[str, Any]) -> np.ndarray:
     return _shifted_ns(result, clock)
 
 
-def _shifted_ns(time_ns: np.ndarray, clock: dict[str, Any]) -> np.ndarray:
+def _shifted_ns(time_ns: np.ndarray, clock: Clock) -> np.ndarray:
     valid = time_ns != NEVER
     result = time_ns.copy()
-    if drift := clock.get("drift", 0.0):
+    if clock.drift:
         first = time_ns[valid].min() if valid.any() else 0
-        stretched = (time_ns[valid] - first) / (1 + drift * 1e-6)
+        stretched = (time_ns[valid] - first) / (1 + clock.drift * 1e-6)
         result[valid] = first + np.rint(stretched).astype(np.int64)
-    result[valid] += round(clock.get("offset", 0.0) * 1e9)
+    result[valid] += clock.offset_ns
     return result
 
 
@@ -116,7 +116,7 @@ def _guessed(values: np.ndarray) -> str:
     return next((u for u in ("ns", "us", "ms") if YEAR_2000 < middle * FACTORS["s"][u] < YEAR_2100), "s")
 
 
-def _of_days(values: np.ndarray, unit: str, clock: dict[str, Any]) -> np.ndarray:
+def _of_days(values: np.ndarray, unit: str, clock: Clock) -> np.ndarray:
     """Return Unix times [ns] of days counted from one of `DAY_ZERO`."""
     return _shifted((values.astype(float) - DAY_ZERO[unit]) * DAY, clock)
 
@@ -248,14 +248,13 @@ CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "
 """Dates and times of day as instruments write them; the layout that fits all rows of a file decides."""
 
 
-def _joined(table: SourceTable, clock: dict[str, Any], where: str) -> tuple[SourceTable, dict[str, Any]]:
-    """Return the table with columns of dates and times of day joined into one."""
-    names = [single(table, column, f"{where}: column") for column in clock["column"]]
+def _joined(table: SourceTable, columns: list[str | int], where: str) -> tuple[SourceTable, str]:
+    """Return the table with columns of dates and times of day joined into one, and that column."""
+    names = [single(table, column, f"{where}: column") for column in columns]
     parts = [_as_texts(table.column(name)) for name in names]
     texts = [" ".join(row) if all(row) else None for row in zip(*parts, strict=True)]
     joined = " ".join(names)
-    columns = {**table.columns, joined: np.array(texts, dtype=object)}
-    return replace(table, columns=columns), {**clock, "column": joined}
+    return replace(table, columns={**table.columns, joined: np.array(texts, dtype=object)}), joined
 
 
 def _as_texts(values: np.ndarray) -> list[str]:

@@ -580,8 +580,9 @@ def test_an_excel_sheet_is_read_like_a_text_file(tmp_path):
     np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 20_000_000, atol=1e6)
     assert episode.press.depth == pytest.approx(depth.max(), abs=1e-3)
     assert episode.measured[0].unit == "N"
+    files = {"data": {"path": "wide.xlsx", "table": "run 2", "time": {"column": "when"}}}
     with pytest.raises(FormatError, match="no sheet run 2"):
-        imported(tmp_path, mapping(tmp_path, files={"data": {"path": "wide.xlsx", "table": "run 2"}}), "again")
+        imported(tmp_path, mapping(tmp_path, files=files), "again")
 
 
 @pytest.mark.parametrize(

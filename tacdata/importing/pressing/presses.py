@@ -7,23 +7,23 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import axis, label_of, single
+from tacdata.importing.columns import axis, label_of, part_of, table_of
 from tacdata.importing.foreign_sensor import foreign_sensor
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.mapping import Axis, Mapping, PositionEntry, TrialRule, Value
 from tacdata.importing.pressing.path_faults import without_faults
 from tacdata.importing.pressing.press_path import PressPath, press_path
 from tacdata.importing.pressing.schedule import ScheduledPress, read_schedule
+from tacdata.importing.pressing.trials import windows
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.streams import ImportedStreams, Stream, read_streams
-from tacdata.importing.trials import windows
 from tacdata.importing.units import factor
-from tacdata.indenters import Indenter, from_document
+from tacdata.indenters import from_document
 from tacdata.plans import Press
 from tacdata.rig import Registration
 
@@ -53,6 +53,19 @@ UNITS = {
 
 
 @dataclass(frozen=True)
+class _Trial:
+    """Values that the presses of a trial have in common."""
+
+    mapping: Mapping
+    tables: dict[str, SourceTable]
+    press: dict[str, float]
+    """Stated values of its presses."""
+    contact: dict[str, float]
+    """Machine position at which the skin is touched."""
+    centre: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Refusal:
     """A stretch of a trial that cannot be a recording, and why. The rest of the trial is imported."""
 
@@ -61,8 +74,7 @@ class Refusal:
 
 
 def presses_of(
-    mapping: dict[str, Any],
-    folder: Path,
+    mapping: Mapping,
     tables: dict[str, SourceTable],
     parts: dict[str, str],
     record: dict[str, Any],
@@ -71,8 +83,7 @@ def presses_of(
     """Yield the recordings that the rows of a trial hold, and a refusal for each stretch that cannot be one.
 
     Args:
-        mapping: The mapping's document.
-        folder: Folder of the mapping, to which the sensor file's path is relative.
+        mapping: The mapping.
         tables: Name under ``files`` -> rows.
         parts: {part} of the paths -> its text.
         record: The import record so far.
@@ -81,15 +92,12 @@ def presses_of(
     Raises:
         FormatError: If columns, units or clocks are wrong, or there is neither position nor schedule.
     """
-    stated = dict(mapping.get("press", {}))
-    if specimen := stated.pop("specimen", ""):
-        record = {**record, "specimen": label_of(specimen, tables, parts, "press: specimen")}
-    press_values = _known(stated, tables, parts, "press")
-    contact = mapping.get("contact", {})
-    resolved = _known({k: v for k, v in contact.items() if k != "known_from"}, tables, parts, "contact")
-    mapping = {**mapping, "press": {**stated, **press_values}, "contact": {**contact, **resolved}}
-    stretches = read_streams(mapping, tables)
-    if len(stretches) > 1 and mapping.get("schedule"):
+    if mapping.specimen:
+        record = {**record, "specimen": label_of(mapping.specimen, tables, parts, "press: specimen")}
+    press = _known(mapping.press, tables, parts, "press")
+    trial = _Trial(mapping, tables, press, _known(mapping.contact, tables, parts, "contact"), centre)
+    stretches = read_streams(mapping, tables, (press.get("x", 0.0), press.get("y", 0.0)))
+    if len(stretches) > 1 and mapping.schedule:
         raise FormatError(
             f"a schedule, and channels whose time goes back {'; '.join(stretches[0].taxels.steps_back)}",
             "one clock for the presses of a schedule",
@@ -103,22 +111,13 @@ def presses_of(
             note = f"stretch {number} has {len(streams.taxels.time_ns)} rows and is left out"
             yield Refusal(label, FormatError(note, f"{FEWEST} rows or more", "leave it out"))
             continue
-        yield from _of_stretch(
-            mapping, folder, tables, streams, press_values, centre, {**record, "trial": label, "time_shift_ns": shift}
-        )
+        yield from _of_stretch(trial, streams, {**record, "trial": label, "time_shift_ns": shift})
 
 
-def _of_stretch(
-    mapping: dict[str, Any],
-    folder: Path,
-    tables: dict[str, SourceTable],
-    streams: ImportedStreams,
-    press_values: dict[str, float],
-    centre: tuple[float, float],
-    record: dict[str, Any],
-) -> Iterator[ImportedPress | Refusal]:
+def _of_stretch(trial: _Trial, streams: ImportedStreams, record: dict[str, Any]) -> Iterator[ImportedPress | Refusal]:
     """Yield the recordings of a stretch, and a refusal for each part that cannot be one."""
-    scheduled = read_schedule(mapping, tables, streams.taxels)
+    mapping = trial.mapping
+    scheduled = read_schedule(mapping.schedule, trial.tables, streams.taxels)
     if streams.position is None and not scheduled:
         raise FormatError(
             "neither a position nor a press schedule",
@@ -131,21 +130,21 @@ def _of_stretch(
         error = FormatError(f"trial {record['trial']}: no position in it", "a position", "split otherwise")
         yield Refusal(record["trial"], error)
         return
-    if not mapping.get("position", {}).get("trusted"):
+    if mapping.position is None or not mapping.position.trusted:
         streams = without_faults(streams)
     record = {**record, "set_aside": list(streams.doubts), "notes": [*streams.notes, *streams.doubts]}
-    place, unsaid = _registration(mapping, streams, centre)
-    cuts = _cuts(mapping, streams, scheduled, place)
+    place, unsaid = _registration(trial, streams)
+    cuts = _cuts(mapping.trials, streams, scheduled, place)
     for number, (begin, end, planned) in enumerate(cuts):
-        trial = (record["trial"] + (f" #{number}" if len(cuts) > 1 else "")).strip()
+        label = (record["trial"] + (f" #{number}" if len(cuts) > 1 else "")).strip()
         part = streams.within(begin, end)
         if planned:
             part = replace(part, position=_commanded(planned, begin, end))
         try:
-            _check_rows(part, trial)
-            yield _imported(mapping, folder, part, place, planned, press_values, [*unsaid], {**record, "trial": trial})
+            _check_rows(part, label)
+            yield _imported(trial, part, place, planned, unsaid, {**record, "trial": label})
         except FormatError as error:
-            yield Refusal(trial, error)
+            yield Refusal(label, error)
 
 
 def _check_rows(streams: ImportedStreams, trial: str) -> None:
@@ -166,19 +165,18 @@ def _check_rows(streams: ImportedStreams, trial: str) -> None:
 
 
 def _imported(
-    mapping: dict[str, Any],
-    folder: Path,
+    trial: _Trial,
     streams: ImportedStreams,
     place: Registration,
     planned: ScheduledPress | None,
-    press_values: dict[str, float],
-    stand_ins: list[str],
+    unsaid: list[str],
     record: dict[str, Any],
 ) -> ImportedPress:
+    mapping, stand_ins = trial.mapping, [*unsaid]
     taxels, lost, restarted = _without_counter(streams)
     spans = np.diff(taxels.time_ns)
     rate = float(1e9 / np.median(spans[spans > 0])) if (spans > 0).any() else 1.0
-    sensor, unknown = foreign_sensor(mapping["sensor"], folder, len(taxels.names), round(rate, 3))
+    sensor, unknown = foreign_sensor(mapping.sensor, mapping.folder, len(taxels.names), round(rate, 3))
     position = streams.position
     if position is None:
         raise FormatError("no position", "a position", "add it to the mapping")
@@ -193,14 +191,16 @@ def _imported(
         )
     for doubt in filter(None, (restarted, _path_doubt(taxels, position, tip[:, 2]))):
         record = {**record, "set_aside": [*record["set_aside"], doubt], "notes": [*record["notes"], doubt]}
-    indenter, name = _indenter(mapping)
-    if name == "unknown":
+    indenter, name = from_document(mapping.indenter or NO_INDENTER, "indenter"), "unknown"
+    if mapping.indenter:
+        name = mapping.indenter["shape"]
+    else:
         stand_ins.append("indenter: not said by the source; a sphere of 2 mm stands in")
-    if path.speed is None and "speed" not in press_values:
+    if path.speed is None and "speed" not in trial.press:
         stand_ins.append("speed: the indenter does not move; 1 mm/s stands in")
     angles = {"yaw": 0.0, "tilt_x": 0.0, "tilt_y": 0.0}
     values = {"x": path.x, "y": path.y, "depth": path.depth, "speed": path.speed or 1.0, "hold": path.hold, **angles}
-    values = {key: round(value, 4) for key, value in {**values, **press_values}.items()}
+    values = {key: round(value, 4) for key, value in {**values, **trial.press}.items()}
     press = Press(
         index=0,
         indenter=indenter,
@@ -220,7 +220,7 @@ def _imported(
         "origin": list(place.origin),
         "yaw": place.yaw,
         "tilt": list(place.tilt),
-        "method": f"import: {mapping.get('contact', {}).get('known_from', 'as the mapping says')}",
+        "method": f"import: {mapping.known_from}",
         "date": datetime.now(UTC).date().isoformat(),
     }
     record = {**record, "stand_ins": [*stand_ins, *unknown], "notes": notes}
@@ -279,29 +279,21 @@ def _without_counter(streams: ImportedStreams) -> tuple[Stream, int, str]:
     return replace(taxels, values=taxels.values[:, :-1]), lost, doubt * bool(len(begun))
 
 
-def _indenter(mapping: dict[str, Any]) -> tuple[Indenter, str]:
-    if "indenter" not in mapping:
-        return from_document(NO_INDENTER), "unknown"
-    return from_document(mapping["indenter"], "indenter"), mapping["indenter"]["shape"]
-
-
-def centre_of(mapping: dict[str, Any], tables: dict[str, SourceTable]) -> tuple[float, float]:
+def centre_of(position: PositionEntry | None, tables: dict[str, SourceTable]) -> tuple[float, float]:
     """Return the median place [mm] of a machine over whole tables, before trials are cut; 0 without such columns.
 
     The median of each trial would put all presses at one place.
     """
-    entry = mapping.get("position", {})
-    table = tables.get(entry.get("file", ""))
-    columns = [entry[name] if isinstance(entry.get(name), dict) else 0.0 for name in ("x", "y")]
-    x, y = (float(np.nanmedian(axis(table, column, "mm", [], "position"))) for column in columns)
+    if position is None:
+        return 0.0, 0.0
+    columns = [position.columns.get(name, 0.0) for name in ("x", "y")]
+    x, y = (float(np.nanmedian(axis(tables[position.file], column, "mm", "position"))) for column in columns)
     return x, y
 
 
-def _registration(
-    mapping: dict[str, Any], streams: ImportedStreams, centre: tuple[float, float]
-) -> tuple[Registration, list[str]]:
+def _registration(trial: _Trial, streams: ImportedStreams) -> tuple[Registration, list[str]]:
     """Return the skin's pose in the machine's frame, and which of its values are stand-ins."""
-    contact, position = mapping.get("contact", {}), streams.position
+    contact, centre, position = trial.contact, trial.centre, streams.position
     if position is None or streams.depth_given:
         return Registration((0.0, 0.0, 0.0), contact.get("yaw", 0.0)), []
     values = position.values
@@ -315,7 +307,7 @@ def _registration(
 
 
 def _cuts(
-    mapping: dict[str, Any], streams: ImportedStreams, scheduled: list[ScheduledPress], place: Registration
+    trials: TrialRule, streams: ImportedStreams, scheduled: list[ScheduledPress], place: Registration
 ) -> list[tuple[int, int, ScheduledPress | None]]:
     begin, end = int(streams.taxels.time_ns[0]), int(streams.taxels.time_ns[-1]) + 1
     if scheduled:
@@ -326,7 +318,7 @@ def _cuts(
         return list(zip(edges[:-1], edges[1:], scheduled, strict=True))
     position = streams.position
     depth = (position.time_ns, place.to_sensor(position.values)[:, 2]) if position else None
-    return [(a, b, None) for a, b in windows(mapping.get("trials", {}), streams.taxels.time_ns, depth)]
+    return [(a, b, None) for a, b in windows(trials, streams.taxels.time_ns, depth)]
 
 
 def _commanded(planned: ScheduledPress, begin_ns: int, end_ns: int) -> Stream:
@@ -350,42 +342,24 @@ def _shifted(streams: ImportedStreams, shift_ns: int) -> ImportedStreams:
 
 
 def _known(
-    entries: dict[str, Any], tables: dict[str, SourceTable], parts: dict[str, str], section: str
+    entries: dict[str, Value], tables: dict[str, SourceTable], parts: dict[str, str], section: str
 ) -> dict[str, float]:
     """Return the numbers that a mapping gives for a trial: constant, from the path, or the median of a column."""
     values = {}
     for name, entry in entries.items():
-        where = f"{section}: {name}"
+        where, unit = f"{section}: {name}", UNITS[name]
         if isinstance(entry, int | float):
             values[name] = float(entry)
-        elif "part" in entry:
-            values[name] = _part(parts, entry, where)
+        elif entry.part:
+            scale = factor(entry.unit, unit, where) if entry.unit else 1.0
+            values[name] = _number(part_of(entry, parts, where), where) * scale
         else:
-            table = tables.get(entry.get("file", next(iter(tables))))
-            if table is None:
-                raise FormatError(f"{where}: file {entry.get('file')!r}", ", ".join(tables), "name one under files")
-            single(table, entry.get("column", ""), where)
-            values[name] = float(np.nanmedian(axis(table, entry, UNITS[name], [], where)))
+            column = axis(table_of(entry, tables, where), Axis(entry.column, entry.unit), unit, where)
+            values[name] = float(np.nanmedian(column))
     return values
 
 
-def _part(parts: dict[str, str], entry: dict[str, Any], where: str) -> float:
-    name = entry["part"]
-    if name not in parts:
-        raise FormatError(f"{where}: part {name!r}", ", ".join(parts) or "none: no path has a {part}", "correct part")
-    text = parts[name]
-    if pattern := entry.get("pattern"):
-        try:
-            match = re.search(pattern, text)
-        except re.error as error:
-            raise FormatError(f"{where}: pattern {pattern!r}: {error}", "a regular expression", "correct it") from None
-        if match is None or not match.groups():
-            raise FormatError(
-                f"{where}: {pattern!r} finds no number in {text!r}",
-                "a pattern with one group, as in x([-0-9.]+)",
-                "correct pattern",
-            )
-        text = match[1]
+def _number(text: str, where: str) -> float:
     # "1p5" and "1,5" are how file names write 1.5.
     digits = re.findall(r"[-+]?\d+(?:[.,p]\d+)?", text)
     if len(digits) != 1:
@@ -394,5 +368,4 @@ def _part(parts: dict[str, str], entry: dict[str, Any], where: str) -> float:
             "one number",
             "say which by pattern: a regular expression with one group",
         )
-    scale = factor(entry["unit"], UNITS[where.split(": ")[1]], where) if "unit" in entry else 1.0
-    return float(digits[0].replace("p", ".").replace(",", ".")) * scale
+    return float(digits[0].replace("p", ".").replace(",", "."))

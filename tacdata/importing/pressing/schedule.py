@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import axis
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.mapping import Axis, Schedule
 from tacdata.importing.streams import Stream
-from tacdata.importing.times import times
+from tacdata.importing.times import YEAR_2000, times
 from tacdata.recording.episode import Phase
+
+UNITS = {"depth": "mm", "speed": "mm/s", "hold": "s", "height": "mm", "x": "mm", "y": "mm", "release_speed": "mm/s"}
+"""Columns of a schedule's file, in the order of `ScheduledPress`."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,8 @@ class ScheduledPress:
         return tuple(Phase(*mark) for mark in marks if mark[2] > mark[1])
 
 
-def read_schedule(mapping: dict[str, Any], tables: dict[str, SourceTable], taxels: Stream) -> list[ScheduledPress]:
-    """Return the presses of a mapping's schedule in the order of time; [] if it has none.
+def read_schedule(schedule: Schedule | None, tables: dict[str, SourceTable], taxels: Stream) -> list[ScheduledPress]:
+    """Return the presses of a schedule in the order of time; [] without one.
 
     Times in a list of presses count from the zero of the channels' clock. If that clock is Unix time and the list's is
     not, they count from the channels' first row.
@@ -60,10 +63,9 @@ def read_schedule(mapping: dict[str, Any], tables: dict[str, SourceTable], taxel
     Raises:
         FormatError: If a column is missing, presses overlap or lie outside the recorded time.
     """
-    entry = mapping.get("schedule")
-    if not entry:
+    if schedule is None:
         return []
-    presses = _listed(entry, taxels) if "presses" in entry else _tabled(mapping, entry, tables)
+    presses = _listed(schedule, taxels) if schedule.presses else _tabled(schedule, tables)
     presses.sort(key=lambda press: press.start_ns)
     for previous, following in pairwise(presses):
         if previous.knots[0][-1] > following.start_ns:
@@ -83,50 +85,36 @@ def read_schedule(mapping: dict[str, Any], tables: dict[str, SourceTable], taxel
     return inside
 
 
-def _listed(entry: dict[str, Any], taxels: Stream) -> list[ScheduledPress]:
-    from tacdata.importing.times import YEAR_2000
-
-    zero = round(entry.get("time", {}).get("offset", 0.0) * 1e9)
+def _listed(schedule: Schedule, taxels: Stream) -> list[ScheduledPress]:
+    zero = schedule.clock.offset_ns
     # Nobody writes a schedule in Unix time by hand: small numbers count from the first row.
-    if taxels.zero == "unix" and entry["presses"][0]["start"] < YEAR_2000:
+    if taxels.zero == "unix" and schedule.presses[0].start < YEAR_2000:
         zero += int(taxels.time_ns[0])
     return [
         ScheduledPress(
-            zero + round(p["start"] * 1e9),
-            p["depth"],
-            p["speed"],
-            p.get("hold", 0.0),
-            p.get("height", 0.0),
-            p.get("x", 0.0),
-            p.get("y", 0.0),
-            p.get("release_speed", p["speed"]),
+            zero + round(p.start * 1e9), p.depth, p.speed, p.hold, p.height, p.x, p.y, p.release_speed or p.speed
         )
-        for p in entry["presses"]
+        for p in schedule.presses
     ]
 
 
-def _tabled(mapping: dict[str, Any], entry: dict[str, Any], tables: dict[str, SourceTable]) -> list[ScheduledPress]:
-    if "file" not in entry or entry["file"] not in tables or "start" not in entry:
+def _tabled(schedule: Schedule, tables: dict[str, SourceTable]) -> list[ScheduledPress]:
+    start = schedule.axes.get("start")
+    if schedule.file not in tables or start is None:
         raise FormatError(
             "schedule without presses, or without file and start",
             "presses: a list, or file: NAME with start, depth and speed as columns",
             "complete the schedule",
         )
-    table = tables[entry["file"]]
-    start = entry["start"]
-    clock = {**entry.get("time", {}), **({"column": start["column"]} if isinstance(start, dict) else {})}
-    if isinstance(start, dict) and "unit" in start:
-        clock["unit"] = start["unit"]
+    table, clock = tables[schedule.file], schedule.clock
+    if isinstance(start, Axis):
+        clock = replace(clock, column=start.column, unit=start.unit or clock.unit)
     start_ns, _ = times(table, clock, "schedule: start")
-    units = {"depth": "mm", "speed": "mm/s", "hold": "s", "height": "mm", "x": "mm", "y": "mm"}
+    axes = {"release_speed": schedule.axes.get("speed", 0.0)} | schedule.axes
     values = {
-        name: np.broadcast_to(axis(table, entry.get(name, 0.0), unit, [], f"schedule: {name}"), (table.rows,))
-        for name, unit in units.items()
+        name: np.broadcast_to(axis(table, axes.get(name, 0.0), unit, f"schedule: {name}"), (table.rows,))
+        for name, unit in UNITS.items()
     }
-    values["release_speed"] = values["speed"]
-    if "release_speed" in entry:
-        up = axis(table, entry["release_speed"], "mm/s", [], "schedule: release_speed")
-        values["release_speed"] = np.broadcast_to(up, (table.rows,))
     if not all((np.isfinite(values[name]) & (values[name] > 0)).all() for name in ("speed", "release_speed")):
         raise FormatError("schedule: a speed that is not above 0 mm/s", "above 0 mm/s", "correct the speed")
     rows = zip(*(column.tolist() for column in values.values()), strict=True)

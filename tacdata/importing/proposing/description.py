@@ -170,11 +170,10 @@ def _joined_kind(order: PartsInOrder, kinds: dict[str, FoundKind]) -> FoundKind:
     """Return the kind of a trial whose parts are in several files or sheets."""
     tables = [kinds[key].table for key in order.keys]
     time = (roles_of(tables[0]).get("time") or [None])[0]
-    options = {"join": order.join, **({"time": {"column": time}} if time else {})}
     if order.join == "columns":
-        table = side_by_side(tables, list(titles_of([key.replace(INSIDE, " ") for key in order.keys])), options)
+        table = side_by_side(tables, titles_of([key.replace(INSIDE, " ") for key in order.keys]), time)
     else:
-        table = joined(tables, options)
+        table = joined(tables, time if order.join == "continued" else None)
     return replace(kinds[order.keys[0]], table=table, parts=order.keys, join=order.join)
 
 

@@ -15,6 +15,7 @@ from tacdata.chain.at_rest import below_zero, zero_side
 from tacdata.errors import FormatError
 from tacdata.importing.columns import unit_of
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.mapping import Clock
 from tacdata.importing.plausibility.codes import table_without_codes
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
@@ -170,7 +171,7 @@ def _motion(
     name, position = columns.get("depth", columns.get("z", []))[0], document["position"]
     clock = document["files"][position["file"]]["time"]
     try:
-        time_ns, _ = times(table, clock, "")
+        time_ns, _ = times(table, Clock(**clock), "")
         axis = table.column(name).astype(float)
         motion = pressing_axis(time_ns, axis, _deviation(table, channels, axis))
     except (FormatError, ValueError):
@@ -233,7 +234,7 @@ def _each_press(depth: np.ndarray) -> list[slice]:
 def _in_mm(table: SourceTable, name: str, entry: dict[str, Any]) -> float:
     """Return the factor of a column's unit, 1 where it has no length: the trial run of the mapping reports that."""
     try:
-        return factor(unit_of(table, {"column": name, **entry}, name) or "mm", "mm", "")
+        return factor(unit_of(table, entry.get("column", name), name, entry.get("unit", "")) or "mm", "mm", "")
     except FormatError:
         return 1.0
 
@@ -325,16 +326,14 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], notes: list[
             "2 s: give time: {rate: ...}" + f"; {counter} counts the rows" * bool(counter)
         )
         return result | {"time": {"rate": rate} | ({"column": counter} if counter else {})}
-    if [table.column(name).dtype for name in roles["time"]] == [object, object]:
-        # A date and a time of day.
-        clock: dict[str, Any] = {"column": roles["time"]}
-    else:
+    clock: dict[str, Any] = {"column": roles["time"]}  # a date and a time of day
+    if [table.column(name).dtype for name in roles["time"]] != [object, object]:
         unit = plain(table.units.get(roles["time"][0], ""))
         clock = {"column": roles["time"][0], **({"unit": unit} if unit in SHORT else {})}
     if "by_values" in roles:
         notes.append(f"{roles['time'][0]}: it rises evenly, and is taken for the time, in s where no unit is given")
     try:
-        times(table, clock, Path(outer).name)
+        times(table, Clock(**clock), Path(outer).name)
     except FormatError as error:
         clock |= _american(table, roles["time"][0], notes)
         if "format" not in clock:

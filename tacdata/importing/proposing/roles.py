@@ -8,6 +8,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.mapping import Clock
 from tacdata.importing.proposing.shapes import are_letters, drive_by_shape, without_signal
 from tacdata.importing.times import times
 from tacdata.importing.units import OTHERS, plain, quantity_of, split_unit
@@ -166,7 +167,7 @@ def _are_times(table: SourceTable, name: str) -> bool:
     """Return whether a column of text holds dates or times of day, in one way or in several."""
     first = SourceTable(table.path, {name: table.columns[name][:ROWS]}, table.units)
     try:
-        times(first, {"column": name}, "")
+        times(first, Clock(name), "")
     except FormatError as error:
         return "can be read as" in error.given
     return True

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import TacdataError
+from tacdata.importing.mapping import Mapping
 from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
+from tacdata.importing.pressing.trials import split_tables
 from tacdata.importing.recording_file import ImportedPress
-from tacdata.importing.source_files import FileSet, file_sets, without_expressions
-from tacdata.importing.trials import split_tables
+from tacdata.importing.source_files import FileSet, file_sets
 
 
 @dataclass(frozen=True)
@@ -42,46 +43,47 @@ class _Outcome:
     refusals: list[TacdataError] = field(default_factory=list)
 
 
-def tried(source: Path, mapping: dict[str, Any], folder: Path, policy: TrialPolicy = POLICY) -> str:
+def tried(source: Path, document: dict[str, Any], folder: Path, policy: TrialPolicy = POLICY) -> str:
     """Return the outcome of importing some of the files by a mapping, or why nothing is imported, as a sentence.
 
     Args:
         source: The files.
-        mapping: The mapping's document.
+        document: The mapping's document.
         folder: The mapping's folder.
         policy: The limits of a good mapping.
     """
     try:
-        mapping = without_expressions(mapping)
-        sets = file_sets(source, mapping["files"])
+        mapping = Mapping.from_document(document, folder)
+        sets = file_sets(source, mapping.files)
     except TacdataError as error:
         return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
     samples = [sets[k] for k in sorted({round(k) for k in np.linspace(0, len(sets) - 1, policy.sets)})]
     outcome = _Outcome()
     for files in samples:
-        _try_set(files, mapping, folder, outcome)
+        _try_set(files, mapping, outcome)
     if not outcome.presses:
         error = outcome.refusals[0]
         return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
     names = f"{len(samples)} of {len(sets)} sets of files hold" if len(sets) > 1 else "the source holds"
     sentence = f"tried: {names} {_figures(outcome.presses, policy)}"
-    remedy = "zero: highest under z" if "z" in mapping.get("position", {}) else "zero: lowest under depth"
+    is_depth = mapping.position is None or mapping.position.depth_given
+    remedy = "zero: lowest under depth" if is_depth else "zero: highest under z"
     faults = _faults(outcome, remedy, policy)
     return f"{sentence}\nnot good as it stands: {'; '.join(faults)}" if faults else sentence
 
 
-def _try_set(files: FileSet, mapping: dict[str, Any], folder: Path, outcome: _Outcome) -> None:
+def _try_set(files: FileSet, mapping: Mapping, outcome: _Outcome) -> None:
     """Import a set of files without writing it."""
-    record = {"trial": "", "name": mapping["name"]}
+    record = {"trial": "", "name": mapping.name}
     try:
         if files.fault:
             raise files.fault
-        tables = files.tables(mapping)
-        centre = centre_of(mapping, tables)
+        tables = files.tables()
+        centre = centre_of(mapping.position, tables)
         parts = [
             part
             for label, rows in split_tables(tables, mapping)
-            for part in presses_of(mapping, folder, rows, files.parts, {**record, "trial": label}, centre)
+            for part in presses_of(mapping, rows, files.parts, {**record, "trial": label}, centre)
         ]
     except TacdataError as error:
         outcome.refusals.append(error)

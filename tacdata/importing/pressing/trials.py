@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.columns import single
 from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.mapping import Known, Mapping, TrialRule
 
 
-def split_tables(
-    tables: dict[str, SourceTable], mapping: dict[str, Any]
-) -> Iterator[tuple[str, dict[str, SourceTable]]]:
+def split_tables(tables: dict[str, SourceTable], mapping: Mapping) -> Iterator[tuple[str, dict[str, SourceTable]]]:
     """Yield the label and the rows of each trial by a column, all rows under "" without such a column.
 
     A trial is of one specimen: where the channels' file names several, by a column, each has a trial of its own.
@@ -24,24 +22,24 @@ def split_tables(
     Raises:
         FormatError: If no file has the column.
     """
-    trials, pieces = mapping.get("trials", {}), iter([("", tables)])
-    if "column" in trials:
-        pieces = _by_column(tables, trials["column"])
-    elif "change" in trials:
-        pieces = _by_column(tables, trials["change"], counted=True)
+    trials, pieces = mapping.trials, iter([("", tables)])
+    if trials.column is not None:
+        pieces = _by_column(tables, trials.column)
+    elif trials.change is not None:
+        pieces = _by_column(tables, trials.change, counted=True)
     for label, rows in pieces:
-        yield from _by_specimen(label, rows, mapping)
+        yield from _by_specimen(label, rows, mapping.specimen, mapping.taxels.file)
 
 
 def _by_specimen(
-    label: str, tables: dict[str, SourceTable], mapping: dict[str, Any]
+    label: str, tables: dict[str, SourceTable], specimen: str | Known, read: str
 ) -> Iterator[tuple[str, dict[str, SourceTable]]]:
-    """Yield the parts of a trial that are of one specimen each."""
-    entry, read = mapping.get("press", {}).get("specimen"), mapping["taxels"].get("file")
-    if not isinstance(entry, dict) or "column" not in entry or entry.get("file", next(iter(tables))) != read:
+    """Yield the parts of a trial that are of one specimen each, by the channels' file ``read``."""
+    by_column = isinstance(specimen, Known) and specimen.column != ""
+    if not by_column or (specimen.file or next(iter(tables))) != read:
         yield label, tables
         return
-    words = _held(_labels(tables[read], entry["column"]))
+    words = _held(_labels(tables[read], specimen.column))
     if len(set(words.tolist()) - {""}) < 2:
         yield label, tables
         return
@@ -97,12 +95,12 @@ def _labels(table: SourceTable, column: str | int) -> np.ndarray:
 
 
 def windows(
-    trials: dict[str, Any], taxels_ns: np.ndarray, path: tuple[np.ndarray, np.ndarray] | None
+    trials: TrialRule, taxels_ns: np.ndarray, path: tuple[np.ndarray, np.ndarray] | None
 ) -> list[tuple[int, int]]:
     """Return the time intervals of the trials.
 
     Args:
-        trials: ``trials`` of the mapping.
+        trials: The end of a trial.
         taxels_ns: Times of the channels [ns], shape (n,).
         path: Times [ns], shape (m,), and depths [mm], shape (m,), if they are known.
 
@@ -113,17 +111,17 @@ def windows(
         FormatError: If nothing is deeper than ``press_above``.
     """
     ends = [int(taxels_ns[0]), int(taxels_ns[-1]) + 1]
-    if "gap" in trials:
-        pauses = np.flatnonzero(np.diff(taxels_ns) > trials["gap"] * 1e9)
+    if trials.gap is not None:
+        pauses = np.flatnonzero(np.diff(taxels_ns) > trials.gap * 1e9)
         ends[1:1] = [int(taxels_ns[k + 1]) for k in pauses]
-    if "press_above" in trials:
+    if trials.press_above is not None:
         if path is None:
             raise FormatError("trials: press_above without a position", "a position", "add position, or split by gap")
         time_ns, depth = path
-        begins, stops = _excursions(depth > trials["press_above"])
+        begins, stops = _excursions(depth > trials.press_above)
         if not len(begins):
             raise FormatError(
-                f"trials: press_above {trials['press_above']:g} mm, the deepest is {depth.max():.3f} mm",
+                f"trials: press_above {trials.press_above:g} mm, the deepest is {depth.max():.3f} mm",
                 f"less than {depth.max():.3f} mm",
                 "correct press_above or the position's zero",
             )

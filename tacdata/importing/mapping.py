@@ -1,0 +1,332 @@
+"""A mapping as a value: names of columns, units and clocks, with every default filled in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+from tacdata import provenance
+from tacdata.errors import FormatError
+
+Selector = str | int | list[Any]
+"""Columns by name, by number from 0, by range or pattern, or a list of these."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The clock of a file or stream."""
+
+    column: Selector | None = None
+    format: str | None = None
+    """Layout of dates, as Python's strptime has it; None: by the file."""
+    rate: float | None = None
+    """Rows a second, or counts a second of `column` [Hz]."""
+    unit: str = ""
+    zero: str = ""
+    """unix, shared or own; empty: by the values."""
+    offset: float | None = None
+    """Added to the times [s]. With an offset, even of 0, the clock is aligned with all others."""
+    drift: float = 0.0
+    """Gain on the true clock [ppm]."""
+
+    @property
+    def offset_ns(self) -> int:
+        """The offset [ns]; 0 without one."""
+        return round((self.offset or 0.0) * 1e9)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A column as a quantity."""
+
+    column: str | int
+    unit: str = ""
+    """Empty: by the file's header."""
+    scale: float = 1.0
+    offset: float = 0.0
+    """Added after the factor [mm, s or mm/s]."""
+    zero: str = ""
+    """The value of each trial that counts as 0: first, lowest or highest; empty: 0 itself."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """A number or a word of a trial, from the path of its files or from a column."""
+
+    part: str = ""
+    """A {part} of the path; empty: by `column`."""
+    pattern: str = ""
+    """Regular expression with one group, for a piece of the part."""
+    column: str | int = ""
+    file: str = ""
+    """Empty: the first file of the mapping."""
+    unit: str = ""
+
+
+Quantity = float | Axis
+"""A number that holds throughout, or a column."""
+Value = float | Known
+"""A constant number, or its place in each trial."""
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """One kind of file: its path and its reading."""
+
+    paths: tuple[str, ...]
+    """One pattern, or the parts of a trial in their order."""
+    options: dict[str, Any]
+    """Options of the reader; see `SourceFormat.read`."""
+    table: str | list[str] | None = None
+    join: str = ""
+    derived: dict[str, str] = field(default_factory=dict)
+    """Name of a further column -> its expression."""
+    missing: tuple[float, ...] = ()
+    """Numbers in place of no value."""
+    clock: Clock | None = None
+
+    @classmethod
+    def from_document(cls, entry: dict[str, Any]) -> Self:
+        """Return the entry of a document that fits the schema."""
+        path, numbers = entry["path"], [value for value in entry.get("missing", []) if not isinstance(value, str)]
+        named = {key: entry[key] for key in ("table", "join", "derived") if key in entry}
+        options = {key: value for key, value in entry.items() if key not in ("path", "time", *named)}
+        paths = tuple(path) if isinstance(path, list) else (path,)
+        return cls(paths, options, missing=tuple(numbers), clock=_clock(entry), **named)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreamEntry:
+    """A stream of one file."""
+
+    file: str
+    clock: Clock
+    missing: tuple[float, ...] = ()
+    """Numbers in place of no value."""
+    trusted: bool = False
+    """Whether codes, rails, repeats, dropouts and jumps count as measured."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnsEntry(StreamEntry):
+    """A stream whose columns have one meaning: the channels, or a further quantity."""
+
+    columns: Selector = ""
+    long: dict[str, str | int] | None = None
+    """Columns of the channel and its value, for files with one channel a row; in place of `columns`."""
+    unit: str = ""
+    scale: float = 1.0
+    counter: str | int | None = None
+    """Column of the device's frame counter."""
+    channels_are: str = ""
+    """response or effort; empty: not known."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionEntry(StreamEntry):
+    """The indenter's position."""
+
+    axes: dict[str, Quantity]
+    """x, y, and either z of a machine or depth below the skin [mm]."""
+
+    @property
+    def depth_given(self) -> bool:
+        """Whether the position is a depth, so that its zero is the skin's surface."""
+        return "depth" in self.axes
+
+    @property
+    def columns(self) -> dict[str, Axis]:
+        """The axes that are columns."""
+        return {key: axis for key, axis in self.axes.items() if isinstance(axis, Axis)}
+
+
+@dataclass(frozen=True)
+class ListedPress:
+    """One press of a schedule that a person wrote."""
+
+    start: float
+    """Beginning of the motion down, in the schedule's time [s]."""
+    depth: float
+    speed: float
+    hold: float = 0.0
+    height: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    release_speed: float | None = None
+    """Speed up [mm/s]; None: as down."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Presses by time, in place of a position: a list, or a file with a row for each."""
+
+    presses: tuple[ListedPress, ...] = ()
+    file: str = ""
+    axes: dict[str, Quantity] = field(default_factory=dict)
+    """start, depth, speed, release_speed, hold, height, x and y of the file."""
+    clock: Clock = field(default_factory=Clock)
+
+
+@dataclass(frozen=True)
+class TrialRule:
+    """The end of a recording in one file; at most one of the fields."""
+
+    column: str | int | None = None
+    change: str | int | None = None
+    gap: float | None = None
+    """Shortest pause between two trials [s]."""
+    press_above: float | None = None
+    """Depth of a trial [mm]."""
+
+
+@dataclass(frozen=True)
+class ForeignSensor:
+    """The known properties of a foreign sensor; None where one is not known."""
+
+    name: str
+    columns: int | None = None
+    rows: int = 1
+    pitch_x: float | None = None
+    pitch_y: float | None = None
+    thickness: float | None = None
+    size_x: float | None = None
+    size_y: float | None = None
+    youngs_modulus: float | None = None
+    poisson_ratio: float | None = None
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """A mapping of foreign files to recordings."""
+
+    document: dict[str, Any]
+    """The mapping's file, with each expression as a derived column."""
+    folder: Path
+    """Folder of the mapping, to which the sensor file's path is relative."""
+    name: str
+    source: str
+    files: dict[str, FileEntry]
+    sensor: str | ForeignSensor
+    """A sensor file's path, or the known properties."""
+    taxels: ColumnsEntry
+    position: PositionEntry | None
+    measured: dict[str, ColumnsEntry]
+    schedule: Schedule | None
+    trials: TrialRule
+    contact: dict[str, Value]
+    """x, y, z and yaw of the machine where it touches the skin."""
+    known_from: str
+    press: dict[str, Value]
+    specimen: str | Known
+    indenter: dict[str, Any] | None
+    """As in a plan."""
+
+    @property
+    def content_hash(self) -> str:
+        """SHA-256 of the document."""
+        return provenance.content_hash(self.document)
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any], folder: Path) -> Self:
+        """Return the mapping of a document that fits `schemas/import_mapping.schema.json`.
+
+        Args:
+            document: The document.
+            folder: Folder of its file.
+
+        Raises:
+            FormatError: If keys exclude each other, or a stream has no file or no clock.
+        """
+        document = _without_expressions(document)
+        files = {name: FileEntry.from_document(entry) for name, entry in document["files"].items()}
+        sensor, contact, press = document["sensor"], dict(document.get("contact", {})), dict(document.get("press", {}))
+        specimen, known_from = press.pop("specimen", ""), contact.pop("known_from", "as the mapping says")
+        measured = document.get("measured", {}).items()
+        return cls(
+            document,
+            folder,
+            document["name"],
+            document.get("source", ""),
+            files,
+            sensor if isinstance(sensor, str) else ForeignSensor(**sensor),
+            _taxels(document["taxels"], files),
+            _position(document["position"], files) if "position" in document else None,
+            {name: ColumnsEntry(**_stream(entry, files, f"measured: {name}")) for name, entry in measured},
+            _schedule(document["schedule"]) if document.get("schedule") else None,
+            TrialRule(**document.get("trials", {})),
+            {key: Known(**value) if isinstance(value, dict) else value for key, value in contact.items()},
+            known_from,
+            {key: Known(**value) if isinstance(value, dict) else value for key, value in press.items()},
+            Known(**specimen) if isinstance(specimen, dict) else specimen,
+            document.get("indenter"),
+        )
+
+
+def _clock(entry: dict[str, Any]) -> Clock | None:
+    return Clock(**entry["time"]) if entry.get("time") else None
+
+
+def _stream(entry: dict[str, Any], files: dict[str, FileEntry], where: str) -> dict[str, Any]:
+    """Return the fields of a stream, with the clock and the missing values of its file."""
+    name = entry["file"]
+    if name not in files:
+        raise FormatError(f"{where}: file {name!r}", ", ".join(files), "name one under files")
+    clock = _clock(entry) or files[name].clock
+    if clock is None:
+        raise FormatError(
+            f"no clock for {name}",
+            "time: {column: NAME} or time: {rate: HZ}",
+            f"add time under files/{name} in the mapping",
+        )
+    fields = {key: value for key, value in entry.items() if key != "time"}
+    return fields | {"clock": clock, "missing": (*files[name].missing, *entry.get("missing", []))}
+
+
+def _taxels(entry: dict[str, Any], files: dict[str, FileEntry]) -> ColumnsEntry:
+    fields = _stream(entry, files, "taxels")
+    if ("long" in entry) == ("columns" in entry):
+        raise FormatError("taxels with both or neither of columns and long", "one of them", "correct the mapping")
+    return ColumnsEntry(**fields)
+
+
+def _position(entry: dict[str, Any], files: dict[str, FileEntry]) -> PositionEntry:
+    if ("depth" in entry) == ("z" in entry):
+        raise FormatError("position with both or neither of z and depth", "one of them", "correct the mapping")
+    fields = _stream(entry, files, "position")
+    keys = [key for key in ("x", "y", "z", "depth") if key in fields]
+    return PositionEntry(axes={key: _quantity(fields.pop(key)) for key in keys}, **fields)
+
+
+def _schedule(entry: dict[str, Any]) -> Schedule:
+    axes = {key: _quantity(value) for key, value in entry.items() if key not in ("presses", "file", "time")}
+    presses = tuple(ListedPress(**press) for press in entry.get("presses", []))
+    return Schedule(presses, entry.get("file", ""), axes, _clock(entry) or Clock())
+
+
+def _quantity(entry: float | dict[str, Any]) -> Quantity:
+    return Axis(**entry) if isinstance(entry, dict) else float(entry)
+
+
+def _without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
+    """Return a mapping in which each axis with an expression names a derived column of its file.
+
+    Raises:
+        FormatError: If an axis has both a column and an expression, or neither.
+    """
+    result = {**mapping, "files": {name: dict(entry) for name, entry in mapping["files"].items()}}
+    for section in ("position", "schedule"):
+        axes = dict(mapping.get(section, {}))
+        for key, axis in axes.items():
+            if not isinstance(axis, dict) or key == "time":
+                continue
+            if ("column" in axis) == ("expression" in axis):
+                fault = f"{section}: {key} with both or neither of column and expression"
+                raise FormatError(fault, "one of them", "correct the mapping")
+            if "expression" in axis:
+                entry, name = result["files"].get(axes.get("file", ""), {}), f"{section} {key}"
+                entry["derived"] = {**entry.get("derived", {}), name: axis["expression"]}
+                axes[key] = {**{k: v for k, v in axis.items() if k != "expression"}, "column": name}
+        if axes:
+            result[section] = axes
+    return result
