@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import numbers, single
-from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.source_table import SourceTable, numbers, single
 
 OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: np.add,

@@ -17,12 +17,12 @@ from tacdata import documents, provenance, schemas
 from tacdata.chain.at_rest import ZeroSide, below_zero, zero_side
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.mapping import Mapping
 from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
 from tacdata.importing.pressing.trials import split_tables
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
+from tacdata.importing.source_table import SourceTable
 from tacdata.recording import session
 from tacdata.recording.files import file_names
 from tacdata.recording.session import FILE

@@ -12,10 +12,10 @@ import numpy as np
 from tacdata import provenance
 from tacdata.documents import composed
 from tacdata.errors import FormatError, UsageError
-from tacdata.importing.columns import single
 from tacdata.importing.expression import with_derived
-from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
+from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.mapping import FileEntry, Selector
+from tacdata.importing.source_table import SourceTable, single
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import axis, numbers, select, single, unit_of, units_of
-from tacdata.importing.formats.source_format import INNER, SourceTable
 from tacdata.importing.mapping import Clock, ColumnsEntry, Mapping, PositionEntry, StreamEntry
 from tacdata.importing.plausibility.codes import table_without_codes, without_codes
 from tacdata.importing.plausibility.repeats import without_repeats
 from tacdata.importing.plausibility.time_order import moments, spread, time_order
+from tacdata.importing.source_table import INNER, SourceTable, axis, numbers, select, single, unit_of, units_of
 from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import factor, quantity_of, split_unit
 

@@ -9,9 +9,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import single, unit_of
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.mapping import Clock
+from tacdata.importing.source_table import SourceTable, single, unit_of
 from tacdata.importing.units import FACTORS, clock_unit, factor, plain
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0

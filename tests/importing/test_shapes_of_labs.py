@@ -7,8 +7,9 @@ from sources import NAMES, mapping, table, write
 
 from tacdata.errors import FormatError
 from tacdata.importing.expression import evaluated
-from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
+from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.imported_session import import_session
+from tacdata.importing.source_table import SourceTable
 from tacdata.recording import read_session
 from tacdata.recording.files.reader import read_episode
 

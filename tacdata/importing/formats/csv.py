@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable, kind_of_bytes
+from tacdata.importing.formats.source_format import SourceFormat, kind_of_bytes
+from tacdata.importing.source_table import SourceTable
 from tacdata.importing.text.encoding import ENCODINGS, encoding_of
 from tacdata.importing.text.layout import (
     COMMENTS,

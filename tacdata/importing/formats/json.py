@@ -10,7 +10,8 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import WHOLE, rows_of
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+from tacdata.importing.formats.source_format import SourceFormat
+from tacdata.importing.source_table import SourceTable
 
 LINES = (".jsonl", ".ndjson")
 FEWEST = 10

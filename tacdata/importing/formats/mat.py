@@ -12,7 +12,8 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import rows_of
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth
+from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
+from tacdata.importing.source_table import SourceTable
 
 
 class Mat(SourceFormat):

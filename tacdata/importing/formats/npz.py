@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth, zipped_size
+from tacdata.importing.formats.source_format import SourceFormat, refuse_growth, zipped_size
+from tacdata.importing.source_table import SourceTable
 
 LONG = 10
 """A lone array whose second axis is longer by this factor than its first has time along it [1]."""

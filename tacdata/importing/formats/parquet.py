@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth
+from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
+from tacdata.importing.source_table import SourceTable
 
 
 class Parquet(SourceFormat):

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable
+from tacdata.importing.formats.source_format import SourceFormat
+from tacdata.importing.source_table import SourceTable
 
 RECEIVED = "received"
 """Column of the time at which the bag's writer got a message [ns]."""

@@ -1,4 +1,4 @@
-"""Base class of a source format, and the table that it returns.
+"""Base class of a source format.
 
 ``tacdata/importing/formats/my_format.py`` defines one class derived from `SourceFormat`. It names its file endings and
 reads a file into a `SourceTable`: named columns as they stand in the file, nothing converted or filled in.
@@ -7,23 +7,18 @@ reads a file into a `SourceTable`: named columns as they stand in the file, noth
 from __future__ import annotations
 
 import gc
-import re
 import traceback
 import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
 from tacdata import registry
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.importing.source_table import SourceTable
 
-INNER = re.compile(r"(.+)\[(\d+)\]")
-"""Name of one column of a table: the table's name and a number from 0, as in ``cap[3]``."""
 ROOM, BASE = "tacdata.importing.formats", "source_format"
 LONGEST = 300
 """Letters of a library's words that an error repeats."""
@@ -59,44 +54,6 @@ CONVERSIONS = {
     ".pkl": "in Python: pandas.read_pickle(name).to_parquet(new_name)",
 }
 """Endings of files that are not read, and the way to a file that is."""
-
-
-@dataclass(frozen=True)
-class SourceTable:
-    """A file's columns."""
-
-    path: Path
-    columns: dict[str, np.ndarray]
-    """Name -> values as in the file [any], shape (rows,) or (rows, k): float64, int64, or text."""
-    units: dict[str, str] = field(default_factory=dict)
-    """Name -> unit, where the file gives one."""
-    typed: frozenset[str] = frozenset()
-    """Columns whose unit is a part of the file's own type, as that of a duration: no mapping overrules it."""
-    notes: tuple[str, ...] = ()
-    """Remarks on the reading, as sentences."""
-    doubts: tuple[str, ...] = ()
-    """Values that were left out because they cannot be measurements, as sentences."""
-    rate: float = 0.0
-    """Rate that the file states outside its columns [Hz]; 0 if it states none."""
-
-    def column(self, name: str) -> np.ndarray:
-        """Return a column's values, or one column of a table in it, named ``name[k]`` (from 0).
-
-        Shape (rows,), or (rows, k) for a table.
-        """
-        if name not in self.columns and (inner := INNER.fullmatch(name)):
-            return self.columns[inner[1]][:, int(inner[2])]
-        return self.columns[name]
-
-    def inner(self, name: str) -> int:
-        """Return the number of columns inside a column: 0 for plain values, k for a table."""
-        values = self.columns.get(name)
-        return 0 if values is None or values.ndim < 2 else values.shape[1]
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return max((len(values) for values in self.columns.values()), default=0)
 
 
 class SourceFormat(ABC):

@@ -16,7 +16,8 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.csv import table_of
-from tacdata.importing.formats.source_format import SourceFormat, SourceTable, refuse_growth, zipped_size
+from tacdata.importing.formats.source_format import SourceFormat, refuse_growth, zipped_size
+from tacdata.importing.source_table import SourceTable
 
 TABS = {"delimiter": "tab", "decimal": "."}
 MERGED = re.compile(rb'<(?:\w+:)?mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -12,17 +11,16 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import axis, label_of, part_of, table_of
 from tacdata.importing.foreign_sensor import foreign_sensor
-from tacdata.importing.formats.source_format import SourceTable
-from tacdata.importing.mapping import Axis, Mapping, PositionEntry, TrialRule, Value
+from tacdata.importing.mapping import Mapping, PositionEntry, TrialRule
+from tacdata.importing.pressing.known_values import known_numbers, label_of
 from tacdata.importing.pressing.path_faults import without_faults
 from tacdata.importing.pressing.press_path import PressPath, press_path
 from tacdata.importing.pressing.schedule import ScheduledPress, read_schedule
 from tacdata.importing.pressing.trials import windows
 from tacdata.importing.recording_file import ImportedPress
+from tacdata.importing.source_table import SourceTable, axis
 from tacdata.importing.streams import ImportedStreams, Stream, read_streams
-from tacdata.importing.units import factor
 from tacdata.indenters import from_document
 from tacdata.plans import Press
 from tacdata.rig import Registration
@@ -39,17 +37,6 @@ LEAST = 0.005
 """Smallest stroke that needs no question [mm]; tactile sensors feel some hundredths of a millimetre."""
 SLOWEST = 1e-4
 """Smallest speed that a press is given [mm/s]."""
-UNITS = {
-    "x": "mm",
-    "y": "mm",
-    "z": "mm",
-    "yaw": "deg",
-    "tilt_x": "deg",
-    "tilt_y": "deg",
-    "depth": "mm",
-    "speed": "mm/s",
-    "hold": "s",
-}
 
 
 @dataclass(frozen=True)
@@ -94,8 +81,8 @@ def presses_of(
     """
     if mapping.specimen:
         record = {**record, "specimen": label_of(mapping.specimen, tables, parts, "press: specimen")}
-    press = _known(mapping.press, tables, parts, "press")
-    trial = _Trial(mapping, tables, press, _known(mapping.contact, tables, parts, "contact"), centre)
+    press = known_numbers(mapping.press, tables, parts, "press")
+    trial = _Trial(mapping, tables, press, known_numbers(mapping.contact, tables, parts, "contact"), centre)
     stretches = read_streams(mapping, tables, (press.get("x", 0.0), press.get("y", 0.0)))
     if len(stretches) > 1 and mapping.schedule:
         raise FormatError(
@@ -339,33 +326,3 @@ def _shifted(streams: ImportedStreams, shift_ns: int) -> ImportedStreams:
     return replace(
         streams, taxels=moved(streams.taxels), position=position, measured=tuple(map(moved, streams.measured))
     )
-
-
-def _known(
-    entries: dict[str, Value], tables: dict[str, SourceTable], parts: dict[str, str], section: str
-) -> dict[str, float]:
-    """Return the numbers that a mapping gives for a trial: constant, from the path, or the median of a column."""
-    values = {}
-    for name, entry in entries.items():
-        where, unit = f"{section}: {name}", UNITS[name]
-        if isinstance(entry, int | float):
-            values[name] = float(entry)
-        elif entry.part:
-            scale = factor(entry.unit, unit, where) if entry.unit else 1.0
-            values[name] = _number(part_of(entry, parts, where), where) * scale
-        else:
-            column = axis(table_of(entry, tables, where), Axis(entry.column, entry.unit), unit, where)
-            values[name] = float(np.nanmedian(column))
-    return values
-
-
-def _number(text: str, where: str) -> float:
-    # "1p5" and "1,5" are how file names write 1.5.
-    digits = re.findall(r"[-+]?\d+(?:[.,p]\d+)?", text)
-    if len(digits) != 1:
-        raise FormatError(
-            f"{where}: {text!r} in the path holds {len(digits)} numbers",
-            "one number",
-            "say which by pattern: a regular expression with one group",
-        )
-    return float(digits[0].replace("p", ".").replace(",", "."))

@@ -8,9 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import axis
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.mapping import Axis, Schedule
+from tacdata.importing.source_table import SourceTable, axis
 from tacdata.importing.streams import Stream
 from tacdata.importing.times import YEAR_2000, times
 from tacdata.recording.episode import Phase

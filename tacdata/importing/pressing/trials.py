@@ -9,9 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import single
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.mapping import Known, Mapping, TrialRule
+from tacdata.importing.source_table import SourceTable, single
 
 
 def split_tables(tables: dict[str, SourceTable], mapping: Mapping) -> Iterator[tuple[str, dict[str, SourceTable]]]:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError, TacdataError, UsageError
-from tacdata.importing.formats.source_format import SourceTable, read_table, tables_in
+from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
 from tacdata.importing.proposing.roles import is_whole, roles_of
 from tacdata.importing.proposing.trial_parts import PartsInOrder, parts_in_order
 from tacdata.importing.source_files import check_source, files_below, is_one, joined, side_by_side, titles_of
+from tacdata.importing.source_table import SourceTable
 
 SHOWN = 30
 """Columns that are listed per file."""

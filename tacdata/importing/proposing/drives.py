@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.pressing.press_path import strokes
 from tacdata.importing.pressing.presses import DEEPEST
 from tacdata.importing.proposing.strokes import CLEAR
+from tacdata.importing.source_table import SourceTable
 from tacdata.importing.units import plain
 
 MEANT = ("strain", "angle", "force")

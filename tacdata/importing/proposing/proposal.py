@@ -13,8 +13,6 @@ import numpy as np
 from tacdata import schemas
 from tacdata.chain.at_rest import below_zero, zero_side
 from tacdata.errors import FormatError
-from tacdata.importing.columns import unit_of
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.mapping import Clock
 from tacdata.importing.plausibility.codes import table_without_codes
 from tacdata.importing.proposing.description import FoundKind
@@ -25,6 +23,7 @@ from tacdata.importing.proposing.shapes import counting_column, varying
 from tacdata.importing.proposing.stream_clocks import SHORT, own_clocks
 from tacdata.importing.proposing.strokes import CLEAR, PressingAxis, pressing_axis
 from tacdata.importing.proposing.unused import leave_unused_out, listed, unread, without_summaries
+from tacdata.importing.source_table import SourceTable, unit_of
 from tacdata.importing.times import layouts_of, times
 from tacdata.importing.units import factor, plain
 

@@ -7,9 +7,9 @@ import re
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.mapping import Clock
 from tacdata.importing.proposing.shapes import are_letters, drive_by_shape, without_signal
+from tacdata.importing.source_table import SourceTable
 from tacdata.importing.times import times
 from tacdata.importing.units import OTHERS, plain, quantity_of, split_unit
 

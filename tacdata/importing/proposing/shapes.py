@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.source_table import SourceTable
 
 
 @dataclass(frozen=True)

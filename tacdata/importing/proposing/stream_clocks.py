@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.importing.formats.source_format import SourceTable
+from tacdata.importing.source_table import SourceTable
 from tacdata.importing.units import plain
 
 SHORT = ("s", "ms", "us", "ns", "min", "h", "d")

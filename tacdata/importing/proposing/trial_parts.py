@@ -8,8 +8,8 @@ from itertools import pairwise, permutations
 
 import numpy as np
 
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.proposing.roles import roles_of
+from tacdata.importing.source_table import SourceTable
 
 NEAR, DEEP = 0.05, 0.5
 """Largest distance between the end of a part and the beginning of the next, and smallest distance between the ends of a

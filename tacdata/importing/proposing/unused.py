@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.importing.formats.source_format import SourceTable
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.file_kinds import INSIDE
 from tacdata.importing.proposing.roles import is_whole, roles_of
+from tacdata.importing.source_table import SourceTable
 
 SHORT = 0.2
 """Largest share of a recording's rows that a table of results has [1]."""

@@ -7,8 +7,8 @@ import pytest
 from running.in_process import tacdata
 
 from tacdata.errors import FormatError
-from tacdata.importing.columns import numbers
 from tacdata.importing.formats.source_format import read_table
+from tacdata.importing.source_table import numbers
 
 ROWS = [(k * 0.02, 20 + k * 0.01, k * 0.005) for k in range(60)]
 HEADER = ("t [s]", "c [pF]", "depth [mm]")

@@ -1,23 +1,64 @@
-"""Columns of a table as a mapping names them, as numbers in our units."""
+"""A file's columns, selected as a mapping names them, as numbers in our units."""
 
 from __future__ import annotations
 
 import fnmatch
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tacdata.documents import composed
 from tacdata.errors import FormatError
-from tacdata.importing.formats.source_format import INNER, SourceTable
-from tacdata.importing.mapping import Axis, Known, Quantity, Selector
+from tacdata.importing.mapping import Axis, Quantity, Selector
 from tacdata.importing.text.layout import THOUSANDS
 from tacdata.importing.units import factor, plain, prefixed, quantity_of, split_unit
 
+INNER = re.compile(r"(.+)\[(\d+)\]")
+"""Name of one column of a table: the table's name and a number from 0, as in ``cap[3]``."""
 WRITTEN = re.compile(r"[-+]?\d*[.,]?\d+([eE][-+]?\d+)?")
 """A number in a text."""
+
+
+@dataclass(frozen=True)
+class SourceTable:
+    """A file's columns."""
+
+    path: Path
+    columns: dict[str, np.ndarray]
+    """Name -> values as in the file [any], shape (rows,) or (rows, k): float64, int64, or text."""
+    units: dict[str, str] = field(default_factory=dict)
+    """Name -> unit, where the file gives one."""
+    typed: frozenset[str] = frozenset()
+    """Columns whose unit is a part of the file's own type, as that of a duration: no mapping overrules it."""
+    notes: tuple[str, ...] = ()
+    """Remarks on the reading, as sentences."""
+    doubts: tuple[str, ...] = ()
+    """Values that were left out because they cannot be measurements, as sentences."""
+    rate: float = 0.0
+    """Rate that the file states outside its columns [Hz]; 0 if it states none."""
+
+    def column(self, name: str) -> np.ndarray:
+        """Return a column's values, or one column of a table in it, named ``name[k]`` (from 0).
+
+        Shape (rows,), or (rows, k) for a table.
+        """
+        if name not in self.columns and (inner := INNER.fullmatch(name)):
+            return self.columns[inner[1]][:, int(inner[2])]
+        return self.columns[name]
+
+    def inner(self, name: str) -> int:
+        """Return the number of columns inside a column: 0 for plain values, k for a table."""
+        values = self.columns.get(name)
+        return 0 if values is None or values.ndim < 2 else values.shape[1]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return max((len(values) for values in self.columns.values()), default=0)
 
 
 def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
@@ -205,64 +246,3 @@ def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> Form
 
 def _example(values: np.ndarray) -> Any:
     return next((value for value in values.tolist() if value is not None), None)
-
-
-def label_of(entry: str | Known, tables: dict[str, SourceTable], parts: dict[str, str], where: str) -> str:
-    """Return a word of a trial: constant, from the path, or the most frequent one of a column.
-
-    Args:
-        entry: The word, or its place.
-        tables: Name under ``files`` -> rows of the trial.
-        parts: {part} of the paths -> its text.
-        where: The mapping's key, for messages.
-
-    Raises:
-        FormatError: If there is no such part, column or match.
-    """
-    if isinstance(entry, str):
-        return entry
-    if entry.part:
-        return part_of(entry, parts, where)
-    table = table_of(entry, tables, where)
-    values = table.column(single(table, entry.column, where))
-    if values.dtype == object:
-        words = [str(value).strip() for value in values.tolist() if value is not None and str(value).strip()]
-    else:
-        numbers = values.astype(float)
-        words = [f"{value:g}" for value in numbers[np.isfinite(numbers)]]
-    if not words:
-        raise FormatError(f"{where}: a column without a value", "a word or a number", "name another column")
-    return max(dict.fromkeys(words), key=words.count)
-
-
-def table_of(entry: Known, tables: dict[str, SourceTable], where: str) -> SourceTable:
-    """Return the file in which a trial's number or word is; raises FormatError if there is none of that name."""
-    name = entry.file or next(iter(tables))
-    if name not in tables:
-        raise FormatError(f"{where}: file {name!r}", ", ".join(tables), "name one under files")
-    return tables[name]
-
-
-def part_of(entry: Known, parts: dict[str, str], where: str) -> str:
-    """Return a {part} of the path, or the piece of it that a pattern finds.
-
-    Raises:
-        FormatError: If there is no such part, or the pattern is wrong or finds nothing.
-    """
-    if entry.part not in parts:
-        listed = ", ".join(parts) or "none: no path has a {part}"
-        raise FormatError(f"{where}: part {entry.part!r}", listed, "correct part")
-    text, pattern = parts[entry.part], entry.pattern
-    if not pattern:
-        return text
-    try:
-        match = re.search(pattern, text)
-    except re.error as error:
-        raise FormatError(f"{where}: pattern {pattern!r}: {error}", "a regular expression", "correct it") from None
-    if match is None or not match.groups():
-        raise FormatError(
-            f"{where}: {pattern!r} finds nothing in {text!r}",
-            "a pattern with one group, as in ([A-Za-z]+) or x([-0-9.]+)",
-            "correct pattern",
-        )
-    return match[1]
