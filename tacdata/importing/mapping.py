@@ -14,7 +14,7 @@ Selector = str | int | list[Any]
 
 
 @dataclass(frozen=True)
-class Clock:
+class SourceClock:
     """The clock of a file or stream."""
 
     column: Selector | None = None
@@ -51,7 +51,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownValue:
     """A number or a word of a trial, from the path of its files or from a column."""
 
     part: str = ""
@@ -66,7 +66,7 @@ class Known:
 
 Quantity = float | Axis
 """A number that holds throughout, or a column."""
-Value = float | Known
+Value = float | KnownValue
 """A constant number, or its place in each trial."""
 
 
@@ -84,7 +84,7 @@ class FileEntry:
     """Name of a further column -> its expression."""
     missing: tuple[float, ...] = ()
     """Numbers in place of no value."""
-    clock: Clock | None = None
+    clock: SourceClock | None = None
 
     @classmethod
     def from_document(cls, entry: dict[str, Any]) -> Self:
@@ -101,7 +101,7 @@ class StreamEntry:
     """A stream of one file."""
 
     file: str
-    clock: Clock
+    clock: SourceClock
     missing: tuple[float, ...] = ()
     """Numbers in place of no value."""
     trusted: bool = False
@@ -165,7 +165,7 @@ class Schedule:
     file: str = ""
     axes: dict[str, Quantity] = field(default_factory=dict)
     """start, depth, speed, release_speed, hold, height, x and y of the file."""
-    clock: Clock = field(default_factory=Clock)
+    clock: SourceClock = field(default_factory=SourceClock)
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ class Mapping:
     """x, y, z and yaw of the machine where it touches the skin."""
     known_from: str
     press: dict[str, Value]
-    specimen: str | Known
+    specimen: str | KnownValue
     indenter: dict[str, Any] | None
     """As in a plan."""
 
@@ -255,16 +255,16 @@ class Mapping:
             {name: ColumnsEntry(**_stream(entry, files, f"measured: {name}")) for name, entry in measured},
             _schedule(document["schedule"]) if document.get("schedule") else None,
             TrialRule(**document.get("trials", {})),
-            {key: Known(**value) if isinstance(value, dict) else value for key, value in contact.items()},
+            {key: KnownValue(**value) if isinstance(value, dict) else value for key, value in contact.items()},
             known_from,
-            {key: Known(**value) if isinstance(value, dict) else value for key, value in press.items()},
-            Known(**specimen) if isinstance(specimen, dict) else specimen,
+            {key: KnownValue(**value) if isinstance(value, dict) else value for key, value in press.items()},
+            KnownValue(**specimen) if isinstance(specimen, dict) else specimen,
             document.get("indenter"),
         )
 
 
-def _clock(entry: dict[str, Any]) -> Clock | None:
-    return Clock(**entry["time"]) if entry.get("time") else None
+def _clock(entry: dict[str, Any]) -> SourceClock | None:
+    return SourceClock(**entry["time"]) if entry.get("time") else None
 
 
 def _stream(entry: dict[str, Any], files: dict[str, FileEntry], where: str) -> dict[str, Any]:
@@ -301,7 +301,7 @@ def _position(entry: dict[str, Any], files: dict[str, FileEntry]) -> PositionEnt
 def _schedule(entry: dict[str, Any]) -> Schedule:
     axes = {key: _quantity(value) for key, value in entry.items() if key not in ("presses", "file", "time")}
     presses = tuple(ListedPress(**press) for press in entry.get("presses", []))
-    return Schedule(presses, entry.get("file", ""), axes, _clock(entry) or Clock())
+    return Schedule(presses, entry.get("file", ""), axes, _clock(entry) or SourceClock())
 
 
 def _quantity(entry: float | dict[str, Any]) -> Quantity:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.mapping import Clock, ColumnsEntry, Mapping, PositionEntry, StreamEntry
+from tacdata.importing.mapping import ColumnsEntry, Mapping, PositionEntry, SourceClock, StreamEntry
 from tacdata.importing.plausibility.codes import table_without_codes, without_codes
 from tacdata.importing.plausibility.repeats import without_repeats
 from tacdata.importing.plausibility.time_order import moments, spread, time_order
@@ -171,12 +171,12 @@ def _timed(
     return stretches
 
 
-def _clock_name(clock: Clock) -> str:
+def _clock_name(clock: SourceClock) -> str:
     column = "time" if clock.column is None else clock.column
     return " ".join(map(str, column)) if isinstance(column, list) else str(column)
 
 
-def _tick(table: SourceTable, clock: Clock, time_ns: np.ndarray, name: str) -> float:
+def _tick(table: SourceTable, clock: SourceClock, time_ns: np.ndarray, name: str) -> float:
     """Return one step of a clock's numbers [ns]; 0 where no column of numbers holds the times."""
     if not isinstance(clock.column, str | int):
         return 0.0
@@ -207,7 +207,7 @@ def _taxels(entry: ColumnsEntry, table: SourceTable) -> list[Stream]:
     return _timed(entry, table, "taxels", values, tuple(map(_label, labels)), unit, doubts)
 
 
-def _refuse_clock(table: SourceTable, names: list[str], clock: Clock) -> None:
+def _refuse_clock(table: SourceTable, names: list[str], clock: SourceClock) -> None:
     """Refuse channels among which is their own clock.
 
     Raises:
@@ -244,7 +244,9 @@ def _label(name: str) -> str:
     return name if INNER.fullmatch(name) else split_unit(name)[0]
 
 
-def _widened(table: SourceTable, clock: Clock, channel: str | int, value: str | int) -> tuple[SourceTable, list[str]]:
+def _widened(
+    table: SourceTable, clock: SourceClock, channel: str | int, value: str | int
+) -> tuple[SourceTable, list[str]]:
     """Turn a table with one row per channel into one with one column per channel; missing values are NaN."""
     if clock.column is None:
         # A rate would count rows, and here a row is one channel and not one moment.

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.mapping import Clock
+from tacdata.importing.mapping import SourceClock
 from tacdata.importing.source_table import SourceTable, single, unit_of
 from tacdata.importing.units import FACTORS, clock_unit, factor, plain
 
@@ -29,7 +29,7 @@ NO_UNIT = {"", "unix", "epoch", "posix", "utc", "gmt", "local", "time", "timesta
 """Words in brackets behind a clock's name that are no unit (compared in lower case)."""
 
 
-def times(table: SourceTable, clock: Clock, where: str) -> tuple[np.ndarray, str]:
+def times(table: SourceTable, clock: SourceClock, where: str) -> tuple[np.ndarray, str]:
     """Return each row's time and the zero of the clock.
 
     Args:
@@ -88,7 +88,7 @@ NEVER = np.iinfo(np.int64).min
 """Time of a row that has none [ns]."""
 
 
-def _shifted(seconds: np.ndarray, clock: Clock) -> np.ndarray:
+def _shifted(seconds: np.ndarray, clock: SourceClock) -> np.ndarray:
     valid = np.isfinite(seconds)
     full_seconds = np.floor(np.where(valid, seconds, 0.0))
     part = np.where(valid, seconds, 0.0) - full_seconds
@@ -98,7 +98,7 @@ def _shifted(seconds: np.ndarray, clock: Clock) -> np.ndarray:
     return _shifted_ns(result, clock)
 
 
-def _shifted_ns(time_ns: np.ndarray, clock: Clock) -> np.ndarray:
+def _shifted_ns(time_ns: np.ndarray, clock: SourceClock) -> np.ndarray:
     valid = time_ns != NEVER
     result = time_ns.copy()
     if clock.drift:
@@ -115,7 +115,7 @@ def _guessed(values: np.ndarray) -> str:
     return next((u for u in ("ns", "us", "ms") if YEAR_2000 < middle * FACTORS["s"][u] < YEAR_2100), "s")
 
 
-def _of_days(values: np.ndarray, unit: str, clock: Clock) -> np.ndarray:
+def _of_days(values: np.ndarray, unit: str, clock: SourceClock) -> np.ndarray:
     """Return Unix times [ns] of days counted from one of `DAY_ZERO`."""
     return _shifted((values.astype(float) - DAY_ZERO[unit]) * DAY, clock)
 

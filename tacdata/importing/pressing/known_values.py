@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.mapping import Axis, Known, Value
+from tacdata.importing.mapping import Axis, KnownValue, Value
 from tacdata.importing.source_table import SourceTable, axis, single
 from tacdata.importing.units import factor
 
@@ -42,7 +42,7 @@ def known_numbers(
     return values
 
 
-def label_of(entry: str | Known, tables: dict[str, SourceTable], parts: dict[str, str], where: str) -> str:
+def label_of(entry: str | KnownValue, tables: dict[str, SourceTable], parts: dict[str, str], where: str) -> str:
     """Return a word of a trial: constant, from the path, or the most frequent one of a column.
 
     Args:
@@ -70,7 +70,7 @@ def label_of(entry: str | Known, tables: dict[str, SourceTable], parts: dict[str
     return max(dict.fromkeys(words), key=words.count)
 
 
-def _table(entry: Known, tables: dict[str, SourceTable], where: str) -> SourceTable:
+def _table(entry: KnownValue, tables: dict[str, SourceTable], where: str) -> SourceTable:
     """Return the file in which a trial's number or word is; raises FormatError if there is none of that name."""
     name = entry.file or next(iter(tables))
     if name not in tables:
@@ -78,7 +78,7 @@ def _table(entry: Known, tables: dict[str, SourceTable], where: str) -> SourceTa
     return tables[name]
 
 
-def _part(entry: Known, parts: dict[str, str], where: str) -> str:
+def _part(entry: KnownValue, parts: dict[str, str], where: str) -> str:
     """Return a {part} of the path, or the piece of it that a pattern finds.
 
     Raises:

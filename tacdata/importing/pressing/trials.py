@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.mapping import Known, Mapping, TrialRule
+from tacdata.importing.mapping import KnownValue, Mapping, TrialRule
 from tacdata.importing.source_table import SourceTable, single
 
 
@@ -31,10 +31,10 @@ def split_tables(tables: dict[str, SourceTable], mapping: Mapping) -> Iterator[t
 
 
 def _by_specimen(
-    label: str, tables: dict[str, SourceTable], specimen: str | Known, read: str
+    label: str, tables: dict[str, SourceTable], specimen: str | KnownValue, read: str
 ) -> Iterator[tuple[str, dict[str, SourceTable]]]:
     """Yield the parts of a trial that are of one specimen each, by the channels' file ``read``."""
-    by_column = isinstance(specimen, Known) and specimen.column != ""
+    by_column = isinstance(specimen, KnownValue) and specimen.column != ""
     if not by_column or (specimen.file or next(iter(tables))) != read:
         yield label, tables
         return

@@ -13,7 +13,7 @@ import numpy as np
 from tacdata import schemas
 from tacdata.chain.at_rest import below_zero, zero_side
 from tacdata.errors import FormatError
-from tacdata.importing.mapping import Clock
+from tacdata.importing.mapping import SourceClock
 from tacdata.importing.plausibility.codes import table_without_codes
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import are_halves, is_copy, length_of, rate_of, stand_in
@@ -170,7 +170,7 @@ def _motion(
     name, position = columns.get("depth", columns.get("z", []))[0], document["position"]
     clock = document["files"][position["file"]]["time"]
     try:
-        time_ns, _ = times(table, Clock(**clock), "")
+        time_ns, _ = times(table, SourceClock(**clock), "")
         axis = table.column(name).astype(float)
         motion = pressing_axis(time_ns, axis, _deviation(table, channels, axis))
     except (FormatError, ValueError):
@@ -332,7 +332,7 @@ def _file(kind: str, entry: FoundKind, roles: dict[str, list[str]], notes: list[
     if "by_values" in roles:
         notes.append(f"{roles['time'][0]}: it rises evenly, and is taken for the time, in s where no unit is given")
     try:
-        times(table, Clock(**clock), Path(outer).name)
+        times(table, SourceClock(**clock), Path(outer).name)
     except FormatError as error:
         clock |= _american(table, roles["time"][0], notes)
         if "format" not in clock:

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.mapping import Clock
+from tacdata.importing.mapping import SourceClock
 from tacdata.importing.proposing.shapes import are_letters, drive_by_shape, without_signal
 from tacdata.importing.source_table import SourceTable
 from tacdata.importing.times import times
@@ -167,7 +167,7 @@ def _are_times(table: SourceTable, name: str) -> bool:
     """Return whether a column of text holds dates or times of day, in one way or in several."""
     first = SourceTable(table.path, {name: table.columns[name][:ROWS]}, table.units)
     try:
-        times(first, Clock(name), "")
+        times(first, SourceClock(name), "")
     except FormatError as error:
         return "can be read as" in error.given
     return True
