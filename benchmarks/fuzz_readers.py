@@ -40,6 +40,7 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
 
     from tacdata import documents
     from tacdata.importing.formats.source_format import read_table
+    from tacdata.importing.mapping import ReadOptions
     from tacdata.indenters import from_document
     from tacdata.plans import read_plan
     from tacdata.recording.files.reader import read_recording
@@ -51,7 +52,7 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
     found: dict[str, tuple[bytes, str, Callable[[Path], object]]] = {}
 
     def table(path: Path) -> object:
-        return read_table(path, {})
+        return read_table(path)
 
     lines = [",".join(columns), *(",".join(f"{v:.5f}" for v in row) for row in zip(*columns.values(), strict=True))]
     text = "\n".join(lines).encode()
@@ -125,7 +126,7 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
     for ending in (".mcap", ".db3"):
 
         def topic(path: Path) -> object:
-            return read_table(path, {"table": "/taxels"})
+            return read_table(path, ReadOptions(table="/taxels"))
 
         found[f"bag{ending}"] = _bag(folder, ending), ending, topic
     return found

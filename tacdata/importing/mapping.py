@@ -71,13 +71,37 @@ Value = float | KnownValue
 
 
 @dataclass(frozen=True)
+class ReadOptions:
+    """Options of a file's reader; a format uses those that concern it."""
+
+    format: str = ""
+    """A source format; empty: by the file's ending."""
+    header: bool = True
+    """Whether the first row may be a header."""
+    delimiter: str = ""
+    """Empty: recognized from the file, as `decimal` and `encoding`."""
+    decimal: str = ""
+    skip: int = 0
+    """Lines to pass over at the beginning."""
+    encoding: str | list[str] = ""
+    """Of several the first that fits."""
+    transpose: bool | None = None
+    """Whether time is the second axis; None: by the shape."""
+    table: str | None = None
+    """Variable, sheet or topic inside the file; None: the only or the first one."""
+    trial_axis: int | None = None
+    """Axis of the trials in arrays of three axes."""
+    missing: tuple[str, ...] = ()
+    """Texts in place of no value."""
+
+
+@dataclass(frozen=True)
 class FileEntry:
     """One kind of file: its path and its reading."""
 
     paths: tuple[str, ...]
     """One pattern, or the parts of a trial in their order."""
-    options: dict[str, Any]
-    """Options of the reader; see `SourceFormat.read`."""
+    options: ReadOptions
     table: str | list[str] | None = None
     join: str = ""
     derived: dict[str, str] = field(default_factory=dict)
@@ -89,11 +113,13 @@ class FileEntry:
     @classmethod
     def from_document(cls, entry: dict[str, Any]) -> Self:
         """Return the entry of a document that fits the schema."""
-        path, numbers = entry["path"], [value for value in entry.get("missing", []) if not isinstance(value, str)]
+        path, missing = entry["path"], entry.get("missing", [])
         named = {key: entry[key] for key in ("table", "join", "derived") if key in entry}
-        options = {key: value for key, value in entry.items() if key not in ("path", "time", *named)}
+        fields = {key: value for key, value in entry.items() if key not in ("path", "time", "missing", *named)}
+        options = ReadOptions(**fields, missing=tuple(value for value in missing if isinstance(value, str)))
+        numbers = tuple(value for value in missing if not isinstance(value, str))
         paths = tuple(path) if isinstance(path, list) else (path,)
-        return cls(paths, options, missing=tuple(numbers), clock=_clock(entry), **named)
+        return cls(paths, options, missing=numbers, clock=_clock(entry), **named)
 
 
 @dataclass(frozen=True, kw_only=True)

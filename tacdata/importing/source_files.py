@@ -36,11 +36,7 @@ class SourceFile:
         """
         entry = self.entry
         sheets = entry.table if isinstance(entry.table, list) else [entry.table]
-        parts = [
-            read_table(path, entry.options | ({"table": sheet} if sheet else {}))
-            for path in self.paths
-            for sheet in sheets
-        ]
+        parts = [read_table(path, replace(entry.options, table=sheet)) for path in self.paths for sheet in sheets]
         clock = entry.clock.column if entry.clock else None
         if len(parts) == 1:
             (table,) = parts

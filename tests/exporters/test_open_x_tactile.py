@@ -87,7 +87,7 @@ def test_the_last_image_before_each_row_is_taken(tmp_path, monkeypatch):
 
 def test_a_store_is_imported(store, tmp_path):
     folder, episodes = store
-    table = read_table(folder, {})
+    table = read_table(folder)
     assert table.columns["right_tactile_data_fingertips"].shape == (76, 48)
     assert np.bincount(table.columns["episode"].astype(int)).tolist() == [38, 38]
     mapping = tmp_path / "mapping.yaml"
@@ -114,7 +114,7 @@ def test_a_store_is_imported(store, tmp_path):
 def test_wide_arrays_are_left_out_and_named(tmp_path, monkeypatch):
     open_x_tactile._array(tmp_path / "a.zarr/data/eye", np.zeros((5, 96, 96, 3), np.uint8))
     open_x_tactile._array(tmp_path / "a.zarr/data/force", np.arange(5.0))
-    table = read_table(tmp_path / "a.zarr", {})
+    table = read_table(tmp_path / "a.zarr")
     assert list(table.columns) == ["force"] and "data/eye of 96 x 96 x 3 values a row is left out" in table.notes[0]
 
 

@@ -43,7 +43,7 @@ def test_a_small_file_that_fills_the_memory_is_refused(tmp_path, write):
     path = tmp_path / f"run.{write.__name__[1:]}"
     write(path)
     with pytest.raises(FormatError, match=r"grows to .* MB when it is read"):
-        read_table(path, {})
+        read_table(path)
 
 
 def test_a_workbook_that_grows_is_refused(tmp_path):
@@ -58,13 +58,13 @@ def test_a_workbook_that_grows_is_refused(tmp_path):
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("xl/worksheets/sheet2.xml", b"<c><v>1</v></c>" * 3_000_000)
     with pytest.raises(FormatError, match="grows to 45 MB"):
-        read_table(path, {})
+        read_table(path)
 
 
 def test_an_archive_of_true_readings_is_read_however_large(tmp_path):
     path = tmp_path / "run.npz"
     np.savez_compressed(path, t=np.arange(1000.0), c0=np.random.default_rng(0).normal(size=1000))
-    assert read_table(path, {}).rows == 1000
+    assert read_table(path).rows == 1000
 
 
 @pytest.mark.parametrize("text", ("a: &a [*a]", "a: &a {b: *a}", "a: &a\n  - b: [*a]"))

@@ -30,7 +30,7 @@ def test_a_file_that_is_none_of_its_kind_is_refused_in_words(name, ending, conte
     path = tmp_path / f"rows{ending}"
     path.write_bytes(content)
     with pytest.raises(FormatError) as caught:
-        read_table(path, {})
+        read_table(path)
     assert path.name in str(caught.value)
     assert caught.value.allowed
     assert caught.value.remedy
@@ -39,6 +39,6 @@ def test_a_file_that_is_none_of_its_kind_is_refused_in_words(name, ending, conte
 @pytest.mark.parametrize("name", NAMES)
 def test_a_missing_file_is_refused_in_words(name, tmp_path):
     path = tmp_path / f"nothing{KINDS[name].endings[0]}"
-    for attempt in (lambda: read_table(path, {}), lambda: tables_in(path)):
+    for attempt in (lambda: read_table(path), lambda: tables_in(path)):
         with pytest.raises(UsageError, match="no file"):
             attempt()

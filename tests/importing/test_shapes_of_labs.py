@@ -9,6 +9,7 @@ from tacdata.errors import FormatError
 from tacdata.importing.expression import evaluated
 from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.imported_session import import_session
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 from tacdata.recording import read_session
 from tacdata.recording.files.reader import read_episode
@@ -38,7 +39,7 @@ def of(path, **time):
 def test_names_units_and_groups_are_told_apart(tmp_path, header, names, units):
     path = tmp_path / "run.csv"
     path.write_text(header + "\n".join(",".join(f"{v:.4f}" for v in row) for row in table()) + "\n")
-    found = read_table(path, {})
+    found = read_table(path)
     assert list(found.columns) == names and list(found.units.values()) == units
 
 
@@ -92,7 +93,7 @@ def test_hidden_rows_and_sheets_are_left_out_and_named(tmp_path):
 
     path = workbook(tmp_path, fill)
     assert tables_in(path) == ("",)
-    found = read_table(path, {})
+    found = read_table(path)
     np.testing.assert_allclose(found.column("depth [mm]"), rows[:100, 1])
     assert any("100 hidden rows" in note for note in found.notes) and any(
         "raw (hidden)" in note for note in found.notes
@@ -223,5 +224,5 @@ def test_files_of_two_encodings_have_their_names(tmp_path):
     text = write(tmp_path, "csv", table()).read_text().replace("depth", "深さ")
     for encoding in ("utf-8", "shift_jis"):
         (tmp_path / f"{encoding}.csv").write_bytes(text.encode(encoding))
-        found = read_table(tmp_path / f"{encoding}.csv", {"encoding": ["utf-8", "shift_jis"]})
+        found = read_table(tmp_path / f"{encoding}.csv", ReadOptions(encoding=["utf-8", "shift_jis"]))
         assert "深さ [mm]" in found.columns

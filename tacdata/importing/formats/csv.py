@@ -13,6 +13,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, kind_of_bytes
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 from tacdata.importing.text.encoding import ENCODINGS, encoding_of
 from tacdata.importing.text.layout import (
@@ -58,13 +59,13 @@ class Csv(SourceFormat):
 
     endings = (".csv", ".tsv", ".txt", ".dat", ".asc", ".log", ".lvm", ".prn", ".csv.gz", ".txt.gz", ".tsv.gz")
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read the file by Arrow's reader, with the layout of `text_layout`; see the base class."""
         data, notes = _decoded(path, options)
         return table_of(path, data, options, notes)
 
 
-def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str]) -> SourceTable:
+def table_of(path: Path, data: bytes, options: ReadOptions, notes: list[str]) -> SourceTable:
     """Return text in UTF-8 as a table.
 
     Args:
@@ -78,8 +79,7 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
     """
     data = _upright(_with_receipt(data), options, path, notes)
     layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
-    missing_texts = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
-    body, comments, headers = _body(data, layout, missing_texts)
+    body, comments, headers = _body(data, layout, options.missing)
     if comments:
         notes.append(f"{path.name}: {comments} comment lines among the rows are left out")
     if headers:
@@ -88,7 +88,7 @@ def table_of(path: Path, data: bytes, options: dict[str, Any], notes: list[str])
         notes.append(f"{path.name}: names that are given twice; the later columns are called {', '.join(twice)}")
     if not body.strip():
         raise FormatError(f"{path} has a header and no row", "one row of data or more", "leave it out")
-    columns, skipped, doubts = _parsed(body, layout, [*MISSING, *missing_texts], path)
+    columns, skipped, doubts = _parsed(body, layout, [*MISSING, *options.missing], path)
     if not skipped and _is_cut(body, layout):
         last_column = columns[layout.names[-1]]
         columns[layout.names[-1]] = np.append(last_column[:-1], np.nan)
@@ -106,11 +106,11 @@ def _stated_rate(data: bytes, skip: int) -> float:
     return float(match[1]) * (1000.0 if match[2] else 1.0) if match else 0.0
 
 
-def _upright(data: bytes, options: dict[str, Any], path: Path, notes: list[str]) -> bytes:
+def _upright(data: bytes, options: ReadOptions, path: Path, notes: list[str]) -> bytes:
     """Return text with a column for each of its few, very long lines; other text as it is."""
     lines = [line for line in data[:MOST_TURNED].split(b"\n") if line.strip()]
     is_short = 2 <= len(lines) <= FEW_LINES and len(data) <= MOST_TURNED
-    if not is_short or options.get("transpose") is False:
+    if not is_short or options.transpose is False:
         return data
     rows = [line.decode("utf-8", "ignore") for line in lines]
     marks = [mark for mark in DELIMITERS if mark != " "] + [" "]
@@ -145,7 +145,7 @@ def _with_receipt(data: bytes) -> bytes:
     if 2 * sum(bool(RECEIPT.match(line)) for line in tail) <= len(tail):
         return data
     cut = [line.partition(b"->")[2].strip() if RECEIPT.match(line) else b"" for line in lines]
-    layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), {}, "")
+    layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), ReadOptions(), "")
     between = b"\t" if layout.delimiter == " " else layout.delimiter.encode()
     bodies = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]
     begin = [b"received" if number < layout.skip else RECEIPT.match(line) for number, line in enumerate(lines)]
@@ -156,7 +156,7 @@ def _with_receipt(data: bytes) -> bytes:
     return b"\n".join(rows)
 
 
-def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
+def _decoded(path: Path, options: ReadOptions) -> tuple[bytes, list[str]]:
     """Return the file's text in UTF-8 with plain line ends."""
     raw = path.read_bytes()
     if path.suffix == ".gz":
@@ -172,7 +172,7 @@ def _decoded(path: Path, options: dict[str, Any]) -> tuple[bytes, list[str]]:
                 "unpack it, and split it into files of fewer rows",
             )
     notes: list[str] = []
-    tried = options.get("encoding")
+    tried = options.encoding
     if isinstance(tried, list):
         tried = next((name for name in tried if _decodes(raw, name)), tried[-1])
     encoding = tried or next((name for mark, name in MARKS.items() if raw.startswith(mark)), None)

@@ -11,6 +11,7 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import WHOLE, rows_of
 from tacdata.importing.formats.source_format import SourceFormat
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
 LINES = (".jsonl", ".ndjson")
@@ -23,7 +24,7 @@ class Json(SourceFormat):
 
     endings = (".json", *LINES)
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read the lists that have rows. See the base."""
         text = path.read_text(encoding="utf-8-sig")
         by_line = path.suffix.lower() in LINES

@@ -13,6 +13,7 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import rows_of
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
 
@@ -36,7 +37,7 @@ class Mat(SourceFormat):
         alike = len({re.sub(r"\d+", "#", name) for name in names}) == 1
         return tuple(names) if are_trials and alike and len(names) > 1 else ("",)
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read the variables; ``table`` in the options selects one. See the base class."""
         try:
             loaded = _loaded(path)
@@ -53,7 +54,7 @@ class Mat(SourceFormat):
                 "numbers, texts and structures",
                 "in MATLAB: writetable(t, 'name.csv'), or s = table2struct(t, 'ToScalar', true); save('name.mat', 's')",
             )
-        if selection := options.get("table"):
+        if selection := options.table:
             if selection not in variables:
                 raise FormatError(
                     f"{path}: no variable {selection}", ", ".join(variables), "correct table in the mapping"

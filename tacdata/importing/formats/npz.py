@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth, zipped_size
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
 LONG = 10
@@ -24,7 +24,7 @@ class Npz(SourceFormat):
 
     endings = (".npz", ".npy")
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read the arrays; nothing pickled is ever loaded. See the base."""
         refuse_growth(path, zipped_size(path))
         # numpy leaves a damaged archive open that it opened itself.
@@ -44,7 +44,7 @@ class Npz(SourceFormat):
             return rows_of(path, {name: loaded[name] for name in loaded.files}, options)
 
 
-def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) -> SourceTable:
+def rows_of(path: Path, arrays: dict[str, np.ndarray], options: ReadOptions) -> SourceTable:
     """Return the arrays that share one number of rows as a table: structured ones by field, others whole.
 
     With ``trial_axis`` in the options, trials lie along that axis of arrays of three axes. They are put below each
@@ -54,8 +54,8 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
         FormatError: If no array has that axis.
     """
     arrays, remarks = _upright(path, arrays, options)
-    if (axis := options.get("trial_axis")) is not None:
-        arrays = _below_each_other(path, arrays, axis)
+    if options.trial_axis is not None:
+        arrays = _below_each_other(path, arrays, options.trial_axis)
     flat = _flat(arrays)
     columns = {name: _column(array) for name, array in flat.items() if array.size > 1}
     if not columns:
@@ -77,12 +77,11 @@ def rows_of(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) 
 
 
 def _upright(
-    path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]
+    path: Path, arrays: dict[str, np.ndarray], options: ReadOptions
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Return arrays with time as their first axis, by the mapping or the shape of a lone array; and a note."""
-    if options.get("transpose") is not None:
-        turn = bool(options["transpose"])
-        return {name: array.T if turn and array.ndim == 2 else array for name, array in arrays.items()}, []
+    if options.transpose is not None:
+        return {name: array.T if options.transpose and array.ndim == 2 else array for name, array in arrays.items()}, []
     lone = next(iter(arrays.values())) if len(arrays) == 1 else None
     if lone is None or lone.ndim != 2 or lone.dtype.names or lone.shape[1] <= LONG * lone.shape[0]:
         return arrays, []
@@ -110,10 +109,10 @@ def _fields(array: np.ndarray, inside: str = "") -> Iterator[tuple[str, np.ndarr
         yield from _fields(array[field], f"{inside}.{field}" if inside else field)
 
 
-def _shapes(path: Path, arrays: dict[str, np.ndarray], options: dict[str, Any]) -> list[str]:
+def _shapes(path: Path, arrays: dict[str, np.ndarray], options: ReadOptions) -> list[str]:
     """Return the assumption about a file of one array: which of its axes is time."""
     array = np.squeeze(next(iter(arrays.values())))
-    if len(arrays) > 1 or array.dtype.names or options.get("trial_axis") is not None:
+    if len(arrays) > 1 or array.dtype.names or options.trial_axis is not None:
         return []
     shape = " x ".join(map(str, array.shape))
     if array.ndim > 2:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
 
@@ -17,7 +18,7 @@ class Parquet(SourceFormat):
 
     endings = (".parquet", ".feather")
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read all columns; nulls become NaN. See the base."""
         import pyarrow as pa
         from pyarrow import feather, parquet

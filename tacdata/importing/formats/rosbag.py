@@ -13,6 +13,7 @@ import numpy as np
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.importing.formats.source_format import SourceFormat
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
 RECEIVED = "received"
@@ -41,11 +42,11 @@ class Rosbag(SourceFormat):
                 if any(np.ndim(v) or not isinstance(v, str) for _, v in _first(reader, topic))
             )
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read one topic; without ``table`` in the options the only one with numbers. See the base class."""
         with _opened(path) as reader:
             available = _topics(reader)
-            topic = options.get("table") or _only(path, self.tables(path), available)
+            topic = options.table or _only(path, self.tables(path), available)
             if topic not in available:
                 raise FormatError(f"{path}: no topic {topic!r}", ", ".join(available) or "none", "correct table")
             longer: Counter[str] = Counter()

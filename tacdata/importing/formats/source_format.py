@@ -17,8 +17,11 @@ from typing import Any, ClassVar
 
 from tacdata import registry
 from tacdata.errors import FormatError, TacdataError, UsageError
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
+AUTOMATIC = ReadOptions()
+"""Options of a file that is read as it is recognized."""
 ROOM, BASE = "tacdata.importing.formats", "source_format"
 LONGEST = 300
 """Letters of a library's words that an error repeats."""
@@ -67,20 +70,19 @@ class SourceFormat(ABC):
         return ("",)
 
     @abstractmethod
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read a file.
 
         Args:
             path: The file.
-            options: The mapping's options: ``header``, ``delimiter``, ``decimal``, ``skip``, ``encoding``,
-                ``missing`` (texts), ``table`` (name inside the file); a format uses those that concern it.
+            options: The mapping's options; a format uses those that concern it.
 
         Raises:
             FormatError: If the file is not of this kind, or damaged.
         """
 
 
-def read_table(path: Path, options: dict[str, Any]) -> SourceTable:
+def read_table(path: Path, options: ReadOptions = AUTOMATIC) -> SourceTable:
     """Read a file by the format that its mapping names, or by its ending.
 
     Raises:
@@ -97,15 +99,15 @@ def read_table(path: Path, options: dict[str, Any]) -> SourceTable:
 
 def tables_in(path: Path) -> tuple[str, ...]:
     """Return the tables that a file holds, ("",) for one that is a single table; raises as `read_table`."""
-    kind, name = _kind(path, {})
+    kind, name = _kind(path, AUTOMATIC)
     with _in_words(path, name):
         return kind.tables(path)
 
 
-def _kind(path: Path, options: dict[str, Any]) -> tuple[SourceFormat, str]:
+def _kind(path: Path, options: ReadOptions) -> tuple[SourceFormat, str]:
     if not path.exists():
         raise UsageError(f"no file {path}", "a file of measured data", "check the path and the mapping's files")
-    name = options.get("format") or _by_ending(path)
+    name = options.format or _by_ending(path)
     kind: type[Any] = registry.load(ROOM, BASE, name, SourceFormat)
     return kind(), name
 

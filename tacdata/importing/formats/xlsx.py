@@ -17,9 +17,10 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.formats.csv import table_of
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth, zipped_size
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
-TABS = {"delimiter": "tab", "decimal": "."}
+TABS = ReadOptions(delimiter="tab", decimal=".")
 MERGED = re.compile(rb'<(?:\w+:)?mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
 HIDDEN = re.compile(rb'<(?:\w+:)?row [^>]*hidden="(?:1|true)"[^>]*>')
 NUMBERED = re.compile(rb'\br="(\d+)"')
@@ -53,14 +54,14 @@ class Xlsx(SourceFormat):
             book.close()
         return tuple(titles) if len(titles) > 1 else ("",)
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read a sheet; dates come as ISO 8601. See the base."""
         from openpyxl import load_workbook
 
         refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
         book = load_workbook(path, read_only=True, data_only=True)
         try:
-            if (sheet_name := options.get("table")) and sheet_name not in book.sheetnames:
+            if (sheet_name := options.table) and sheet_name not in book.sheetnames:
                 allowed = ", ".join(book.sheetnames)
                 raise FormatError(f"{path}: no sheet {sheet_name}", allowed, "correct table in the mapping")
             table, read, remainder = _first_table(path, book, options)
@@ -75,9 +76,9 @@ class Xlsx(SourceFormat):
         return replace(table, notes=tuple(notes))
 
 
-def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[SourceTable, str, list[str]]:
+def _first_table(path: Path, book: Any, options: ReadOptions) -> tuple[SourceTable, str, list[str]]:
     """Return the sheet that is meant, else the first with rows of numbers; its name, and those of other full sheets."""
-    sheet_name, refused, sheets, notes = options.get("table"), None, {}, {}
+    sheet_name, refused, sheets, notes = options.table, None, {}, {}
     visible = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
     for sheet in [book[sheet_name]] if sheet_name else visible or book.worksheets:
         sheet.reset_dimensions()  # programs other than Excel write wrong ones, by which rows would be cut off
@@ -87,7 +88,12 @@ def _first_table(path: Path, book: Any, options: dict[str, Any]) -> tuple[Source
     hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != sheet_name]
     for name, data in sheets.items():
         try:
-            table = table_of(path, data, {**options, **TABS}, [f"{path.name}: {note}" for note in notes[name]])
+            table = table_of(
+                path,
+                data,
+                replace(options, delimiter=TABS.delimiter, decimal=TABS.decimal),
+                [f"{path.name}: {note}" for note in notes[name]],
+            )
         except FormatError as error:
             refused = refused or error
             continue

@@ -12,6 +12,7 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.formats.npz import rows_of
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
 DESCRIBED = (".zarray", ".zattrs", ".zgroup", "zarr.json")
@@ -34,7 +35,7 @@ class Zarr(SourceFormat):
 
     endings = (".zarr",)
 
-    def read(self, path: Path, options: dict[str, Any]) -> SourceTable:
+    def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read the arrays; images are left out and named. See the base class."""
         import zarr
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.formats.source_format import read_table, tables_in
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
 from tacdata.importing.proposing.roles import is_whole, roles_of
 from tacdata.importing.proposing.trial_parts import PartsInOrder, parts_in_order
@@ -93,18 +94,18 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
 
 def _read(path: Path, options: dict[str, Any]) -> tuple[SourceTable, dict[str, Any]]:
     """Return a file's table and the options that read it: with trials along the axis that loses fewest arrays."""
-    table = read_table(path, options)
+    table = read_table(path, ReadOptions(**options))
     best, best_options = len(_lost(table)), options
     for axis in (2, 0, 1) if path.suffix in (".mat", ".npz") and best else ():
         try:
-            tried = read_table(path, {**options, "trial_axis": axis})
+            tried = read_table(path, ReadOptions(**options, trial_axis=axis))
         except FormatError:
             break
         if len(_lost(tried)) < best:
             table, best, best_options = tried, len(_lost(tried)), {**options, "trial_axis": axis}
     if not best and any("trial_axis says" in note for note in table.notes):
         for axis in (2, 1, 0):
-            tried = read_table(path, {**options, "trial_axis": axis})
+            tried = read_table(path, ReadOptions(**options, trial_axis=axis))
             if _one_clock(tried):
                 return tried, {**options, "trial_axis": axis}
     return table, best_options

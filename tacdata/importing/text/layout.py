@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tacdata.documents import composed
 from tacdata.errors import FormatError
+from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.units import BRACKETED, OTHERS, plain, quantity_of, split_unit
 
 COMMENTS = ("#", "%", "//")
@@ -113,7 +114,7 @@ def is_comment(line: str, missing: tuple[str, ...] = ()) -> bool:
     return bare.startswith(COMMENTS) and not bare.startswith((*SHEET_ERRORS, *(text for text in missing if text)))
 
 
-def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
+def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     """Recognize the layout from a file's beginning; the mapping's ``options`` take precedence.
 
     Raises:
@@ -122,14 +123,13 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     if not text.strip():
         raise FormatError(f"{origin} is empty", "a text file of columns", "leave it out, or copy it again")
     lines = text.split("\n")[:SAMPLE]  # splitlines would part lines at other signs, too, which counts rows wrongly
-    skip = int(options.get("skip", 0))
-    missing = tuple(str(text) for text in options.get("missing", ()) if isinstance(text, str))
-    lines_of_data = [line for line in lines[skip:] if line.strip() and not is_comment(line, missing)]
-    delimiter = {"tab": "\t", "space": " "}.get(options.get("delimiter", ""), options.get("delimiter"))
+    skip = options.skip
+    lines_of_data = [line for line in lines[skip:] if line.strip() and not is_comment(line, options.missing)]
+    delimiter = {"tab": "\t", "space": " "}.get(options.delimiter, options.delimiter)
     delimiter = delimiter or _delimiter(lines_of_data)
     rows = [split(line, delimiter) for line in lines_of_data]
     width = Counter(len(row) for row in rows[-_told(rows) :]).most_common(1)[0][0] if rows else 0
-    decimal = options.get("decimal") or _decimal(rows)
+    decimal = options.decimal or _decimal(rows)
     first = _first_row(rows, width, decimal)
     if first is None:
         raise FormatError(
@@ -140,7 +140,7 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     _refuse_commas_for_both(rows[:first], rows[first:], delimiter, width, origin)
     header = [row for row in rows[:first] if len(row) in (width, width - 1, width + 1) and any(row)]
     header = header or _commented_header(lines[skip:], lines_of_data[first], delimiter, width)
-    if options.get("header") is False:
+    if not options.header:
         header, first = [], next(k for k, row in enumerate(rows) if len(row) == width)
     names, units = _names(header, width)
     start = _line_of(lines, lines_of_data[first], skip)
@@ -149,16 +149,16 @@ def text_layout(text: str, options: dict[str, Any], origin: str) -> TextLayout:
     return TextLayout(delimiter, decimal, start, names, units, kinds)
 
 
-def _as_given(options: dict[str, Any]) -> str:
+def _as_given(options: ReadOptions) -> str:
     """Return the layout that the mapping gives, as the end of a sentence."""
-    settings = [f"{name} {options[name]!r}" for name in GUESSED if name in options]
+    settings = [f"{name} {value!r}" for name in GUESSED if (value := getattr(options, name))]
     return f", read with {' and '.join(settings)} as the mapping says" if settings else ""
 
 
-def _otherwise(text: str, options: dict[str, Any], origin: str) -> str:
+def _otherwise(text: str, options: ReadOptions, origin: str) -> str:
     """Return a layout that reads a file which the mapping's delimiter or decimal sign does not; "" if there is none."""
-    remainder = {name: value for name, value in options.items() if name not in GUESSED}
-    if len(remainder) == len(options):
+    remainder = replace(options, delimiter="", decimal="")
+    if remainder == options:
         return ""
     try:
         layout = text_layout(text, remainder, origin)

@@ -10,7 +10,7 @@ from tacdata.importing.formats.source_format import read_table
 def test_a_text_that_is_named_xls_is_read(tmp_path):
     path = write(tmp_path, "csv", table()).rename(tmp_path / "run.xls")
     path.write_text(path.read_text().replace(",", "\t"))
-    assert read_table(path, {}).rows == len(table())
+    assert read_table(path).rows == len(table())
 
 
 @pytest.mark.parametrize(
@@ -26,5 +26,5 @@ def test_a_text_that_is_named_xls_is_read(tmp_path):
 def test_the_way_to_a_file_that_is_read_is_named(tmp_path, name, data, remedy):
     (tmp_path / name).write_bytes(data)
     with pytest.raises(UsageError) as error:
-        read_table(tmp_path / name, {})
+        read_table(tmp_path / name)
     assert remedy in error.value.remedy

@@ -15,6 +15,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.example import copy_session
 from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.imported_session import import_session
+from tacdata.importing.mapping import ReadOptions
 from tacdata.recording.files.reader import read_episode
 
 BEGIN = 1_743_486_221_000_000_000
@@ -102,17 +103,17 @@ def test_every_topic_keeps_its_own_rate(tmp_path, storage):
 
 def test_own_types_images_and_stamps(tmp_path):
     path = bag(tmp_path, "mcap", late=0.5)
-    own = read_table(path, {"table": "/lab"})
+    own = read_table(path, ReadOptions(table="/lab"))
     assert own.columns["pair"].shape == (1, 2) and own.columns["word"].tolist() == ["a"]
-    eye = read_table(path, {"table": "/eye"})
+    eye = read_table(path, ReadOptions(table="/eye"))
     assert "data" not in eye.columns and "6144 values a message is left out" in eye.notes[0]
-    stage = read_table(path, {"table": "/stage"})
+    stage = read_table(path, ReadOptions(table="/stage"))
     assert next(iter(stage.columns)) == "header.stamp", "nearer to the measurement than the time of receipt"
     assert np.all(stage.columns["received"] - stage.columns["header.stamp"] == 500_000_000)
     with pytest.raises(UsageError, match="4 topics with numbers"):
-        read_table(path, {})
+        read_table(path)
     with pytest.raises(FormatError, match="no topic '/taxel'"):
-        read_table(path, {"table": "/taxel"})
+        read_table(path, ReadOptions(table="/taxel"))
 
 
 def test_a_mapping_is_proposed_from_all_topics(tmp_path):
@@ -153,7 +154,7 @@ def test_parts_of_a_message_that_are_not_taken_are_counted(tmp_path):
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         topic = writer.add_connection("/tf", message.__msgtype__, typestore=types)
         writer.write(topic, BEGIN, types.serialize_cdr(message, message.__msgtype__))
-    table = read_table(next((tmp_path / "bag").glob("*.mcap")), {"table": "/tf"})
+    table = read_table(next((tmp_path / "bag").glob("*.mcap")), ReadOptions(table="/tf"))
     assert "transforms[31].transform.translation.x" in table.columns
     assert table.notes == ("bag.mcap: 1 messages of /tf have more than 32 parts in transforms: the first 32 are taken",)
 
@@ -164,8 +165,8 @@ def test_a_recording_becomes_a_bag_that_comes_back_as_it_was(tmp_path):
     counts = example["write"](episode, tmp_path / "bag")
     assert counts == {"/taxels": len(episode.taxels.counts), "/tip": len(episode.tip)}
     (path,) = (tmp_path / "bag").glob("*.mcap")
-    board = read_table(path, {"table": "/taxels"})
+    board = read_table(path, ReadOptions(table="/taxels"))
     np.testing.assert_array_equal(board.columns["data"], episode.taxels.counts)
     np.testing.assert_array_equal(board.columns["received"], episode.taxels.sample_ns)
-    tip = read_table(path, {"table": "/tip"})
+    tip = read_table(path, ReadOptions(table="/tip"))
     np.testing.assert_allclose(tip.columns["point.z"], -episode.tip[:, 2] / 1000, atol=1e-9)

@@ -249,6 +249,6 @@ def test_names_in_older_encodings_are_read(tmp_path, encoding, names):
 
     lines = [names, *(",".join(row) for row in zip(*rounded(T, DEPTH, C0), strict=True))]
     (tmp_path / "run.csv").write_bytes("\n".join(lines).encode(encoding))
-    table = read_table(tmp_path / "run.csv", {})
+    table = read_table(tmp_path / "run.csv")
     assert list(table.columns) == names.split(",")
     assert any("not UTF-8, read as" in note for note in table.notes)

@@ -15,7 +15,7 @@ STRESS = 10 * np.log(STRETCH)
 
 def time_of(path, columns):
     np.savetxt(path, np.column_stack(columns))
-    return roles_of(read_table(path, {}))["time"]
+    return roles_of(read_table(path))["time"]
 
 
 @pytest.mark.parametrize("place", range(3))
@@ -38,5 +38,5 @@ def test_what_was_taken_for_the_time_is_said(tmp_path):
 def test_a_comma_at_the_end_of_each_row_makes_no_channel(tmp_path):
     rows = [f"{0.1 * k:g}, {stress:.4f}," for k, stress in enumerate(STRESS)]
     (tmp_path / "run.csv").write_text("\n".join(["# Made by a program", "# data-1-x, data-1-y,", *rows]))
-    table = read_table(tmp_path / "run.csv", {})
+    table = read_table(tmp_path / "run.csv")
     assert len(table.columns) == 3 and len([name for names in roles_of(table).values() for name in names]) == 2

@@ -210,7 +210,7 @@ def test_every_row_of_a_text_file_is_imported_or_counted(tmp_path, change, note)
 def test_a_file_that_is_called_compressed_and_is_not_is_to_be_renamed(tmp_path):
     (tmp_path / "a.csv.gz").write_text(text())
     with pytest.raises(FormatError, match="and is not compressed") as caught:
-        read_table(tmp_path / "a.csv.gz", {})
+        read_table(tmp_path / "a.csv.gz")
     assert caught.value.remedy == "rename it to a.csv"
 
 
@@ -341,7 +341,7 @@ def test_line_breaks_in_the_quoted_names_of_all_columns_are_joined(tmp_path, bre
     lines = text().split("\n")
     path = tmp_path / "run.csv"
     path.write_text("\n".join(["\t".join(names), *(line.replace(",", "\t") for line in lines[1:])]))
-    table = read_table(path, {})
+    table = read_table(path)
     assert [split_unit(name)[0] for name in table.columns] == ["t", "d", "a", "b"] and table.rows == ROWS
 
 
