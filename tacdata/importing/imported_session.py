@@ -65,15 +65,15 @@ def import_session(
         >>> made.refused
         ()
     """
-    described = Mapping.from_document(documents.read(mapping, "import_mapping"), mapping.parent)
+    contents = Mapping.from_document(documents.read(mapping, "import_mapping"), mapping.parent)
     if target.exists():
         raise UsageError(f"{target} exists", "a new session folder", "choose another --out")
-    sets = file_sets(source, described.files)
+    sets = file_sets(source, contents.files)
     target.parent.mkdir(parents=True, exist_ok=True)
     # On the same drive, so that the rename at the end is atomic.
     work = Path(mkdtemp(dir=target.parent, prefix=f".{target.name}."))
     try:
-        run = _Import(described, source, work, progress)
+        run = _Import(contents, source, work, progress)
         for files in sets:
             run.add(files)
         if not run.presses:
