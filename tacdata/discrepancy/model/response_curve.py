@@ -26,7 +26,7 @@ EACH = 3
 DEEPER = 0.02
 """Episodes deeper than those fitted to by more are not asked [1]."""
 FOLLOWS = 0.05
-"""A law that leaves more of the change of the readings is none worth telling [1]."""
+"""Share of the readings' change that a law may leave unexplained [1]."""
 MIDDLE = (0.1, 0.9)
 """Quantiles of the channels' numbers that are reported [1]."""
 

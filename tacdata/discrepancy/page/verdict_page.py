@@ -10,7 +10,7 @@ import numpy as np
 
 from tacdata.discrepancy.heading import sentence, sizes
 from tacdata.discrepancy.page.heat_map import heat_map
-from tacdata.discrepancy.page.telling import ToldPress, telling
+from tacdata.discrepancy.page.press_curves import PressCurves, largest_changes
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.verdict.residual_table import Residuals
 from tacdata.discrepancy.verdict.text import LEAST_CLOSED, between_specimens, unsaid
@@ -93,17 +93,17 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
 
 def _presses(verdict: dict[str, Any], found: Residuals) -> Slider | None:
     """Return the presses under one slider: reading, residual, and what lies beyond the model over depth."""
-    presses = telling(found)
+    presses = largest_changes(found)
     if not presses:
         return None
     added = bool(verdict["effects"]) and not between_specimens(verdict)
     unit = verdict.get("heading", {}).get("unit", "") or "the stream's unit"
     kind = "sealed press" if found.sealed else "press"
     panels = zip(*(_panels(press, unit, added) for press in presses), strict=True)
-    return Slider(f"{kind}, the most telling first", [f"{p.name}, {p.stream}" for p in presses], list(panels))
+    return Slider(f"{kind}, largest change first", [f"{p.name}, {p.stream}" for p in presses], list(panels))
 
 
-def _panels(p: ToldPress, unit: str, added: bool) -> tuple[Plot, Plot, Plot]:
+def _panels(p: PressCurves, unit: str, added: bool) -> tuple[Plot, Plot, Plot]:
     level, noise = (
         float(np.nanmedian(p.measured[:5])),
         Band(-2 * p.noise, 2 * p.noise, "noise, two standard deviations"),

@@ -69,7 +69,7 @@ def _header(revision: dict[str, Any], verdict: dict[str, Any]) -> PageHeader:
 
 
 def _panels(episode: EpisodeCurves, unit: str) -> tuple[Plot, Plot]:
-    """Return readings and residuals of an episode on its most telling channel."""
+    """Return readings and residuals of an episode on the channel of its largest change."""
     c, names = episode.channel, (("model before", "vermilion", episode.before), ("model after", "blue", episode.after))
     measured = episode.measured[:, c]
     readings = [Series("measured", measured, "ink", width=3.0)]

@@ -12,7 +12,7 @@ from tacdata import documents
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.page.heat_map import heat_map
-from tacdata.discrepancy.page.telling import telling
+from tacdata.discrepancy.page.press_curves import largest_changes
 from tacdata.discrepancy.page.verdict_page import TAKEN_OUT, verdict_page
 from tacdata.discrepancy.verdict.before_and_after import beside_model
 from tacdata.discrepancy.verdict.sealed import chosen
@@ -42,8 +42,8 @@ def test_the_presses_are_under_one_slider_with_their_readings_as_data(judged):
     assert not re.search(r'(src|href)="(?!#)', page), "nothing comes from elsewhere"
     assert "`" not in re.sub(r"<script.*?</script>", "", page, flags=re.S), "commands are set as code"
     reading, residual, loop = figures(page)
-    assert len(reading) == len(residual) == len(loop) == len(telling(residuals)) == page.count("<option ")
-    press = telling(residuals)[0]
+    assert len(reading) == len(residual) == len(loop) == len(largest_changes(residuals)) == page.count("<option ")
+    press = largest_changes(residuals)[0]
     shown = reading[0]["series"][0]["values"]
     assert np.ptp(shown) == pytest.approx(np.ptp(press.measured), rel=1e-3)
     assert residual[0]["bands"][0]["high"] == pytest.approx(2 * press.noise, rel=1e-4)
@@ -81,9 +81,9 @@ def test_what_only_specimens_tell_together_is_drawn_into_no_press(judged):
         assert ("model with the effects" in page) == ("with the effects" in page) == gap
 
 
-def test_telling_presses_are_sealed_ones(judged):
+def test_shown_presses_are_sealed_ones(judged):
     verdict, residuals = judged
-    presses = telling(residuals)
+    presses = largest_changes(residuals)
     assert {p.name for p in presses} <= set(verdict["data"]["sealed"]) and presses
 
 

@@ -1,4 +1,4 @@
-"""The most telling sealed presses: measured, and the model before and after."""
+"""Curves of the sealed presses that the effects change most: measured, model before and after."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from tacdata.discrepancy.verdict.residual_table import Residuals
 
-MOST_TOLD = 24
+MOST_PRESSES = 24
 """Presses that are shown."""
 
 
 @dataclass(frozen=True)
-class ToldPress:
-    """One press on its most telling channel."""
+class PressCurves:
+    """One press on the channel of its largest change."""
 
     name: str
     stream: str
@@ -32,7 +32,7 @@ class ToldPress:
     """Standard deviation of the stream's noise [its unit]."""
 
 
-def telling(found: Residuals, most: int = MOST_TOLD) -> list[ToldPress]:
+def largest_changes(found: Residuals, most: int = MOST_PRESSES) -> list[PressCurves]:
     """Return the sealed presses in which the effects change most; of all presses, where none was sealed.
 
     They show where the effects matter, whether they help there or not.
@@ -52,10 +52,10 @@ def telling(found: Residuals, most: int = MOST_TOLD) -> list[ToldPress]:
     return [_press(found, k, stream) for _, k, stream in sorted(ranked, key=lambda one: -one[0])[:most]]
 
 
-def _press(found: Residuals, number: int, stream: int) -> ToldPress:
+def _press(found: Residuals, number: int, stream: int) -> PressCurves:
     rows = found.episode == number
     time = found.time[rows]
-    return ToldPress(
+    return PressCurves(
         found.names[number],
         found.streams[stream],
         time - time[0],
