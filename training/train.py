@@ -186,7 +186,8 @@ def train(
             }
             _keep(run, line, out)
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
-        best = _corrected(checkpoint.load(out, place), frames, split)
+        _correct(checkpoint.load(out, place), frames, split, pretrained)
+        best = checkpoint.load(out, place)
         if len(split.validation) > 1:
             conformal_intervals.write(out, _calibrated(best, windows, frames, split))
         known = novelty.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
@@ -206,14 +207,11 @@ def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, s
     return conformal_intervals.calibrate(maps, labels, grid.pixel_pitch, best.content_hash)
 
 
-def _corrected(best: checkpoint.Checkpoint, frames: Frames, split: Split) -> checkpoint.Checkpoint:
-    """Return the best epoch with its maxima corrected, and write it so; validation presses stay unseen."""
-    peaks = fit_peaks(best.network, frames, split.train)
-    # A finished run that is resumed has this correction: its file must not change.
-    if peaks and peaks.document != best.document.get("peak"):
-        best.network.set_peak(peaks.mean, peaks.scale, peaks.weight)
-        checkpoint.save(best.path, best.network, None, {**best.document, "peak": peaks.document})
-    return best
+def _correct(best: checkpoint.Checkpoint, frames: Frames, split: Split, parent: checkpoint.Checkpoint | None) -> None:
+    """Correct the maxima of the best epoch, and write it so; validation presses stay unseen."""
+    peak = fit_peaks(best.network, frames, split.train, parent.peak if parent else None)
+    if peak and peak.document != best.document.get("peak"):  # that of a resumed run which had ended is equal
+        checkpoint.save(best.path, best.network, None, {**best.document, "peak": peak.document})
 
 
 def _started(

@@ -60,8 +60,8 @@ def application(inventory: Inventory, token: str) -> FastAPI:
     @routes.get("/file/{name:path}")
     def file(name: str) -> FileResponse:
         path = shown_file(inventory.root, name)
-        kind = {"media_type": "text/plain; charset=utf-8"} if path.suffix == ".md" else {}
-        return FileResponse(path, headers={"Content-Security-Policy": SEALED}, **kind)
+        kind = "text/plain; charset=utf-8" if path.suffix == ".md" else None
+        return FileResponse(path, media_type=kind, headers={"Content-Security-Policy": SEALED})
 
     api.include_router(routes)
     return api

@@ -5,7 +5,8 @@ depends on the unit's skin. So the logarithm of labelled over predicted maximum 
 and loads (`networks.network.peak_features`), on the training presses.
 
 Ridge regression: each press weighs the same, each frame by its squared depth, as the error in millimetres counts. The
-prior is no correction. With few presses it holds the coefficients near zero.
+prior's mean is no correction, or that of the network from which this one was fitted: with few presses the coefficients
+stay near it.
 """
 
 from __future__ import annotations
@@ -56,13 +57,16 @@ class PeakRegression:
 
 
 @torch.inference_mode()
-def fit_peaks(network: Network, frames: Frames, episodes: tuple[int, ...]) -> PeakRegression | None:
-    """Fit the correction to labelled presses; None if fewer than `FEWEST` of them touch.
+def fit_peaks(
+    network: Network, frames: Frames, episodes: tuple[int, ...], parent: PeakRegression | None = None
+) -> PeakRegression | None:
+    """Fit the correction to labelled presses; the ``parent``'s if fewer than `FEWEST` of them touch.
 
     Args:
         network: The network, on the CPU or a GPU; a correction that it has is left out.
         frames: The dataset.
         episodes: Numbers of the presses.
+        parent: Correction of the network that was fitted to these presses; it is the prior's mean.
     """
     place = network.get_buffer("mean").device
     windows, top = Windows(frames, network.offsets, place), frames.sensor.map.depth_max
@@ -83,13 +87,14 @@ def fit_peaks(network: Network, frames: Frames, episodes: tuple[int, ...]) -> Pe
         targets.append(np.log(peak / (largest.double().cpu().numpy() * top)))
         weights.append(peak / np.sqrt(len(peak)))
     if len(features) < FEWEST:
-        return None
+        return parent
     columns, target, weight = (np.concatenate(part) for part in (features, targets, weights))
-    mean, scale = columns.mean(axis=0), columns.std(axis=0)
+    mean, scale = (parent.mean, parent.scale) if parent else (columns.mean(axis=0), columns.std(axis=0))
     scale = np.where(scale > 1e-6, scale, 1.0)
+    expected = parent.weight if parent else np.zeros(columns.shape[1] + 1)
     design = weight[:, None] * np.column_stack([np.ones(len(columns)), (columns - mean) / scale])
     # The constant is known better than a slope beforehand, as all frames of a unit share it.
     prior = RIDGE * np.r_[0.1, np.ones(columns.shape[1])]
-    return PeakRegression(
-        mean, scale, np.linalg.solve(design.T @ design + np.diag(prior), design.T @ (weight * target))
-    )
+    remainder = weight * target - design @ expected
+    change = np.linalg.solve(design.T @ design + np.diag(prior), design.T @ remainder)
+    return PeakRegression(mean, scale, expected + change)

@@ -62,6 +62,12 @@ class Checkpoint:
         return ChannelCalibration.from_document(document, self.sensor.taxels) if document else None
 
     @property
+    def peak(self) -> PeakRegression | None:
+        """Correction of its maps' maxima; None without."""
+        document = self.document.get("peak")
+        return PeakRegression.from_document(document) if document else None
+
+    @property
     def content_hash(self) -> str:
         """Hash of the file: the checkpoint's identity."""
         return provenance.file_hash(self.path)
@@ -152,11 +158,11 @@ def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
     if calibration := document.get("calibration"):
         channel_calibration = ChannelCalibration.from_document(calibration, sensor.taxels)
         network.set_calibration(channel_calibration.gain, channel_calibration.exponent, channel_calibration.mixing)
-    if peak := document.get("peak"):
-        regression = PeakRegression.from_document(peak)
-        network.set_peak(regression.mean, regression.scale, regression.weight)
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
-    return Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
+    found = Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
+    if peak := found.peak:
+        network.set_peak(peak.mean, peak.scale, peak.weight)
+    return found
 
 
 def restore(optimizer: torch.optim.Optimizer, state: dict[str, torch.Tensor]) -> None:
