@@ -252,7 +252,7 @@ def _free(probe: GuardedProbe, motion: GuardedMotion, streams: RigStreams, heigh
         with suppress(TacdataError):
             probe.rise(speed)
             motion.settle()
-        return
+            return
     if not probe.stopped:  # a fault while the guide stood still: the hold must be released first
         with suppress(TacdataError):
             motion.drive((), probe.position, streams, None)

@@ -110,10 +110,12 @@ class GuardedMotion:
                 if streams.fault:
                     break
             end = host.monotonic() + (REASON if self._halted.is_set() else WATCH)
-            while failure and streams.fault is None and host.monotonic() < end:
+            while (failure or self._halted.is_set()) and streams.fault is None and host.monotonic() < end:
                 host.sleep(WATCH / 2)  # a stream that stopped the motion is about to give the reason
             if streams.fault or failure:
                 raise streams.fault or failure[0]
+            if self._halted.is_set():  # the steps were not carried out
+                raise DeviceError("the motion was stopped", "a motion that reaches its end", "start again")
         except BaseException:
             self.stop()
             try:
