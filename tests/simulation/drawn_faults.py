@@ -28,12 +28,13 @@ class Faults:
         """Draw and plan them; ``only`` names kinds to draw from."""
         self.world, self.random = world, random.Random(f"faults {seed}")
         self.fatal, self.stalls = [], []
-        """Times [s] at which a fault must have ended the run, if it goes on until then."""
+        """(time of a fault [s], time [s] within which it must have ended the run, if it goes on until then)."""
         self.names, self.visible, self.over = [], [], False
         """(time [ns] from which the recorder can see it, its name)."""
         self.deaf = False
         """Whether the controller may hear nothing, so that nobody can stop it."""
-        self.frozen = False
+        self.frozen, self.alarmed = False, np.inf
+        """Whether the board was frozen, and when an alarm was raised [s]."""
         self.moved_otherwise = False
         """Whether a line to the controller was changed, so that it may do something else."""
         kinds = only or tuple(KINDS)
@@ -83,20 +84,26 @@ class Faults:
     def must_end(self, seconds):
         """Note that the run must end within so many seconds from now [s], once it is under way."""
         if self.world.schedule.now > LIVED:
-            self.fatal.append(self.world.schedule.now + seconds)
+            self.fatal.append((self.world.schedule.now, seconds))
 
     def stalled(self, seconds):
         """Note a stall of the computer that must end the run if the guide moves."""
         self.stalls.append((self.world.schedule.now, seconds))
 
     def due(self):
-        """Return the first time at which a fault must have ended the run [s]; None on a late computer."""
-        computer = self.world.computer
-        return None if not self.fatal or computer.stalls or computer.lateness else min(self.fatal)
+        """Return the first time at which a fault must have ended the run [s]; None on a late computer.
 
-    def seen(self):
-        """Return when the recorder could first see one of them [s], or None."""
-        found = list(self.visible)
+        While a person mounts a tool nothing moves, and the recorder waits for the person.
+        """
+        computer, changes = self.world.computer, self.world.tool_changes
+        if not self.fatal or computer.stalls or computer.lateness:
+            return None
+        ends = [(next((end for begin, end in changes if begin <= at <= end), at), most) for at, most in self.fatal]
+        return min(at + most for at, most in ends)
+
+    def seen(self, cameras=True):
+        """Return when the recorder could first see one of them [s], or None; without ``cameras``, one of the others."""
+        found = [entry for entry in self.visible if cameras or not entry[1].startswith("camera")]
         if self.world.computer.disk.refused_ns is not None:
             found.append((self.world.computer.disk.refused_ns, "full disk"))
         if not found:
@@ -272,6 +279,7 @@ def controller_mute(faults):
 
 def alarm(faults):
     faults.must_end(2.0)
+    faults.alarmed = faults.world.schedule.now
     faults.world.controller.inject_alarm(faults.random.choice((1, 2, 3)))
 
 

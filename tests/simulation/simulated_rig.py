@@ -77,7 +77,7 @@ class Calm:
     def due(self):
         """Return that nothing has to end the run."""
 
-    def seen(self):
+    def seen(self, cameras=True):
         """Return that there is nothing to see."""
 
 
@@ -124,7 +124,7 @@ class World:
         """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
         self.stops = []
         """Times at which the recorder stopped the motion [s]."""
-        self._awaited, self.mounted = [], []
+        self._awaited, self.mounted, self.tool_changes = [], [], []
         self.raised = 0.0
         """Height of the skin above the registered one [mm]."""
         self.camera = CameraDevice() if camera else None
@@ -179,8 +179,9 @@ class World:
 
     def _mount(self, press):
         """Change the tool, as a person does; the guide stands still meanwhile."""
-        begun = self.position()
+        begun, moment = self.position(), self.schedule.now
         self.computer.sleep(4.0)
+        self.tool_changes.append((moment, self.schedule.now))
         self.mounted.append((press.indenter_name, begun, self.position()))
 
     def record(self, resume=False, sync_tap=False, confirmed="", prove=None, **controller):

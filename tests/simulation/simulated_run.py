@@ -33,6 +33,8 @@ UNLOCKED = (None, 2)
 """Alarms that a reset and ``$X`` end without a loss of the position: a soft limit is raised after braking to rest."""
 COURSES = ("", "", "", "", "sync tap", "tools", "touch", "registration")
 """Courses that a seed draws: plain presses, or what may come before and between them."""
+REPORT = 0.25
+"""Longest interval of two reports, with their way [s]."""
 STEP = 0.002
 """Way sideways that is none [mm]: half a motor step, on which a machine that lost its power need not stand."""
 BUMP, TOUCHED = 1.0, 0.4
@@ -147,7 +149,7 @@ def _motion(run, faults):
     astray = np.linalg.norm(places[: first + 1, :2] - places[0, :2], axis=1)
     if astray.max() > STEP or np.any(down[:first] > 1e-6):
         yield "the first move was not straight up"
-    seen = faults.seen()  # in the sense of `Faults.see`
+    seen = faults.seen(cameras=not run.is_registration)  # in the sense of `Faults.see`; a registration opens none
     if seen is not None and not faults.deaf:
         late = times[:-1] > seen + STOPPED + BRAKING
         goes = np.flatnonzero(late & ((sideways > NEAR / 10) | (down > NEAR / 10)))
@@ -314,7 +316,8 @@ def _play(world, faults, anew=False, unlocks=False, course=""):
     alarm = world.controller.machine.alarm
     cut = run.killed and run.here[2] < ORIGIN[2] + CLEARANCE - NEAR  # nobody saw its motion end
     calm = world.repair(world.lost or alarm is not None, unlocks)
-    lost = world.lost or alarm not in UNLOCKED  # a hard limit may have cost steps even where it did not
+    # A hard limit may have cost steps even where it did not. No report states one of the last moments of a run.
+    lost = world.lost or (alarm not in UNLOCKED and not run.end - REPORT < faults.alarmed < np.inf)
     resume = world.folder.exists()
     before = world.path[-1][1:4] if world.path else None
     if lost or cut:
