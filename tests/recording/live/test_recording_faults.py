@@ -130,7 +130,7 @@ def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(be
     # The touch that proves the zero goes as deep, before any file is open.
     while height(virtual) > -0.2 or not list(out.glob("*.partial.mcap")):
         time.sleep(0.002)
-    time.sleep(0.3)
+    time.sleep(0.7)  # the first chunk is on disk half a second after the file was opened, later on a busy machine
     killed_ns = virtual.clock.now_ns()
     os.kill(child.pid, signal.SIGKILL)
     child.wait()
