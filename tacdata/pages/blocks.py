@@ -59,8 +59,8 @@ class Shares:
     @property
     def widths(self) -> list[tuple[str, float, float]]:
         """Name, share [%] and width of the bar [%] of each part."""
-        whole = max(sum(share for _, share in self.parts), 1e-12)
-        return [(name, 100 * share, 100 * share / whole) for name, share in self.parts]
+        total = max(sum(share for _, share in self.parts), 1e-12)
+        return [(name, 100 * share, 100 * share / total) for name, share in self.parts]
 
 
 @dataclass(frozen=True)

@@ -75,8 +75,8 @@ class HtmlPage:
 
     def add(self, title: str, *blocks: Any, folded: bool = False) -> None:
         """Add a section; none without blocks."""
-        if kept := [block for block in blocks if block is not None]:
-            self.sections.append(Section(title, kept, folded))
+        if present := [block for block in blocks if block is not None]:
+            self.sections.append(Section(title, present, folded))
 
     @property
     def text(self) -> str:

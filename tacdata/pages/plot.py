@@ -82,12 +82,12 @@ class Plot:
         Raises:
             UsageError: If a series is not as long as its places.
         """
-        for one in self.series:
-            places = one.x if one.x is not None else self.x
-            if places is None or len(places) != len(one.values):
+        for series in self.series:
+            places = series.x if series.x is not None else self.x
+            if places is None or len(places) != len(series.values):
                 count = "no" if places is None else str(len(places))
                 raise UsageError(
-                    f"series {one.name!r} of figure {self.title!r}: {len(one.values)} values at {count} places",
+                    f"series {series.name!r} of figure {self.title!r}: {len(series.values)} values at {count} places",
                     "as many values as places",
                     "give x to the figure or the series",
                 )
@@ -97,7 +97,8 @@ class Plot:
             "x": {"label": self.x_label, "values": None if self.x is None else np.asarray(self.x)[pick]},
             "y": self.y_label,
             "series": [
-                _series(one, pick if one.x is None else picked(len(one.values), self.most)) for one in self.series
+                _series(series, pick if series.x is None else picked(len(series.values), self.most))
+                for series in self.series
             ],
             "bands": [{"low": b.low, "high": b.high, "name": b.name} for b in self.bands],
             "names": list(self.names),
@@ -129,17 +130,22 @@ class Slider:
         return [as_json([plot.document for plot in panel]) for panel in self.panels]
 
 
-def picked(count: int, most: int) -> np.ndarray:
+def picked(count: int, limit: int) -> np.ndarray:
     """Return the indices of the points that are drawn, evenly spread, int, shape (m,)."""
-    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)) if count else np.zeros(0, int)
+    return np.unique(np.linspace(0, count - 1, min(limit, count)).round().astype(int)) if count else np.zeros(0, int)
 
 
-def _series(one: Series, pick: np.ndarray | None) -> dict[str, Any]:
-    document: dict[str, Any] = {"name": one.name, "color": one.color, "style": one.style, "width": one.width}
+def _series(series: Series, pick: np.ndarray | None) -> dict[str, Any]:
+    document: dict[str, Any] = {
+        "name": series.name,
+        "color": series.color,
+        "style": series.style,
+        "width": series.width,
+    }
     for name in ("values", "x", "low", "high"):
-        given = getattr(one, name)
-        if given is not None:
-            document[name] = np.asarray(given, dtype=float)[pick]
-    if one.labels:
-        document["labels"] = [one.labels[int(k)] for k in pick] if pick is not None else list(one.labels)
+        values = getattr(series, name)
+        if values is not None:
+            document[name] = np.asarray(values, dtype=float)[pick]
+    if series.labels:
+        document["labels"] = [series.labels[int(k)] for k in pick] if pick is not None else list(series.labels)
     return document
