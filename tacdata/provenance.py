@@ -16,7 +16,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from tacdata import answers
+from tacdata import result_cache
 
 _ALIKE = "24 presses, 336 arrays: equal to the last bit"
 EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {
@@ -87,13 +87,13 @@ def code_hash(*names: str, without: tuple[str, ...] = ()) -> Any:
     sources = [(place, path.read_bytes()) for path, place in places if path not in left_out]
     # Parsing takes most of a second, so it is done once for the same bytes.
     key = _bytes_hash([("", Path(__file__).read_bytes()), *sources])
-    version = answers.recall("code", key)
+    version = result_cache.load("code", key)
     if not isinstance(version, str):
         digest = hashlib.sha256()
         for place, source in sources:
             digest.update(f"{place}\0{_syntax(ast.parse(source))}\0".encode())
         version = digest.hexdigest()
-        answers.keep("code", key, version)
+        result_cache.store("code", key, version)
     name, _ = EQUAL_VERSIONS.get(version, (version, ""))
     return name
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 import tacdata.errors
-from tacdata import answers, provenance, registry
+from tacdata import provenance, registry, result_cache
 from tacdata.errors import SolveError, TacdataError, UsageError
 from tacdata.extras import missing_package
 from tacdata.label_farm import environment
@@ -118,12 +118,12 @@ def version(factory: str, sensor: Sensor) -> Version:
     """
     if factory != FACTORY:
         return _found(factory, sensor)
-    match answers.recall("versions", _deciding(sensor)):
+    match result_cache.load("versions", _deciding(sensor)):
         case {"version": str(version), "remarks": [*remarks]}:
             return Version(version, tuple(remarks))
     found = _found(factory, sensor)
     # Only now is there a mesh, which is part of what decides a version.
-    answers.keep("versions", _deciding(sensor), {"version": found.content_hash, "remarks": found.remarks})
+    result_cache.store("versions", _deciding(sensor), {"version": found.content_hash, "remarks": found.remarks})
     return found
 
 

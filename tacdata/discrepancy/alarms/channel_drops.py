@@ -26,7 +26,7 @@ CALM = 0.3
 NORMAL = 0.385
 """Size that this share of normal numbers stays below, over their standard deviation [1]."""
 SEVERAL = 4
-"""Presses that are far off, at least."""
+"""Presses that are far off, at least: set on synthetic presses, seeds 1000 to 1019 and 1100 to 1139."""
 RARE = 200
 """Beforehand, a press of a channel is far off for other reasons, as a spike, once in so many, known as by one such."""
 MOST_NAMED = 3
@@ -58,7 +58,7 @@ def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
     """Return which channel drops or jumps, in which presses, and by which share of its gain; None if none does.
 
     Args:
-        logs: Logarithm of the gain of each press and channel, beside what is common to channels and usual at its place
+        logs: Logarithm of the gain of each press and channel, relative to the median of its channels and of its place
             [1], shape (presses, channels); NaN where it is not known.
     """
     known = np.isfinite(logs)

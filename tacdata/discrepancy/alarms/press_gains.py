@@ -11,7 +11,10 @@ from tacdata.discrepancy.data.single_channels import risen
 STIRRED = 0.15
 """A press of which a channel rises by less, over its largest rise, gives it no gain [1]."""
 SURE = 0.01
-"""Nor does one of which noise, or half a step of its numbers, may change the gain by more [1]."""
+"""Nor does one of which noise, or half a step of its numbers, may change the gain by more [1].
+
+Set on synthetic presses of a fitted response, seeds 1000 to 1019 and 1100 to 1139.
+"""
 DEPTHS = 12
 """Intervals of depth, over the stroke, that two presses are compared in."""
 FEWEST_EACH = 4
@@ -50,7 +53,7 @@ def press_gains(cleaned: Cleaned) -> np.ndarray:
     noise, step = _grain(course.readings, measured)
     least = np.maximum(STIRRED * peak.max(axis=0), 0.5 * step / SURE)
     logs[(peak < least) | (SURE * np.sqrt(power.sum(axis=1)) <= noise)] = np.nan
-    return _beside_common(logs)
+    return _relative_to_median(logs)
 
 
 def _grain(readings: np.ndarray, measured: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +89,7 @@ def _over_others(both: np.ndarray, power: np.ndarray, deepest: np.ndarray, place
     return logs
 
 
-def _beside_common(logs: np.ndarray) -> np.ndarray:
+def _relative_to_median(logs: np.ndarray) -> np.ndarray:
     """Return logarithms of gains less the median of their press; NaN where it has few."""
     enough = np.isfinite(logs).sum(axis=1) >= FEWEST_CHANNELS
     found = np.full(logs.shape, np.nan)

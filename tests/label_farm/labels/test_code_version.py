@@ -141,7 +141,7 @@ def test_a_label_of_an_equal_version_stays_current(tmp_path, solves, monkeypatch
 def test_a_version_from_the_cache_is_the_one_that_parsing_gives(copied, tmp_path, monkeypatch, damage):
     monkeypatch.setenv("TACDATA_CACHE", str(tmp_path / "cache"))
     parsed = version(copied)
-    [entry] = (tmp_path / "cache" / "answers" / "code").iterdir()
+    [entry] = (tmp_path / "cache" / "results" / "code").iterdir()
     if damage is not None:
         entry.write_bytes(damage)
     assert version(copied) == parsed

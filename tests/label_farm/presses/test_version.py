@@ -54,7 +54,7 @@ def test_a_mesh_that_is_made_again_is_another_model(asked, tmp_path):
 @pytest.mark.parametrize("damage", [b"", b"half a checks", b"\xff\xfe", b'"not a version"'])
 def test_a_damaged_entry_is_asked_for_again_and_mended(asked, tmp_path, damage):
     model.version(FACTORY, SENSOR)
-    [entry] = (tmp_path / "answers" / "versions").iterdir()
+    [entry] = (tmp_path / "results" / "versions").iterdir()
     whole = entry.read_bytes()
     entry.write_bytes(damage)
     assert model.version(FACTORY, SENSOR).content_hash == "version 2"

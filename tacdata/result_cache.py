@@ -1,4 +1,4 @@
-"""Answers that cost seconds, kept in the user's cache by a hash of everything that decides them.
+"""Cache of small results that cost seconds: JSON values by a hash of everything that decides them.
 
 An entry is never changed. A damaged one counts as none, and so does a cache that cannot be written: results are the
 same, only later.
@@ -16,11 +16,11 @@ from tacdata.paths import cache_folder
 from tacdata.replacement import replacement
 
 
-def recall(kind: str, key: str) -> Any | None:
-    """Return an answer (JSON types) that was kept, None without an intact one.
+def load(kind: str, key: str) -> Any | None:
+    """Return a stored value (JSON types), None without an intact one.
 
     Args:
-        kind: Folder of answers of one kind.
+        kind: Folder of values of one kind.
         key: Hash of all that decides it (hex).
     """
     try:
@@ -30,15 +30,15 @@ def recall(kind: str, key: str) -> Any | None:
         return None
 
 
-def keep(kind: str, key: str, answer: Any) -> None:
-    """Keep an answer (JSON types); of two processes that keep one at a time, the later decides."""
-    text = json.dumps(answer)
+def store(kind: str, key: str, value: Any) -> None:
+    """Store a value (JSON types); of two processes that store one, the later decides."""
+    text = json.dumps(value)
     with suppress(OSError), replacement(_place(kind, key), settled=False) as stream:
         stream.write(f"{_checksum(text)}\n{text}".encode())
 
 
 def _place(kind: str, key: str) -> Path:
-    return cache_folder() / "answers" / kind / key
+    return cache_folder() / "results" / kind / key
 
 
 def _checksum(text: str) -> str:
