@@ -12,7 +12,6 @@ from tacdata import cli, documents, provenance
 from tacdata.dataset import read_dataset
 from tacdata.dataset.flags import carry_flags, flagged_episodes, read_flags, set_flag
 from tacdata.labels import write_label
-from tacdata.recording import session
 from tacdata.recording.files import reader
 
 
@@ -48,7 +47,6 @@ def recorded(tmp_path: Path, monkeypatch) -> Path:
     }
     documents.write(folder / "labels" / "episode-000002.failure.json", failure, "label_failure")
     found = RecordedSession(tuple(episodes), (folder / "episode-000003.partial.mcap",), folder / "labels")
-    monkeypatch.setattr(session, "read_session", lambda _: found)
     monkeypatch.setattr("tacdata.pipeline.pack.read_session", lambda _: found)
     monkeypatch.setattr(reader, "read_episode", episodes.__getitem__)
     return folder
