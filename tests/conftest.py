@@ -8,4 +8,5 @@ pytest_plugins = (
     "running.side_by_side",
     "running.chromium",
     "running.user_cache",
+    "running.lasting_patches",
 )

@@ -53,10 +53,9 @@ def run(
         write_foxglove_layout(path, foxglove)
         print(f"saved {foxglove}; in Foxglove open {path}, then Layouts, Import from file")
         return Result({"written": [foxglove]})
-    path = viewable(path)
+    path = viewable(following.meant(path) if episode is None else path)
     output = showing.Output(save, picture, video, web)
     output.check()
-    path = following.meant(path) if episode is None else path
     if path.suffix == output_file.RERUN and path.is_file():
         showing.show_saved(path, output)
         return Result({"shown": path, "written": []})
@@ -75,10 +74,12 @@ def viewable(path: Path) -> Path:
     """Return a path, or the only thing to view in a folder that is none itself.
 
     Raises:
-        UsageError: If a folder holds several things to view.
+        UsageError: If there is nothing there, or a folder holds several things to view.
     """
     from tacdata.viewers.kinds.kind import contents, kind_of
 
+    if not path.exists():
+        kind_of(path)  # refuses: a wrong path is named before a missing display
     if not path.is_dir() or kind_of(path).holds(path):
         return path
     entries = contents(path)
