@@ -61,8 +61,9 @@ def run(
                 f"the dataset {place} of {network.path} is not there", "a dataset folder", "give --dataset"
             )
         frames = by_folder.setdefault(place, read_frames(place)) if place not in by_folder else by_folder[place]
-        scored.append(Scored(network.settings.title, evaluate(network, frames, device, threads), frames))
-        say(f"scored {network.path.parent}")
+        folder = network.path.parent
+        scored.append(Scored(network.settings.title, evaluate(network, frames, device, threads), frames, folder))
+        say(f"scored {folder}")
     sheet = markdown(protocols(frames_of(read_dataset(trials)), trained[0])) if trials else ""
     documents.write_text(out, page(scored, sheet))
     print(f"report: {out}")

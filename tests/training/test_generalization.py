@@ -151,7 +151,8 @@ def test_runs_are_reported_by_the_verb(outcomes, tmp_path, monkeypatch):
     assert (tmp_path / "runs/report.html").read_text().startswith("<!doctype html>")
     words = ["--out", tmp_path / "page.html", "--device", "cpu", "--threads", 1, "--json"]
     (run,) = json.loads(tacdata("report", tmp_path / "runs", *words).stdout)["runs"]
-    assert "direct" in (tmp_path / "page.html").read_text()
+    text = (tmp_path / "page.html").read_text()
+    assert "direct" in text and f"--predictions {tmp_path / 'runs' / 'direct-episode-0'} --sort error --web" in text
     with pytest.raises(UsageError, match="exists"):
         call("report", tmp_path / "runs", "--out", tmp_path / "page.html")
     scores = json.loads((tmp_path / "runs/direct-episode-0/scores/scores.json").read_text())

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,8 @@ class Scored:
     evaluation: Evaluation
     frames: Frames
     """Data of the score."""
+    folder: Path | None = None
+    """Folder of the run, if it is kept."""
 
 
 def page(runs: list[Scored], trials: str = "", impossible: dict[str, str] | None = None) -> str:
@@ -69,7 +73,14 @@ def _header(runs: list[Scored], group_list: list[Group]) -> PageHeader:
         made=stamp.get("made_at", "")[:10],
         version=stamp["code_version"],
         lines=[document["statement"], f"The first network's checkpoint is {checkpoint}."],
+        next=[_worst_first(document["dataset"]["path"], runs[0].folder)] if runs[0].folder else [],
     )
+
+
+def _worst_first(dataset: str, folder: Path) -> str:
+    """Return the command that lists a run's presses, the largest error first."""
+    words = f"tacdata browse {quote(dataset)} --predictions {quote(str(folder))} --sort error --web"
+    return f"its worst presses first: `{words}`"
 
 
 def summary(group_list: list[Group]) -> str:
