@@ -159,7 +159,7 @@ def code_version() -> str:
         return release
     try:
         described = subprocess.run(
-            ["git", "describe", "--always", "--dirty=.dirty", "--exclude=*"],
+            ["git", "--no-optional-locks", "describe", "--always", "--dirty=.dirty", "--exclude=*"],
             cwd=root,
             capture_output=True,
             text=True,
