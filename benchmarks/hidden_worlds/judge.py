@@ -133,17 +133,8 @@ def answered(folder, without=(), **switches):
 def main(folder, options):
     """Judge and write."""
     sys.addaudithook(guard)
-    method = options.pop("method", "workflow")
-    if method == "workflow":
-        answer, said, seconds = answered(folder, **options)
-    else:
-        sys.path.insert(0, str(Path(__file__).parent))
-        import baselines
-
-        course = course_of(dict(np.load(folder / "recordings.npz")))
-        answer, said, seconds = baselines.answered(setting_of(folder, course), method)
-    if said:
-        np.savez_compressed(folder / "said.npz", **said)
+    answer, said, seconds = answered(folder, **options)
+    np.savez_compressed(folder / "said.npz", **said)
     (folder / "verdict.json").write_text(json.dumps({"verdict": answer, "seconds": seconds}))
 
 

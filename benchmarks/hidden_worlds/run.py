@@ -76,8 +76,6 @@ def main(arguments):
     out, kept = arguments.out, arguments.out / "verdicts" / arguments.label
     kept.mkdir(parents=True, exist_ok=True)
     options = json.loads(arguments.options)
-    if arguments.method != "workflow":
-        options["method"] = arguments.method
     for case in wanted(arguments):
         path = kept / f"{case.identity}.json"
         if path.exists():
@@ -116,7 +114,6 @@ def chosen(words=None):
     parser.add_argument("--most", type=int, default=None, help="stop after so many worlds of this shard")
     parser.add_argument("--name", nargs="*", default=[], help="only cases whose names hold one of these")
     parser.add_argument("--label", default="workflow", help="folder of the verdicts below OUT/verdicts")
-    parser.add_argument("--method", default="workflow", help="workflow, or a baseline")
     parser.add_argument("--options", default="{}", help="JSON: switches of the engine's setting")
     parser.add_argument("--without-truth", action="store_true", help="take what is true out of the library")
     parser.add_argument("--engine", type=Path, default=REPOSITORY, help="folder that holds the package to judge with")

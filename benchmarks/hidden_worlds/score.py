@@ -37,7 +37,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--label", default="workflow")
-    parser.add_argument("--beside", nargs="*", default=[], help="other labels: baselines, ablations")
+    parser.add_argument("--beside", nargs="*", default=[], help="other labels: ablations")
     help_dump = "also write each verdict with the names that were right to this folder"
     parser.add_argument("--dump", type=Path, default=None, help=help_dump)
     chosen = parser.parse_args()

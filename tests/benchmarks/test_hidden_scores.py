@@ -133,14 +133,14 @@ def test_gap_and_labels_know_the_truth_from_the_start():
     _, known, _ = world.make(4, {"z_offset": 2.0, "latency": 1.0}, episodes=10)
     known = {k: np.asarray(v, float) for k, v in known.items() if k != "parameters"}
     bare = world.make(4, {}, episodes=10)[1]["oracle"]
-    said = {"time": known["time"], "episode": known["episode"], "before": bare, "pose": known["pose"]}
+    said = {name: known[name] for name in ("time", "episode", "pose")} | {"before": bare, "nominal": known["command"]}
     assert gap({**said, "after": known["oracle"]}, known) == pytest.approx(1.0)
     assert gap({**said, "after": bare}, known) == pytest.approx(0.0)
     before, after = labels({**said, "after": bare}, known, True)
     assert before > 0.02 and after < 1e-6
     assert labels({**said, "after": bare}, known, False) == (before, before)
     # Readings that are far apart cut the path's corners, before as after.
-    few = {k: v[::40] for k, v in {**said, "nominal": known["command"], "pose": known["command"]}.items()}
+    few = {k: v[::40] for k, v in {**said, "pose": known["command"]}.items()}
     before, after = labels(few, known, True)
     assert before == after
     assert abs(before - labels({**said, "pose": known["command"]}, known, True)[1]) > 1e-5

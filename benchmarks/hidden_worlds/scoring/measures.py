@@ -68,8 +68,7 @@ def labels(said, truth, trusted):
     def error(pose):
         return float(np.sqrt(np.mean((skin.depth_map(pose[rows], radius) - real) ** 2)))
 
-    # Verdicts of judges without a nominal pose are compared with the command itself.
-    before = error(_at(said, "nominal", truth) if "nominal" in said else truth["command"])
+    before = error(_at(said, "nominal", truth))
     return before, error(_at(said, "pose", truth)) if trusted else before
 
 

@@ -76,7 +76,7 @@ def document(rows, label, rivals=None):
     Args:
         rows: Of the label.
         label: Its name.
-        rivals: Other labels -> rows: baselines and ablations.
+        rivals: Other labels -> rows: ablations.
     """
     engines = sorted({f"{r['engine']['commit'] or 'a copy outside git'} (files {r['engine']['hash']})" for r in rows})
     lines = [f"# Hidden worlds: {label}", "", f"{len(rows)} worlds; engine: {', '.join(engines)}.", ""]
