@@ -26,8 +26,8 @@ def imported(folder, kept):
     source = folder / kept.source
     kinds, _ = described(source)
     proposal = proposed_mapping(source, kinds)
-    row = {"asked": len(proposal.questions), "as_proposed": tried(source, proposal.mapping, folder).startswith("tried")}
-    documents.write(folder / "mapping.yaml", proposal.mapping | kept.answers, "import_mapping")
+    row = {"asked": len(proposal.questions), "as_proposed": tried(source, proposal.mapping).startswith("tried")}
+    documents.write(folder / "mapping.yaml", proposal.document | kept.answers, "import_mapping")
     made = import_session(source, folder / "mapping.yaml", folder / "session")
     return row | {"recordings": made.recordings, "refused": len(made.refused)}
 

@@ -82,16 +82,16 @@ def _inspect(source: Path, propose: Path | None) -> Result:
     kinds, text = described(source)
     print(text)
     proposal = proposed_mapping(source, kinds)
-    mapping, result = proposal.mapping, {"mapping": proposal.mapping, "questions": list(proposal.questions)}
+    result = {"mapping": proposal.document, "questions": list(proposal.questions)}
     if propose is None:
         suggest("import", source, "--propose mapping.yaml")
         return Result(result)
-    documents.write(propose, mapping, "import_mapping")
+    documents.write(propose, proposal.document, "import_mapping")
     heads = "".join(f"# ? {question}\n" for question in proposal.questions)
     propose.write_text(heads + propose.read_text(encoding="utf-8"), encoding="utf-8")
     print(f"a mapping to start from is in {propose}; read it over, it rests on names, units and values")
     for question in proposal.questions:
         print(f"  ? {question}")
-    print(tried(source, mapping, propose.parent))
+    print(tried(source, proposal.mapping))
     suggest("import", source, "--mapping", propose, "--out SESSION")
     return Result({**result, "written": propose})

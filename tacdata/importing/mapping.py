@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,12 +17,12 @@ Selector = str | int | list[Any]
 class SourceClock:
     """The clock of a file or stream."""
 
-    column: Selector | None = None
-    format: str | None = None
-    """Layout of dates, as Python's strptime has it; None: by the file."""
     rate: float | None = None
     """Rows a second, or counts a second of `column` [Hz]."""
+    column: Selector | None = None
     unit: str = ""
+    format: str | None = None
+    """Layout of dates, as Python's strptime has it; None: by the file."""
     zero: str = ""
     """unix, shared or own; empty: by the values."""
     offset: float | None = None
@@ -38,9 +38,10 @@ class SourceClock:
 
 @dataclass(frozen=True)
 class Axis:
-    """A column as a quantity."""
+    """A column, or an expression of columns, as a quantity."""
 
-    column: str | int
+    column: str | int = ""
+    """Of an expression: the name of its values among the file's columns."""
     unit: str = ""
     """Empty: by the file's header."""
     scale: float = 1.0
@@ -48,6 +49,7 @@ class Axis:
     """Added after the factor [mm, s or mm/s]."""
     zero: str = ""
     """The value of each trial that counts as 0: first, lowest or highest; empty: 0 itself."""
+    expression: str = ""
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,9 @@ class KnownValue:
     """A {part} of the path; empty: by `column`."""
     pattern: str = ""
     """Regular expression with one group, for a piece of the part."""
-    column: str | int = ""
     file: str = ""
     """Empty: the first file of the mapping."""
+    column: str | int = ""
     unit: str = ""
 
 
@@ -141,10 +143,10 @@ class ColumnsEntry(StreamEntry):
     columns: Selector = ""
     long: dict[str, str | int] | None = None
     """Columns of the channel and its value, for files with one channel a row; in place of `columns`."""
-    unit: str = ""
-    scale: float = 1.0
     counter: str | int | None = None
     """Column of the device's frame counter."""
+    unit: str = ""
+    scale: float = 1.0
     channels_are: str = ""
     """response or effort; empty: not known."""
 
@@ -222,31 +224,31 @@ class ForeignSensor:
     poisson_ratio: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Mapping:
     """A mapping of foreign files to recordings."""
 
-    document: dict[str, Any]
-    """The mapping's file, with each expression as a derived column."""
-    folder: Path
-    """Folder of the mapping, to which the sensor file's path is relative."""
     name: str
-    source: str
+    source: str = ""
     files: dict[str, FileEntry]
     sensor: str | ForeignSensor
     """A sensor file's path, or the known properties."""
     taxels: ColumnsEntry
-    position: PositionEntry | None
-    measured: dict[str, ColumnsEntry]
-    schedule: Schedule | None
-    trials: TrialRule
-    contact: dict[str, Value]
+    position: PositionEntry | None = None
+    measured: dict[str, ColumnsEntry] = field(default_factory=dict)
+    schedule: Schedule | None = None
+    trials: TrialRule = field(default_factory=TrialRule)
+    contact: dict[str, Value] = field(default_factory=dict)
     """x, y, z and yaw of the machine where it touches the skin."""
-    known_from: str
-    press: dict[str, Value]
-    specimen: str | KnownValue
-    indenter: dict[str, Any] | None
+    known_from: str = "as the mapping says"
+    press: dict[str, Value] = field(default_factory=dict)
+    specimen: str | KnownValue = ""
+    indenter: dict[str, Any] | None = None
     """As in a plan."""
+    document: dict[str, Any] = field(default_factory=dict)
+    """The mapping's file."""
+    folder: Path = Path()
+    """Folder of the mapping, to which the sensor file's path is relative."""
 
     @property
     def content_hash(self) -> str:
@@ -264,29 +266,35 @@ class Mapping:
         Raises:
             FormatError: If keys exclude each other, or a stream has no file or no clock.
         """
-        document = _without_expressions(document)
         files = {name: FileEntry.from_document(entry) for name, entry in document["files"].items()}
         sensor, contact, press = document["sensor"], dict(document.get("contact", {})), dict(document.get("press", {}))
-        specimen, known_from = press.pop("specimen", ""), contact.pop("known_from", "as the mapping says")
+        specimen = _value(press.pop("specimen", ""))
+        known = {"known_from": contact.pop("known_from")} if "known_from" in contact else {}
         measured = document.get("measured", {}).items()
+        position = _position(document["position"], files) if "position" in document else None
+        schedule = _schedule(document["schedule"]) if document.get("schedule") else None
         return cls(
-            document,
-            folder,
-            document["name"],
-            document.get("source", ""),
-            files,
-            sensor if isinstance(sensor, str) else ForeignSensor(**sensor),
-            _taxels(document["taxels"], files),
-            _position(document["position"], files) if "position" in document else None,
-            {name: ColumnsEntry(**_stream(entry, files, f"measured: {name}")) for name, entry in measured},
-            _schedule(document["schedule"]) if document.get("schedule") else None,
-            TrialRule(**document.get("trials", {})),
-            {key: KnownValue(**value) if isinstance(value, dict) else value for key, value in contact.items()},
-            known_from,
-            {key: KnownValue(**value) if isinstance(value, dict) else value for key, value in press.items()},
-            KnownValue(**specimen) if isinstance(specimen, dict) else specimen,
-            document.get("indenter"),
+            document=document,
+            folder=folder,
+            name=document["name"],
+            source=document.get("source", ""),
+            files=_with_expressions(files, position, schedule),
+            sensor=sensor if isinstance(sensor, str) else ForeignSensor(**sensor),
+            taxels=_taxels(document["taxels"], files),
+            position=position,
+            measured={name: ColumnsEntry(**_stream(entry, files, f"measured: {name}")) for name, entry in measured},
+            schedule=schedule,
+            trials=TrialRule(**document.get("trials", {})),
+            contact={key: _value(value) for key, value in contact.items()},
+            **known,
+            press={key: _value(value) for key, value in press.items()},
+            specimen=specimen,
+            indenter=document.get("indenter"),
         )
+
+
+def _value(entry: Any) -> Any:
+    return KnownValue(**entry) if isinstance(entry, dict) else entry
 
 
 def _clock(entry: dict[str, Any]) -> SourceClock | None:
@@ -321,38 +329,35 @@ def _position(entry: dict[str, Any], files: dict[str, FileEntry]) -> PositionEnt
         raise FormatError("position with both or neither of z and depth", "one of them", "correct the mapping")
     fields = _stream(entry, files, "position")
     keys = [key for key in ("x", "y", "z", "depth") if key in fields]
-    return PositionEntry(axes={key: _quantity(fields.pop(key)) for key in keys}, **fields)
+    return PositionEntry(axes={key: _quantity(fields.pop(key), "position", key) for key in keys}, **fields)
 
 
 def _schedule(entry: dict[str, Any]) -> Schedule:
-    axes = {key: _quantity(value) for key, value in entry.items() if key not in ("presses", "file", "time")}
+    names = [key for key in entry if key not in ("presses", "file", "time")]
+    axes = {key: _quantity(entry[key], "schedule", key) for key in names}
     presses = tuple(ListedPress(**press) for press in entry.get("presses", []))
     return Schedule(presses, entry.get("file", ""), axes, _clock(entry) or SourceClock())
 
 
-def _quantity(entry: float | dict[str, Any]) -> Quantity:
-    return Axis(**entry) if isinstance(entry, dict) else float(entry)
+def _quantity(entry: float | dict[str, Any], section: str, key: str) -> Quantity:
+    """Return an axis; raises FormatError if it has both a column and an expression, or neither."""
+    if not isinstance(entry, dict):
+        return float(entry)
+    if ("column" in entry) == ("expression" in entry):
+        fault = f"{section}: {key} with both or neither of column and expression"
+        raise FormatError(fault, "one of them", "correct the mapping")
+    named: dict[str, Any] = {"column": f"{section} {key}", **entry}
+    return Axis(**named)
 
 
-def _without_expressions(mapping: dict[str, Any]) -> dict[str, Any]:
-    """Return a mapping in which each axis with an expression names a derived column of its file.
-
-    Raises:
-        FormatError: If an axis has both a column and an expression, or neither.
-    """
-    result = {**mapping, "files": {name: dict(entry) for name, entry in mapping["files"].items()}}
-    for section in ("position", "schedule"):
-        axes = dict(mapping.get(section, {}))
-        for key, axis in axes.items():
-            if not isinstance(axis, dict) or key == "time":
-                continue
-            if ("column" in axis) == ("expression" in axis):
-                fault = f"{section}: {key} with both or neither of column and expression"
-                raise FormatError(fault, "one of them", "correct the mapping")
-            if "expression" in axis:
-                entry, name = result["files"].get(axes.get("file", ""), {}), f"{section} {key}"
-                entry["derived"] = {**entry.get("derived", {}), name: axis["expression"]}
-                axes[key] = {**{k: v for k, v in axis.items() if k != "expression"}, "column": name}
-        if axes:
-            result[section] = axes
-    return result
+def _with_expressions(
+    files: dict[str, FileEntry], position: PositionEntry | None, schedule: Schedule | None
+) -> dict[str, FileEntry]:
+    """Return the files, with the expression of each axis as a derived column."""
+    for section in (position, schedule):
+        axes = section.axes.values() if section else ()
+        further = {str(axis.column): axis.expression for axis in axes if isinstance(axis, Axis) and axis.expression}
+        if section and further and section.file in files:
+            entry = files[section.file]
+            files = files | {section.file: replace(entry, derived=entry.derived | further)}
+    return files

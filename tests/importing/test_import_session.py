@@ -321,7 +321,7 @@ def test_a_load_cell_alone_is_the_sensor_and_a_second_length_a_gauge(tmp_path):
     lines = ["run,t_s,lvdt_mm,crosshead_mm,Fz_N", *rows]
     (tmp_path / "log.csv").write_text("\n".join(lines))
     tables, _ = described(tmp_path)
-    found = proposed_mapping(tmp_path, tables).mapping
+    found = proposed_mapping(tmp_path, tables).document
     assert found["taxels"] == {"file": "log", "columns": ["Fz_N"], "unit": "N"}
     assert found["position"]["depth"]["column"] == "crosshead_mm", "what was commanded"
     assert found["measured"] == {"displacement": {"file": "log", "columns": ["lvdt_mm"], "unit": "mm"}}
@@ -332,7 +332,7 @@ def test_speeds_with_decimals_in_names_are_one_kind_of_file_and_a_single_axis_is
         lines = ["t_s,x_mm,P_kPa", *[f"{0.1 * k:.1f},{0.1 * min(k, 20 - k)},{k + high}" for k in range(21)]]
         (tmp_path / f"trial_{name}.csv").write_text("\n".join(lines))
     tables, _ = described(tmp_path)
-    found = proposed_mapping(tmp_path, tables).mapping
+    found = proposed_mapping(tmp_path, tables).document
     assert [file["path"] for file in found["files"].values()] == ["trial_{part0}_at{part1}mms.csv"]
     assert found["position"]["depth"] == {"column": "x_mm"}
     assert found["taxels"]["columns"] == ["P_kPa"]

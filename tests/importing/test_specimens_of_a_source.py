@@ -101,7 +101,7 @@ def test_a_proposal_finds_the_column_and_the_path(tmp_path):
     in_a_column(tmp_path)
     (tmp_path / "mapping.yaml").unlink()
     tables, _ = described(tmp_path)
-    found = proposed_mapping(tmp_path, tables).mapping
+    found = proposed_mapping(tmp_path, tables).document
     assert found["press"] == {"specimen": {"file": "wide", "column": "material"}}
     assert found["taxels"]["columns"] == ["cap0"]
     (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(found))
@@ -112,4 +112,4 @@ def test_a_proposal_finds_the_column_and_the_path(tmp_path):
         lines = ["t,disp,cap0", *(row.split(",", 2)[2] for row in rows(0, "eco30"))]
         (named / f"spec{number}_cyc{number}.csv").write_text("\n".join(lines) + "\n")
     tables, _ = described(named)
-    assert proposed_mapping(named, tables).mapping["press"] == {"specimen": {"part": "part0"}}
+    assert proposed_mapping(named, tables).document["press"] == {"specimen": {"part": "part0"}}

@@ -23,7 +23,7 @@ SENTINELS = (-1, 0, -999, -9999, 9999, 65535)
 """Numbers that loggers write for no value."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class FoundKind:
     """Files, or tables in files, that hold the same columns."""
 
@@ -32,8 +32,8 @@ class FoundKind:
     path: str = ""
     """Of the first one, below the source."""
     count: int = 1
-    options: dict[str, Any] = field(default_factory=dict)
-    """Options that a mapping needs under the file to read it so."""
+    options: ReadOptions = field(default_factory=ReadOptions)
+    """Options by which it is read so."""
     words: dict[int, list[str]] = field(default_factory=dict)
     """Number of a # of the kind -> the words in its place."""
     parts: tuple[str, ...] = ()
@@ -54,18 +54,17 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     refused = []
     below = [path.relative_to(source) if path != source else Path(path.name) for path in paths]
     for path, name_below, kind in zip(paths, (p.as_posix() for p in below), kinds_of(list(below)), strict=True):
-        members = [entry for key, entry in kinds.items() if key.partition(INSIDE)[0] == kind]
-        for entry in members:
-            entry.count += 1
+        members = [key for key in kinds if key.partition(INSIDE)[0] == kind]
+        kinds |= {key: replace(kinds[key], count=kinds[key].count + 1) for key in members}
         if members or kind in refused:
             continue
         try:
             for name in tables_in(path):
                 key = f"{kind}{INSIDE}{numberless(name)}" if name else kind
                 if key in kinds:
-                    kinds[key].count += 1
+                    kinds[key] = replace(kinds[key], count=kinds[key].count + 1)
                     continue
-                table, options = _read(path, {"table": name} if name else {})
+                table, options = _read(path, ReadOptions(table=name or None))
                 kinds[key] = FoundKind(table, name_below, 1, options)
         except ModuleNotFoundError:
             raise
@@ -92,22 +91,22 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     return kinds, "\n".join(lines)
 
 
-def _read(path: Path, options: dict[str, Any]) -> tuple[SourceTable, dict[str, Any]]:
+def _read(path: Path, options: ReadOptions) -> tuple[SourceTable, ReadOptions]:
     """Return a file's table and the options that read it: with trials along the axis that loses fewest arrays."""
-    table = read_table(path, ReadOptions(**options))
+    table = read_table(path, options)
     best, best_options = len(_lost(table)), options
     for axis in (2, 0, 1) if path.suffix in (".mat", ".npz") and best else ():
         try:
-            tried = read_table(path, ReadOptions(**options, trial_axis=axis))
+            tried = read_table(path, replace(options, trial_axis=axis))
         except FormatError:
             break
         if len(_lost(tried)) < best:
-            table, best, best_options = tried, len(_lost(tried)), {**options, "trial_axis": axis}
+            table, best, best_options = tried, len(_lost(tried)), replace(options, trial_axis=axis)
     if not best and any("trial_axis says" in note for note in table.notes):
         for axis in (2, 1, 0):
-            tried = read_table(path, ReadOptions(**options, trial_axis=axis))
+            tried = read_table(path, replace(options, trial_axis=axis))
             if _one_clock(tried):
-                return tried, {**options, "trial_axis": axis}
+                return tried, replace(options, trial_axis=axis)
     return table, best_options
 
 

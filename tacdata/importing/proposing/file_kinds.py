@@ -64,3 +64,8 @@ def pattern(kind: str, first: int = 0) -> tuple[str, int]:
     while PART in kind:
         kind, first = kind.replace(PART, f"{{part{first}}}", 1), first + 1
     return kind, first
+
+
+def listed(words: list[str]) -> str:
+    """Return words as a list in a sentence: a, b and c."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

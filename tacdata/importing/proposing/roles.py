@@ -167,7 +167,7 @@ def _are_times(table: SourceTable, name: str) -> bool:
     """Return whether a column of text holds dates or times of day, in one way or in several."""
     first = SourceTable(table.path, {name: table.columns[name][:ROWS]}, table.units)
     try:
-        times(first, SourceClock(name), "")
+        times(first, SourceClock(column=name), "")
     except FormatError as error:
         return "can be read as" in error.given
     return True

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from tacdata.importing.mapping import Axis, PositionEntry, SourceClock
+from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.source_table import SourceTable
 from tacdata.importing.units import plain
 
@@ -15,32 +15,28 @@ STEADY = 0.9
 """Smallest share of steps in which a clock rises [1]."""
 
 
-def own_clocks(
-    document: dict[str, Any], tables: dict[str, SourceTable], roles: dict[str, dict[str, list[str]]], notes: list[str]
-) -> None:
-    """Give a position the clock column before it if the channels of the same file follow another clock column."""
-    position, alias = document.get("position", {}), document["taxels"]["file"]
-    if position.get("file") != alias or not roles[alias]["channels"]:
-        return
-    table = tables[alias]
-    clocks = [name for name in roles[alias].get("time", []) if _rises(table, name)]
-    axis = position.get("depth") or position.get("z") or {}
-    places = list(table.columns)
-    if len(clocks) < 2 or axis.get("column") not in places or roles[alias]["channels"][0] not in places:
-        return
+def clock_by(table: SourceTable, name: str) -> SourceClock:
+    """Return the clock of a column, with the unit of its header."""
+    unit = plain(table.units.get(name, ""))
+    return SourceClock(column=name, unit=unit if unit in SHORT else "")
 
-    def before(name: str) -> str:
+
+def own_clocks(kind: SourceKind, position: PositionEntry) -> tuple[str, str] | None:
+    """Return the clock columns before the position and before the channels of one file; None if they share one."""
+    places, channels = list(kind.table.columns), kind.channels
+    clocks = [name for name in kind.roles.get("time", []) if _rises(kind.table, name)]
+    axis = position.axes.get("depth") or position.axes.get("z")
+    name = axis.column if isinstance(axis, Axis) else ""
+    if len(clocks) < 2 or name not in places or not channels or channels[0] not in places:
+        return None
+
+    def before(name: str | int) -> str:
         """Return the last clock before a column, else the first one behind it."""
-        nearer = [clock for clock in clocks if places.index(clock) < places.index(name)]
+        nearer = [clock for clock in clocks if places.index(clock) < places.index(str(name))]
         return nearer[-1] if nearer else clocks[0]
 
-    ours, theirs = before(axis["column"]), before(roles[alias]["channels"][0])
-    if ours == theirs:
-        return
-    for name, entry in ((ours, position), (theirs, document["taxels"])):
-        unit = plain(table.units.get(name, ""))
-        entry["time"] = {"column": name, **({"unit": unit} if unit in SHORT else {})}
-    notes.append(f"{theirs} is taken for the clock of the channels, and {ours} for the one of the position")
+    ours, theirs = before(name), before(channels[0])
+    return None if ours == theirs else (ours, theirs)
 
 
 def _rises(table: SourceTable, name: str) -> bool:

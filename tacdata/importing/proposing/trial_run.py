@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -43,17 +42,15 @@ class _Outcome:
     refusals: list[TacdataError] = field(default_factory=list)
 
 
-def tried(source: Path, document: dict[str, Any], folder: Path, policy: TrialPolicy = POLICY) -> str:
+def tried(source: Path, mapping: Mapping, policy: TrialPolicy = POLICY) -> str:
     """Return the outcome of importing some of the files by a mapping, or why nothing is imported, as a sentence.
 
     Args:
         source: The files.
-        document: The mapping's document.
-        folder: The mapping's folder.
+        mapping: The mapping.
         policy: The limits of a good mapping.
     """
     try:
-        mapping = Mapping.from_document(document, folder)
         sets = file_sets(source, mapping.files)
     except TacdataError as error:
         return f"as it stands, it imports nothing: {error.given}; {error.remedy}"

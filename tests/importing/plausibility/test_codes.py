@@ -79,7 +79,7 @@ def test_a_proposal_takes_no_code_for_a_depth(tmp_path):
     rows = table(presses=3)
     rows[[30, 31, 140, 141, 250], 1] = -999.0
     path = write(tmp_path, "csv", rows)
-    found = proposed_mapping(path, described(path)[0]).mapping
+    found = proposed_mapping(path, described(path)[0]).document
     assert found["position"]["depth"] == {"column": "depth [mm]"} and found["trials"] == {"press_above": 0.12}
 
 
@@ -104,7 +104,7 @@ def test_a_clock_is_no_channel_and_text_is_named_as_such(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("\n".join(lines) + "\n")
     proposal = proposed_mapping(path, described(path)[0])
-    assert proposal.mapping["taxels"]["columns"] == ["c0 [fF]", "c1 [fF]"]
+    assert proposal.document["taxels"]["columns"] == ["c0 [fF]", "c1 [fF]"]
     assert "no column is a channel: c0 [fF] and c1 [fF] hold text" in proposal.questions
     write(tmp_path, "npz", rows)
     with pytest.raises(FormatError, match=r"t of run\.npz is the time, and among the channels"):

@@ -129,7 +129,7 @@ def test_a_proposal_takes_a_counter_for_the_clock_where_rows_are_lost(tmp_path, 
     numbers[restart:] -= restart
     numbers[40:] += lost
     path, _ = counted(tmp_path, rows, numbers)
-    found = proposed_mapping(path, described(path)[0]).mapping
+    found = proposed_mapping(path, described(path)[0]).document
     assert found["files"]["run"]["time"] == {"column": "frame", "rate": 50.0}
 
 

@@ -1,0 +1,78 @@
+"""A kind of file as an entry of the mapping: its path, its parts, its clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tacdata.errors import FormatError
+from tacdata.importing.mapping import FileEntry, SourceClock
+from tacdata.importing.proposing.drives import rate_of
+from tacdata.importing.proposing.file_kinds import INSIDE, listed, pattern
+from tacdata.importing.proposing.shapes import counting_column
+from tacdata.importing.proposing.source_kind import SourceKind
+from tacdata.importing.proposing.stream_clocks import clock_by
+from tacdata.importing.source_table import SourceTable
+from tacdata.importing.times import layouts_of, times
+
+PLACES = {"columns": "side by side", "rows": "below each other"}
+"""How parts of a trial are joined -> their places."""
+
+
+@dataclass(frozen=True)
+class ProposedFile:
+    """An entry under ``files``."""
+
+    entry: FileEntry
+    questions: tuple[str, ...]
+
+
+def proposed_file(kind: SourceKind) -> ProposedFile:
+    """Return how the files of a kind are found and read."""
+    found, (outer, _, inside) = kind.found, kind.kind.partition(INSIDE)
+    path, parts = pattern(outer) if found.count > 1 or "#" in inside else (found.path, 0)
+    paths, table, questions = (path,), found.options.table, ()
+    if found.join:
+        outers, sheets = zip(*(part.partition(INSIDE)[::2] for part in found.parts), strict=True)
+        same = len(set(outers)) == 1
+        place = PLACES.get(found.join, "below each other, the clock continued")
+        names = listed(list(sheets if same else outers))
+        questions = (f"{names} are taken for parts of one trial, {place} (join: {found.join})",)
+        paths, table = (paths, list(sheets)) if same else (tuple(pattern(part)[0] for part in outers), table)
+    elif "#" in inside:
+        table = pattern(inside, parts)[0]
+    clock, doubts = _clock(kind, Path(outer).name)
+    options = replace(found.options, table=None)
+    return ProposedFile(FileEntry(paths, options, table, found.join, clock=clock), questions + doubts)
+
+
+def _clock(kind: SourceKind, file: str) -> tuple[SourceClock, tuple[str, ...]]:
+    """Return the clock of a file, and doubts about it."""
+    table, names = kind.table, kind.roles.get("time")
+    if not names:
+        rate, counter = rate_of(table, kind.roles), counting_column(table, kind.roles)
+        question = (
+            f"{file}: no column of times; {rate:g} rows a second is a guess, by which a press takes some "
+            "2 s: give time: {rate: ...}" + f"; {counter} counts the rows" * bool(counter)
+        )
+        return SourceClock(rate=rate, column=counter or None), (question,)
+    is_dated = [table.column(name).dtype for name in names] == [object, object]  # a date and a time of day
+    clock = SourceClock(column=names) if is_dated else clock_by(table, names[0])
+    questions = ()
+    if "by_values" in kind.roles:
+        questions = (f"{names[0]}: it rises evenly, and is taken for the time, in s where no unit is given",)
+    try:
+        times(table, clock, file)
+    except FormatError as error:
+        layout, question = _american(table, names[0])
+        return replace(clock, format=layout), (*questions, question or f"{error.given}: {error.remedy}")
+    return clock, questions
+
+
+def _american(table: SourceTable, name: str) -> tuple[str | None, str]:
+    """Return the format of dates with AM and PM, where month and day could change places: the month comes first."""
+    values = table.column(name)
+    texts = [str(text).strip() for text in values.tolist() if text is not None] if values.dtype == object else []
+    layouts = layouts_of(texts) if texts else []
+    layout = next((layout for layout in layouts if layout.startswith("%m/") and "%p" in layout), None)
+    return layout, f"{name}: {texts[0]!r} is read with the month first (format: {layout!r}); is it?" if layout else ""
