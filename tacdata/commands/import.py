@@ -16,7 +16,7 @@ PANEL = DATA
 EXAMPLES = (
     "tacdata import measured --propose mapping.yaml",
     "tacdata import measured --mapping mapping.yaml --out session",
-    "tacdata import bag --mapping mapping.yaml --out session --json",
+    "tacdata import measured --web",
 )
 
 
@@ -31,10 +31,16 @@ def run(
     propose: Annotated[
         Path | None, typer.Option(help="Without --mapping: a mapping to start from, to be written here.")
     ] = None,
+    web: Annotated[bool, typer.Option("--web", help="Assign the columns on a page of this computer.")] = False,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port of the page; 0 for any that is free; default: 9099.")
+    ] = None,
 ) -> Result:
     """Turn measured data of another rig into recordings that every other verb reads, by a mapping file."""
     import tacdata as td
 
+    if web:
+        return _on_a_page(source, mapping, propose, out, port)
     if mapping is None:
         return _inspect(source, propose)
     if out is None or propose is not None:
@@ -95,3 +101,18 @@ def _inspect(source: Path, propose: Path | None) -> Result:
     print(tried(source, proposal.mapping))
     suggest("import", source, "--mapping", propose, "--out SESSION")
     return Result({**result, "written": propose})
+
+
+def _on_a_page(source: Path, mapping: Path | None, propose: Path | None, out: Path | None, port: int | None) -> Result:
+    from tacdata.studio.wizard.server import PORT, wizard_server
+    from tacdata.studio.wizard.wizard import Wizard
+    from tacdata.viewers.rerun import window
+
+    target = propose or mapping or Path(f"{source.resolve().stem}-mapping.yaml")
+    wizard = Wizard.of(source, target, out or Path(f"{source.resolve().stem}-session"), mapping)
+    with wizard_server(wizard, window.free_port(PORT) if port is None else port) as address:
+        print(f"open {address}\nCtrl-C ends it", flush=True)
+        if window.has_display():
+            typer.launch(address)
+        window.until_interrupted()
+    return Result({"source": source, "mapping": target if target.exists() else None})

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.foreign_sensor import foreign_sensor
 from tacdata.importing.mapping import Mapping, PositionEntry, TrialRule
+from tacdata.importing.pressing.foreign_sensor import foreign_sensor
 from tacdata.importing.pressing.known_values import known_numbers, label_of
 from tacdata.importing.pressing.path_faults import without_faults
 from tacdata.importing.pressing.press_path import PressPath, press_path

@@ -9,6 +9,7 @@ from tacdata.errors import FormatError
 from tacdata.importing.mapping import FileEntry, SourceClock
 from tacdata.importing.proposing.drives import rate_of
 from tacdata.importing.proposing.file_kinds import INSIDE, listed, pattern
+from tacdata.importing.proposing.question import Question
 from tacdata.importing.proposing.shapes import counting_column
 from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.proposing.stream_clocks import clock_by
@@ -24,7 +25,7 @@ class ProposedFile:
     """An entry under ``files``."""
 
     entry: FileEntry
-    questions: tuple[str, ...]
+    questions: tuple[Question, ...]
 
 
 def proposed_file(kind: SourceKind) -> ProposedFile:
@@ -37,7 +38,7 @@ def proposed_file(kind: SourceKind) -> ProposedFile:
         same = len(set(outers)) == 1
         place = PLACES.get(found.join, "below each other, the clock continued")
         names = listed(list(sheets if same else outers))
-        questions = (f"{names} are taken for parts of one trial, {place} (join: {found.join})",)
+        questions = (Question(f"{names} are taken for parts of one trial, {place} (join: {found.join})"),)
         paths, table = (paths, list(sheets)) if same else (tuple(pattern(part)[0] for part in outers), table)
     elif "#" in inside:
         table = pattern(inside, parts)[0]
@@ -46,26 +47,30 @@ def proposed_file(kind: SourceKind) -> ProposedFile:
     return ProposedFile(FileEntry(paths, options, table, found.join, clock=clock), questions + doubts)
 
 
-def _clock(kind: SourceKind, file: str) -> tuple[SourceClock, tuple[str, ...]]:
+def _clock(kind: SourceKind, file: str) -> tuple[SourceClock, tuple[Question, ...]]:
     """Return the clock of a file, and doubts about it."""
     table, names = kind.table, kind.roles.get("time")
     if not names:
         rate, counter = rate_of(table, kind.roles), counting_column(table, kind.roles)
-        question = (
+        text = (
             f"{file}: no column of times; {rate:g} rows a second is a guess, by which a press takes some "
             "2 s: give time: {rate: ...}" + f"; {counter} counts the rows" * bool(counter)
         )
-        return SourceClock(rate=rate, column=counter or None), (question,)
+        return SourceClock(rate=rate, column=counter or None), (Question(text, "rate", file=kind.alias, value=rate),)
     is_dated = [table.column(name).dtype for name in names] == [object, object]  # a date and a time of day
     clock = SourceClock(column=names) if is_dated else clock_by(table, names[0])
     questions = ()
     if "by_values" in kind.roles:
-        questions = (f"{names[0]}: it rises evenly, and is taken for the time, in s where no unit is given",)
+        text = f"{names[0]}: it rises evenly, and is taken for the time, in s where no unit is given"
+        questions = (Question(text),)
     try:
         times(table, clock, file)
     except FormatError as error:
-        layout, question = _american(table, names[0])
-        return replace(clock, format=layout), (*questions, question or f"{error.given}: {error.remedy}")
+        layout, text = _american(table, names[0])
+        doubt = Question(
+            text or f"{error.given}: {error.remedy}", "date" * bool(text), file=kind.alias, word=layout or ""
+        )
+        return replace(clock, format=layout), (*questions, doubt)
     return clock, questions
 
 

@@ -12,6 +12,7 @@ from tacdata.errors import FormatError
 from tacdata.importing.mapping import Axis, PositionEntry, Quantity, SourceClock, TrialRule, Value
 from tacdata.importing.proposing.drives import length_of
 from tacdata.importing.proposing.file_kinds import listed
+from tacdata.importing.proposing.question import Question
 from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.proposing.strokes import CLEAR, PressingAxis, pressing_axis
 from tacdata.importing.source_table import SourceTable, unit_of
@@ -31,7 +32,7 @@ class ProposedPosition:
     """Height at which the skin is touched."""
     known_from: str = "as the mapping says"
     trials: TrialRule = field(default_factory=TrialRule)
-    questions: tuple[str, ...] = ()
+    questions: tuple[Question, ...] = ()
 
 
 def proposed_position(kind: SourceKind, clock: SourceClock, channels: list[str]) -> ProposedPosition:
@@ -45,12 +46,10 @@ def proposed_position(kind: SourceKind, clock: SourceClock, channels: list[str])
     table, roles = kind.table, kind.roles
     pressing = "depth" if "depth" in roles else "z"
     names = {key: roles[key][0] for key in ("x", "y", pressing) if key in roles}
-    questions: list[str] = []
+    questions: list[Question] = []
     if "by_shape" in roles:
-        questions.append(
-            f"{names['depth']}: taken for the position by its shape: it is smooth, comes back, and the "
-            "readings follow it"
-        )
+        words = "taken for the position by its shape: it is smooth, comes back, and the readings follow it"
+        questions.append(Question(f"{names['depth']}: {words}"))
     unsaid = [name for name in names.values() if name not in table.units]
     unit = _length(table, names[pressing]) if unsaid and "stand_in" not in roles else "mm"
     axes = {key: Axis(name, unit if name in unsaid else "") for key, name in names.items()}
@@ -60,7 +59,7 @@ def proposed_position(kind: SourceKind, clock: SourceClock, channels: list[str])
     if "stand_in" in roles:
         axes["depth"] = replace(axes["depth"], unit=length_of(table, roles["stand_in"][0]))
     elif unsaid:
-        questions.append(f"{listed(unsaid)}: no unit is given; {unit} is a guess")
+        questions.append(Question(f"{listed(unsaid)}: no unit is given; {unit} is a guess", "unit", tuple(unsaid)))
     entry = PositionEntry(file=kind.alias, clock=clock, axes=dict[str, Quantity](axes))
     try:
         time_ns, _ = times(table, clock, "")
@@ -77,7 +76,7 @@ def _turned(
     axes: dict[str, Axis],
     motion: PressingAxis,
     channels: list[str],
-    questions: list[str],
+    questions: list[Question],
 ) -> ProposedPosition:
     """Return the position with its sign, as a depth or a machine's height, with trials cut by pauses or presses."""
     proposed, pressing = ProposedPosition(), next(reversed(axes))
@@ -90,32 +89,37 @@ def _turned(
     if motion.sign * (1 if is_depth else -1) < 0:
         axis = replace(axis, scale=-1.0)
         way = "falls" if motion.sign < 0 else "grows"
-        questions.append(f"{name}: it {way} into the skin, so its sign is turned (scale: -1)")
+        text = f"{name}: it {way} into the skin, so its sign is turned (scale: -1)"
+        questions.append(Question(text, "sign", (name,)))
     if is_depth and (offset := _lowest(axis, kind.table, name, channels)):
         axis = replace(axis, offset=offset)
-        questions.append(
+        text = (
             f"{name}: readings answer on both sides of its zero, so depth is counted from the lowest "
             f"(offset: {offset:g} mm); do other files go lower? Then take the lowest of all"
         )
+        questions.append(Question(text, "zero", value=offset))
     if not is_depth and motion.at_zero:
         proposed = replace(proposed, contact={"z": 0.0}, known_from="the zero of the machine")
-        questions.append(f"{name}: its zero is taken for the height at which the skin is touched (contact: {{z: 0}})")
+        text = f"{name}: its zero is taken for the height at which the skin is touched (contact: {{z: 0}})"
+        questions.append(Question(text, "contact"))
     elif not is_depth and "stand_in" in kind.roles:
-        questions.append(f"{name}: it does not rest at zero; depth is counted from where each trial is at rest")
+        text = f"{name}: it does not rest at zero; depth is counted from where each trial is at rest"
+        questions.append(Question(text, "contact"))
     elif not is_depth:
-        questions.append(
+        text = (
             f"{name}: a machine's height; where does it touch the skin? Give contact: {{z: ...}}, else depth is "
             "counted from the highest position of each trial"
         )
+        questions.append(Question(text, "contact"))
     if "trial" not in kind.roles and motion.pause:
         proposed = replace(proposed, trials=TrialRule(gap=motion.pause))
         pause = f"{motion.pauses} pauses of more than {motion.pause:g} s"
-        questions.append(f"{pause}: each is taken for the end of a trial")
+        questions.append(Question(f"{pause}: each is taken for the end of a trial", "trials"))
     elif "trial" not in kind.roles and motion.strokes > 1 and is_depth:
         above = f"{motion.above * _in_mm(kind.table, name, axis):.2g}"
         proposed = replace(proposed, trials=TrialRule(press_above=float(above)))
         stretches = f"each stretch deeper than {above} mm is taken for a trial"
-        questions.append(f"{motion.strokes} presses without a pause: {stretches}")
+        questions.append(Question(f"{motion.strokes} presses without a pause: {stretches}", "trials"))
     return replace(proposed, entry=replace(entry, axes=others | {pressing: axis}), questions=tuple(questions))
 
 
@@ -168,11 +172,12 @@ def _deviation(table: SourceTable, channels: list[str], axis: np.ndarray) -> np.
     return np.where(rows, deviation, 0.0).sum(axis=1) / np.where(rows.any(axis=1), rows.sum(axis=1), np.nan)
 
 
-def _without_error(table: SourceTable, target: str, error: str) -> tuple[Axis, str]:
+def _without_error(table: SourceTable, target: str, error: str) -> tuple[Axis, Question]:
     """Return the measured depth as the set point minus the position error, and the question that this raises."""
     stated = table.units.get(target)
     axis = Axis(unit="" if stated and stated == table.units.get(error) else "mm", expression=f"`{target}` - `{error}`")
-    return axis, f"the position is taken as {target} - {error}: is the error the set point minus the position?"
+    text = f"the position is taken as {target} - {error}: is the error the set point minus the position?"
+    return axis, Question(text)
 
 
 def _length(table: SourceTable, pressing: str) -> str:

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tacdata.importing.mapping import ColumnsEntry, ForeignSensor, Mapping, SourceClock, TrialRule
+from tacdata.importing.mapping import ColumnsEntry, FileEntry, ForeignSensor, Mapping, SourceClock, TrialRule
+from tacdata.importing.mapping_document import document_of
 from tacdata.importing.proposing.description import FoundKind
 from tacdata.importing.proposing.drives import is_copy
 from tacdata.importing.proposing.file_entry import proposed_file
 from tacdata.importing.proposing.file_kinds import listed
-from tacdata.importing.proposing.mapping_document import document_of
 from tacdata.importing.proposing.position import ProposedPosition, proposed_position
+from tacdata.importing.proposing.question import Question, questions_of
 from tacdata.importing.proposing.shapes import counting_column, varying
 from tacdata.importing.proposing.source_kind import SourceKind, source_kinds, widest
 from tacdata.importing.proposing.specimens import place_in_path, specimen_of
@@ -23,7 +24,9 @@ from tacdata.importing.units import plain
 AXES = ("depth", "z", "x", "y")
 IDLE = ("idle", "setting", "state", "counter", "orientation", "joint", "derived")
 """Roles of columns that are no channels of a sensor."""
-NO_POSITION = ProposedPosition(questions=("no column is named as a position or a depth: give position, or schedule",))
+NO_POSITION = ProposedPosition(
+    questions=questions_of(["no column is named as a position or a depth: give position, or schedule"])
+)
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,17 @@ class Proposal:
     """A mapping to start from."""
 
     mapping: Mapping
-    questions: tuple[str, ...]
-    """Values that a person has to give or to check, as sentences."""
+    open: tuple[Question, ...]
+    """Values that a person has to give or to check."""
+    kinds: tuple[SourceKind, ...]
+    """Kinds of files, with the roles of their columns."""
+    files: dict[str, FileEntry]
+    """Entry of each kind, those that the mapping does not use among them."""
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """The open questions as sentences."""
+        return tuple(question.text for question in self.open)
 
     @property
     def document(self) -> dict[str, Any]:
@@ -80,17 +92,15 @@ def proposed_mapping(source: Path, found: dict[str, FoundKind]) -> Proposal:
         specimen=specimen or "",
         press=dict(path),
     )
-    questions = [
-        *notes,
+    questions = (
+        *questions_of(notes),
         *(question for file in proposed.values() for question in file.questions),
-        *doubts,
+        *questions_of(doubts),
         *place.questions,
         *(question for _, further in specimens for question in further),
-        *_unnamed(wide),
-        *shared,
-        *_unused(kinds, used, wide),
-    ]
-    return Proposal(Mapping.from_document(document_of(mapping), source.parent), tuple(questions))
+        *questions_of([*_unnamed(wide), *shared, *_unused(kinds, used, wide)]),
+    )
+    return Proposal(Mapping.from_document(document_of(mapping), source.parent), questions, kinds, files)
 
 
 def _taxels(kind: SourceKind, clock: SourceClock) -> tuple[ColumnsEntry, tuple[str, ...]]:

@@ -134,9 +134,14 @@ def is_whole(roles: dict[str, list[str]]) -> bool:
     return ("depth" in roles or "z" in roles) and bool(roles["channels"] or "force" in roles)
 
 
+def bare_name(name: str) -> str:
+    """Return a column's name without its unit and path, in small letters: "stage.posZ [mm]" is pos_z."""
+    bare, _ = split_unit(name.rsplit(".", 1)[-1])
+    return re.sub(r"[\s-]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
+
+
 def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
-    bare, inside = split_unit(name.rsplit(".", 1)[-1])
-    bare = re.sub(r"[\s-]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
+    bare, inside = bare_name(name), split_unit(name.rsplit(".", 1)[-1])[1]
     if values.ndim == 2 and values.shape[1] in (3, 6, 7) and re.fullmatch(PLACE, bare):
         return "place"
     role = next((role for role, pattern in GUESSES.items() if re.fullmatch(pattern, bare)), None)

@@ -6,6 +6,7 @@ import re
 
 from tacdata.importing.mapping import KnownValue
 from tacdata.importing.proposing.file_kinds import INSIDE, listed
+from tacdata.importing.proposing.question import Question
 from tacdata.importing.proposing.source_kind import SourceKind
 
 SPECIMEN = re.compile(r"(?:specimen|spec|sample|material|coupon|probe)[-_ ]?$", re.IGNORECASE)
@@ -19,19 +20,21 @@ MATERIAL = re.compile(
 """Words of folders that name materials of soft sensors."""
 
 
-def specimen_of(kind: SourceKind) -> tuple[KnownValue | None, tuple[str, ...]]:
+def specimen_of(kind: SourceKind) -> tuple[KnownValue | None, tuple[Question, ...]]:
     """Return the specimen's column or part of the path, and questions about it."""
     for name in kind.roles.get("specimen", []):
         if len({str(value) for value in kind.table.columns[name].tolist() if value is not None}) > 1:
             return KnownValue(file=kind.alias, column=name), ()
     if part := next((f"part{k}" for k, text in enumerate(_texts(kind.kind)) if SPECIMEN.search(text)), None):
         return KnownValue(part), ()
-    questions: tuple[str, ...] = ()
+    questions: tuple[Question, ...] = ()
     for number, words in kind.found.words.items():
         if 2 * sum(bool(MATERIAL.search(word)) for word in words) >= len(words):
-            return KnownValue(f"part{number}"), (*questions, f"the folders {listed(words)} are taken for specimens")
+            text = f"the folders {listed(words)} are taken for specimens"
+            return KnownValue(f"part{number}"), (*questions, Question(text, "specimen", word=f"part{number}"))
         remedy = f"Then write press: {{specimen: {{part: part{number}}}}}"
-        questions += (f"are the folders {listed(words)} specimens? {remedy}",)
+        text = f"are the folders {listed(words)} specimens? {remedy}"
+        questions += (Question(text, "specimen", word=f"part{number}"),)
     return None, questions
 
 

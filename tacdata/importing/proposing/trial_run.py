@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,18 +33,52 @@ class TrialPolicy:
 POLICY = TrialPolicy()
 
 
-@dataclass
-class _Outcome:
-    """Outcome of importing the sets of files."""
+@dataclass(frozen=True)
+class TrialRun:
+    """The result of trying a mapping on some sets of files."""
 
-    presses: list[ImportedPress] = field(default_factory=list)
-    rests: list[float] = field(default_factory=list)
-    """Lowest depth of each set of files [mm]."""
-    refusals: list[TacdataError] = field(default_factory=list)
+    mapping: Mapping
+    by_set: tuple[tuple[FileSet, tuple[ImportedPress, ...]], ...] = ()
+    """Each set of files that was tried, and its recordings."""
+    refusals: tuple[TacdataError, ...] = ()
+    """Why sets, or parts of them, give none."""
+    sets: int = 0
+    """Sets of files that the mapping finds."""
+    policy: TrialPolicy = POLICY
+
+    @property
+    def presses(self) -> tuple[ImportedPress, ...]:
+        """All recordings."""
+        return tuple(press for _, presses in self.by_set for press in presses)
+
+    @property
+    def rests(self) -> list[float]:
+        """Lowest depth of each set of files with a recording [mm]."""
+        return [min(float(_depths(press).min()) for press in presses) for _, presses in self.by_set if presses]
+
+    @property
+    def sentence(self) -> str:
+        """The recordings in figures, or why there are none."""
+        if not self.presses:
+            return f"as it stands, it imports nothing: {self.refusals[0].given}; {self.refusals[0].remedy}"
+        tried = len(self.by_set)
+        names = f"{tried} of {self.sets} sets of files hold" if self.sets > 1 else "the source holds"
+        return f"tried: {names} {_figures(self.presses, self.policy)}"
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Reasons for which the mapping is not good, with remedies."""
+        return tuple(_faults(self)) if self.presses else ()
 
 
-def tried(source: Path, mapping: Mapping, policy: TrialPolicy = POLICY) -> str:
-    """Return the outcome of importing some of the files by a mapping, or why nothing is imported, as a sentence.
+def tried(source: Path, mapping: Mapping) -> str:
+    """Return the outcome of importing some of the files by a mapping, or why nothing is imported, as a sentence."""
+    run = trial_run(source, mapping)
+    return f"{run.sentence}\nnot good as it stands: {'; '.join(run.faults)}" if run.faults else run.sentence
+
+
+def trial_run(source: Path, mapping: Mapping, policy: TrialPolicy = POLICY) -> TrialRun:
+    """Import some of the files by a mapping, without writing them.
 
     Args:
         source: The files.
@@ -53,42 +88,30 @@ def tried(source: Path, mapping: Mapping, policy: TrialPolicy = POLICY) -> str:
     try:
         sets = file_sets(source, mapping.files)
     except TacdataError as error:
-        return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
-    samples = [sets[k] for k in sorted({round(k) for k in np.linspace(0, len(sets) - 1, policy.sets)})]
-    outcome = _Outcome()
-    for files in samples:
-        _try_set(files, mapping, outcome)
-    if not outcome.presses:
-        error = outcome.refusals[0]
-        return f"as it stands, it imports nothing: {error.given}; {error.remedy}"
-    names = f"{len(samples)} of {len(sets)} sets of files hold" if len(sets) > 1 else "the source holds"
-    sentence = f"tried: {names} {_figures(outcome.presses, policy)}"
-    is_depth = mapping.position is None or mapping.position.depth_given
-    remedy = "zero: lowest under depth" if is_depth else "zero: highest under z"
-    faults = _faults(outcome, remedy, policy)
-    return f"{sentence}\nnot good as it stands: {'; '.join(faults)}" if faults else sentence
+        return TrialRun(mapping, refusals=(error,), policy=policy)
+    by_set, refusals = [], list[TacdataError]()
+    for files in [sets[k] for k in sorted({round(k) for k in np.linspace(0, len(sets) - 1, policy.sets)})]:
+        parts: list[ImportedPress | Refusal] = []
+        try:
+            parts = _parts(files, mapping)
+        except TacdataError as error:
+            refusals.append(error)
+        by_set.append((files, tuple(part for part in parts if isinstance(part, ImportedPress))))
+        refusals += [part.error for part in parts if isinstance(part, Refusal)]
+    return TrialRun(mapping, tuple(by_set), tuple(refusals), len(sets), policy)
 
 
-def _try_set(files: FileSet, mapping: Mapping, outcome: _Outcome) -> None:
-    """Import a set of files without writing it."""
-    record = {"trial": "", "name": mapping.name}
-    try:
-        if files.fault:
-            raise files.fault
-        tables = files.tables()
-        centre = centre_of(mapping.position, tables)
-        parts = [
-            part
-            for label, rows in split_tables(tables, mapping)
-            for part in presses_of(mapping, rows, files.parts, {**record, "trial": label}, centre)
-        ]
-    except TacdataError as error:
-        outcome.refusals.append(error)
-        return
-    presses = [part for part in parts if isinstance(part, ImportedPress)]
-    outcome.refusals += [part.error for part in parts if isinstance(part, Refusal)]
-    outcome.presses += presses
-    outcome.rests += [min(float(_depths(press).min()) for press in presses)] if presses else []
+def _parts(files: FileSet, mapping: Mapping) -> list[ImportedPress | Refusal]:
+    """Return the recordings of a set of files, and the refusals of its parts."""
+    if files.fault:
+        raise files.fault
+    tables, record = files.tables(), {"name": mapping.name}
+    centre = centre_of(mapping.position, tables)
+    return [
+        part
+        for label, rows in split_tables(tables, mapping)
+        for part in presses_of(mapping, rows, files.parts, {**record, "trial": label}, centre)
+    ]
 
 
 def _depths(press: ImportedPress) -> np.ndarray:
@@ -96,7 +119,7 @@ def _depths(press: ImportedPress) -> np.ndarray:
     return press.registration["origin"][2] - press.position.values[:, 2]
 
 
-def _figures(presses: list[ImportedPress], policy: TrialPolicy) -> str:
+def _figures(presses: Sequence[ImportedPress], policy: TrialPolicy) -> str:
     depths = sorted(press.press.depth for press in presses)
     rows = sorted(len(press.taxels.time_ns) for press in presses)
     deep = " to ".join(dict.fromkeys(f"{depth:.3g}" for depth in (depths[0], depths[-1])))
@@ -110,13 +133,13 @@ def _figures(presses: list[ImportedPress], policy: TrialPolicy) -> str:
     )
 
 
-def _rate(presses: list[ImportedPress]) -> float:
+def _rate(presses: Sequence[ImportedPress]) -> float:
     """Return the median rate of the channels [Hz]; 0 if no time differs from the one before."""
     steps = np.concatenate([np.diff(press.taxels.time_ns) for press in presses])
     return 1e9 / float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
 
-def _answers(presses: list[ImportedPress], policy: TrialPolicy) -> int | None:
+def _answers(presses: Sequence[ImportedPress], policy: TrialPolicy) -> int | None:
     """Return the number of channels that change by more than their noise in a press; None without a stroke."""
     changes = []
     for press in presses:
@@ -132,14 +155,14 @@ def _answers(presses: list[ImportedPress], policy: TrialPolicy) -> int | None:
     return int(np.any(changes, axis=0).sum()) if changes else None
 
 
-def _faults(outcome: _Outcome, own_zero: str, policy: TrialPolicy) -> list[str]:
-    """Return the reasons for which a mapping is not good, with remedies; ``own_zero`` gives each file its zero."""
-    presses = outcome.presses
+def _faults(run: TrialRun) -> list[str]:
+    presses, rests, position, policy = run.presses, run.rests, run.mapping.position, run.policy
+    own_zero = "zero: lowest under depth" if position is None or position.depth_given else "zero: highest under z"
     strokes = [float(np.ptp(_depths(press))) for press in presses]
     ends = [float(_depths(press)[-1] - _depths(press).min()) for press in presses]
     faults = []
-    if outcome.refusals:
-        number, error = len(outcome.refusals), outcome.refusals[0]
+    if run.refusals:
+        number, error = len(run.refusals), run.refusals[0]
         faults.append(f"{_counted(number, 'part')} left out, first: {error.given} ({error.remedy})")
     if back := next((press.taxels.steps_back for press in presses if press.taxels.steps_back), ()):
         faults.append(f"time goes back {back[0]}: is another column the time, or does another one number the trials?")
@@ -149,9 +172,9 @@ def _faults(outcome: _Outcome, own_zero: str, policy: TrialPolicy) -> list[str]:
         faults.append("no channel answers to any press: are other columns the channels, or another the position?")
     if max(press.press.depth for press in presses) <= 0 < max(strokes):
         faults.append("the position never reaches depth 0: correct its sign, or the zero by contact or offset")
-    elif len(outcome.rests) > 1 and np.ptp(outcome.rests) > policy.zero * float(np.median(strokes)):
+    elif len(rests) > 1 and np.ptp(rests) > policy.zero * float(np.median(strokes)):
         faults.append(
-            f"the highest positions of the files lie {np.ptp(outcome.rests):.3g} mm apart: if each file has its own "
+            f"the highest positions of the files lie {np.ptp(rests):.3g} mm apart: if each file has its own "
             f"zero, count depth from it ({own_zero})"
         )
     cut = sum(end > policy.back * stroke > 0 for end, stroke in zip(ends, strokes, strict=True))

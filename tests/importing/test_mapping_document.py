@@ -7,9 +7,9 @@ import yaml
 
 from tacdata import documents
 from tacdata.importing.mapping import Mapping
-from tacdata.importing.proposing.mapping_document import document_of
+from tacdata.importing.mapping_document import document_of
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 TIME = {"column": "t", "unit": "s"}
 WHOLE = {
     "version": "1.6",

@@ -1,0 +1,1 @@
+"""The import wizard: a page on which a person assigns columns to quantities."""

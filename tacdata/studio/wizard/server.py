@@ -1,0 +1,103 @@
+"""The import wizard's page, served on this computer."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from importlib.resources import files
+from threading import Lock
+from typing import Any
+
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse, JSONResponse
+from pydantic import BaseModel
+
+from tacdata.pages import live_page
+from tacdata.progress import say
+from tacdata.studio.wizard.choices import Choices
+from tacdata.studio.wizard.wizard import Wizard
+from tacdata.viewers.browse import loopback
+
+PORT = 9099
+"""Where the page is offered; another where it is in use."""
+SEALED = (
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:; "
+    "connect-src 'self'; form-action 'none'; frame-ancestors 'none'; base-uri 'none'"
+)
+"""Policy of the page: it asks no other address, and no other page frames it."""
+HEADERS = {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff", "Content-Security-Policy": SEALED}
+
+
+class WriteRequest(BaseModel):
+    """Request of the page to write the mapping."""
+
+    choices: Choices
+    file: str
+    replace: bool = False
+
+
+class ImportRequest(BaseModel):
+    """Request of the page to import by a mapping that was written."""
+
+    file: str
+    session: str
+
+
+@contextmanager
+def wizard_server(wizard: Wizard, port: int) -> Iterator[str]:
+    """Serve the page while the context lasts, on the loopback, to whoever knows its address.
+
+    Yields:
+        The address to open.
+    """
+    token = secrets.token_urlsafe(16)
+    with loopback.serving(application(wizard, token), port) as address:
+        yield f"{address}/{token}/"
+
+
+def application(wizard: Wizard, token: str) -> FastAPI:
+    """Return the application: the page, its contents, a trial of choices, the mapping, the session."""
+    api = FastAPI(openapi_url=None)
+    routes = APIRouter(prefix=f"/{token}")
+    loopback.guard(api, token, HEADERS)
+    one_at_a_time = Lock()  # requests run in threads of their own; two must not write one file
+
+    @api.exception_handler(RequestValidationError)
+    async def unfit(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        return JSONResponse({"error": f"{first['loc'][-1]}: {first['msg']}"}, HTTPStatus.UNPROCESSABLE_ENTITY)
+
+    @routes.get("/")
+    def page() -> HTMLResponse:
+        body = files("tacdata.studio.wizard").joinpath("page.html").read_text(encoding="utf-8")
+        return HTMLResponse(live_page(f"{wizard.source.name}: import", body))
+
+    @routes.get("/contents")
+    def contents() -> dict[str, Any]:
+        return wizard.contents()
+
+    @routes.post("/try")
+    def tried(choices: Choices) -> dict[str, Any]:
+        with one_at_a_time:
+            return wizard.tried(choices)
+
+    @routes.post("/write")
+    def write(asked: WriteRequest) -> dict[str, Any]:
+        with one_at_a_time:
+            answer = wizard.written(asked.choices, asked.file, asked.replace)
+        if "command" in answer:
+            say(f"{answer['file']} is written\nnext: {answer['command']}")
+        return answer
+
+    @routes.post("/import")
+    def imported(asked: ImportRequest) -> dict[str, Any]:
+        with one_at_a_time:
+            answer = wizard.imported(asked.file, asked.session)
+        say(f"{answer['recordings']} recordings in {asked.session}")
+        return answer
+
+    api.include_router(routes)
+    return api
