@@ -37,6 +37,7 @@ def evidence(kind: SourceKind, name: str, path: np.ndarray | None) -> tuple[str,
     values = table.column(name)
     if values.dtype == object:
         texts = list(dict.fromkeys(str(value) for value in values.tolist() if value is not None))
+        grounds += ["it reads as dates or times of day"] if "time" in roles else []
         return (*grounds, f"text, {len(texts)} different: {', '.join(texts[:3])}")
     if reason := without_signal(table, [name, *kind.channels]).get(name):
         grounds.append({"constant": "it never changes"}.get(reason, f"it is {reason}"))

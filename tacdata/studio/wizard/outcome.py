@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import TacdataError
-from tacdata.importing.mapping import Mapping, PositionEntry
+from tacdata.importing.mapping import Mapping, PositionEntry, TrialRule
 from tacdata.importing.proposing.trial_run import TrialRun, trial_run
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet
@@ -19,6 +19,8 @@ from tacdata.studio.wizard.source_preview import numbers
 
 COLORS = ("blue", "vermilion", "green", "purple", "amber", "sky", "ink", "grey")
 """Colours of channels; more than these are not drawn."""
+CUT = 0.1
+"""Share of the deepest depth above which a press is told from the next, as in a proposal [1]."""
 SHOWN, POINTS, LONG = 24, 300, 2400
 """Presses that are drawn, points of each, and points of the whole path."""
 
@@ -27,7 +29,7 @@ def outcome(source: Path, mapping: Mapping) -> dict[str, Any]:
     """Return the result of trying a mapping: a sentence, faults, and figures of path and presses."""
     run = trial_run(source, mapping)
     return {
-        "sentence": run.sentence,
+        "sentence": run.sentence.removeprefix("tried: "),
         "faults": list(run.faults),
         "good": bool(run.presses) and not run.faults,
         "set_aside": list(dict.fromkeys(words for press in run.presses for words in press.record["set_aside"])),
@@ -35,7 +37,16 @@ def outcome(source: Path, mapping: Mapping) -> dict[str, Any]:
         "path": _path(mapping, run),
         "presses": [_press(press, number) for number, press in enumerate(run.presses[:SHOWN], 1)],
         "found": len(run.presses),
+        "cut_above": _cut_above(mapping, run),
     }
+
+
+def _cut_above(mapping: Mapping, run: TrialRun) -> float | None:
+    """Return the depth [mm] that parts the presses of a recording without phases; None where it needs no such rule."""
+    if mapping.trials != TrialRule() or mapping.schedule:
+        return None
+    deepest = max((press.press.depth for press in run.presses if not press.phases), default=0.0)
+    return float(f"{CUT * deepest:.2g}") if deepest > 0 else None
 
 
 def _figure(title: str, y: str, x: np.ndarray, series: list[dict[str, Any]], link: str = "") -> dict[str, Any]:
@@ -114,7 +125,7 @@ def _path(mapping: Mapping, run: TrialRun) -> dict[str, Any] | None:
     depth, members, aside = depth[pick], members[pick], aside[pick]
     series = [
         _series("in no press", "grey", np.where(members == 0, depth, np.nan)),
-        _series("presses 1, 3, …", "blue", np.where(members % 2 == 1, depth, np.nan)),
+        _series("presses 1, 3, …" if len(presses) > 1 else "press", "blue", np.where(members % 2 == 1, depth, np.nan)),
         _series("presses 2, 4, …", "green", np.where((members > 0) & (members % 2 == 0), depth, np.nan)),
         _series("set aside", "vermilion", np.where(aside, depth, np.nan), "points"),
     ]
