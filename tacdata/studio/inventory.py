@@ -9,6 +9,8 @@ from pathlib import Path
 from tacdata.errors import TacdataError, UsageError
 from tacdata.studio.entry import LabEntry, local_minute
 from tacdata.studio.farm import LOCK, farm_entry
+from tacdata.studio.measured import SECTION as MEASURED
+from tacdata.studio.measured import measured_entry, measured_sources
 from tacdata.studio.results import (
     dataset_entry,
     health_entry,
@@ -29,6 +31,7 @@ SECTIONS = (
     "Revisions",
     "Health",
     "Label farm",
+    MEASURED,
     "Pages",
     "Others",
 )
@@ -81,6 +84,8 @@ class Inventory:
         for section, name, make in (("Health", "health.json", health_entry), ("Label farm", LOCK, farm_entry)):
             tasks += [(section, path.parent, make) for path in self._placed(name)]
         folders = {folder for _, folder, _ in tasks}
+        taken = folders if kind.holds(self.root) else folders - {self.root}
+        tasks += [(MEASURED, path, measured_entry) for path in measured_sources(self.root, self._placed("*.*"), taken)]
         pages = [path for path in self._placed("*.html") if not folders & set(path.parents) - {self.root}]
         return tasks + [("Pages", path, page_entry) for path in pages]
 

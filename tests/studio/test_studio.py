@@ -213,3 +213,19 @@ def test_the_page_refreshes_without_losing_its_place(lab, browser):
         assert opened.value.title() == "a verdict"
         context.close()
         assert not faults and all(url.startswith(address) for url in asked)
+
+
+def test_measured_files_have_the_wizard_as_their_next_step_and_exports_of_a_session_are_none(lab):
+    for number in (1, 2):
+        (lab / "bench 2" / f"trial_{number}").mkdir(parents=True)
+        (lab / "bench 2" / f"trial_{number}" / "skin.csv").write_text("t,cap\n")
+    (lab / "monday" / "table.csv").write_text("t,cap\n")
+    (lab / "loose.mat").write_bytes(b"")
+    (lab / "found" / "beside.csv").write_text("t,cap\n")
+    entries = {entry.path: entry for entry in Inventory(lab).entries() if entry.section == "Measured files"}
+    assert set(entries) == {"bench 2", "found/beside.csv", "loose.mat"}
+    assert entries["bench 2"].facts == ("2 .csv",)
+    assert entries["bench 2"].commands == ("tacdata import 'bench 2' --web",)
+    (lab / "bench 2-mapping.yaml").write_text("")
+    again = next(entry for entry in Inventory(lab).entries() if entry.path == "bench 2")
+    assert again.commands[0] == "tacdata import 'bench 2' --mapping 'bench 2-mapping.yaml' --out 'bench 2-session'"
