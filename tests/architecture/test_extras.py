@@ -40,6 +40,7 @@ ROOMS = {
     "tacdata.training": "learn",
     "tacdata.viewers.browse.catalogue": "view",
     "tacdata.studio.server": "view",
+    "tacdata.studio.wizard.server": "view",
     "tacdata.viewers.browse.loopback": "view",
     "tacdata.viewers.browse.server": "view",
     "tacdata.viewers.rerun": "view",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
 from tacdata.importing.pressing.trials import split_tables
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets
+from tacdata.importing.source_table import SourceTable
 
 
 @dataclass(frozen=True)
@@ -77,13 +78,19 @@ def tried(source: Path, mapping: Mapping) -> str:
     return f"{run.sentence}\nnot good as it stands: {'; '.join(run.faults)}" if run.faults else run.sentence
 
 
-def trial_run(source: Path, mapping: Mapping, policy: TrialPolicy = POLICY) -> TrialRun:
+def trial_run(
+    source: Path,
+    mapping: Mapping,
+    policy: TrialPolicy = POLICY,
+    tables_of: Callable[[FileSet], dict[str, SourceTable]] = FileSet.tables,
+) -> TrialRun:
     """Import some of the files by a mapping, without writing them.
 
     Args:
         source: The files.
         mapping: The mapping.
         policy: The limits of a good mapping.
+        tables_of: Reads a set of files.
     """
     try:
         sets = file_sets(source, mapping.files)
@@ -93,7 +100,7 @@ def trial_run(source: Path, mapping: Mapping, policy: TrialPolicy = POLICY) -> T
     for files in [sets[k] for k in sorted({round(k) for k in np.linspace(0, len(sets) - 1, policy.sets)})]:
         parts: list[ImportedPress | Refusal] = []
         try:
-            parts = _parts(files, mapping)
+            parts = _parts(files, mapping, tables_of)
         except TacdataError as error:
             refusals.append(error)
         by_set.append((files, tuple(part for part in parts if isinstance(part, ImportedPress))))
@@ -101,11 +108,13 @@ def trial_run(source: Path, mapping: Mapping, policy: TrialPolicy = POLICY) -> T
     return TrialRun(mapping, tuple(by_set), tuple(refusals), len(sets), policy)
 
 
-def _parts(files: FileSet, mapping: Mapping) -> list[ImportedPress | Refusal]:
+def _parts(
+    files: FileSet, mapping: Mapping, tables_of: Callable[[FileSet], dict[str, SourceTable]]
+) -> list[ImportedPress | Refusal]:
     """Return the recordings of a set of files, and the refusals of its parts."""
     if files.fault:
         raise files.fault
-    tables, record = files.tables(), {"name": mapping.name}
+    tables, record = tables_of(files), {"name": mapping.name}
     centre = centre_of(mapping.position, tables)
     return [
         part
@@ -170,6 +179,8 @@ def _faults(run: TrialRun) -> list[str]:
         faults.append("all rows of a recording have one time: name another column under time")
     if _answers(presses, policy) == 0:
         faults.append("no channel answers to any press: are other columns the channels, or another the position?")
+    if position is not None and position.columns and not max(strokes):
+        faults.append("the position never moves: is another column or file the position?")
     if max(press.press.depth for press in presses) <= 0 < max(strokes):
         faults.append("the position never reaches depth 0: correct its sign, or the zero by contact or offset")
     elif len(rests) > 1 and np.ptp(rests) > policy.zero * float(np.median(strokes)):

@@ -36,7 +36,7 @@ FURTHER = ("displacement", "force", "temperature")
 
 
 @dataclass(frozen=True)
-class Assignment:
+class ColumnRole:
     """The role of one column."""
 
     file: str
@@ -54,7 +54,7 @@ class Assignment:
 class Choices:
     """The choices of a person, one value each."""
 
-    assignments: tuple[Assignment, ...] = ()
+    assignments: tuple[ColumnRole, ...] = ()
     rates: dict[str, float] = field(default_factory=dict)
     """File without a time -> its rows a second [Hz]."""
     formats: dict[str, str] = field(default_factory=dict)
@@ -75,6 +75,6 @@ class Choices:
     source: str = ""
     """Where the data come from."""
 
-    def of_role(self, *roles: str) -> list[Assignment]:
+    def of_role(self, *roles: str) -> list[ColumnRole]:
         """Return the assignments of some roles, in the order of the columns."""
         return [each for each in self.assignments if each.role in roles]

@@ -21,7 +21,7 @@ from tacdata.importing.mapping import (
 from tacdata.importing.mapping_document import document_of
 from tacdata.importing.proposing.proposal import short
 from tacdata.importing.source_table import SourceTable, select
-from tacdata.studio.wizard.choices import AXES, FURTHER, Assignment, Choices
+from tacdata.studio.wizard.choices import AXES, FURTHER, Choices, ColumnRole
 
 Tables = dict[str, SourceTable]
 BY_HAND = "read off by a person"
@@ -44,11 +44,11 @@ def choices_of(mapping: Mapping, tables: Tables) -> Choices:
         mapping: The mapping.
         tables: Every file, by its name under ``files``, with derived columns.
     """
-    roles: dict[tuple[str, str], Assignment] = {}
+    roles: dict[tuple[str, str], ColumnRole] = {}
 
     def assign(file: str, selector: Selector | None, role: str, unit: str = "", scale: float = 1.0) -> None:
         for name in _columns(tables[file], selector):
-            roles[file, name] = Assignment(file, name, role, unit, scale)
+            roles[file, name] = ColumnRole(file, name, role, unit, scale)
 
     for alias, entry in mapping.files.items():
         if entry.clock and entry.clock.column is not None:
@@ -80,7 +80,7 @@ def choices_of(mapping: Mapping, tables: Tables) -> Choices:
     clocks = {alias: entry.clock or SourceClock() for alias, entry in mapping.files.items()}
     return Choices(
         tuple(
-            roles.get((alias, name), Assignment(alias, name))
+            roles.get((alias, name), ColumnRole(alias, name))
             for alias, table in tables.items()
             for name in column_names(table)
         ),
@@ -188,7 +188,7 @@ def _kept(before: Choices, choices: Choices, role: str, file: str) -> bool:
     return first == second
 
 
-def _one_file(columns: list[Assignment], words: str) -> str:
+def _one_file(columns: list[ColumnRole], words: str) -> str:
     files = list(dict.fromkeys(each.file for each in columns))
     if len(files) > 1:
         raise FormatError(

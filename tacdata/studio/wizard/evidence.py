@@ -7,7 +7,6 @@ import re
 import numpy as np
 
 from tacdata.importing.proposing.roles import GUESSES, bare_name
-from tacdata.importing.proposing.shapes import without_signal
 from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.units import plain, quantity_of, split_unit
 
@@ -17,13 +16,14 @@ FOLLOWS = 0.5
 """Smallest correlation with the position that is named [1]."""
 
 
-def evidence(kind: SourceKind, name: str, path: np.ndarray | None) -> tuple[str, ...]:
+def evidence(kind: SourceKind, name: str, path: np.ndarray | None, idle: dict[str, str]) -> tuple[str, ...]:
     """Return what speaks for a column's role, or against one.
 
     Args:
         kind: The file and the roles that were found.
         name: The column.
         path: The position in each row of this file [any], shape (rows,); None if it is in another one.
+        idle: Columns that measure nothing, and the reasons (`without_signal`).
     """
     table, grounds = kind.table, list[str]()
     outer = name.rpartition("[")[0] if name not in table.columns else name
@@ -39,8 +39,8 @@ def evidence(kind: SourceKind, name: str, path: np.ndarray | None) -> tuple[str,
         texts = list(dict.fromkeys(str(value) for value in values.tolist() if value is not None))
         grounds += ["it reads as dates or times of day"] if "time" in roles else []
         return (*grounds, f"text, {len(texts)} different: {', '.join(texts[:3])}")
-    if reason := without_signal(table, [name, *kind.channels]).get(name):
-        grounds.append({"constant": "it never changes"}.get(reason, f"it is {reason}"))
+    if name in idle:
+        grounds.append({"constant": "it never changes"}.get(idle[name], f"it is {idle[name]}"))
     return (*grounds, *_course(values.astype(float), path))
 
 

@@ -11,11 +11,11 @@ from tacdata.errors import TacdataError
 from tacdata.importing.mapping import Mapping, PositionEntry, TrialRule
 from tacdata.importing.proposing.trial_run import TrialRun, trial_run
 from tacdata.importing.recording_file import ImportedPress
-from tacdata.importing.source_files import FileSet
-from tacdata.importing.source_table import axis
+from tacdata.importing.source_table import SourceTable, axis
 from tacdata.importing.times import NEVER, times
 from tacdata.pages.plot import picked
 from tacdata.studio.wizard.source_preview import numbers
+from tacdata.studio.wizard.table_memory import TableMemory
 
 COLORS = ("blue", "vermilion", "green", "purple", "amber", "sky", "ink", "grey")
 """Colours of channels; more than these are not drawn."""
@@ -25,16 +25,16 @@ SHOWN, POINTS, LONG = 24, 300, 2400
 """Presses that are drawn, points of each, and points of the whole path."""
 
 
-def outcome(source: Path, mapping: Mapping) -> dict[str, Any]:
+def outcome(source: Path, mapping: Mapping, memory: TableMemory) -> dict[str, Any]:
     """Return the result of trying a mapping: a sentence, faults, and figures of path and presses."""
-    run = trial_run(source, mapping)
+    run = trial_run(source, mapping, tables_of=memory.tables)
     return {
         "sentence": run.sentence.removeprefix("tried: "),
         "faults": list(run.faults),
         "good": bool(run.presses) and not run.faults,
         "set_aside": list(dict.fromkeys(words for press in run.presses for words in press.record["set_aside"])),
         "notes": list(dict.fromkeys(words for press in run.presses for words in press.record["notes"]))[:20],
-        "path": _path(mapping, run),
+        "path": _path(mapping, run, memory),
         "presses": [_press(press, number) for number, press in enumerate(run.presses[:SHOWN], 1)],
         "found": len(run.presses),
         "cut_above": _cut_above(mapping, run),
@@ -98,14 +98,14 @@ def _first(values: np.ndarray) -> np.ndarray:
     return np.where(finite.any(axis=0), values[finite.argmax(axis=0), np.arange(values.shape[1])], 0.0)
 
 
-def _path(mapping: Mapping, run: TrialRun) -> dict[str, Any] | None:
+def _path(mapping: Mapping, run: TrialRun, memory: TableMemory) -> dict[str, Any] | None:
     """Return the position as read, of the first files with a press: its presses, and the rows that were set aside."""
     tried = [(files, presses) for files, presses in run.by_set if presses]
     if not tried or mapping.position is None:
         return None
     files, presses = tried[0]
     try:
-        time_ns, depth = _read(mapping.position, files, presses[0])
+        time_ns, depth = _read(mapping.position, memory.tables(files)[mapping.position.file], presses[0])
     except TacdataError:
         return None
     shown = np.isfinite(depth) & (time_ns != NEVER)
@@ -135,9 +135,8 @@ def _path(mapping: Mapping, run: TrialRun) -> dict[str, Any] | None:
     return _figure(title, "depth [mm]", (time_ns[pick] - time_ns.min()) / 1e9, drawn)
 
 
-def _read(position: PositionEntry, files: FileSet, press: ImportedPress) -> tuple[np.ndarray, np.ndarray]:
+def _read(position: PositionEntry, table: SourceTable, press: ImportedPress) -> tuple[np.ndarray, np.ndarray]:
     """Return times [ns] and depths [mm] of the position as the files have it, shape (rows,)."""
-    table = files.tables()[position.file]
     time_ns, _ = times(table, position.clock, "position: time")
     key = "depth" if position.depth_given else "z"
     values = axis(table, position.axes[key], "mm", "position", position.missing)

@@ -8,6 +8,7 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.mapping import Mapping
+from tacdata.importing.proposing.shapes import without_signal
 from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.source_table import SourceTable
 from tacdata.importing.times import NEVER, times
@@ -30,6 +31,7 @@ def file_preview(kind: SourceKind, mapping: Mapping) -> dict[str, Any]:
     pressing = [str(axis.column) for key, axis in position.columns.items() if key in ("z", "depth")] if position else []
     path = table.column(pressing[0]) if pressing and pressing[0] in names else None
     path = path.astype(float) if path is not None and path.dtype != object else None
+    idle = without_signal(table, [name for name in names if table.column(name).dtype != object])
     return {
         "alias": kind.alias,
         "path": kind.kind.replace("::", ", "),
@@ -43,7 +45,7 @@ def file_preview(kind: SourceKind, mapping: Mapping) -> dict[str, Any]:
             {
                 "name": name,
                 "stated": table.units.get(name.rpartition("[")[0] if name not in table.columns else name, ""),
-                "evidence": evidence(kind, name, path),
+                "evidence": evidence(kind, name, path, idle),
                 "values": _values(table.column(name), pick),
             }
             for name in names

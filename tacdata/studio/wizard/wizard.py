@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -26,6 +26,7 @@ from tacdata.studio.wizard.choices import ROLES, UNITS, Choices
 from tacdata.studio.wizard.chosen_mapping import choices_of, with_choices
 from tacdata.studio.wizard.outcome import outcome
 from tacdata.studio.wizard.source_preview import file_preview
+from tacdata.studio.wizard.table_memory import TableMemory
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Wizard:
     """The mapping's file, where a person names no other."""
     session: Path
     """The session, likewise."""
+    memory: TableMemory = field(default_factory=TableMemory)
 
     @classmethod
     def of(cls, source: Path, target: Path, session: Path, mapping: Path | None = None) -> Self:
@@ -94,7 +96,7 @@ class Wizard:
     def tried(self, choices: Choices) -> dict[str, Any]:
         """Return the mapping of some choices, as text, and the presses that it gives. Raises as `with_choices`."""
         mapping = self.mapping(choices)
-        return {"text": _text(mapping), **outcome(self.source, mapping)}
+        return {"text": _text(mapping), **outcome(self.source, mapping, self.memory)}
 
     def written(self, choices: Choices, file: str, replace: bool) -> dict[str, Any]:
         """Write the mapping of some choices.
@@ -128,14 +130,17 @@ class Wizard:
         """Import by a mapping's file and check the session. Raises as `tacdata.import_files`."""
         made = import_files(self.source, file, session)
         report = check(made.folder)
-        after = "label" if report.usable else "browse"
         return {
             "recordings": made.recordings,
             "refused": list(made.refused),
             "notes": list(made.notes),
             "usable": report.usable,
             "check": report.text,
-            "commands": [self.command(Path(file), session), command("check", session), command(after, session)],
+            "commands": [
+                self.command(Path(file), session),
+                command("check", session),
+                command("browse", session, "--web"),
+            ],
         }
 
 
