@@ -50,10 +50,10 @@ def lessons(presses: PressSet, sensor: Sensor, spread: FingertipSpread, seed: in
             maps = maps[:, ::-1] if over_x else maps
             maps = maps[:, :, ::-1] if over_y else maps
             noisy = mirrored(clean, sensor, over_x, over_y) + rng.normal(0.0, spread.noise, clean.shape)
-            noisy += rng.normal(0.0, spread.drift, clean.shape[1])
             x, y = presses.place[k, :2] * np.where([over_x, over_y], -1, 1)
             tip = np.column_stack([np.full(len(depth), x), np.full(len(depth), y), depth])
-            tared = noisy - noisy[:REST].mean(axis=0)
+            # It was tared before an earlier press, so the drift since then remains, as in the study.
+            tared = noisy - noisy[:REST].mean(axis=0) + rng.normal(0.0, spread.drift, clean.shape[1])
             taxels, depths, tips = (values.astype(np.float32) for values in (tared, maps, tip))
             examples.append(Lesson(taxels, depths, tips, name, document["shape"]))
     return examples

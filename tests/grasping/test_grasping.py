@@ -94,6 +94,8 @@ def test_what_is_learnt_from_never_is_the_orange(sensor):
     for one in found:
         assert one.depth.min() >= 0 and one.depth[:REST].max() == 0
         assert one.depth.max() == pytest.approx(one.tip[:, 2].max(), abs=0.1)
+    untouched = np.array([one.taxels[:REST].mean(axis=0) for one in found])
+    assert untouched.std() == pytest.approx(FingertipSpread().drift, rel=0.2)
     deepest = [np.array(np.unravel_index(one.depth.max(axis=0).argmax(), sensor.map.shape)) for one in found[:4]]
     assert abs(deepest[0][0] + deepest[1][0] - 34) <= 1  # mirrored along x
 
