@@ -13,7 +13,7 @@ from tacdata.errors import DeviceError, UsageError
 from tacdata.wire.grbl import codes
 from tacdata.wire.grbl.lines import OPENED_AGAIN
 from tacdata.wire.grbl.link import GrblLink
-from tacdata.wire.grbl.opening import ANSWER, clear, greet, locked, name_alarm, straighten, unblock
+from tacdata.wire.grbl.opening import ANSWER, ask_all, clear, greet, locked, straighten, unblock, unproved
 from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.rest import come_to_rest, in_motion, in_words
 from tacdata.wire.grbl.settings import GrblSettings
@@ -98,9 +98,9 @@ class Grbl(MotionController):
             link.start()
             greet(link, self.baud)
             state = self._make_ready(link)
+            ask_all(link, self._answers)
             is_locked = link.fresh_status(ANSWER).state.split(":")[0] == "Alarm"
             if is_locked:
-                name_alarm(link, self._answers)
                 if not self.home_first:
                     raise locked(link, self._answers)
                 self.before_homing()
@@ -383,7 +383,7 @@ class Grbl(MotionController):
         answers.limits("$11", 60.0, self.port)
 
     def _remember_opening(self, link: GrblLink, state: str, homed: bool) -> None:
-        """Keep the identified board; one without homing that was just reset counts from an unknown place."""
+        """Keep the identified board, and why its position cannot be trusted."""
         position = link.last.position if link.last is not None else np.full(3, np.nan)
         version = self._answers.answers.get("VER", "nothing")
         self._found = {
@@ -391,8 +391,9 @@ class Grbl(MotionController):
             "reset_at_opening": "yes" if link.resets else "no",
             "state_at_opening": state,
             "homed_at_opening": "yes" if homed else "no",
+            "homed_before": {True: "yes", False: "no", None: "unknown"}[link.statuses.homed],
             # Adding 0.0 turns -0.0 into 0.0, which is printed without a sign.
             "position_at_opening": ",".join(f"{value:.3f}" for value in position + 0.0),
         }
-        if link.resets and not self._answers.homing:
-            self._lost = "the controller was reset when its port was opened, so it counts from where it stands now"
+        if not homed:
+            self._lost = unproved(link, self._answers) or self._lost

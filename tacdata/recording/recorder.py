@@ -109,7 +109,7 @@ class Recorder:
         self._motion = GuardedMotion(self.devices.cnc, rig.clock, self._interruption, self._state)
         self._tap = tap_motion.touch(plan, sensor) if sync_tap else None
         self._say, self._watch, self._ask = say or (lambda words: None), watch, ask
-        self._prove, self._doubtful = prove, False
+        self._prove = prove
         self._latencies: dict[str, StreamLatency] = {}
 
     def run(self, confirm: Callable[[Preflight], bool]) -> Session:
@@ -174,7 +174,7 @@ class Recorder:
             summary = preflight(self.plan, self.sensor, self.rig, limits, numbers, *bounds, self._tap)
             if not confirm(summary):
                 raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
-            self._doubtful = self._guard.require_known(self._height, session is not None)
+            self._guard.require_known(self._height, session is not None)
             if session is None:  # one without recordings counts as empty
                 session = create_session(self.out, self.plan, self.sensor, self.rig.document)
             with RigStreams(
@@ -291,7 +291,6 @@ class Recorder:
             self._height,
             self._say,
             position,
-            self._doubtful,
         )
 
     def _touch(

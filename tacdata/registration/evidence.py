@@ -26,7 +26,8 @@ UNSTATED = 0.05
 HALF_WIDTH = 4.0
 """Half width of a flat tip, whose edge touches a tilted skin first [mm]."""
 FAR = 1.0
-"""Step from the present height down to `NEAR` [mm]; no plan that is worth a touch presses less deep."""
+"""Step from the present height down to `NEAR` [mm]; no plan that is worth a touch presses less deep. A controller
+without homing may have lost its place unseen, so no way down is trusted."""
 NEAR = 1.0
 """Height above the expected skin from which steps are fine [mm]."""
 BELOW = 0.3
@@ -86,12 +87,12 @@ def touch_site(press: Press, sensor: Sensor, rig: Rig) -> tuple[float, float]:
 
 
 def touch_evidence(
-    probe: Probe, start: Position, place: tuple[float, float], expected: float, limit: float, doubtful: bool
+    probe: Probe, start: Position, place: tuple[float, float], expected: float, limit: float
 ) -> Evidence:
     """Touch the skin at one place, slowly, and compare its height with the expected one.
 
-    The last millimetre is in steps, each ended by a reading at rest. Where the height is doubtful, so is the whole way
-    down: into a skin that begins higher than expected nothing goes deeper than one step.
+    The way down is in steps, each ended by a reading at rest, and fine ones in the last millimetre: into a skin that
+    begins higher than expected nothing goes deeper than one step.
 
     Args:
         probe: The indenter.
@@ -99,7 +100,6 @@ def touch_evidence(
         place: x and y of the touch [mm, machine].
         expected: Height of the skin there [mm, machine].
         limit: Largest difference that is no contradiction [mm].
-        doubtful: Whether the machine's position had been lost.
 
     Raises:
         DeviceError: If the skin answers elsewhere than expected, or not at all.
@@ -112,7 +112,7 @@ def touch_evidence(
     noise = np.maximum(idle.spread, 0.3)
     near = min(height, expected + NEAR)
     far, fine = np.arange(height - FAR, near, -FAR), np.arange(near, expected - limit - BELOW, -COARSE)
-    heights = [*(far.tolist() if doubtful else ()), *fine.tolist()]
+    heights = [*far.tolist(), *fine.tolist()]
     contact = _first_answer(probe, place, heights, idle.mean, noise)
     if contact is None:
         raise _contradiction(f"no channel answers down to machine height {heights[-1]:.2f} mm", expected, limit)
@@ -139,7 +139,6 @@ def prove_zero(
     height: float,
     say: Callable[[str], None],
     position: Position,
-    doubtful: bool,
 ) -> Position:
     """Touch the skin with the mounted indenter before the first press; return the guide's position then [mm].
 
@@ -154,7 +153,6 @@ def prove_zero(
         height: Safe machine height [mm].
         say: Called with the result in words.
         position: Position of the guide [mm, machine].
-        doubtful: Whether the machine's position had been lost.
 
     Raises:
         DeviceError: If the touch contradicts the registration; the indenter was lifted.
@@ -163,7 +161,7 @@ def prove_zero(
     x, y, expected = registration.to_machine(*touch_site(press, sensor, rig), 0.0)
     limit = difference_limit(registration, rig.document["registration"])
     with probing(rig, devices, streams, motion, height, LIFT_SPEED, interruption, say, position) as probe:
-        evidence = touch_evidence(probe, probe.position, (x, y), expected, limit, doubtful)
+        evidence = touch_evidence(probe, probe.position, (x, y), expected, limit)
     say(evidence.text)
     return probe.position
 

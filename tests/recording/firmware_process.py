@@ -1,4 +1,4 @@
-"""A firmware built for a host, behind a pseudo-terminal of its own."""
+"""Firmwares behind a pseudo-terminal: one built for a host, and the emulated one."""
 
 import os
 import pty
@@ -10,6 +10,45 @@ import time
 import tty
 
 import serial
+
+from tacdata.clock import Clock
+from tacdata.virtual_rig.firmware.controller import Controller
+
+
+def tell(path, *lines):
+    """Send lines one by one as a terminal would, until each is answered."""
+    with serial.Serial(path, 115200, timeout=1.5) as port:
+        end = time.monotonic() + 60
+        heard = b""
+        # One with an empty memory answers before its welcome, and then forgets what it was sent.
+        while not heard or port.readline():
+            assert time.monotonic() < end, "the firmware says nothing"
+            if not heard:
+                port.write(b"?")
+                heard = port.readline()
+        for line in lines:
+            port.write(line.encode() + b"\n")
+            while port.readline().strip() != b"ok":
+                assert time.monotonic() < end, f"{line} is not answered"
+
+
+class EmulatedFirmware:
+    """The virtual rig's controller with an empty memory; as `Firmware`."""
+
+    def __init__(self):
+        defaults = {"$20": "0", "$22": "0"}
+        self._clock = Clock.start()
+        self._controller = Controller(self._clock, position=(0.0, 0.0, 0.0), settings=defaults, fresh=True)
+        self.path = self._controller.port.path
+        self._controller.start()
+
+    def when(self, byte):
+        """Return when a byte was last received [monotonic ns]."""
+        begin = time.monotonic_ns() - self._clock.now_ns()
+        return max((begin + t for b, t in self._controller.heard if b == byte), default=None)
+
+    def close(self):
+        self._controller.stop()
 
 
 class Firmware:
@@ -41,22 +80,6 @@ class Firmware:
                     os.write(self._inner if source == self._outer else self._outer, data)
                 except OSError:
                     return
-
-    def tell(self, *lines):
-        """Send lines one by one as a terminal would, until each is answered."""
-        with serial.Serial(self.path, 115200, timeout=1.5) as port:
-            end = time.monotonic() + 60
-            heard = b""
-            # One with an empty memory answers before its welcome, and then forgets what it was sent.
-            while not heard or port.readline():
-                assert time.monotonic() < end, "the firmware says nothing"
-                if not heard:
-                    port.write(b"?")
-                    heard = port.readline()
-            for line in lines:
-                port.write(line.encode() + b"\n")
-                while port.readline().strip() != b"ok":
-                    assert time.monotonic() < end, f"{line} is not answered"
 
     def when(self, byte):
         """Return when a byte was last sent [monotonic ns]."""

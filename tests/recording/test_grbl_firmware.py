@@ -1,6 +1,6 @@
-"""Driver and recorder against a real firmware built for a host (see docs/how_to/testing_with_firmware.md).
+"""Driver and recorder against the emulated firmware and a real one (see docs/how_to/testing_with_firmware.md).
 
-Run with ``TACDATA_GRBL_FIRMWARE='PATH/TO/grblHAL_sim -n -s /dev/null -b /dev/null'``.
+For a real one, run with ``TACDATA_GRBL_FIRMWARE='PATH/TO/grblHAL_sim -n -s /dev/null -b /dev/null'``.
 """
 
 import os
@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from device_doubles import Board
-from firmware_process import Firmware
+from firmware_process import EmulatedFirmware, Firmware, tell
 from recording_examples import SENSOR, plan, rig
 
 from tacdata.clock import Clock
@@ -23,10 +23,9 @@ from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
 
 COMMAND = os.environ.get("TACDATA_GRBL_FIRMWARE", "")
-pytestmark = [
-    pytest.mark.skipif(not COMMAND, reason="TACDATA_GRBL_FIRMWARE names no firmware"),
-    pytest.mark.long("tacdata/devices", "tacdata/recording", reason="a real firmware, in its own time"),
-]
+pytestmark = pytest.mark.long(
+    "tacdata/devices", "tacdata/recording", "tacdata/wire", "tacdata/virtual_rig", reason="a firmware, in its own time"
+)
 START = (10.0, 20.0, -20.0)
 SET_UP = (
     "$X",
@@ -50,23 +49,26 @@ WITHIN = 0.05
 """What a nominal position may be off a reported one [mm], by what is claimed: 5 mm/s for 10 ms."""
 
 
-@pytest.fixture
-def firmware(tmp_path):
-    process = Firmware(COMMAND, tmp_path)
+REAL = pytest.param("real", marks=pytest.mark.skipif(not COMMAND, reason="TACDATA_GRBL_FIRMWARE names no firmware"))
+
+
+@pytest.fixture(params=["emulated", REAL])
+def firmware(request, tmp_path):
+    process = Firmware(COMMAND, tmp_path) if request.param == "real" else EmulatedFirmware()
     yield process
     process.close()
 
 
 @pytest.fixture
 def ready(firmware):
-    firmware.tell(*SET_UP)
+    tell(firmware.path, *SET_UP)
     return firmware
 
 
 class Reported(Grbl):
     """Tells the doubled board where the machine is."""
 
-    def position(self):
+    def position(self, time_ns=None):
         last = self._link.last if self._link else None
         return np.zeros(3) if last is None else last.position
 

@@ -92,6 +92,23 @@ def test_a_machine_that_lost_its_zero_is_found_out_after_a_mistaken_yes(shifted,
     assert depth(world) < 1.1, "one step"
 
 
+def test_a_loss_that_no_report_shows_is_found_by_the_touch(shifted):
+    """Moved by hand while switched off: the controller reports the place where it was left."""
+    world = shifted(0.0)
+    world.record()
+    world.reboot()
+    world.folder = world.folder.with_name("session2")
+    machine = world.controller.machine
+    machine._move(machine.planner.target - [0.0, 0.0, 2.5], 5.0, world.clock.now_ns(), "Jog")
+    world.schedule.run_for(3.0, world.bench)
+    world.path.clear()
+    machine.error = np.array([0.0, 0.0, -2.5])
+    with pytest.raises(DeviceError, match="nothing goes deeper"):
+        world.record(prove=prove_zero)
+    assert not world.asked
+    assert depth(world) < 1.1, "one step"
+
+
 def test_a_board_that_does_not_answer_stops_the_way_down(shifted):
     world = shifted(0.0)
     world.board.inject_readings(lambda counts: np.round(9000 + np.random.default_rng().normal(0, 5, 24)))

@@ -81,6 +81,12 @@ def test_overrides_and_inputs_of_a_report():
     assert (bare.feed_override, bare.pins, np.isnan(bare.feed)) == (None, "", True)
 
 
+@pytest.mark.parametrize(("field", "homed"), [("", None), ("|H:0", False), ("|H:1,7", True), ("|H:", None)])
+def test_whether_a_report_states_that_it_was_homed(field, homed):
+    report = parse_status(f"<Idle|MPos:1,2,3{field}>")
+    assert report is not None and report.homed is homed
+
+
 @pytest.mark.parametrize(
     "line",
     [

@@ -62,11 +62,12 @@ class PositionGuard:
         """Return why the position of the opened controller is not known, in words; empty if it is."""
         if self._cnc.settings().get("homed_at_opening") == "yes":
             return ""
-        unmet = UNKNOWN if resumed and not self._state.is_known else ""
+        unhomed = self._cnc.settings().get("homed_before") == "no"
+        unmet = UNKNOWN if (resumed or unhomed) and not self._state.is_known else ""
         return self._state.why_lost or self._cnc.position_lost or self._state.difference or unmet
 
-    def require_known(self, height: float, resumed: bool = False) -> bool:
-        """Ask whether a position that was lost was found again; return whether there was a doubt.
+    def require_known(self, height: float, resumed: bool = False) -> None:
+        """Ask whether a position that was lost was found again.
 
         Args:
             height: Where the first move ends, straight up [mm, machine].
@@ -91,7 +92,6 @@ class PositionGuard:
             )
         self._cnc.trust_position()
         self._state.find()
-        return bool(why)
 
     def _require_free(self, why: str) -> None:
         code = self._code("free", why)

@@ -41,6 +41,10 @@ class Firmware:
     """Whether ``$I``, ``$$``, ``$#``, ``$G`` and ``$N`` are answered then; every other line gets ``error:79``."""
     scales: bool = False
     """Whether it knows G51, which scales the coordinates of G53 lines, too."""
+    lock: int = 1
+    """Bit of ``$22`` that locks it when it is switched on."""
+    tells_homing: bool = False
+    """Whether a report with all fields states that it was homed."""
     changed: dict[str, str] = field(default_factory=dict)
     """Settings whose defaults differ."""
 
@@ -88,7 +92,9 @@ GRBLHAL = Firmware(
     scales=True,
     answers_questions_in_critical_alarm=True,
     report_bits={"Bf": 2, "FS": 8, "Pn": 16, "WCO": 32, "Ov": 64, "alarm": 1024},
-    changed={"$10": "511", "$22": "1", "$481": "0"},
+    lock=4,
+    tells_homing=True,
+    changed={"$10": "511", "$22": "5", "$481": "0"},
 )
 """grblHAL (`report.c`, `protocol.c` of its core)."""
 

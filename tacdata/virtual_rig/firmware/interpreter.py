@@ -115,7 +115,7 @@ class Interpreter(Machine):
         self._say(now_ns, "ok")
 
     def _home(self, now_ns: int) -> None:
-        if self.settings["$22"] != "1":
+        if not int(self.settings["$22"]) & 1:
             raise gcode.Refused(5)
         self.homing, self.error = True, np.zeros(3)
         self._move(np.full(3, -float(self.settings["$27"])), float(self.settings["$25"]) / 60, now_ns, "Home")

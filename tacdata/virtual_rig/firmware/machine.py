@@ -42,6 +42,7 @@ class Machine:
         self.planner = Planner(position, firmware.prepared)
         self.startup = ["", ""]
         self.alarm: int | None = None if homed else 0
+        self.homed = homed
         self.door_open = False
         self.override = 100
         self.unreadable = self.whole = False
@@ -119,7 +120,7 @@ class Machine:
         self.busy_until = 0
         backlog = self.planner.retire(now_ns)
         if self.homing and not backlog:
-            self.homing, self.alarm, self.error = False, None, np.zeros(3)
+            self.homing, self.homed, self.alarm, self.error = False, True, None, np.zeros(3)
             self._say(now_ns, "ok")
         if (self._jog_cancelled or self._jog_left) and not self.moving(now_ns):
             self._jog_cancelled = self._jog_left = False
@@ -183,8 +184,9 @@ class Machine:
         capacity = self.firmware.planner_blocks - self.planner.retire(now_ns), rx_free
         believed = self.planner.position(now_ns) - self.error
         offset = self.offset + self.modal.shift + (0.0, 0.0, self.modal.length)
-        # The alarm's number was asked for once.
-        state, self.whole = self.state(now_ns), False
+        # Asked for once: the alarm's number, and whether it was homed.
+        state, whole, self.whole = self.state(now_ns), self.whole, False
+        tells_homing = whole and self.firmware.tells_homing and int(self.settings["$22"]) & 1
         return texts.report(
             self.settings,
             self.firmware.report_bits,
@@ -196,6 +198,7 @@ class Machine:
             self.counters,
             self.override,
             "D" if self.door_open else "",
+            self.homed if tells_homing else None,
         )
 
     def reset(self, now_ns: int) -> None:
@@ -222,7 +225,8 @@ class Machine:
         self._clear()
         self.error = self.planner.position(now_ns)
         self._dropped = False
-        self.alarm = 0 if self.settings["$22"] != "0" else None
+        self.alarm = 0 if int(self.settings["$22"]) & self.firmware.lock else None
+        self.homed = False
         self._say(now_ns, "\x00")
         self._boot(now_ns)
 

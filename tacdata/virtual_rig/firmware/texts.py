@@ -109,6 +109,7 @@ def report(
     counters: Counters,
     override: int,
     pins: str,
+    homed: bool | None = None,
 ) -> str:
     """Return a status report (Grbl's `report_realtime_status`).
 
@@ -123,6 +124,7 @@ def report(
         counters: Updated.
         override: Feed override [%].
         pins: Letters of the active inputs.
+        homed: Whether it was homed; None if the report does not state it.
     """
     mask, inches = int(settings["$10"]), settings["$13"] == "1"
     unit, digits = (25.4, 4) if inches else (1.0, 3)
@@ -145,6 +147,7 @@ def report(
     elif counters.overrides == 0:
         counters.overrides = OV_PERIOD[busy]
         fields += [f"Ov:{override},100,100"] if "Ov" in contents else []
+    fields += [] if homed is None else [f"H:{int(homed)}"]
     counters.wco -= 1
     counters.overrides -= counters.overrides > 0
     return f"<{'|'.join(fields)}>"

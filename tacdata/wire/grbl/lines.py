@@ -18,6 +18,8 @@ SETTING = re.compile(r"^(\$[A-Z0-9]+)=([^\s(]*)")
 STARTUP = re.compile(r"^\$N\d+=(.*)$")
 MESSAGE = re.compile(r"^\[([A-Z][A-Z0-9. ]*):(.*)\]$")
 
+BITS = {"1": True, "0": False}
+
 OPENED_AGAIN = ("Hold:0", "Door:0")
 """States of a machine at rest that waits for a cycle start."""
 MOVING = ("Run", "Jog", "Home")
@@ -52,6 +54,8 @@ class StatusReport:
     """Whether a pendant has control (grblHAL's ``MPG``), if the report states it."""
     scaled: str = ""
     """Letters of the axes that G51 scales (grblHAL's ``Sc``)."""
+    homed: bool | None = None
+    """Whether it was homed since it was switched on (grblHAL's ``H``), if the report states it."""
 
 
 def parse_status(line: str) -> StatusReport | None:
@@ -88,6 +92,7 @@ def parse_status(line: str) -> StatusReport | None:
         (values.get("FS") or values.get("F") or [float("nan")])[0],
         (values.get("Ov") or [None])[0],
         texts.get("Pn", ""),
-        {"1": True, "0": False}.get(texts.get("MPG", "")),
+        BITS.get(texts.get("MPG", "")),
         texts.get("Sc", ""),
+        BITS.get(texts.get("H", "").partition(",")[0]),
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tacdata.errors import DeviceError
 from tacdata.wire.delivered import OwesAnswer
 from tacdata.wire.grbl import codes
@@ -26,7 +28,9 @@ DEAF = (1, 2, 17)
 Grbl sends nothing at all then). The emergency stop is not among them: while it is active, a reset ends nothing.
 """
 TELL_ALL = b"\x87"
-"""grblHAL's query for a report with all fields, the alarm's number among them. FluidNC runs a macro at it."""
+"""grblHAL's query for a report with all fields: the alarm's number, and whether it was homed. FluidNC runs a macro at
+it.
+"""
 FULL_SPEED = (b"\x90", b"\x95")
 """Set feed and rapid override back to 100 %; moves nothing."""
 REMEDIES = {
@@ -160,11 +164,23 @@ def attune(link: GrblLink) -> None:
         link.clock.host.sleep(SETTLE)
 
 
-def name_alarm(link: GrblLink, settings: GrblSettings) -> None:
-    """Ask a locked grblHAL for its alarm's number. Reports state it only with a bit of ``$10``."""
-    if link.alarm is None and settings.is_hal:
+def ask_all(link: GrblLink, settings: GrblSettings) -> None:
+    """Ask a grblHAL for its alarm's number and whether it was homed. Other reports need not state them."""
+    if settings.is_hal:
         link.realtime(TELL_ALL)
         link.clock.host.sleep(SETTLE)
+
+
+def unproved(link: GrblLink, settings: GrblSettings) -> str:
+    """Return why an unlocked controller's position cannot be trusted, as a sentence; empty without a reason."""
+    homed = link.statuses.homed
+    if homed or (settings.homing and homed is None):  # a Grbl with homing is locked until it is homed
+        return ""
+    if link.resets:
+        return "the controller was reset when its port was opened, so it counts from where it stands now"
+    if link.last is not None and not np.any(link.last.position):
+        return "the controller reports exactly (0, 0, 0), as when it is switched on, and it was not homed"
+    return ""
 
 
 def unblock(link: GrblLink) -> None:

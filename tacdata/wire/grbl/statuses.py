@@ -39,6 +39,8 @@ class Statuses:
         self.last: CncStatus | None = None
         self.unplaced = ""
         """State of the latest report whose work position lacks a known offset; empty otherwise."""
+        self.homed: bool | None = None
+        """Whether it was homed since it was switched on, by the latest report that states it."""
         self.damaged = 0
         """Reports that could not be read [count]."""
         self._tells_offset = self._is_work = False  # whether a report has contained it; whether they are work positions
@@ -85,6 +87,7 @@ class Statuses:
         """Take a report; return it in mm, or None if its position cannot be known yet."""
         sent_ns = self._queries.popleft() if self._queries else None
         self._answered_at, self._answered = self._clock.host.monotonic(), True
+        self.homed = self.homed if report.homed is None else report.homed
         if report.offset is not None:
             self.offset, self._tells_offset = report.offset, True
         self._is_work = report.is_work

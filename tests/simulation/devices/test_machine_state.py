@@ -198,3 +198,30 @@ def test_a_damaged_record_is_named_and_nothing_moves(world):
     world.folder = world.folder.with_name("session2")
     with pytest.raises(FormatError, match=r"cannot be read, so it is unknown where a machine was left"):
         world.record()
+
+
+HAL_UNLOCKED = {"firmware": "grblHAL", "settings": {"$22": "1"}}
+
+
+@pytest.mark.parametrize("setting", [{"settings": NO_HOMING}, HAL_UNLOCKED], ids=["no homing", "grblHAL"])
+def test_a_zero_of_power_on_is_asked_about_though_it_was_left_there(tmp_path, setting):
+    """Left at (0, 0, 0), switched off, moved by hand, switched on: the report is that of the record."""
+    world = World(1, tmp_path / "session", zero=True, **setting)
+    world.record()
+    world.reboot()
+    path = next((world.folder.parent / "machines").glob("*.json"))
+    path.write_text(json.dumps({**json.loads(path.read_text()), "position": [0.0, 0.0, 0.0]}))
+    world.controller.inject_brown_out()
+    world.folder = world.folder.with_name("session2")
+    assert "reports exactly (0, 0, 0), as when it is switched on" in refused(world).given
+    world.end()
+
+
+@pytest.mark.parametrize("up", [0.0, 3.0])
+def test_another_computer_asks_a_grblhal_that_was_not_homed(tmp_path, up):
+    world = World(1, tmp_path / "session", **HAL_UNLOCKED)
+    world.controller.inject_brown_out()
+    world.schedule.run_for(1.0, world.bench)
+    jog(world, up)
+    assert "the position is not known" in refused(world).given
+    world.end()
