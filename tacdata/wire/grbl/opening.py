@@ -19,8 +19,9 @@ FIRST_QUERY = 0.25
 """Interval between queries while nothing is received [s, real time]."""
 ANSWER = 10.0
 """Timeout for the answer to a ``$`` command or a reset [s of the clock]; an alarm alone takes Grbl 0.5 s."""
-ATTEMPTS, SETTLE = 3, 0.5
-"""Questions for the version [count], and the pause after one in which late answers come [s, real time]."""
+ATTEMPTS, SETTLE, LOOK = 3, 0.5, 0.02
+"""Questions for the version [count], the pause after one in which late answers come, and its part after which they are
+looked at [s, real time]."""
 TALKS = ("Idle", "Alarm")
 """States in which ``$`` commands are answered."""
 DEAF = (1, 2, 17)
@@ -165,10 +166,15 @@ def attune(link: GrblLink) -> None:
 
 
 def ask_all(link: GrblLink, settings: GrblSettings) -> None:
-    """Ask a grblHAL for its alarm's number and whether it was homed. Other reports need not state them."""
-    if settings.is_hal:
-        link.realtime(TELL_ALL)
-        link.clock.host.sleep(SETTLE)
+    """Ask a grblHAL for its alarm's number, or whether it was homed. Other reports need not state them."""
+    is_locked = bool(link.last and link.last.state.startswith("Alarm"))
+    if not settings.is_hal or not (is_locked or settings.homing):
+        return
+    link.realtime(TELL_ALL)
+    for _ in range(round(SETTLE / LOOK)):  # an older firmware states neither
+        if (link.alarm if is_locked else link.statuses.homed) is not None:
+            return
+        link.clock.host.sleep(LOOK)
 
 
 def unproved(link: GrblLink, settings: GrblSettings) -> str:

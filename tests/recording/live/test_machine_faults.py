@@ -206,7 +206,7 @@ def test_a_machine_at_its_power_on_zero_is_not_believed_on_resuming(virtual, tmp
     # Its welcome goes out while nobody listens: one that is still under way would tell of the reset.
     while virtual.controller._out:
         time.sleep(0.01)
-    with pytest.raises(DeviceError, match=r"reports \(0.000, 0.000, 0.000\) mm, and the machine was left at"):
+    with pytest.raises(DeviceError, match=r"reports exactly \(0, 0, 0\), as when it is switched on"):
         recorder(virtual, out, resume=True).run(lambda summary: True)
 
 
