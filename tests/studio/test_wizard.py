@@ -108,6 +108,38 @@ def test_rows_that_were_set_aside_are_points_of_their_own(tmp_path):
     assert any("dropouts" in words for words in got["set_aside"])
 
 
+def test_rows_set_aside_are_kept_where_a_person_says_so(tmp_path):
+    depth = DEPTH.copy()
+    depth[35::70] = 0.0
+    path = written(tmp_path / "run.csv", "t (s),depth (mm),a,b", T, depth, C0, C1)
+    with wizard_server(Wizard.of(path, tmp_path / "m.yaml", tmp_path / "s"), 0) as address:
+        choices = asked(address, "contents")["choices"]
+        kept = asked(address, "try", choices | {"trusted": True, "trials": {}})
+    assert not any("dropouts" in words for words in kept["set_aside"])
+    assert yaml.safe_load(kept["text"])["position"]["trusted"] is True
+
+
+def test_a_time_that_goes_back_is_drawn_by_rows(tmp_path):
+    time = np.concatenate([T[:70], T[:70], T[:70]])
+    path = written(tmp_path / "run.csv", "t (s),depth (mm),a,b", time, DEPTH, C0, C1)
+    with wizard_server(Wizard.of(path, tmp_path / "m.yaml", tmp_path / "s"), 0) as address:
+        got = asked(address, "try", asked(address, "contents")["choices"])
+    assert got["path"]["x"] == {"label": "row", "values": list(range(210))}
+    assert not got["good"] and any("time goes back" in words for words in got["faults"])
+
+
+def test_a_clock_without_a_unit_has_its_units_as_answers(tmp_path):
+    path = written(tmp_path / "run.csv", "time,depth (mm),a,b", 740311 + T / 86400, DEPTH, C0, C1)
+    with wizard_server(Wizard.of(path, tmp_path / "m.yaml", tmp_path / "s"), 0) as address:
+        contents = asked(address, "contents")
+        assert asked(address, "try", contents["choices"])["found"] == 0
+        question = next(each for each in contents["questions"] if "no unit is given" in each["text"])
+        answer = next(each for each in question["answers"] if each["label"] == "datenum")
+        assert answer["change"] == {"columns": [["run", "time"]], "unit": "datenum"}
+        choices = assigned(contents["choices"], "time", unit="datenum")
+        assert "at 20 Hz" in asked(address, "try", choices)["sentence"]
+
+
 @pytest.mark.parametrize(
     ("column", "change", "words"),
     (

@@ -90,7 +90,7 @@ def faults():
         (in_metres, "2 of 2 sets of files hold"),
         (sheets, "2 of 2 sets of files hold"),
         (with_dropouts, "3 recordings"),
-        (array, "imports nothing"),
+        (array, "Nothing is imported yet."),
     ),
 )
 def test_files_of_six_kinds_fit_every_window(browser, faults, tmp_path, make, sentence):
@@ -100,6 +100,8 @@ def test_files_of_six_kinds_fit_every_window(browser, faults, tmp_path, make, se
             assert sentence in page.inner_text("#sentence")
             assert page.evaluate("document.documentElement.scrollWidth") <= width
             assert page.locator(".column").count() > 1
+            assert page.locator("#cut").is_visible() == (make in (german, in_metres))
+            assert page.locator("#path").is_visible() == (make is not array)
             shown = page.evaluate("getComputedStyle(document.body).backgroundColor")
             assert (shown == "rgb(21, 25, 29)") == dark
             page.context.close()

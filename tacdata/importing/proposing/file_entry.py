@@ -67,9 +67,9 @@ def _clock(kind: SourceKind, file: str) -> tuple[SourceClock, tuple[Question, ..
         times(table, clock, file)
     except FormatError as error:
         layout, text = _american(table, names[0])
-        doubt = Question(
-            text or f"{error.given}: {error.remedy}", "date" * bool(text), file=kind.alias, word=layout or ""
-        )
+        doubt = Question(f"{error.given}: {error.remedy}", "clock", (names[0],), kind.alias)
+        if layout:
+            doubt = Question(text, "date", file=kind.alias, word=layout)
         return replace(clock, format=layout), (*questions, doubt)
     return clock, questions
 

@@ -12,11 +12,11 @@ class Question:
     text: str
     """A sentence."""
     topic: str = ""
-    """Quantity that the answer decides: sign, unit, zero, contact, trials, rate, date or specimen; empty: another."""
+    """Quantity that the answer decides: sign, unit, zero, contact, trials, clock, rate, date or specimen."""
     columns: tuple[str, ...] = ()
-    """Columns of the position that it concerns."""
+    """Columns that it concerns."""
     file: str = ""
-    """Name under ``files`` that it concerns."""
+    """Name under ``files`` of its columns; empty: the position's."""
     value: float | None = None
     """Number that is proposed."""
     word: str = ""

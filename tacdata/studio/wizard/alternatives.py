@@ -7,6 +7,7 @@ from typing import Any
 
 from tacdata.importing.mapping import Mapping
 from tacdata.importing.proposing.question import Question
+from tacdata.studio.wizard.choices import UNITS
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Alternative:
 
 def alternatives(question: Question, mapping: Mapping) -> tuple[Alternative, ...]:
     """Return the answers to a question; () where it is answered by a role or in the mapping's file."""
-    file = mapping.position.file if mapping.position else ""
+    file = question.file or (mapping.position.file if mapping.position else "")
 
     def of_columns(key: str, values: dict[str, Any]) -> tuple[Alternative, ...]:
         columns = [[file, name] for name in question.columns]
@@ -33,6 +34,7 @@ def alternatives(question: Question, mapping: Mapping) -> tuple[Alternative, ...
     answers = {
         "sign": lambda: of_columns("scale", {"turn the sign": -1.0, "leave the sign": 1.0}),
         "unit": lambda: of_columns("unit", {unit: unit for unit in ("mm", "um", "m", "cm", "in")}),
+        "clock": lambda: of_columns("unit", {unit: unit for unit in UNITS["time"]}),
         "zero": lambda: (
             Alternative("count from there", {"offset": question.value}),
             Alternative("zero is the skin", {"offset": 0.0}),

@@ -67,6 +67,8 @@ class Choices:
     """Value of each trial that counts as 0: first, lowest, highest; empty: 0 itself."""
     offset: float = 0.0
     """Added to the depth or the height [mm]."""
+    trusted: bool = False
+    """Whether dropouts, jumps and gaps of the position count as measured."""
     specimen: str = ""
     """A {part} of the path that names the specimen."""
     radius: float | None = None

@@ -90,6 +90,7 @@ def choices_of(mapping: Mapping, tables: Tables) -> Choices:
         z if isinstance(z, float | int) else None,
         pressing.zero,
         pressing.offset,
+        position is not None and position.trusted,
         specimen.part if isinstance(specimen, KnownValue) else "",
         (mapping.indenter or {}).get("radius"),
         mapping.name,
@@ -270,4 +271,4 @@ def _at_zero(position: PositionEntry | None, choices: Choices) -> PositionEntry 
         else axis
         for key, axis in position.axes.items()
     }
-    return replace(position, axes=axes)
+    return replace(position, axes=axes, trusted=choices.trusted)

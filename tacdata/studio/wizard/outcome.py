@@ -49,10 +49,12 @@ def _cut_above(mapping: Mapping, run: TrialRun) -> float | None:
     return float(f"{CUT * deepest:.2g}") if deepest > 0 else None
 
 
-def _figure(title: str, y: str, x: np.ndarray, series: list[dict[str, Any]], link: str = "") -> dict[str, Any]:
+def _figure(
+    title: str, y: str, places: np.ndarray, series: list[dict[str, Any]], link: str = "", x: str = "time [s]"
+) -> dict[str, Any]:
     return {
         "title": title,
-        "x": {"label": "time [s]", "values": numbers(x)},
+        "x": {"label": x, "values": numbers(places)},
         "y": y,
         "series": series,
         "bands": [],
@@ -112,6 +114,13 @@ def _path(mapping: Mapping, run: TrialRun, memory: TableMemory) -> dict[str, Any
     time_ns, depth = time_ns[shown], depth[shown]
     if len(depth) < 2:
         return None
+    names = ", ".join(file.paths[0].name for file in files.files.values())
+    title = f"{len(presses)} press{'es' * (len(presses) > 1)} found in {names}"
+    if (np.diff(time_ns) < 0).any():
+        # Rows of different stretches have one time: they are drawn by their order.
+        pick = picked(len(depth), LONG)
+        series = [_series("as read", "ink", depth[pick])]
+        return _figure(f"{title}; time goes back, so rows are drawn", "depth [mm]", pick.astype(float), series, x="row")
     members, kept = np.zeros(len(depth), int), np.zeros(len(depth), bool)
     tolerance = 0.5 * float(np.median(np.abs(np.diff(time_ns))))
     for number, press in enumerate(presses, 1):
@@ -130,8 +139,6 @@ def _path(mapping: Mapping, run: TrialRun, memory: TableMemory) -> dict[str, Any
         _series("set aside", "vermilion", np.where(aside, depth, np.nan), "points"),
     ]
     drawn = [each for each in series if any(value is not None for value in each["values"])]
-    names = ", ".join(file.paths[0].name for file in files.files.values())
-    title = f"{len(presses)} press{'es' * (len(presses) > 1)} found in {names}"
     return _figure(title, "depth [mm]", (time_ns[pick] - time_ns.min()) / 1e9, drawn)
 
 
