@@ -10,9 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from scipy.spatial.transform import Rotation
 
+from tacdata.viewers.pictures.felt_maps import FeltMaps
+from tacdata.viewers.pictures.panels import shade_bridged
 from tacdata.viewers.scene.color_scale import HUES
 from tacdata.viewers.scene.moments import nearest
-from tacdata.viewers.scene.scene import Body, CameraView, Curves, Scene
+from tacdata.viewers.scene.scene import Body, CameraView, Curves, DepthMaps, Scene
 
 SIZE, RESOLUTION = (13.0, 8.6), 80
 """Of a frame [inch], and dots an inch."""
@@ -68,30 +70,10 @@ class HandPage:
             for axes, (horizontal, up) in zip(rows[-2].subplots(1, 2), ((0, 2), (0, 1)), strict=True)
         ]
         self._line = _depth_curves(rows[-1].subplots(), scene, self._fingers)
-        self._maps: list[tuple[Any, Any, str]] = []
-        if scene.maps:
-            self._draw_maps(parts[1])
+        self._map_ns = {_finger(maps): maps.time_ns for maps in scene.maps}
+        felt = {_finger(maps): (maps.values, maps.x, maps.y) for maps in scene.maps}
+        self._maps = FeltMaps(parts[1], felt, scene.maps[0].scale) if felt else None
         self.show(_begin(scene))
-
-    def _draw_maps(self, figure: Any) -> None:
-        axes = figure.subplots(len(self._scene.maps), 1, squeeze=False)[:, 0]
-        for panel, maps in zip(axes, self._scene.maps, strict=True):
-            name = maps.name.removeprefix("predicted ")
-            image = panel.imshow(
-                maps.values[0].T,
-                origin="lower",
-                cmap=maps.scale.colormap,
-                vmin=maps.scale.low,
-                vmax=maps.scale.high,
-                extent=(maps.x[0], maps.x[-1], maps.y[0], maps.y[-1]),
-            )
-            panel.tick_params(labelsize=7)
-            panel.set_ylabel("y [mm]", fontsize=8)
-            self._maps.append((image, panel.set_title(name, fontsize=9), name))
-        axes[-1].set_xlabel("x [mm]", fontsize=8)
-        bar = figure.colorbar(self._maps[0][0], ax=axes.tolist(), location="bottom", shrink=0.9)
-        bar.set_label("predicted depth [mm]", fontsize=8)
-        bar.ax.tick_params(labelsize=7)
 
     def show(self, time_ns: int) -> None:
         """Move everything to where it was at a time [ns]."""
@@ -106,10 +88,9 @@ class HandPage:
         for plane in self._space:
             plane.show(time_ns, bridged)
         self._line.set_xdata([seconds, seconds])
-        for (image, title, name), maps in zip(self._maps, self._scene.maps, strict=True):
-            image.set_data(maps.values[nearest(maps.time_ns, time_ns)].T)
-            title.set_text(f"{name}: path bridged" if bridged.get(name) else name)
-            title.set_color("crimson" if bridged.get(name) else "black")
+        if self._maps:
+            rows = {name: nearest(times, time_ns) for name, times in self._map_ns.items()}
+            self._maps.show(rows, [name for name, hit in bridged.items() if hit])
 
 
 class _CameraPicture:
@@ -207,6 +188,10 @@ def apart(places: np.ndarray, wide: float, high: float) -> np.ndarray:
     return result
 
 
+def _finger(maps: DepthMaps) -> str:
+    return maps.name.removeprefix("predicted ")
+
+
 def _begin(scene: Scene) -> int:
     """Return the time of the first known fingertip [ns]."""
     return min(int(body.time_ns[0]) for body in scene.bodies)
@@ -257,17 +242,7 @@ def _depth_curves(axes: Axes, scene: Scene, fingers: list[str]) -> Any:
             axes.plot(seconds, values, color=_color(fingers.index(name)), linewidth=1.2, label=name)
     for curves in scene.curves:
         if curves.name.startswith("fingertip/") and len(curves.doubtful):
-            seconds = (curves.time_ns - zero) / 1e9
-            axes.fill_between(
-                seconds,
-                0,
-                1,
-                where=curves.doubtful.tolist(),
-                transform=axes.get_xaxis_transform(),
-                color="0.85",
-                zorder=0,
-                linewidth=0,
-            )
+            shade_bridged(axes, (curves.time_ns - zero) / 1e9, curves.doubtful)
     axes.set(xlim=(0.0, (end - zero) / 1e9))
     axes.set_xlabel("time [s]; grey: a path is bridged", fontsize=8)
     axes.set_ylabel("predicted\ndepth [mm]" if depth else "no predicted\ndepth", fontsize=8)

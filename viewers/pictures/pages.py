@@ -143,16 +143,7 @@ def course(axes: Axes, curves: Curves, scene: Scene) -> None:
         width, alpha = (3.5, 0.4) if label == "measured" else (1.1, 1.0)  # models are drawn over it, and fit it
         axes.plot(seconds, values, color=color, linewidth=width, alpha=alpha, label=label)
     if len(curves.doubtful):
-        axes.fill_between(
-            seconds,
-            0,
-            1,
-            where=curves.doubtful.tolist(),
-            transform=axes.get_xaxis_transform(),
-            color="0.85",
-            zorder=0,
-            label="bridged",
-        )
+        panels.shade_bridged(axes, seconds, curves.doubtful, label="bridged")
     if len(curves.labels) <= 6:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=7, ncols=6, borderaxespad=0.1)
     axes.set_title(curves.name.replace("_", " ").replace("/", ": "), fontsize=10)

@@ -33,6 +33,12 @@ def seconds(scene: Scene, time_ns: np.ndarray) -> np.ndarray:
     return (np.asarray(time_ns) - scene.frame_ns[0]) / 1e9
 
 
+def shade_bridged(axes: Axes, seconds: np.ndarray, bridged: np.ndarray, label: str | None = None) -> None:
+    """Shade the times [s], shape (n,), at which a path is bridged, shape (n,), bool."""
+    shade = axes.fill_between(seconds, 0, 1, where=bridged.tolist(), transform=axes.get_xaxis_transform())
+    shade.set(color="0.85", linewidth=0, label=label, zorder=0)
+
+
 def mappable(scale: ColorScale) -> ScalarMappable:
     """Return the arguments of a colour bar."""
     return ScalarMappable(Normalize(scale.low, scale.high), scale.colormap)

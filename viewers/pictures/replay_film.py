@@ -16,12 +16,14 @@ from matplotlib.patheffects import withStroke
 from tacdata.replay.outcome import ReplayOutcome
 from tacdata.replay.targets import FingertipTargets
 from tacdata.viewers.output_file import FILMS, new_file
+from tacdata.viewers.parts.maps import DEPTH_FLOOR
 from tacdata.viewers.pictures.felt_maps import FeltMaps
 from tacdata.viewers.pictures.film import MOST, RATE, write_film
 from tacdata.viewers.pictures.hand_film import apart
 from tacdata.viewers.pictures.page_frames import page_frames
+from tacdata.viewers.pictures.panels import shade_bridged
 from tacdata.viewers.pictures.replay_object import ReplayObjectShape
-from tacdata.viewers.scene.color_scale import HUES
+from tacdata.viewers.scene.color_scale import HUES, scale_of
 
 WIDTH, MAPS, HEIGHT = 4.6, 2.3, 8.6
 """Widths of a replay and of the depth maps, and height of a frame [inch]."""
@@ -95,7 +97,8 @@ class ReplayPage:
             self._axes[3, column].set_xlabel("time [s]", fontsize=8)
             for axes in self._axes[:, column]:
                 axes.tick_params(labelsize=7)
-        self._maps = FeltMaps(parts[1], targets)
+        self._maps = _felt_maps(parts[1], targets)
+        self._fingers = targets.fingers
         self.show(0.0)
 
     def show(self, time: float) -> None:
@@ -115,7 +118,20 @@ class ReplayPage:
             verdict = replay.reason if time >= replay.decided else ""
             title = f"{NAMES.get(kind, kind)}\n{time:.1f} s, {_moved(replay, row)}\n"
             self._axes[0, column].set_title(title + _two_lines(verdict), fontsize=9, loc="left")
-        self._maps.show(min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1))
+        row = min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1)
+        bridged = [name for name, gap in zip(self._fingers, self._gap[row], strict=True) if gap]
+        self._maps.show(dict.fromkeys(self._fingers, row), bridged)
+
+
+def _felt_maps(figure: Any, targets: FingertipTargets) -> FeltMaps:
+    """Draw the maps of the demonstration that is replayed; none for targets without predicted depth."""
+    tracks = targets.source.tracks if targets.source else {}
+    depth = {name: tracks[name].depth for name in targets.fingers if name in tracks}
+    maps = {name: np.nan_to_num(np.asarray(d)[targets.rows]) for name, d in depth.items() if d is not None}
+    deepest = np.array([max((float(values.max()) for values in maps.values()), default=0.0)])
+    grids = {name: targets.source.sensors[name].map for name in maps} if targets.source else {}
+    felt = {name: (maps[name], grid.x, grid.y) for name, grid in grids.items()}
+    return FeltMaps(figure, felt, scale_of(deepest, "mm", floor=DEPTH_FLOOR))
 
 
 def _strongest(replay: ReplayOutcome) -> float:
@@ -159,17 +175,7 @@ class ReplayCurves:
             for k, finger in enumerate(replay.fingers)
         ]
         if gap.any():
-            bridged = gap.any(axis=1).tolist()
-            axes.fill_between(
-                replay.time,
-                0,
-                1,
-                where=bridged,
-                transform=axes.get_xaxis_transform(),
-                color="0.85",
-                zorder=0,
-                label="path bridged",
-            )
+            shade_bridged(axes, replay.time, np.any(gap, axis=1), label="path bridged")
         axes.set(xlim=(replay.time[0], replay.time[-1]), ylim=(0, limit))
         axes.set_ylabel(name, fontsize=8)
         self._now = axes.axvline(0.0, color="black", linewidth=1)

@@ -39,6 +39,8 @@ def draw_tracks(path: Path, seconds: np.ndarray, strips: Sequence[Strip], title:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from tacdata.viewers.pictures.panels import shade_bridged
+
     figure = Figure(figsize=(11, 2.6 * len(strips) + 0.6), layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(title)
@@ -48,9 +50,7 @@ def draw_tracks(path: Path, seconds: np.ndarray, strips: Sequence[Strip], title:
             place = 1000 * strip.position[:, k]
             axis.plot(seconds, place, color=color, lw=1, label=name)
             axis.fill_between(seconds, place - 3e3 * strip.spread, place + 3e3 * strip.spread, color=color, alpha=0.25)
-        axis.fill_between(
-            seconds, 0, 1, where=strip.gap, transform=axis.get_xaxis_transform(), color="0.8", label="gap", zorder=0
-        )
+        shade_bridged(axis, seconds, strip.gap, label="gap")
         axis.set_ylabel(f"{strip.name} [mm]")
         if strip.depth is not None:
             felt = axis.twinx()

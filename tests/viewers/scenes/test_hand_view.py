@@ -106,7 +106,7 @@ def test_a_film_shows_paths_in_the_images_and_says_what_is_bridged(made):
     for row, said in ((5, ""), (30, "no sighting of middle, path bridged")):
         page.show(int(times[row]))
         assert page._title.get_text().endswith(said or " s")
-        colors = {title.get_text(): title.get_color() for _, title, _ in page._maps}
+        colors = {title.get_text(): title.get_color() for title in page._maps.titles}
         assert colors.get("middle: path bridged", "crimson") == "crimson" and colors["thumb"] == "black"
         for k, (dot, name) in enumerate(picture._marks):
             # 30 mm apart, at a height that the camera sees 600 px / distance larger.
