@@ -1,19 +1,15 @@
-"""Make the datasets on which the paper's evaluation is recreated: five kinds of sessions on virtual rigs, labelled.
+"""Make the datasets on which the paper's evaluation is recreated: three kinds of sessions on virtual rigs, labelled.
 
     python benchmarks/training_data.py OUT [--presses 216] [--speed 8] [--device cpu] [--stage record|label|pack]
 
 | dataset | session | purpose |
 |---|---|---|
 | `main` | 216 presses, nine shapes, random sites, depths and speeds, specimen 1 | to learn from, and all splits |
-| `rates` | two shapes, four sites, two depths, three speeds, twice, specimen 1 | the split by rate |
-| `other` | every third press of `main` on specimen 2 | the split by specimen |
 | `evaluation` | the shipped evaluation plan, specimen 1, held out | 78 depth and 40 position trials |
 | `wearing` | 57 presses with a prism on twelve specimens | centroid-aligned IoU per participant |
 
-`all` holds `main`, `rates` and `other` together. A specimen is a virtual rig with a seed of its own: other gains,
-stiffness and noise, and put down again; it has the name of a sensor file of its own. Presses of the same
-configuration share one label. Recording takes some 10 minutes at speed 8; labels 14 s a press and core on a CPU
-(about 350 different presses), or a few minutes on a card (--device cuda:0). Existing files are not made again.
+A specimen is a virtual rig with a seed of its own: other gains, stiffness and noise, and put down again; it has the
+name of a sensor file of its own. Presses of the same configuration share one label. Existing files are not made again.
 """
 
 from __future__ import annotations
@@ -47,62 +43,16 @@ def sensor_file(folder: Path, name: str) -> Path:
     return path
 
 
-def thinned(plan: Path, out: Path, step: int) -> Path:
-    """Write every ``step``-th press of a plan."""
-    document = yaml.safe_load(plan.read_text())
-    out.write_text(yaml.safe_dump({**document, "presses": document["presses"][::step]}, sort_keys=False))
-    return out
-
-
-def rates_recipe(path: Path) -> Path:
-    """Write the recipe of presses that differ in their rate."""
-    motion = {
-        "clearance": 4.0,
-        "travel_speed": 20.0,
-        "approach_speed": 5.0,
-        "press_speed": 0.7,
-        "hold": 0.7,
-        "rest": 1.0,
-    }
-    block = {
-        "indenter": ["sphere_2", "punch"],
-        "depths": [0.6, 1.0],
-        "speeds": [0.25, 0.7, 3.0],
-        "repeats": 2,
-        "at": {"kind": "points", "points": [[0.0, 0.0], [-2.5, 1.2], [3.0, -1.6], [-4.2, -3.0]]},
-        "order": "random",
-        "purpose": "rates",
-    }
-    from tacdata.plans.specimens import specimens
-
-    recipe = {
-        "version": "1.0",
-        "name": "rates",
-        "indenters": specimens(("sphere_2", "punch")),
-        "motion": motion,
-        "blocks": [block],
-    }
-    path.write_text(yaml.safe_dump(recipe, sort_keys=False))
-    return path
-
-
 def wearing_plan(path: Path, trials: int) -> Path:
     """Write a plan of ``trials`` presses with the prism's edge."""
+    from tacdata.plans.shipped.shipped_plan import MOTION
     from tacdata.plans.specimens import specimens
 
-    motion = {
-        "clearance": 4.0,
-        "travel_speed": 20.0,
-        "approach_speed": 5.0,
-        "press_speed": 0.7,
-        "hold": 0.7,
-        "rest": 1.0,
-    }
     recipe = {
         "version": "1.0",
         "name": "wearing",
         "indenters": specimens(("prism",)),
-        "motion": motion,
+        "motion": {**MOTION, "hold": 0.7},
         "blocks": [
             {
                 "indenter": "prism",
@@ -157,13 +107,9 @@ def recorded(folder: Path, presses: int, speed: float) -> None:
 
     shapes = [word for name in SHAPES for word in ("--indenter", name)]
     main = planned("main", ["training", "--presses", str(presses), "--seed", "5", *shapes])
-    rates = planned("rates", [str(rates_recipe(plans / "rates_recipe.yaml"))])
     evaluation = planned("evaluation", ["evaluation", "--seed", "5"])
     sessions = folder / "sessions"
-    first = {sessions / "main": main, sessions / "rates": rates, sessions / "evaluation": evaluation}
-    record(folder, 1, first, speed, "specimen-01")
-    other = thinned(main, plans / "other.yaml", 3)
-    record(folder, 2, {sessions / "other": other}, speed, "specimen-02")
+    record(folder, 1, {sessions / "main": main, sessions / "evaluation": evaluation}, speed, "specimen-01")
     for k in range(WEARERS):
         count = WEARING_TRIALS // WEARERS + (k < WEARING_TRIALS % WEARERS)
         plan = planned(f"wearing-{count}", [str(wearing_plan(plans / f"wearing_recipe-{count}.yaml", count))])
@@ -183,9 +129,8 @@ def labelled(folder: Path, device: str) -> None:
 
 def packed(folder: Path) -> None:
     """Pack the sessions into datasets."""
-    groups = {name: [name] for name in ("main", "rates", "other", "evaluation")}
+    groups = {"main": ["main"], "evaluation": ["evaluation"]}
     groups["wearing"] = [f"wearing-{k + 1:02d}" for k in range(WEARERS)]
-    groups["all"] = ["main", "rates", "other"]
     for name, sessions in groups.items():
         out = folder / "datasets" / name
         if out.exists():

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import threading
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,16 +52,14 @@ def add_receiving(api: FastAPI, foreman: Foreman) -> None:
         return await run_in_threadpool(take)
 
 
+@dataclass(frozen=True)
 class _Piece:
-    def __init__(self, folder: str, name: str, size: int, sha256: str, offset: int, body: bytes) -> None:
-        self.folder, self.name, self.size, self.sha256, self.offset, self.body = (
-            folder,
-            name,
-            size,
-            sha256,
-            offset,
-            body,
-        )
+    folder: str
+    name: str
+    size: int
+    sha256: str
+    offset: int
+    body: bytes
 
 
 def _take(foreman: Foreman, piece: _Piece) -> dict[str, Any]:

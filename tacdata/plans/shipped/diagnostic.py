@@ -23,10 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.errors import UsageError
-from tacdata.plans.recipe import write_out
-from tacdata.plans.shipped.shipped_plan import PlanOptions, ShippedPlan
-from tacdata.plans.sites import clear_of_rim, half_box
+from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, from_recipe, points
+from tacdata.plans.sites import half_box
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
@@ -42,16 +40,6 @@ ONSET_SPEED = 0.1
 """Speed of the slow first contacts [mm/s]."""
 CLEARANCE = 0.5
 """Minimum distance of an indenter at full depth from the skin's rim [mm]."""
-MOTION = {
-    "clearance": 4.0,
-    "standoff": 0.3,
-    "travel_speed": 20.0,
-    "approach_speed": 5.0,
-    "press_speed": 0.5,
-    "hold": 1.0,
-    "rest": 1.0,
-    "run_up": 1.0,
-}
 
 
 class Diagnostic(ShippedPlan):
@@ -61,44 +49,36 @@ class Diagnostic(ShippedPlan):
 
     def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
         """Return the plan; ``purpose`` of each press names its block."""
-        names = self.specimen_names(wishes)
-        if len(names) != 2:
-            raise UsageError(
-                f"{len(names)} indenters for the diagnostic plan",
-                "two of one shape and different radius",
-                "name --indenter twice, for example sphere_4 and sphere_2",
-            )
-        first, second = names
+        first, second = names = self.specimen_names(wishes, 2, "two of one shape, for example sphere_4 and sphere_2")
         half, pitch = half_box(sensor), np.array([sensor.taxels.pitch_x, sensor.taxels.pitch_y])
         on = _nearest(sensor, -0.3 * half)
         between = _nearest(sensor, 0.3 * half) + pitch / 2 * (np.array([sensor.taxels.columns, sensor.taxels.rows]) > 1)
         virgin = half * [-0.8, 0.8]
         corners = half * [[0, 0], [-1, -1], [1, -1], [1, 1]]  # the fourth is the virgin site's
-        reference = {"indenter": first, "at": _points(on), "depths": [0.7], "purpose": "reference"}
+        reference = {"indenter": first, "at": points(on), "depths": [0.7], "purpose": "reference"}
         recipe = {
-            "version": "1.0",
             "name": f"diagnostic-{first}-{second}",
             "purpose": "presses that tell physical effects apart",
             "indenters": specimens(names),
-            "motion": dict(MOTION),
+            "motion": {**MOTION, "press_speed": 0.5, "run_up": 1.0},
             "grouped": False,
             "blocks": [
                 {
                     "indenter": first,
-                    "at": _points(on),
+                    "at": points(on),
                     "depths": [-MOTION["clearance"] / 2],
                     "holds": [IDLE],
                     "purpose": "idle stretch",
                 },
                 *_light(first, corners),
-                {"indenter": first, "at": _points(virgin), "depths": [0.6], "repeats": 6, "purpose": "virgin site"},
-                {"indenter": first, "at": _points(virgin), "depths": [0.9, 0.6], "purpose": "virgin site, then deeper"},
+                {"indenter": first, "at": points(virgin), "depths": [0.6], "repeats": 6, "purpose": "virgin site"},
+                {"indenter": first, "at": points(virgin), "depths": [0.9, 0.6], "purpose": "virgin site, then deeper"},
                 reference,
                 *_rates(first, np.array([on, between])),
                 reference,
                 {
                     "indenter": first,
-                    "at": _points(between),
+                    "at": points(between),
                     "depths": [DEPTHS[0], DEPTHS[-1]],
                     "holds": [HOLD],
                     "recovery": RECOVERY,
@@ -107,7 +87,7 @@ class Diagnostic(ShippedPlan):
                 reference,
                 {
                     "indenter": first,
-                    "at": _points(between),
+                    "at": points(between),
                     "depths": [0.7],
                     "approach_from": ["+x", "-x", "+y", "-y"],
                     "repeats": 2,
@@ -115,7 +95,7 @@ class Diagnostic(ShippedPlan):
                 },
                 {
                     "indenter": first,
-                    "at": _points(on),
+                    "at": points(on),
                     "depths": [0.7],
                     "overshoot": 0.3,
                     "repeats": 2,
@@ -134,13 +114,13 @@ class Diagnostic(ShippedPlan):
                     "depths": [0.4],
                     "purpose": "between taxels",
                 },
-                {"indenter": first, "at": _points(virgin), "depths": [0.6], "purpose": "virgin site, after a rest"},
+                {"indenter": first, "at": points(virgin), "depths": [0.6], "purpose": "virgin site, after a rest"},
                 reference,
                 *_light(second, corners[:1]),
                 *_rates(second, np.array([on])),
                 {
                     "indenter": second,
-                    "at": _points(between),
+                    "at": points(between),
                     "depths": [DEPTHS[-1]],
                     "holds": [HOLD],
                     "recovery": RECOVERY,
@@ -149,15 +129,13 @@ class Diagnostic(ShippedPlan):
                 {**reference, "yaws": [180.0], "repeats": 2, "purpose": "turned indenter"},
             ],
         }
-        document = write_out(recipe, sensor, "diagnostic plan", wishes.seed)
-        clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
-        return document
+        return from_recipe(recipe, sensor, wishes.seed, CLEARANCE)
 
 
 def _light(name: str, places: np.ndarray) -> list[dict[str, Any]]:
     return [
-        {"indenter": name, "at": _points(places), "depths": [-0.2], "purpose": "fly-over"},
-        {"indenter": name, "at": _points(places), "depths": [0.3], "speeds": [ONSET_SPEED], "purpose": "onset map"},
+        {"indenter": name, "at": points(places), "depths": [-0.2], "purpose": "fly-over"},
+        {"indenter": name, "at": points(places), "depths": [0.3], "speeds": [ONSET_SPEED], "purpose": "onset map"},
     ]
 
 
@@ -165,7 +143,7 @@ def _rates(name: str, places: np.ndarray) -> list[dict[str, Any]]:
     return [
         {
             "indenter": name,
-            "at": _points(places),
+            "at": points(places),
             "depths": DEPTHS,
             "speeds": SPEEDS,
             "order": "random",
@@ -186,7 +164,3 @@ def _every(sensor: Sensor, count: int) -> list[int]:
     return (
         np.unique(np.linspace(0, sensor.taxels.count - 1, min(count, sensor.taxels.count)).round()).astype(int).tolist()
     )
-
-
-def _points(places: np.ndarray) -> dict[str, Any]:
-    return {"kind": "points", "points": np.round(np.atleast_2d(places), 3).tolist()}

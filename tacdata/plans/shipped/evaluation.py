@@ -14,10 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.errors import UsageError
-from tacdata.plans.recipe import write_out
-from tacdata.plans.shipped.shipped_plan import PlanOptions, ShippedPlan
-from tacdata.plans.sites import clear_of_rim, half_box
+from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, from_recipe, points
+from tacdata.plans.sites import half_box
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
@@ -31,15 +29,6 @@ POSITION_DEPTH = 0.8
 """Depth of the position trials [mm]."""
 CLEARANCE = 0.1
 """Minimum distance of the indenter at full depth from the skin's rim [mm]; more would keep every contact whole."""
-MOTION = {
-    "clearance": 4.0,
-    "standoff": 0.3,
-    "travel_speed": 20.0,
-    "approach_speed": 5.0,
-    "press_speed": 0.7,
-    "hold": 1.0,
-    "rest": 1.0,
-}
 
 
 class Evaluation(ShippedPlan):
@@ -49,20 +38,13 @@ class Evaluation(ShippedPlan):
 
     def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
         """Return the plan; each press's ``purpose`` names its kind of trial."""
-        names = self.specimen_names(wishes)
-        if len(names) != 1:
-            raise UsageError(
-                f"{len(names)} indenters for the evaluation plan",
-                "one",
-                "name one --indenter, or write one plan for each",
-            )
+        names = self.specimen_names(wishes, 1, "one; write one plan for each")
         half = half_box(sensor)
         edge = half + np.array([sensor.taxels.pitch_x / 2, sensor.taxels.pitch_y / 4])
         interior = np.vstack([[0.0, 0.0], _spread(INTERIOR - 1) * (half - _margin(half))])
         cut = np.array([[edge[0], 0.3 * half[1]], [-edge[0], -0.3 * half[1]], [0.3 * half[0], edge[1]]])[:EDGE]
         places = np.vstack([[0.0, 0.0], _spread(PLACES - 1) * (half - _margin(half))])
         recipe = {
-            "version": "1.0",
             "name": f"evaluation-{names[0]}",
             "purpose": "the paper's evaluation: 78 depth trials, 40 contact-position trials",
             "indenters": specimens(names),
@@ -70,23 +52,21 @@ class Evaluation(ShippedPlan):
             "blocks": [
                 {
                     "indenter": names[0],
-                    "at": _points(places),
+                    "at": points(places),
                     "depths": DEPTHS,
                     "order": "random",
                     "purpose": "depth trial",
                 },
                 {
                     "indenter": names[0],
-                    "at": _points(np.vstack([interior, cut])),
+                    "at": points(np.vstack([interior, cut])),
                     "depths": [POSITION_DEPTH],
                     "order": "random",
                     "purpose": "position trial",
                 },
             ],
         }
-        document = write_out(recipe, sensor, "evaluation plan", wishes.seed)
-        clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
-        return document
+        return from_recipe(recipe, sensor, wishes.seed, CLEARANCE)
 
 
 def _margin(half: np.ndarray) -> np.ndarray:
@@ -96,16 +76,7 @@ def _margin(half: np.ndarray) -> np.ndarray:
 
 def _spread(count: int) -> np.ndarray:
     """Return points spread evenly over [-1, 1]^2, shape (count, 2): Halton's sequence in bases 2 and 3."""
-    return np.array([[2 * _radical_inverse(k, base) - 1 for base in (2, 3)] for k in range(1, count + 1)])
+    from scipy.stats import qmc
 
-
-def _radical_inverse(number: int, base: int) -> float:
-    result, share = 0.0, 1.0 / base
-    while number:
-        number, digit = divmod(number, base)
-        result, share = result + digit * share, share / base
-    return result
-
-
-def _points(places: np.ndarray) -> dict[str, Any]:
-    return {"kind": "points", "points": np.round(places, 3).tolist()}
+    # Its first point is the origin of the unit square, a corner.
+    return 2 * qmc.Halton(2, scramble=False).random(count + 1)[1:] - 1

@@ -12,10 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.errors import UsageError
-from tacdata.plans.recipe import write_out
-from tacdata.plans.shipped.shipped_plan import PlanOptions, ShippedPlan
-from tacdata.plans.sites import clear_of_rim
+from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, from_recipe, points
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
@@ -32,15 +29,6 @@ OFF_CENTRE = (0.15, 0.2)
 each of the four answers otherwise, and neighbours do not keep their ratio from site to site."""
 CLEARANCE = 0.5
 """Minimum distance of the indenter at full depth from the skin's rim [mm]."""
-MOTION = {
-    "clearance": 4.0,
-    "standoff": 0.3,
-    "travel_speed": 20.0,
-    "approach_speed": 5.0,
-    "press_speed": 1.0,
-    "hold": HOLD,
-    "rest": 1.0,
-}
 
 
 class Health(ShippedPlan):
@@ -50,34 +38,27 @@ class Health(ShippedPlan):
 
     def document(self, sensor: Sensor, wishes: PlanOptions) -> dict[str, Any]:
         """Return the plan; ``purpose`` of each press names its block."""
-        names = self.specimen_names(wishes)
-        if len(names) != 1:
-            raise UsageError(
-                f"{len(names)} indenters for the health plan", "one, the same at every visit", "name one --indenter"
-            )
+        names = self.specimen_names(wishes, 1, "one, the same at every visit")
         places = _sites(sensor)
         reference = {
             "indenter": names[0],
-            "at": _points(places[np.argmin(np.linalg.norm(places, axis=1))]),
+            "at": points(places[np.argmin(np.linalg.norm(places, axis=1))]),
             "depths": [DEPTH],
         }
         recipe = {
-            "version": "1.0",
             "name": f"health-{names[0]}",
             "purpose": "how a unit is, compared with its other visits",
             "indenters": specimens(names),
-            "motion": dict(MOTION),
+            "motion": {**MOTION, "press_speed": SPEEDS[0], "hold": HOLD},
             "grouped": False,
             "blocks": [
                 {**reference, "rest": REST, "purpose": "rest stretch, then reference"},
-                {**reference, "at": _points(places), "purpose": "sites"},
+                {**reference, "at": points(places), "purpose": "sites"},
                 {**reference, "repeats": REPEATS, "purpose": "reference"},
                 {**reference, "speeds": [SPEEDS[1]], "purpose": "slow reference"},
             ],
         }
-        document = write_out(recipe, sensor, "health plan", wishes.seed)
-        clear_of_rim(document["presses"], document["indenters"], sensor, CLEARANCE)
-        return document
+        return from_recipe(recipe, sensor, wishes.seed, CLEARANCE)
 
 
 def _sites(sensor: Sensor) -> np.ndarray:
@@ -94,7 +75,3 @@ def _middles(count: int) -> np.ndarray:
     """Return the middles of successive pairs of ``count`` taxels [pitches from the centre]; an odd one is a pair."""
     first = np.arange(0, count, 2)
     return first + np.where(first + 1 < count, 0.5, 0.0) - (count - 1) / 2
-
-
-def _points(places: np.ndarray) -> dict[str, Any]:
-    return {"kind": "points", "points": np.round(np.atleast_2d(places), 3).tolist()}

@@ -10,11 +10,25 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tacdata import registry
 from tacdata.errors import UsageError
+from tacdata.plans.recipe import write_out
+from tacdata.plans.sites import clear_of_rim
 from tacdata.sensor import Sensor
 
 ROOM, BASE = "tacdata.plans.shipped", "shipped_plan"
+MOTION = {
+    "clearance": 4.0,
+    "standoff": 0.3,
+    "travel_speed": 20.0,
+    "approach_speed": 5.0,
+    "press_speed": 0.7,
+    "hold": 1.0,
+    "rest": 1.0,
+}
+"""Usual motion of a plan (`schemas/plan.schema.json`)."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +60,41 @@ class ShippedPlan(ABC):
             FormatError: If the sensor is too small or too thin for the plan.
         """
 
-    def specimen_names(self, wishes: PlanOptions) -> tuple[str, ...]:
-        """Return the names of the specimens to use."""
-        return wishes.indenters or self.usual
+    def specimen_names(self, wishes: PlanOptions, count: int | None = None, which: str = "") -> tuple[str, ...]:
+        """Return the names of the specimens to use.
+
+        Args:
+            wishes: Options of a person.
+            count: Number that the plan needs; None for any.
+            which: The specimens it needs, in words, for the error.
+
+        Raises:
+            UsageError: If their number is another one.
+        """
+        names = wishes.indenters or self.usual
+        if count not in (None, len(names)):
+            plan = type(self).__name__.lower()
+            raise UsageError(f"{len(names)} indenters for the {plan} plan", which, f"name --indenter {count} times")
+        return names
+
+
+def from_recipe(recipe: dict[str, Any], sensor: Sensor, seed: int, clearance: float) -> dict[str, Any]:
+    """Return the plan's document of a recipe without version, its presses moved inwards from the skin's rim.
+
+    Args:
+        recipe: Entries of `schemas/plan_recipe.schema.json`.
+        sensor: The skin.
+        seed: Seed of random orders.
+        clearance: Minimum distance of the indenter at full depth from the rim [mm].
+    """
+    document = write_out({"version": "1.0", **recipe}, sensor, f"plan {recipe['name']}", seed)
+    clear_of_rim(document["presses"], document["indenters"], sensor, clearance)
+    return document
+
+
+def points(places: np.ndarray) -> dict[str, Any]:
+    """Return the entry ``at`` of a recipe's block for places [mm], shape (2,) or (n, 2)."""
+    return {"kind": "points", "points": np.round(np.atleast_2d(places), 3).tolist()}
 
 
 def shipped_plan(name: str, sensor: Sensor, wishes: PlanOptions | None = None) -> dict[str, Any]:

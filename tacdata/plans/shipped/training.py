@@ -9,7 +9,8 @@ import numpy as np
 from tacdata import documents, schemas
 from tacdata.errors import UsageError
 from tacdata.indenters import from_document
-from tacdata.plans.shipped.shipped_plan import PlanOptions, ShippedPlan
+from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan
+from tacdata.plans.sites import half_box
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
@@ -31,15 +32,6 @@ HOLDS = (0.5, 1.0)
 CLEARANCE = 0.5
 """Minimum distance of an indenter at full depth from the skin's rim, which the frame holds [mm]."""
 KINDS = ("taxel", "between", "anywhere", "edge")
-MOTION = {
-    "clearance": 4.0,
-    "standoff": 0.3,
-    "travel_speed": 20.0,
-    "approach_speed": 5.0,
-    "press_speed": 0.7,
-    "hold": 0.7,
-    "rest": 1.0,
-}
 
 
 class Training(ShippedPlan):
@@ -104,7 +96,7 @@ def training_plan(
         "name": f"training-{presses}-{seed}",
         "purpose": "random presses to train on",
         "indenters": {name: shapes[name] for name in used},
-        "motion": dict(MOTION),
+        "motion": {**MOTION, "hold": 0.7},
         "presses": entries,
     }
     for name in used:
@@ -116,7 +108,7 @@ def training_plan(
 def _site(sensor: Sensor, kind: str, rng: np.random.Generator, footprint: tuple[float, float]) -> tuple[float, float]:
     """Return a site [mm, sensor frame] whose whole footprint [mm] keeps `CLEARANCE` from the skin's rim."""
     taxels, centers = sensor.taxels, sensor.taxels.centers
-    half = np.array([taxels.pitch_x * (taxels.columns - 1), taxels.pitch_y * (taxels.rows - 1)]) / 2
+    half = half_box(sensor)
     pitch = np.array([taxels.pitch_x, taxels.pitch_y])
     rim = np.maximum(np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2 - footprint - CLEARANCE, 0.0)
     if kind == "taxel":
