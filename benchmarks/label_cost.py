@@ -27,10 +27,11 @@ from tacdata.plans.shipped.training import training_plan
 from tacdata.sensor import Sensor, default_sensor
 
 
-def jobs(sensor: Sensor, count: int) -> list[Job]:
-    """Return presses of the plan of 24, in random order."""
-    plan, ladder = training_plan(sensor, 24, 0), Ladder()
-    made = [
+def jobs(sensor: Sensor, count: int, ladder: Ladder, seed: int = 0, order: int = 1) -> list[Job]:
+    """Return presses of the plan of 24, in random order; the same ones for every ladder."""
+    plan = training_plan(sensor, 24, seed)
+    presses = [plan["presses"][k] for k in np.random.default_rng(order).permutation(24)[:count]]
+    return [
         Job(
             sensor.content_hash,
             "benchmark",
@@ -41,9 +42,8 @@ def jobs(sensor: Sensor, count: int) -> list[Job]:
             ladder.depths(press["depth"]),
             ladder.tolerance,
         )
-        for press in plan["presses"]
+        for press in presses
     ]
-    return [made[k] for k in np.random.default_rng(1).permutation(24)[:count]]
 
 
 def main() -> None:
@@ -54,7 +54,7 @@ def main() -> None:
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     sensor = default_sensor() if arguments.spreads else replace(default_sensor(), uncertainty={})
-    farm, asked = FemModel(sensor), jobs(sensor, arguments.presses)
+    farm, asked = FemModel(sensor), jobs(sensor, arguments.presses, Ladder())
     models = [farm._model, *filter(None, [farm._model.companion])]
     for model in models:
         _ = model.skin.rest

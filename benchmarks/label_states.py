@@ -17,38 +17,19 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from label_cost import jobs
 
 from tacdata.label_farm.presses.fem import FemModel
 from tacdata.label_farm.presses.interpolate import Branch
 from tacdata.label_farm.presses.job import Job
 from tacdata.label_farm.presses.ladder import Ladder
 from tacdata.labels import PathSolution
-from tacdata.plans.shipped.training import training_plan
-from tacdata.sensor import Sensor, default_sensor
+from tacdata.sensor import default_sensor
 
 LADDERS = {"every step both ways": Ladder(0.05, 1.6, 0.25, 0.25), "today's": Ladder()}
 DENSE = Ladder(0.03, 1.5, 0.1, 0.1, tolerance=None)
 DENTED = 0.1
 """Share of the depth from which a pixel counts [1]."""
-
-
-def jobs(sensor: Sensor, count: int, seed: int, ladder: Ladder) -> list[Job]:
-    """Return the same presses for every ladder."""
-    plan = training_plan(sensor, 24, seed)
-    presses = [plan["presses"][k] for k in np.random.default_rng(seed).permutation(24)[:count]]
-    return [
-        Job(
-            sensor.content_hash,
-            "benchmark",
-            plan["indenters"][press["indenter"]],
-            press["x"],
-            press["y"],
-            press["yaw"],
-            ladder.depths(press["depth"]),
-            ladder.tolerance,
-        )
-        for press in presses
-    ]
 
 
 def solved(farm: FemModel, asked: list[Job]) -> dict[tuple[float, float], PathSolution]:
@@ -91,11 +72,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=7)
     arguments = parser.parse_args()
     torch.set_num_threads(1)
+    seed = arguments.seed
     sensor = replace(default_sensor(), uncertainty={})
     farm = FemModel(sensor)
-    truth = solved(farm, jobs(sensor, arguments.presses, arguments.seed, DENSE))
+    truth = solved(farm, jobs(sensor, arguments.presses, DENSE, seed, seed))
     for name, ladder in LADDERS.items():
-        found = solved(farm, jobs(sensor, arguments.presses, arguments.seed, ladder))
+        found = solved(farm, jobs(sensor, arguments.presses, ladder, seed, seed))
         states = np.mean([len(one.depth) for one in found.values()])
         steps = np.mean([one.provenance["parameters"]["newton"] for one in found.values()])
         print(f"{name}: {states:.1f} states, {steps:.1f} Newton steps a press")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,11 +51,8 @@ class Fetch:
         self._labels.sweep()
         self.fetched = Fetched()
 
-    def bring(self, progress: Callable[[int, int], None] = lambda *_: None) -> None:
+    def bring(self) -> None:
         """Fetch finished labels that are not here.
-
-        Args:
-            progress: Called with how many episodes were looked at, and how many there are.
 
         Raises:
             UsageError: If the service does not know the submission or has no results of it, if a label is of another
@@ -67,14 +63,12 @@ class Fetch:
         local = {*self.fetched.written, *self.fetched.current}
         remote = self._client.get(f"{self._path}/results")
         missing = [number for number in remote["labels"] if number not in local]
-        for done, number in enumerate(missing):
-            progress(done, len(missing))
+        for number in missing:
             self._bring(number)
             self.fetched.failed.pop(number, None)
         for number in remote["failures"]:
             if number not in self.fetched.failed:
                 self._bring_reason(number)
-        progress(len(missing), len(missing))
 
     def _recording(self, number: int) -> Path:
         if number not in self._recordings:

@@ -51,15 +51,14 @@ def orange_presses() -> list[PressRequest]:
     return [PressRequest(orange(), a, b, 0.0, depths) for a in x.tolist() for b in y.tolist()]
 
 
-def training_presses(sensor: Sensor, count: int, seed: int = 0) -> list[PressRequest]:
+def training_presses(sensor: Sensor, count: int) -> list[PressRequest]:
     """Return presses of spheres and ellipsoids at random positions, also beyond edges.
 
     Args:
         sensor: The skin.
-        count: Number of presses.
-        seed: Same seed, same presses.
+        count: Number of presses; the same at every call.
     """
-    rng = np.random.default_rng([seed, 31])
+    rng = np.random.default_rng([0, 31])
     half = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2 - BEYOND
     requests = []
     for _ in range(count):

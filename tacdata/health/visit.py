@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -127,12 +126,8 @@ def _slope(time: np.ndarray, values: np.ndarray) -> UncertainValue:
     return UncertainValue(float(fit.slope), float(fit.stderr), float(valid.sum() - 2))
 
 
-def read_visit(folder: StrPath, done: Callable[[str], None] = lambda name: None) -> Visit:
+def read_visit(folder: StrPath) -> Visit:
     """Read a session; recordings that say nothing are named with the reason.
-
-    Args:
-        folder: The session's folder.
-        done: Called with the name of each recording that was read.
 
     Raises:
         UsageError: If it is no session, or none of its recordings can be used.
@@ -151,7 +146,6 @@ def read_visit(folder: StrPath, done: Callable[[str], None] = lambda name: None)
             left_out.append((path.name, reason))
         else:
             entries.append(entry)
-        done(path.name)
     if not entries:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out[:3]) or "it holds none"
         raise UsageError(

@@ -42,10 +42,6 @@ class EpisodeCurves:
         """The channel in which the effects change most."""
         return int(np.argmax(np.square(self.after - self.before).mean(axis=0) / self.noise**2))
 
-    def rms_error(self, predicted: np.ndarray) -> float:
-        """Return the root mean square difference from the measurement [the source's unit]."""
-        return float(np.sqrt(np.nanmean(np.square(predicted - self.measured))))
-
 
 def curves(comparison: Comparison, change: GapReduction, episodes: np.ndarray, count: int = 3) -> list[EpisodeCurves]:
     """Return the episodes in which the effects change most, largest change first.

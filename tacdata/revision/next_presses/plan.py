@@ -100,16 +100,11 @@ def standard_errors(nats: float) -> float:
     return float(np.sqrt(2 * nats))
 
 
-def left_open(choices: list[Choice], repeats: int = REPEATS) -> str:
-    """Return the pairs that a plan will not settle, as a sentence; empty if it settles every pair.
-
-    Args:
-        choices: Its presses.
-        repeats: Repeats of each.
-    """
+def left_open(choices: list[Choice]) -> str:
+    """Return the pairs that a plan of some presses will not settle, as a sentence; empty if it settles every pair."""
     sentences, beyond = [], []
     for pair in choices[0].nats:
-        z = standard_errors(repeats * sum(c.nats[pair] for c in choices))
+        z = standard_errors(REPEATS * sum(c.nats[pair] for c in choices))
         plans = int(np.ceil((SETTLES / max(z, 1e-9)) ** 2))
         if plans > PLANS:
             beyond.append(f"{pair[0]} from {pair[1]}")
