@@ -35,8 +35,6 @@ class Faults:
         """Whether the controller may hear nothing, so that nobody can stop it."""
         self.frozen, self.alarmed = False, np.inf
         """Whether the board was frozen, and when an alarm was raised [s]."""
-        self.moved_otherwise = False
-        """Whether a line to the controller was changed, so that it may do something else."""
         kinds = only or tuple(KINDS)
         number = self.random.choices((0, 1, 2, 3), (1, 10, 6, 3))[0] if not only else 1
         for _ in range(number):
@@ -219,7 +217,6 @@ def damaged_answer(faults):
 
 
 def damaged_command(faults):
-    faults.moved_otherwise = True
     _damage(faults, faults.world.cnc_line.to_device, True)
 
 
@@ -439,7 +436,6 @@ def damaged_lift(faults):
 
 def damaged_press(faults):
     """Change a digit of the next line that goes into the skin or out of it."""
-    faults.moved_otherwise = True
     _change_one(faults, PRESS)
 
 

@@ -72,7 +72,7 @@ def plan(presses, tools=False, **entries):
 class Calm:
     """No fault, as the judge of a run sees it."""
 
-    deaf, names, stalls, moved_otherwise = False, (), (), False
+    deaf, names, stalls = False, (), ()
 
     def due(self):
         """Return that nothing has to end the run."""
