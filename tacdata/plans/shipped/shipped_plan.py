@@ -74,7 +74,7 @@ class ShippedPlan(ABC):
         names = wishes.indenters or self.usual
         if count not in (None, len(names)):
             plan = type(self).__name__.lower()
-            raise UsageError(f"{len(names)} indenters for the {plan} plan", which, f"name --indenter {count} times")
+            raise UsageError(f"{len(names)} indenters for the {plan} plan", which, "give one --indenter for each")
         return names
 
 
