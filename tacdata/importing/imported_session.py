@@ -98,6 +98,7 @@ class _Import:
         self.failures: list[tuple[str, TacdataError]] = []
         self.notes: list[str] = []
         self.seen: dict[tuple[Any, ...], str] = {}
+        self.recorded: dict[tuple[int, ...], str] = {}
         self.centre: tuple[float, float] | None = None
         self.sides: list[ZeroSide] = []
 
@@ -136,6 +137,20 @@ class _Import:
         first = self.seen.setdefault(contents, name)
         return f"{name} is the same, byte by byte, as {first} and is left out" if first != name else ""
 
+    def _recorded_before(self, imported: ImportedPress) -> str:
+        """Return a note that a recording is a copy, value by value, of one before it; empty if it is not.
+
+        A table that is pasted twice, or saved in two formats, is no second measurement either.
+        """
+        taxels, position = imported.taxels, imported.position
+        if not (taxels.values[1:] != taxels.values[:-1]).any():
+            return ""  # a sensor left alone may read the same for long
+        arrays = (taxels.time_ns, taxels.values, position.time_ns, position.values)
+        contents = tuple(hash(np.ascontiguousarray(each).tobytes()) for each in arrays)
+        label = imported.record["trial"] or self.mapping.name
+        first = self.recorded.setdefault(contents, label)
+        return f"{label} is the same, value by value, as {first} and is left out" if first != label else ""
+
     def _presses(
         self, files: FileSet, label: str, full_tables: dict[str, SourceTable], rows: dict[str, SourceTable]
     ) -> Iterator[ImportedPress | Refusal]:
@@ -164,6 +179,9 @@ class _Import:
 
     def _write(self, imported: ImportedPress) -> None:
         number = len(self.presses)
+        if copied := self._recorded_before(imported):
+            self.notes.append(copied)
+            return
         imported = replace(imported, record=_in_unicode(imported.record))
         press = replace(imported.press, index=number)
         plan = plan_of(self.mapping.name, [press])

@@ -15,6 +15,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.importing.expression import with_derived
 from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.mapping import FileEntry, Selector
+from tacdata.importing.plausibility.copies import without_copies
 from tacdata.importing.source_table import SourceTable, single
 
 
@@ -47,6 +48,8 @@ class SourceFile:
             table = side_by_side(parts, labels, clock)
         else:
             table = joined(parts, clock if entry.join == "continued" else None)
+        if isinstance(clock, str) and entry.clock and entry.clock.rate is None and clock in table.columns:
+            table = without_copies(table, clock)
         return with_derived(table, entry.derived, where)
 
 
@@ -100,7 +103,9 @@ def files_below(folder: Path) -> list[Path]:
     """Return the files below a folder, sorted; a folder that counts as one file replaces its contents."""
     files = []
     for path in sorted(folder.iterdir()):
-        files += [path] if is_one(path) else files_below(path) if path.is_dir() else []
+        # A link to a folder above would be walked without an end.
+        circle = path.is_symlink() and path.is_dir() and folder.resolve().is_relative_to(path.resolve())
+        files += [path] if is_one(path) else files_below(path) if path.is_dir() and not circle else []
     return sorted(files)
 
 

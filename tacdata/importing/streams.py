@@ -11,9 +11,11 @@ from tacdata.errors import FormatError
 from tacdata.importing.mapping import ColumnsEntry, Mapping, PositionEntry, SourceClock, StreamEntry
 from tacdata.importing.plausibility.codes import table_without_codes, without_codes
 from tacdata.importing.plausibility.repeats import without_repeats
+from tacdata.importing.plausibility.resolution import restored
 from tacdata.importing.plausibility.time_order import moments, spread, time_order
+from tacdata.importing.plausibility.wraps import unwrapped
 from tacdata.importing.source_table import INNER, SourceTable, axis, numbers, select, single, unit_of, units_of
-from tacdata.importing.times import NEVER, times
+from tacdata.importing.times import NEVER, future, times
 from tacdata.importing.units import factor, quantity_of, split_unit
 
 
@@ -143,8 +145,13 @@ def _timed(
     bare = replace(clock, offset=None)
     time_ns, zero = times(table, bare, f"{name}: time")
     tick_ns = 0.0 if zero == "unix" else _tick(table, bare, time_ns, name)
+    where = f"{table.path.name}: {_clock_name(clock)}"
+    if (numbers := _clock_numbers(table, bare, name)) is not None and clock.rate is None:
+        time_ns, lost = restored(numbers, time_ns, where)
+        doubts = (*lost, *doubts)
+    doubts = (*doubts, *future(time_ns, where)) if zero == "unix" else doubts
     zero = "aligned" if clock.offset is not None else f"own: {entry.file}" if zero == "own" else zero
-    order = time_order(time_ns, f"{table.path.name}: {_clock_name(clock)}", tick_ns=tick_ns)
+    order = time_order(time_ns, where, tick_ns=tick_ns)
     stretches = []
     for rows in order.stretches:
         apart_ns, shared = spread(order.time_ns[rows] + clock.offset_ns)
@@ -178,14 +185,20 @@ def _clock_name(clock: SourceClock) -> str:
 
 def _tick(table: SourceTable, clock: SourceClock, time_ns: np.ndarray, name: str) -> float:
     """Return one step of a clock's numbers [ns]; 0 where no column of numbers holds the times."""
-    if not isinstance(clock.column, str | int):
-        return 0.0
-    numbers = table.column(single(table, clock.column, f"{name}: time"))
-    if numbers.dtype == object:
+    numbers = _clock_numbers(table, clock, name)
+    if numbers is None:
         return 0.0
     valid = time_ns != NEVER
     span = float(np.ptp(numbers[valid].astype(float))) if valid.any() else 0.0
     return float(np.ptp(time_ns[valid])) / span if span > 0 else 0.0
+
+
+def _clock_numbers(table: SourceTable, clock: SourceClock, name: str) -> np.ndarray | None:
+    """Return the numbers of a clock as in the file, shape (rows,); None where no column of numbers holds them."""
+    if not isinstance(clock.column, str | int):
+        return None
+    numbers = table.column(single(table, clock.column, f"{name}: time"))
+    return None if numbers.dtype == object else numbers
 
 
 def _taxels(entry: ColumnsEntry, table: SourceTable) -> list[Stream]:
@@ -228,9 +241,10 @@ def _readings(
     values = numbers(table, names, entry.missing, name)
     if entry.trusted:
         return values, ()
-    values, codes = without_codes(values, name, rails=name == "taxels")
+    values, wraps = unwrapped(values, name, signed=True)
+    values, codes = without_codes(values, name, rails=name == "taxels" and not wraps)
     values, repeats = without_repeats(values, name)
-    return values, (*codes, *repeats)
+    return values, (*wraps, *codes, *repeats)
 
 
 def _several(units: list[str]) -> str:

@@ -11,10 +11,14 @@ import numpy as np
 from tacdata.errors import FormatError
 from tacdata.importing.mapping import SourceClock
 from tacdata.importing.source_table import SourceTable, single, unit_of
+from tacdata.importing.text.layout import THOUSANDS
+from tacdata.importing.text.months import in_english
 from tacdata.importing.units import FACTORS, clock_unit, factor, plain
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
 """Unix times between which a clock that does not say its zero is taken for Unix time [s]."""
+SINCE_1904 = 2_082_844_800.0
+"""From LabVIEW's zero to that of Unix [s]."""
 DAY_ZERO = {"datenum": 719_529.0, "excel": 25_569.0}
 """Clocks that count days: the day on which 1970 begins, in MATLAB's datenum and in Excel's serial time [d]."""
 DAY = 86_400.0
@@ -82,6 +86,18 @@ def times(table: SourceTable, clock: SourceClock, where: str) -> tuple[np.ndarra
     if values.dtype.kind in "iu" and not clock.drift and scale < 1:
         return values.astype(np.int64) * round(scale * 1e9) + clock.offset_ns, zero
     return _shifted(values.astype(float) * scale, clock), zero
+
+
+def future(time_ns: np.ndarray, where: str) -> tuple[str, ...]:
+    """Return a doubt about Unix times [ns] that have not come yet, as LabVIEW's are, which count from 1904."""
+    known = time_ns[time_ns != NEVER]
+    middle = float(np.median(known)) / 1e9 if len(known) else 0.0
+    now = datetime.now(UTC).timestamp()
+    if middle < now + DAY:
+        return ()
+    year = datetime.fromtimestamp(min(middle, YEAR_2100), UTC).year
+    zero = " LabVIEW counts from 1904: then give offset: -2082844800" if YEAR_2000 < middle - SINCE_1904 < now else ""
+    return (f"{where}: its times lie in the future, in {year}: is their zero another?{zero}",)
 
 
 NEVER = np.iinfo(np.int64).min
@@ -204,6 +220,10 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
     Excel shows times as 34:56.7 and begins again every hour: seconds are then counted from the first one.
     """
     texts = [str(text).strip() for text in values.tolist() if text is not None]
+    if any(re.fullmatch(DURATION, text) for text in texts) and all(
+        re.fullmatch(r"-?\d+:\d{2}:\d{2}.*", t) for t in texts
+    ):
+        return np.array([np.nan if text is None else _duration(str(text)) for text in values.tolist()])
     forms = {
         r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?": 86_400,
         r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?\s*[AaPp]\.?[Mm]\.?": 86_400,
@@ -226,6 +246,16 @@ def _times_of_day(values: np.ndarray) -> np.ndarray | None:
     return seconds + turn * np.cumsum(back)
 
 
+DURATION = r"-\d+:\d{2}:\d{2}([.,]\d+)?|(2[4-9]|[3-9]\d|\d{3,}):\d{2}:\d{2}([.,]\d+)?"
+"""A time since a start and no time of day: with a sign, or of more than 24 hours."""
+
+
+def _duration(text: str) -> float:
+    hours, minutes, seconds = text.strip().replace(",", ".").lstrip("-").split(":")
+    size = 3600 * int(hours) + 60 * int(minutes) + float(seconds)
+    return -size if text.strip().startswith("-") else size
+
+
 DATES = (
     "%Y-%m-%d",
     "%Y/%m/%d",
@@ -237,12 +267,14 @@ DATES = (
     "%d-%m-%Y",
     "%d-%b-%Y",
     "%d %b %Y",
+    "%d. %b %Y",
     "%b %d %Y",
     "%b %d, %Y",
     "%d.%m.%y",
     "%d/%m/%y",
     "%m/%d/%y",
 )
+WEEKDAYS = ("%a %b %d %H:%M:%S %Y", "%a %b %d %H:%M:%S.%f %Y")
 CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%I:%M %p", "%H%M%S", "%H:%M:%S:%f")
 """Dates and times of day as instruments write them; the layout that fits all rows of a file decides."""
 
@@ -265,7 +297,7 @@ def _as_texts(values: np.ndarray) -> list[str]:
 def _datetimes(values: np.ndarray, layout: str | None, where: str) -> np.ndarray:
     if values.dtype != object:
         return values.astype(np.int64)
-    texts = ["" if text is None else str(text).strip() for text in values.tolist()]
+    texts = ["" if text is None else in_english(str(text).strip()) for text in values.tolist()]
     moments = _iso(texts) if layout is None else None
     if moments is None:
         layout = layout or _layout(texts, where)
@@ -311,9 +343,12 @@ def _parsed(text: str, layout: str, where: str) -> datetime | None:
 def layouts_of(texts: list[str]) -> dict[str, list[datetime]]:
     """Return every layout of dates that fits texts, with a sample of the times that it makes of them."""
     # Spread over the file and up to its end: only a day above 12 distinguishes days from months.
-    sample = [_pointed(text).replace("T", " ") for text in texts[:: max(len(texts) // 200, 1)] + texts[-1:]]
+    sample = [
+        re.sub(r"(?<=\d)T(?=\d)", " ", in_english(_pointed(text)))
+        for text in texts[:: max(len(texts) // 200, 1)] + texts[-1:]
+    ]
     fitting = {}
-    for layout in (f"{date} {clock}" for date in DATES for clock in CLOCKS):
+    for layout in (*(f"{date} {clock}" for date in DATES for clock in CLOCKS), *WEEKDAYS):
         try:
             fitting[layout] = [datetime.strptime(text, layout) for text in sample]
         except ValueError:
@@ -331,6 +366,12 @@ def _layout(texts: list[str], where: str) -> str:
     fitting = layouts_of(filled)
     different = {tuple(moments) for moments in fitting.values()}
     example = filled[0] if filled else ""
+    if grouped := next((text for text in filled if THOUSANDS.fullmatch(text)), ""):
+        raise FormatError(
+            f"{where}: {grouped!r} is a number with a sign between its thousands",
+            "numbers without one",
+            "save it again without a sign between thousands",
+        )
     if len(different) == 1:
         return next(iter(fitting))
     if not different:

@@ -16,6 +16,7 @@ from tacdata.importing.formats.source_format import SourceFormat, kind_of_bytes
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 from tacdata.importing.text.encoding import ENCODINGS, encoding_of
+from tacdata.importing.text.inner_headers import without_headers
 from tacdata.importing.text.layout import (
     COMMENTS,
     DELIMITERS,
@@ -44,6 +45,10 @@ STATED_RATE = re.compile(
     re.IGNORECASE,
 )
 """How a file states its rate above its rows."""
+STATED_STEP = re.compile(r"^Delta_X\t(\d*[.,]?\d+(?:[eE][-+]?\d+)?)", re.MULTILINE)
+"""How LabVIEW states the time between two rows [s]."""
+TYPOGRAPHIC_MINUS = re.compile(rb"\xe2\x88\x92(?=[\d.,])")
+"""The minus of a text program before a number, in UTF-8."""
 HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+")
 """A number to base 16, as boards print registers."""
 LARGEST = 256 * 1024 * 1024
@@ -103,7 +108,10 @@ def _stated_rate(data: bytes, skip: int) -> float:
     """Return the rate that the lines above the rows state [Hz]; 0 if they state none."""
     head = b"\n".join(data[:SNIFFED].split(b"\n")[:skip]).decode("utf-8", "ignore")
     match = STATED_RATE.search(head)
-    return float(match[1]) * (1000.0 if match[2] else 1.0) if match else 0.0
+    if match:
+        return float(match[1]) * (1000.0 if match[2] else 1.0)
+    step = STATED_STEP.search(head)
+    return 1 / float(step[1].replace(",", ".")) if step and float(step[1].replace(",", ".")) > 0 else 0.0
 
 
 def _upright(data: bytes, options: ReadOptions, path: Path, notes: list[str]) -> bytes:
@@ -192,6 +200,7 @@ def _decoded(path: Path, options: ReadOptions) -> tuple[bytes, list[str]]:
             advice = " by guess; if names look wrong, give encoding under the file" if doubtful else ""
             notes.append(f"{path.name}: not UTF-8, read as {ENCODINGS.get(encoding, encoding)}{advice}")
     # Windows ends lines with \r\n, and an old Macintosh with \r: from here on every line ends with \n.
+    raw = TYPOGRAPHIC_MINUS.sub(b"-", raw)
     raw = raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return _whole_cells(raw[:HEAD]) + raw[HEAD:], notes
 
@@ -285,7 +294,13 @@ def _parsed(
     except pa.ArrowInvalid:
         # A single cell without a number makes Arrow refuse the file. As text, the cell can be named or left out.
         table, skipped = _arrow(body, layout, missing, dict.fromkeys(layout.names, pa.string()))
-    columns, doubts = {}, []
+    headers = 0
+    if any(
+        kind != "text" and pa.types.is_string(table.column(name).type)
+        for name, kind in zip(layout.names, layout.kinds, strict=True)
+    ):
+        table, headers = without_headers(table, layout, path)
+    columns, doubts = {}, [f"{path.name}: {headers} repeated header lines among the rows are left out"] * bool(headers)
     for name, kind in zip(layout.names, layout.kinds, strict=True):
         column = table.column(name)
         if kind == "text" or not pa.types.is_string(column.type):

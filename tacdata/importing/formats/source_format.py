@@ -54,6 +54,8 @@ CONVERSIONS = {
     ".hdf5": "in Python: h5py.File(name)[dataset][:], then numpy.savez(new_name, ...)",
     ".tdms": "in LabVIEW or Excel: export it as .csv or .xlsx",
     ".bag": "rosbags-convert --src name.bag --dst folder, then import the folder",
+    **dict.fromkeys((".zip", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz", ".zst"), "unpack it, and import the folder"),
+    ".sqlite": "in Python: pandas.read_sql(...).to_parquet(new_name)",
     ".pkl": "in Python: pandas.read_pickle(name).to_parquet(new_name)",
 }
 """Endings of files that are not read, and the way to a file that is."""
@@ -177,6 +179,15 @@ def _really(path: Path, name: str) -> str:
     return "is empty and " if not start else f"is {kind} and " if kind and name not in kind else ""
 
 
+def _markup(path: Path) -> str:
+    """Return the kind of a text that a spreadsheet program opens and that is no table of columns; "" for others."""
+    with path.open("rb") as stream:
+        head = stream.read(1024).lstrip(b"\xef\xbb\xbf \r\n\t").lower()
+    if not head.startswith(b"<"):
+        return ""
+    return "a table in HTML" if b"<html" in head or b"<table" in head else "an XML Spreadsheet"
+
+
 def _by_ending(path: Path) -> str:
     endings = {}
     for name in registry.names(ROOM, BASE):
@@ -187,6 +198,8 @@ def _by_ending(path: Path) -> str:
     if ending == ".xls" and path.is_file():
         with path.open("rb") as stream:
             kind = kind_of_bytes(stream.read(16))
+        if not kind:
+            kind = _markup(path)
         if not kind:
             return "csv"  # instruments write tabs and give the file this ending
         raise UsageError(f"{path} is {kind}", "an Excel workbook (.xlsx)", CONVERSIONS[ending])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tacdata.importing.plausibility.wraps import unwrapped
 from tacdata.importing.source_table import SourceTable
 
 
@@ -150,9 +151,10 @@ def table_without_codes(table: SourceTable, names: list[str], name: str) -> tupl
     for column in names:
         values = table.columns.get(column)
         if values is not None and values.ndim == 1 and values.dtype.kind in "fiu":
-            columns[column], counts = without_codes(values.astype(float)[:, None], name, rails=False)
-            columns[column] = columns[column][:, 0]
-            doubts += counts
+            numbers, wraps = unwrapped(values.astype(float)[:, None], name, signed=False)
+            numbers, counts = without_codes(numbers, name, rails=False)
+            columns[column] = numbers[:, 0]
+            doubts += [*wraps, *counts]
     return replace(table, columns={**table.columns, **columns}), tuple(dict.fromkeys(doubts))
 
 

@@ -51,7 +51,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     check_source(source)
     paths = [source] if is_one(source) else files_below(source)
     kinds: dict[str, FoundKind] = {}
-    refused = []
+    refused, remedies = [], dict[str, None]()
     below = [path.relative_to(source) if path != source else Path(path.name) for path in paths]
     for path, name_below, kind in zip(paths, (p.as_posix() for p in below), kinds_of(list(below)), strict=True):
         members = [key for key in kinds if key.partition(INSIDE)[0] == kind]
@@ -72,12 +72,13 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
             if is_one(source) and isinstance(error, TacdataError):
                 raise
             words = error.given if isinstance(error, TacdataError) else f"{kind}: {type(error).__name__}"
+            remedies |= {error.remedy: None} if isinstance(error, TacdataError) else {}
             refused.append(words.removeprefix(f"{source}/"))
     if not kinds:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
             "CSV, Excel, JSON, NPZ, Parquet or MATLAB files, or bags of ROS 2",
-            "check the path, or convert the files",
+            next(iter(remedies)) if len(remedies) == 1 else "check the path, or convert the files",
         )
     kinds = _of_same_columns(kinds)
     lines = []

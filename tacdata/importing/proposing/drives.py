@@ -58,6 +58,8 @@ def length_of(table: SourceTable, name: str) -> str:
 
 def rate_of(table: SourceTable, columns: dict[str, list[str]]) -> float:
     """Return a rate by which a press takes some seconds."""
+    if table.rate:
+        return table.rate
     rows = [float(table.rows)]
     moving = columns.get("depth") or columns.get("z")
     if "trial" in columns:

@@ -52,9 +52,10 @@ def _clock(kind: SourceKind, file: str) -> tuple[SourceClock, tuple[Question, ..
     table, names = kind.table, kind.roles.get("time")
     if not names:
         rate, counter = rate_of(table, kind.roles), counting_column(table, kind.roles)
+        source = "stated by the file" if table.rate else "a guess, by which a press takes some 2 s"
         text = (
-            f"{file}: no column of times; {rate:g} rows a second is a guess, by which a press takes some "
-            "2 s: give time: {rate: ...}" + f"; {counter} counts the rows" * bool(counter)
+            f"{file}: no column of times; {rate:g} rows a second is {source}: give time: {{rate: ...}}"
+            + f"; {counter} counts the rows" * bool(counter)
         )
         return SourceClock(rate=rate, column=counter or None), (Question(text, "rate", file=kind.alias, value=rate),)
     is_dated = [table.column(name).dtype for name in names] == [object, object]  # a date and a time of day

@@ -66,6 +66,8 @@ PLACE = r"(tip|tcp|pos(ition)?s?|pose|xyz|probe|indenter|stage|ee(_?pos)?|end_?e
 """Name of an array whose first three columns are a place."""
 GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 """Words that mark a length as measured, in addition to the commanded one."""
+COMMAND = r"(?<![a-z])(set|target|cmd|command(ed)?|desired|demand(ed)?|soll)(?![a-z])|set_?point|sollw"
+"""Words that mark a length as commanded, which the machine may not have reached."""
 DEGREES = ("degc", "c", "k", "degf")
 ROWS = 50
 """Rows of a text column that are tried as times."""
@@ -159,13 +161,19 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
         return "time"
     if role == "error" and unit != "mm" and (unit or bare in ("error", "err")):
         role = "state"
+    if role in ("angle", "joint") and unit == "mm":
+        return "depth"
     return {"mm": "depth", "deg": "angle"}.get(unit or "") if role is None else role
 
 
-def _rank(name: str) -> tuple[bool, bool]:
-    """Return a length's place: depths first, then other lengths, gauges last."""
+def _rank(name: str) -> tuple[bool, bool, bool]:
+    """Return a length's place: depths first, then other lengths, gauges, and commands last."""
     bare = re.sub(r"\s+", "_", split_unit(name)[0].lower())
-    return bool(re.search(GAUGE, name.lower())), not re.fullmatch(GUESSES["depth"], bare)
+    return (
+        bool(re.search(COMMAND, name.lower())),
+        bool(re.search(GAUGE, name.lower())),
+        not re.fullmatch(GUESSES["depth"], bare),
+    )
 
 
 def _are_times(table: SourceTable, name: str) -> bool:

@@ -69,6 +69,17 @@ MISSING = (
     "-1.#IND",
     "1.#INF",
     "-1.#INF",
+    "N.A.",
+    "n.d.",
+    "k.A.",
+    "s.o.",
+    "\\N",
+    "no data",
+    "No Data",
+    "Bad Input",
+    "\u2013",
+    "\u2014",
+    *(f"{sign}1,#{word}" for sign in ("", "-") for word in ("QNAN", "IND", "INF")),
     *(f"{sign}1.#{word}" for sign in ("", "-") for word in ("IND0", "IND00", "INF0", "INF00", "QNAN0", "QNB", "J")),
     *(f"Err:{number}" for number in range(501, 541)),
     *("*" * width for width in range(3, 25)),
@@ -137,6 +148,7 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
             "a text file of columns, with or without a header",
             _otherwise(text, options, origin) or "give delimiter, decimal, skip or header under files in the mapping",
         )
+    first = _with_wider_rows(rows, first, decimal)
     _refuse_commas_for_both(rows[:first], rows[first:], delimiter, width, origin)
     header = [row for row in rows[:first] if len(row) in (width, width - 1, width + 1) and any(row)]
     header = header or _commented_header(lines[skip:], lines_of_data[first], delimiter, width)
@@ -263,6 +275,18 @@ def _first_row(rows: list[list[str]], width: int, decimal: str) -> int | None:
         ):
             return number
     return None
+
+
+def _with_wider_rows(rows: list[list[str]], first: int, decimal: str) -> int:
+    """Return the first row of data among those of another width, too: LabVIEW writes a remark behind the first one."""
+    numeric = [is_number(field, decimal) for field in rows[first]]
+    while first:
+        flags = [is_number(field, decimal) for field in rows[first - 1]]
+        common = min(len(flags), len(numeric))
+        if common < 2 or not any(flags) or flags[:common] != numeric[:common]:
+            break
+        first -= 1
+    return first
 
 
 def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[str, str]]:
