@@ -19,6 +19,7 @@ from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.mapping import Mapping
 from tacdata.importing.pressing.presses import Refusal, centre_of, presses_of
+from tacdata.importing.pressing.rest_levels import RestLevel, rest_doubt, rest_level
 from tacdata.importing.pressing.trials import split_tables
 from tacdata.importing.recording_file import ImportedPress
 from tacdata.importing.source_files import FileSet, file_sets, is_one, source_hash
@@ -101,6 +102,7 @@ class _Import:
         self.recorded: dict[tuple[int, ...], str] = {}
         self.centre: tuple[float, float] | None = None
         self.sides: list[ZeroSide] = []
+        self.rests: list[RestLevel] = []
 
     def add(self, files: FileSet) -> None:
         """Import one set of files."""
@@ -146,7 +148,9 @@ class _Import:
         if not (taxels.values[1:] != taxels.values[:-1]).any():
             return ""  # a sensor left alone may read the same for long
         arrays = (taxels.time_ns, taxels.values, position.time_ns, position.values)
-        contents = tuple(hash(np.ascontiguousarray(each).tobytes()) for each in arrays)
+        press = imported.press
+        stated = hash((press.x, press.y, press.depth, press.speed, press.hold))
+        contents = (stated, *(hash(np.ascontiguousarray(each).tobytes()) for each in arrays))
         label = imported.record["trial"] or self.mapping.name
         first = self.recorded.setdefault(contents, label)
         return f"{label} is the same, value by value, as {first} and is left out" if first != label else ""
@@ -194,6 +198,8 @@ class _Import:
         depth = imported.registration["origin"][2] - imported.position.values[:, 2]
         at = np.interp(imported.taxels.time_ns, imported.position.time_ns, depth)
         self.sides.append(zero_side(at, imported.taxels.values))
+        if level := rest_level(trial, at, imported.taxels.values):
+            self.rests.append(level)
         # At the end only the press is needed, and the rows of all recordings would fill the memory.
         self.presses.append(replace(imported, taxels=None, position=None, measured=()))
         rows = len(imported.taxels.time_ns)
@@ -207,6 +213,8 @@ class _Import:
                 f"readings answer as much below zero, down to {below:.4g} mm, as above: does it touch there, too? "
                 f"Then count depth from the lowest (offset: {lowest:g} under depth, or contact); else it is no contact"
             )
+        if doubt := rest_doubt(self.rests):
+            self.notes.append(doubt)
         first = self.presses[0]
         plan = plan_of(self.mapping.name, [imported.press for imported in self.presses])
         document = {

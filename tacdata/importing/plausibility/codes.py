@@ -37,6 +37,10 @@ class CodePolicy:
     """Largest share of codes in a column [1]; above it they are the signal."""
     rare: float = 0.01
     """Largest share of numbers far from all others that are called spikes [1]."""
+    tight: float = 3.0
+    """Largest ratio of numbers of one size [1]."""
+    power: float = 0.1
+    """Largest distance of the logarithm of a ratio from a power of ten [1]."""
     stays: int = 3
     """Longest run of rows of a code that is no usual one [rows]."""
 
@@ -72,6 +76,11 @@ def without_codes(
     if clipped.any():
         doubts.append(_counted(values, clipped, name, "are the largest that its converter has, and so no readings"))
     missing = codes | clipped
+    if (stays := _constant(np.where(missing, np.nan, values), policy)).any():
+        doubts.append(_counted(values, stays, name, "stay far from all others", "they count as measured"))
+    if (shifted := _shifted(np.where(missing, np.nan, values), policy)).any():
+        words = "are ten, a hundred or a thousand times the others among which they stand"
+        doubts.append(_counted(values, shifted, name, words, "was a decimal sign lost?"))
     if (spikes := _spikes(np.where(missing, np.nan, values), policy)).any():
         doubts.append(_counted(values, spikes, name, "lie far from all others", "they count as measured"))
     return (np.where(missing, np.nan, values) if missing.any() else values), tuple(doubts)
@@ -123,6 +132,44 @@ def _isolated(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
             else:
                 edge = value
     return codes if codes.mean() <= policy.share else np.zeros_like(codes)
+
+
+def _constant(values: np.ndarray, policy: CodePolicy) -> np.ndarray:
+    """Return which numbers repeat exactly for long and lie apart from all others, as of a cable that came off."""
+    constant = np.zeros(values.shape, dtype=bool)
+    for number, column in enumerate(values.T):
+        distinct = np.unique(column[np.isfinite(column)])
+        if len(distinct) <= policy.levels:
+            continue
+        for value, others in ((distinct[0], distinct[1:]), (distinct[-1], distinct[:-1])):
+            hits = column == value
+            away = max(others[0] - value, value - others[-1])
+            if away > policy.unusual_apart * np.ptp(others) and hits.mean() <= policy.share:
+                constant[:, number] |= hits & (_longest(hits) > policy.stays)
+    return constant
+
+
+def _shifted(values: np.ndarray, policy: CodePolicy) -> np.ndarray:
+    """Return which numbers are a power of ten times those before and behind them, shape (rows, k), bool.
+
+    A program that took decimal points for signs between thousands leaves such columns.
+    """
+    shifted = np.zeros(values.shape, dtype=bool)
+    for number, column in enumerate(values.T):
+        sizes = np.abs(column[np.isfinite(column) & (column != 0)])
+        if len(np.unique(sizes)) <= policy.levels:
+            continue
+        ordered = np.sort(sizes)
+        cut = int(np.argmax(ordered[1:] / ordered[:-1]))
+        low, high = ordered[: cut + 1], ordered[cut + 1 :]
+        power = np.log10(np.median(high) / np.median(low))
+        large = np.abs(column) >= high[0]
+        fewer = large if len(high) <= len(low) else ~large
+        tight = high[-1] < policy.tight * high[0] and low[-1] < policy.tight * low[0]
+        whole = power > 0.5 and abs(power - np.rint(power)) < policy.power
+        if tight and whole and len(fewer) > 1 and fewer.sum() >= policy.run and _longest(fewer) <= policy.stays:
+            shifted[:, number] = large
+    return shifted
 
 
 def _spikes(values: np.ndarray, policy: CodePolicy) -> np.ndarray:

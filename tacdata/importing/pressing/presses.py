@@ -12,10 +12,12 @@ import numpy as np
 
 from tacdata.errors import FormatError
 from tacdata.importing.mapping import Mapping, PositionEntry, TrialRule
+from tacdata.importing.pressing.clock_lag import lag_doubts
 from tacdata.importing.pressing.foreign_sensor import foreign_sensor
 from tacdata.importing.pressing.known_values import known_numbers, label_of
 from tacdata.importing.pressing.path_faults import without_faults
 from tacdata.importing.pressing.press_path import PressPath, press_path
+from tacdata.importing.pressing.reading_faults import reading_doubts
 from tacdata.importing.pressing.schedule import ScheduledPress, read_schedule
 from tacdata.importing.pressing.trials import windows
 from tacdata.importing.recording_file import ImportedPress
@@ -119,8 +121,9 @@ def _of_stretch(trial: _Trial, streams: ImportedStreams, record: dict[str, Any])
         return
     if mapping.position is None or not mapping.position.trusted:
         streams = without_faults(streams)
-    record = {**record, "set_aside": list(streams.doubts), "notes": [*streams.notes, *streams.doubts]}
     place, unsaid = _registration(trial, streams)
+    doubts = (*streams.doubts, *_doubts(mapping, streams, place))
+    record = {**record, "set_aside": list(doubts), "notes": [*streams.notes, *doubts]}
     cuts = _cuts(mapping.trials, streams, scheduled, place)
     for number, (begin, end, planned) in enumerate(cuts):
         label = (record["trial"] + (f" #{number}" if len(cuts) > 1 else "")).strip()
@@ -132,6 +135,24 @@ def _of_stretch(trial: _Trial, streams: ImportedStreams, record: dict[str, Any])
             yield _imported(trial, part, place, planned, unsaid, {**record, "trial": label})
         except FormatError as error:
             yield Refusal(label, error)
+
+
+def _doubts(mapping: Mapping, streams: ImportedStreams, place: Registration) -> tuple[str, ...]:
+    """Return doubts that need readings and position together, as sentences."""
+    taxels, position, entry = streams.taxels, streams.position, mapping.position
+    if position is None or entry is None or min(len(taxels.time_ns), len(position.time_ns)) < FEWEST:
+        return ()
+    doubts = () if mapping.taxels.trusted else _reading_doubts(streams, place)
+    if (entry.file, entry.clock.column) != (mapping.taxels.file, mapping.taxels.clock.column):
+        doubts += lag_doubts(taxels, position)
+    return doubts
+
+
+def _reading_doubts(streams: ImportedStreams, place: Registration) -> tuple[str, ...]:
+    position, taxels = streams.position, streams.taxels
+    if position is None:
+        return ()
+    return reading_doubts(taxels, position.time_ns, place.to_sensor(position.values)[:, 2])
 
 
 def _check_rows(streams: ImportedStreams, trial: str) -> None:
@@ -176,7 +197,7 @@ def _imported(
             f"presses of at most {limit:g} mm",
             "say the unit of the position's columns in the mapping (unit: um, m, inch), or correct contact",
         )
-    for doubt in filter(None, (restarted, _path_doubt(taxels, position, tip[:, 2]))):
+    for doubt in filter(None, (restarted, _path_doubt(taxels, position, tip[:, 2]), _cut_doubt(tip[:, 2]))):
         record = {**record, "set_aside": [*record["set_aside"], doubt], "notes": [*record["notes"], doubt]}
     indenter, name = from_document(mapping.indenter or NO_INDENTER, "indenter"), "unknown"
     if mapping.indenter:
@@ -217,6 +238,8 @@ def _imported(
 def _path_doubt(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
     """Return a doubt about the zero or the unit of a path that the readings follow, above the skin or hardly moved."""
     stroke = float(np.ptp(depth))
+    if depth.max() > DEEPEST:
+        return f"position: it reaches {depth.max():.4g} mm deep: is its unit another?"
     if stroke <= 0 or (depth.max() > 0 and stroke >= LEAST):
         return ""
     at = np.interp(taxels.time_ns, position.time_ns, depth)
@@ -233,6 +256,21 @@ def _path_doubt(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
         f"position: it stays {abs(depth.max()):.4g} mm above the skin, and the readings follow it: correct its zero "
         "(contact, offset, or zero under the position) or its sign (scale: -1)"
     )
+
+
+def _cut_doubt(depth: np.ndarray) -> str:
+    """Return a doubt about a press of which only the way back was recorded, or only the way in."""
+    stroke = float(np.ptp(depth))
+    deep = depth > depth.min() + 0.5 * stroke
+    ways_in = int((deep[1:] & ~deep[:-1]).sum())
+    ways_back = int((deep[:-1] & ~deep[1:]).sum())
+    if stroke < LEAST or depth.max() <= 0:
+        return ""
+    if deep[0] and not ways_in:
+        return "position: it begins deep in the skin: is the way in part of another file or trial? (join: continued)"
+    if deep[-1] and not ways_back:
+        return "position: it ends deep in the skin: is the way back part of another file or trial? (join: continued)"
+    return ""
 
 
 def _remarks(taxels: Stream, planned: ScheduledPress | None, path: PressPath, lost: int) -> list[str]:
