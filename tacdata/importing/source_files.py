@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -48,8 +49,9 @@ class SourceFile:
             table = side_by_side(parts, labels, clock)
         else:
             table = joined(parts, clock if entry.join == "continued" else None)
-        if isinstance(clock, str) and entry.clock and entry.clock.rate is None and clock in table.columns:
-            table = without_copies(table, clock)
+        if clock is not None and not isinstance(clock, list) and entry.clock and entry.clock.rate is None:
+            with suppress(FormatError):  # a clock that is not there is named where times are read
+                table = without_copies(table, single(table, clock, where))
         return with_derived(table, entry.derived, where)
 
 

@@ -70,9 +70,10 @@ def reading_doubts(
         )
     if limits:
         name, value, rows = limits[0]
+        channels = f"{len(limits)} channel{'s saturate' if len(limits) > 1 else ' saturates'}"
         doubts.append(
-            f"taxels: {len(limits)} channel{'s' * (len(limits) > 1)} saturate: {name} stays at {value:.6g} for {rows} "
-            "rows while the indenter moves; such readings count as measured"
+            f"taxels: {channels}: {name} stays at {value:.6g} for {rows} rows while the indenter moves; such readings "
+            "count as measured"
         )
     return tuple(doubts)
 

@@ -61,7 +61,7 @@ def rest_doubt(levels: list[RestLevel], policy: RestPolicy = POLICY) -> str:
         return ""
     changes = np.abs(np.diff([level.rest for level in levels], axis=0))
     answer = np.median([level.answer for level in levels], axis=0)
-    usual = np.median(changes, axis=0) if len(changes) > 2 else np.zeros(len(answer))
+    usual = np.median(changes, axis=0) if len(changes) > 2 else changes.min(axis=0) * (len(changes) > 1)
     large = (changes > policy.change * answer) & (changes > policy.faster * usual) & (answer > 0)
     if not large.any():
         return ""
