@@ -40,7 +40,7 @@ def judged(out, name, seed):
     from tacdata.discrepancy.data.recordings import course_of
     from tacdata.discrepancy.judge import judge
     from tacdata.discrepancy.model.spec import read_spec
-    from tacdata.discrepancy.verdict.text import in_text
+    from tacdata.discrepancy.report.text import in_text
 
     folder = out / f"{name}-{seed}"
     shutil.rmtree(folder, ignore_errors=True)

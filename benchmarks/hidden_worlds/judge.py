@@ -57,17 +57,14 @@ def course_of(data):
     )
 
 
-def setting_of(folder, course, without=(), **switches):
+def setting_of(folder, course, without=()):
     """Return the setting that the engine is to judge.
 
     Args:
         folder: The world's.
         course: Its recordings.
         without: Mechanisms that are taken out of the library.
-        **switches: Of the engine's setting, where it has them.
     """
-    from dataclasses import fields
-
     from tacdata.chain.table_response import TableResponse
     from tacdata.discrepancy.model.fitted_response import FittedResponse
     from tacdata.discrepancy.model.setting import Setting
@@ -79,10 +76,7 @@ def setting_of(folder, course, without=(), **switches):
         quiet = course.reduced.tip[:, 2] <= 0
         table = TableResponse.read(folder / "table.npz")
         response = table.idling_at(np.median(course.reduced.readings[quiet], axis=0))
-    missing = set(switches) - {f.name for f in fields(Setting)}
-    if missing:
-        raise SystemExit(f"this engine has no switch {', '.join(sorted(missing))}")
-    return Setting(course, response, [e for e in library() if e.called not in without], **switches)
+    return Setting(course, response, [e for e in library() if e.called not in without])
 
 
 def spec_of(folder):
@@ -96,28 +90,17 @@ def spec_of(folder):
     return Spec({"version": version, "name": "nominal", "parent": None, "response": response, "effects": []}, folder)
 
 
-def answered(folder, without=(), **switches):
+def answered(folder, without=()):
     """Return the verdict's document, the model's prediction before and after correction, and CPU seconds."""
     from tacdata.chain import predict
-    from tacdata.discrepancy.data.checks import check
     from tacdata.discrepancy.judge import judge
-    from tacdata.discrepancy.search.find import find
-    from tacdata.discrepancy.verdict.decide import decide
-    from tacdata.discrepancy.verdict.document import document
-    from tacdata.discrepancy.verdict.residual_slices import slices
 
     course = course_of(dict(np.load(folder / "recordings.npz")))
     begin = time.process_time()
-    if switches:
-        setting = setting_of(folder, course, without, **switches)
-        found, checks = find(setting), check(setting)
-        answer = document(decide(found, checks), found, checks, (slices(found.problem), slices(found.final)), {})
-    else:
-        verdict = judge(course, spec_of(folder), without=tuple(without))
-        found, answer = verdict.found, verdict.document
+    verdict = judge(course, spec_of(folder), without=tuple(without))
     seconds = time.process_time() - begin
-    after = predict(course, found.final.setting.response, list(found.final.placed))
-    before = predict(course, found.problem.setting.response, [])
+    fits = verdict.conclusion.before, verdict.conclusion.after
+    before, after = (predict(course, fit.response, list(fit.placed)) for fit in fits)
     rows = course.read
     said = {
         "time": course.time[rows],
@@ -127,7 +110,7 @@ def answered(folder, without=(), **switches):
         "pose": after.pose[rows].astype(np.float32),
         "nominal": before.pose[rows].astype(np.float32),
     }
-    return answer, said, seconds
+    return verdict.document, said, seconds
 
 
 def main(folder, options):

@@ -117,7 +117,7 @@ def chosen(words=None):
     parser.add_argument("--name", nargs="*", default=[], help="only cases whose names hold one of these")
     parser.add_argument("--label", default="workflow", help="folder of the verdicts below OUT/verdicts")
     parser.add_argument("--method", default="workflow", help="workflow, or a baseline")
-    parser.add_argument("--options", default="{}", help="JSON: switches of the engine's setting")
+    parser.add_argument("--options", default="{}", help="JSON: options of the judge")
     parser.add_argument("--without-truth", action="store_true", help="take what is true out of the library")
     parser.add_argument("--engine", type=Path, default=REPOSITORY, help="folder that holds the package to judge with")
     parser.add_argument("--show", action="store_true", help="print what was hidden beside what was found")

@@ -7,19 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from tacdata.chain import Course
-from tacdata.discrepancy.alarms.all_alarms import alarms
-from tacdata.discrepancy.data.checks import DataChecks, check
-from tacdata.discrepancy.levels.lack_of_fit import lack_of_fit, with_families
-from tacdata.discrepancy.levels.margins import beside_remainder
-from tacdata.discrepancy.levels.several_names import form_error
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
-from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.search.findings import STEPS, Findings
-from tacdata.discrepancy.verdict.decide import Decision, adequate, answer_of, decide
-from tacdata.discrepancy.verdict.document import document
-from tacdata.discrepancy.verdict.residual_slices import Slice, slices
-from tacdata.discrepancy.verdict.sealed import chosen, gap, without_readings
+from tacdata.discrepancy.report.conclusion import Conclusion, Step
+from tacdata.discrepancy.report.document import document
+from tacdata.discrepancy.report.judgement import concluded, open_course
+from tacdata.discrepancy.report.residual_slices import Slice, slices
 from tacdata.effects import library
 
 
@@ -29,14 +22,10 @@ class Verdict:
 
     document: dict[str, Any]
     """As in the file (`schemas/verdict.schema.json`)."""
-    checks: DataChecks
-    """Checks of the recordings' information."""
-    found: Findings
-    """Findings of the search."""
-    decision: Decision
-    """Decision on them."""
+    conclusion: Conclusion
+    """What it states, and the evidence."""
     before: list[Slice]
-    """Where the residual lives, in the episodes that were not sealed; empty where the gate was the last step."""
+    """Residual by slices of the presses that were not sealed; empty where the gate was the last step."""
     after: list[Slice]
     """The same with the effects in place."""
 
@@ -47,20 +36,16 @@ def judge(
     note: Callable[[str], None] = lambda text: None,
     parents: dict[str, str] | None = None,
     without: tuple[str, ...] = (),
-    until: str = "decide",
-    correct_p: bool = True,
+    until: Step = Step.DECIDE,
 ) -> Verdict:
     """Judge recordings: which effect does the model lack?
 
-    1. Seal some episodes: the search does not use their readings.
+    1. Seal some presses: the search does not use their readings.
     2. Check the data: wiring, units, gaps.
-    3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
-    4. Compare the answer with the saturated model of each family: does another law explain more?
-    5. Test the residual for patterns outside the library: alarms.
-    6. Open the sealed episodes: how much smaller is their gap?
-    7. Decide: named (all of it, or some with a remainder left), ambiguous, unknown or none. Sealed episodes can take a
-       name away; they never give one.
-    8. Write it all down.
+    3. Compute the posterior over sets of effects (`tacdata.discrepancy.posterior`).
+    4. Test the residual for patterns outside the library: alarms.
+    5. Open the sealed presses: they can take a name away, and never give one.
+    6. Conclude: named, incomplete, ambiguous, unknown or none. Write it all down.
 
     Args:
         course: The recordings.
@@ -68,31 +53,21 @@ def judge(
         note: Called with each step.
         parents: Name to content hash of the judged files.
         without: Mechanisms that are not tried.
-        until: The last step to make (`tacdata.discrepancy.search.findings.STEPS`).
-        correct_p: Whether p-values are corrected for the number of effects tried.
+        until: The last step to make.
 
     Raises:
         FormatError: If recordings and spec do not fit together.
     """
-    sealed = chosen(course)
-    setting = _setting(without_readings(course, sealed), spec, without, correct_p)
-    checks = check(setting)
-    found = find(setting, note, until)
-    lacking = lack_of_fit(found.final) if found.effects and until == STEPS[-1] else {}
-    found = with_families(found, lacking)
-    beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
-    note("the gap on sealed presses")
-    shown = gap(course, found, sealed)
-    seen = alarms(found.final, form_error(found)) if until == STEPS[-1] else ()
-    decision = decide(found, checks, beside, shown, lacking, seen)
-    before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))
-    written = document(decision, found, checks, (before, after), parents or {}, shown)
-    return Verdict(written, checks, found, decision, before, after)
+    opened = open_course(course)
+    conclusion = concluded(course, _setting(opened, spec, without), note, until=until)
+    fits = [fit for fit in (conclusion.before, conclusion.after) if fit is not None and until != Step.GATE]
+    before, after = (slices(fit.problem) for fit in fits) if fits else ([], [])
+    return Verdict(document(conclusion, opened, (before, after), parents or {}), conclusion, before, after)
 
 
-def _setting(course: Course, spec: Spec, without: tuple[str, ...], correct_p: bool) -> Setting:
+def _setting(course: Course, spec: Spec, without: tuple[str, ...]) -> Setting:
     """Return the setting of a judgement: all effects are tried that the model has not."""
     response, given = spec.response(course), spec.effects()
     left_out = {p.effect.called for p in given} | set(without)
     effects = [e for e in library() if e.called not in left_out]
-    return Setting(course, response, effects, spec.nuisance, given, correct_p)
+    return Setting(course, response, effects, spec.nuisance, given)

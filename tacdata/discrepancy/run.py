@@ -14,12 +14,12 @@ from tacdata.discrepancy.heading import Heading
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.page.verdict_page import verdict_page
-from tacdata.discrepancy.search.findings import STEPS
-from tacdata.discrepancy.verdict import residual_table
-from tacdata.discrepancy.verdict.before_and_after import beside_model
-from tacdata.discrepancy.verdict.picture import draw
-from tacdata.discrepancy.verdict.sealed import chosen
-from tacdata.discrepancy.verdict.text import in_text
+from tacdata.discrepancy.report import residual_table
+from tacdata.discrepancy.report.before_and_after import beside_model
+from tacdata.discrepancy.report.conclusion import Status, Step
+from tacdata.discrepancy.report.picture import draw
+from tacdata.discrepancy.report.sealed_gap import chosen
+from tacdata.discrepancy.report.text import in_text
 from tacdata.errors import UsageError
 
 VERDICT, TEXT, PICTURE, PAGE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "verdict.html", "spec.json"
@@ -45,7 +45,7 @@ def run(
         spec: The model.
         out: Folder to create.
         note: Called with each step.
-        until: The last step to make (`tacdata.discrepancy.search.findings.STEPS`).
+        until: The last step to make (`tacdata.discrepancy.report.conclusion.Step`).
 
     Raises:
         UsageError: If ``out`` exists, or there is nothing to read.
@@ -53,15 +53,16 @@ def run(
     """
     if out.exists():
         raise UsageError(f"{out} exists", "a new folder", "choose another --out")
-    if until not in STEPS:
-        raise UsageError(f"step {until!r}", ", ".join(STEPS), "choose one of them for --stop-after")
+    if until not in list(Step):
+        raise UsageError(f"step {until!r}", ", ".join(Step), "choose one of them for --stop-after")
     note("reading")
     course = course_of(paths)
     counts = Counter(path.name for path in paths)
     names = [path.name if counts[path.name] == 1 else str(path) for path in paths]
     hashes = {f"recording {name}": recording_hash(path) for name, path in zip(names, paths, strict=True)}
     parents = {"spec": spec.content_hash, **hashes}
-    verdict = judge(course, spec, note, parents, until=until)
+    verdict = judge(course, spec, note, parents, until=Step(until))
+    conclusion = verdict.conclusion
     heading = Heading.of(paths, out)
     following = [heading.filled(words) for words in verdict.document["next"]]
     document = verdict.document | {"heading": heading.document(), "next": following}
@@ -69,14 +70,14 @@ def run(
     documents.write(out / VERDICT, document, "verdict")
     text = in_text(document)
     documents.write_text(out / TEXT, text)
-    draw(verdict.found, verdict.before, verdict.after, document, out / PICTURE)
-    residuals = beside_model(course, verdict.found, chosen(course))
+    draw(conclusion, verdict.before, verdict.after, document, out / PICTURE)
+    residuals = beside_model(course, (conclusion.before, conclusion.after), chosen(course))
     residual_table.write(out / residual_table.FILE, residuals, provenance.content_hash(document))
     documents.write_text(out / PAGE, verdict_page(document, residuals))
-    if verdict.decision.status == "named":
-        effects = [e.finding for e in verdict.decision.effects]
-        revised = spec.with_effects([f.placed for f in effects], [f.error for f in effects], VERDICT)
-        documents.write(out / SPEC, revised, "model_spec")
+    if conclusion.status is Status.NAMED:
+        placed = [e.placed for e in conclusion.effects]
+        errors = [{n: float(v.error.max()) for n, v in e.estimates.items()} for e in conclusion.effects]
+        documents.write(out / SPEC, spec.with_effects(placed, errors, VERDICT), "model_spec")
     return Written(document, text, out)
 
 

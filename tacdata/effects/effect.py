@@ -267,10 +267,6 @@ class Effect(ABC):
         """Return the delay of the readings [s]; 0 for most effects."""
         return 0.0
 
-    def nested(self, values: Values) -> Placed | None:
-        """Return the nested model with its values; None for most effects."""
-        return None
-
     def thickness_factor(self, values: Values) -> float:
         """Return the skin's thickness over the nominal thickness [1]; 1 for most effects."""
         return 1.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tacdata.chain.memory import delayed
-from tacdata.effects.effect import AtRest, Effect, Family, Parameter, Placed, State, Values
+from tacdata.effects.effect import AtRest, Effect, Family, Parameter, State, Values
 
 LONG = 0.25
 """Longest delay of a sensor [s]; longer ones are errors of clocks."""
@@ -70,9 +70,6 @@ class LatencyEitherWay(Latency):
 
     def delay(self, values: Values) -> float:
         return 0.5 * float(values["L_in"] + values["L_out"])
-
-    def nested(self, values: Values) -> Placed:
-        return Placed(Latency(), {"L": np.asarray(self.delay(values))})
 
     def remark(self, values: Values) -> str:
         onset, recovery = (float(values[name]) for name in ("L_in", "L_out"))

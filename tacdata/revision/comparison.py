@@ -12,8 +12,8 @@ from tacdata.chain import Course, Response, predict
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.model.spec import Spec
 from tacdata.discrepancy.noise.null_model import NullModel, null_model
+from tacdata.discrepancy.report.sealed_gap import without_readings
 from tacdata.discrepancy.search.gauss_newton import Refined, corrected, refine
-from tacdata.discrepancy.verdict.sealed import without_readings
 from tacdata.effects import Placed
 from tacdata.revision.episodes import part
 
@@ -129,7 +129,6 @@ def _frame_of(null: NullModel, course: Course, rows: np.ndarray, episodes: np.nd
         null.ridge,
         null.beside[rows],
         null.noise.of(rows, episodes),
-        null.folds,
         sizes=null.sizes,
         spread=null.spread,
     )

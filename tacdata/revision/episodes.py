@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.verdict.sealed import DEEPER, chosen
+from tacdata.discrepancy.report.sealed_gap import DEEPER, chosen
 
 SHARE = 0.25
 """Share of the episodes that is sealed if the verdict sealed none [1]."""

@@ -13,8 +13,8 @@ from tacdata import documents
 from tacdata.discrepancy.data.recordings import _of_one_sensor, _to_the_end
 from tacdata.discrepancy.data.strokes import strokes
 from tacdata.discrepancy.model.spec import read_spec
+from tacdata.discrepancy.report.residual_table import read
 from tacdata.discrepancy.run import run
-from tacdata.discrepancy.verdict.residual_table import read
 from tacdata.errors import FormatError, UsageError
 from tacdata.importing.imported_session import import_session
 from tacdata.recording import Episode

@@ -53,13 +53,13 @@ def cycles(softened, seed=0, sets=3, count=6, touch=0.006):
 @pytest.mark.parametrize(("softened", "status"), [(0.08, "named"), (0.0, "none")])
 def test_softening_is_named_in_cycles_of_growing_depth(softened, status):
     answer = judged(effects=(*FEW, "softening", "softening_of_depth", "wear_in"), made=cycles(softened))
-    assert answer.decision.status == status
+    assert answer.status == status
     assert answer.names == ({"softening"} if softened else set())
 
 
 def test_without_its_form_small_softening_is_missed():
     """Why the form is there: the other one's sharpness is one for all depths."""
-    assert judged(effects=(*FEW, "softening", "wear_in"), made=cycles(0.08)).decision.status != "named"
+    assert judged(effects=(*FEW, "softening", "wear_in"), made=cycles(0.08)).status != "named"
 
 
 def test_a_skin_softens_alike_below_any_depth_that_it_knows():

@@ -5,11 +5,9 @@ import pytest
 
 from tacdata.chain import Course, Tool
 from tacdata.chain.rows import rows_of
-from tacdata.discrepancy.data.checks import check
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.verdict.decide import decide
+from tacdata.discrepancy.report.judgement import concluded
 from tacdata.effects import load
 
 STEP = 0.005
@@ -62,10 +60,9 @@ FRICTION = ("dry_friction", "bouc_wen", "proportional_hysteresis", "hysteresis",
 def judged(made, few=(*FRICTION, "relaxation", "viscosity", "latency")):
     """Return which mechanisms are named, and the answer with its numbers."""
     setting = Setting(made, FittedResponse(made), [load(name) for name in few])
-    found = find(setting)
-    decision = decide(found, check(setting))
-    named = {e.finding.placed.effect.called for e in decision.effects if e.status == "named"}
-    return named, {f.placed.effect.name: f.placed.values for f in found.effects}
+    conclusion = concluded(made, setting)
+    named = {e.placed.effect.called for e in conclusion.named}
+    return named, {e.placed.effect.name: e.placed.values for e in conclusion.effects}
 
 
 def test_the_friction_of_a_seal_is_named_and_its_width_measured():
@@ -94,6 +91,7 @@ def test_friction_inside_the_skin_whose_equation_ends_before_the_loops_do_is_not
     """Loops of a seal open at once: the shortest way that the other's equation knows is too long."""
     made = strokes(seal=0.05)
     setting = Setting(made, FittedResponse(made), [load("bouc_wen")])
-    found = find(setting)
-    assert [f.at_bound for f in found.effects] == [("w",)]
-    assert not [e for e in decide(found, check(setting)).effects if e.status == "named"]
+    conclusion = concluded(made, setting)
+    (one,) = conclusion.effects
+    assert one.estimates["w"].at_bound
+    assert not conclusion.named

@@ -11,8 +11,6 @@ from test_effects_conform import Springs, pressed
 
 import tacdata.effects
 from tacdata.chain import predict
-from tacdata.discrepancy.data.checks import DataChecks
-from tacdata.discrepancy.data.identifiability import lookalikes
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
@@ -20,14 +18,11 @@ from tacdata.discrepancy.noise.nuisances import pose_errors
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.regressors.candidates import build
 from tacdata.discrepancy.regressors.model_error import model_errors
-from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.search.j_test import j_statistic
+from tacdata.discrepancy.report.calibration import calibration_error, gains_beyond_calibration
+from tacdata.discrepancy.report.conclusion import Named
+from tacdata.discrepancy.report.document import document
+from tacdata.discrepancy.report.judgement import concluded
 from tacdata.discrepancy.search.problem import prepare
-from tacdata.discrepancy.search.rivals import RIVAL_Z, required_margin
-from tacdata.discrepancy.verdict.calibration import calibration_error, gains_beyond_calibration
-from tacdata.discrepancy.verdict.decide import decide
-from tacdata.discrepancy.verdict.document import document
 from tacdata.effects import Placed, library, load
 from tacdata.example.shipped import SESSION
 from tacdata.recording import read_episode, read_session
@@ -113,56 +108,25 @@ def read_with(effect, size, rates):
     return replace(course, readings=truth + rng.normal(size=truth.shape)), response
 
 
-def test_a_new_file_is_raced_and_named(newcomer):
+def test_a_new_file_is_tried_and_named(newcomer):
     remark = "def remark(self, values): return 'look at the clocks'"
     effect = newcomer("at_rest = AtRest.CATCHES_UP", remark, unit="s")
     assert effect.name in {e.name for e in library()}
     course, response = read_with(effect, 0.1, (0.5, 2.0))
-    found = find(Setting(course, response, [effect, load("backlash"), load("drift")]))
-    decision = decide(found, DataChecks(course.episodes))
-    assert [e.finding.placed.effect.name for e in decision.effects] == ["newcomer"]
-    assert decision.status == "named" and not decision.effects[0].finding.rivals
-    assert "look at the clocks" in document(decision, found, DataChecks(course.episodes), ([], []), {})["remarks"]
+    conclusion = concluded(course, Setting(course, response, [effect, load("backlash"), load("drift")]))
+    assert [e.placed.effect.name for e in conclusion.effects] == ["newcomer"]
+    assert conclusion.status == "named" and not conclusion.effects[0].alternatives
+    assert "look at the clocks" in document(conclusion, course, ([], []), {})["remarks"]
 
 
 @pytest.mark.parametrize("mechanism", ["low_pass_filter", ""])
 def test_another_form_of_a_mechanism_is_no_rival_of_it(newcomer, mechanism):
     effect = newcomer(f'mechanism = "{mechanism}"', unit="s")
     course, response = read_with(load("low_pass_filter"), 0.1, (0.5, 2.0))
-    found = find(Setting(course, response, [effect, load("low_pass_filter")]))
-    (decided,) = decide(found, DataChecks(course.episodes)).effects
-    named = {decided.finding.placed.effect.called, *decided.finding.rivals}
+    conclusion = concluded(course, Setting(course, response, [effect, load("low_pass_filter")]))
+    (one,) = conclusion.effects
+    named = {one.placed.effect.called, *one.alternatives}
     assert named == ({"low_pass_filter"} if mechanism else {"low_pass_filter", "newcomer"})
-
-
-def test_one_that_needs_two_rates_is_not_split_by_one(newcomer):
-    effect = newcomer("at_rest = AtRest.CATCHES_UP", unit="s")
-    course, response = read_with(effect, 0.1, (1.0,))
-    others = lookalikes(course, effect, {"k": 0.1})
-    assert "latency" in others and not {"backlash", "newcomer"} & set(others), "in a hold it catches up"
-    assert {"latency", "backlash"} <= set(lookalikes(course, effect, {"k": 2.0})), "it does not in a short one"
-    assert "newcomer" in lookalikes(course, load("latency"), {}), "nor are the others from it"
-    decision = decide(find(Setting(course, response, [effect])), DataChecks(course.episodes))
-    assert decision.status == "ambiguous" and "latency" in decision.effects[0].finding.rivals
-    assert lookalikes(read_with(effect, 0.1, (0.5, 2.0))[0], effect, {"k": 0.1}) == ()
-
-
-def test_one_without_a_trait_is_split_by_any_presses(newcomer):
-    effect = newcomer()
-    course, _ = read_with(effect, 0.1, (1.0,))
-    assert lookalikes(course, effect, {"k": 0.1}) == ()
-    assert "newcomer" not in lookalikes(course, load("latency"), {})
-
-
-@pytest.mark.parametrize(("grows", "other"), [("PRESSES", "gain_drift"), ("TIME", "softening")])
-def test_evenly_spaced_presses_do_not_tell_growth_by_presses_from_growth_by_time(newcomer, grows, other):
-    effect = newcomer(f"grows_with = Growth.{grows}")
-    even = read_with(effect, 0.1, (1.0,))[0]
-    first, begins = np.flatnonzero(even.first), 50.0 * np.arange(even.episodes)
-    even = replace(even, time=even.time - even.time[first][even.episode] + begins[even.episode])
-    assert lookalikes(even, effect, {}) == (other,)
-    rested = replace(even, time=even.time + 2000.0 * (even.episode >= 8))
-    assert lookalikes(rested, effect, {}) == ()
 
 
 def test_one_that_equals_a_gain_without_a_force_reading_is_refused_then(newcomer):
@@ -183,49 +147,21 @@ def test_one_that_resembles_a_gain_is_its_rival_without_a_force_reading(newcomer
         setting = SimpleNamespace(
             nuisance=prior, channel_gain=load("channel_gain"), course=SimpleNamespace(force=force)
         )
-        found = SimpleNamespace(
-            gains=np.full(24, 0.2), halves=np.full((2, 24), 0.2), problem=SimpleNamespace(setting=setting)
-        )
-        (gain,) = gains_beyond_calibration(found)
-        assert gain.placed.effect.name == "gain" and gain.rivals == rivals
+        (gain,) = gains_beyond_calibration(setting, np.full(24, 0.2), np.full((2, 24), 0.2))
+        assert gain.placed.effect.name == "gain" and gain.alternatives == rivals
 
 
 @pytest.mark.parametrize(("size", "known"), [(0.004, True), (0.06, False)])
 def test_the_scale_of_an_observer_is_known_as_well_as_it_is_calibrated(newcomer, size, known):
     effect = newcomer("scale = Scale.OBSERVER")
-    found = FoundEffect(Placed(effect, {"k": np.array(size)}), {}, (), (), {}, 9.0)
-    assert calibration_error(found) == known
-    drive = FoundEffect(Placed(load("travel_scale"), {"k": np.array(size)}), {}, (), ("newcomer",), {}, 9.0)
-    assert calibration_error(drive) == known
-    assert not calibration_error(replace(drive, rivals=())), "the drive alone has no calibrated observer"
 
+    def found(name, *alternatives):
+        placed = Placed(name, {"k": np.array(size)})
+        return Named(placed, 0, 0.9, 0.9, 0.9, None, alternatives)
 
-@pytest.mark.parametrize("clock", [True, False])
-def test_one_that_follows_the_clock_is_held_against_others_that_do(newcomer, clock):
-    effect, asked = newcomer(f"follows_clock = {clock}"), []
-
-    class Priors:
-        def get(self, kind):
-            asked.append(kind)
-
-    def model(residual, *placed):
-        episode = np.repeat(np.arange(12), 10)
-        return SimpleNamespace(
-            left=residual,
-            episode=episode,
-            place=episode // 4,
-            placed=placed,
-            freedom=0.0,
-            projected_draws=still,
-            energy=0.5 * np.bincount(episode, np.square(residual).sum(axis=1)),
-            knobs=[],
-            loss=0.5 * float(np.square(residual).sum()),
-        )
-
-    rng, still = np.random.default_rng(0), np.zeros((120, 1, 2))
-    noise = rng.normal(size=(120, 1))
-    j_statistic(model(noise, SimpleNamespace(effect=effect)), model(noise + 0.5), Priors())
-    assert asked == [clock]
+    assert calibration_error(found(effect)) == known
+    assert calibration_error(found(load("travel_scale"), "newcomer")) == known
+    assert not calibration_error(found(load("travel_scale"))), "the drive alone has no calibrated observer"
 
 
 def own_errors():
@@ -296,10 +232,3 @@ def test_an_equation_may_be_as_wrong_as_it_says(newcomer, traits, wrong):
     placed = [Placed(newcomer(*traits), {"k": np.array(0.1)})]
     columns = model_errors(pressed(), Springs(), placed).values
     assert columns.shape[2] > 0 and np.any(columns) == wrong
-
-
-def test_one_that_is_rare_has_to_be_farther_ahead(newcomer):
-    effect, usual = newcomer("odds = 0.1"), load("latency")
-    assert required_margin(effect, usual) == pytest.approx(np.sqrt(RIVAL_Z**2 + 2 * np.log(10)))
-    assert required_margin(usual, usual) == pytest.approx(RIVAL_Z)
-    assert required_margin(usual, effect) < RIVAL_Z

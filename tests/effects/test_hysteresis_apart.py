@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from tacdata.chain import Course, Tool, predict
-from tacdata.discrepancy.data.checks import check
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.response_splines import taken_up
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.verdict.decide import decide
+from tacdata.discrepancy.report.judgement import concluded
 from tacdata.effects import Placed, load
 
 FEW = (
@@ -71,8 +69,7 @@ def foam(share=0.2, seed=0, episodes=12):
 
 def named(made):
     setting = Setting(made, FittedResponse(made), [load(name) for name in FEW])
-    told = decide(find(setting), check(setting)).effects
-    return {e.finding.placed.effect.called: e.finding.placed for e in told if e.status == "named"}
+    return {e.placed.effect.called: e.placed for e in concluded(made, setting).named}
 
 
 def test_a_foams_friction_is_named_and_readings_stay_high():

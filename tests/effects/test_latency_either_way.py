@@ -46,6 +46,3 @@ def test_equal_times_are_the_plain_delay():
     assert load("latency_either_way").delay(values) == pytest.approx(0.2)
     assert "0.10 s late while load rises and 0.30 s" in load("latency_either_way").remark(values)
     assert load("latency_either_way").remark({"L_in": np.array(0.1), "L_out": np.array(0.2)}) == ""
-    nested = load("latency_either_way").nested(values)
-    assert nested is not None and nested.effect.name == "latency" and nested.values["L"] == pytest.approx(0.2)
-    assert load("latency").nested({"L": np.array(0.2)}) is None

@@ -56,15 +56,16 @@ def verdict(folder, effect, values, status="named", alternatives=(), session=Non
         "effect": effect,
         "title": kind.title,
         "stage": kind.stage,
+        "family": kind.family.value,
+        "level": None if status == "unknown" or alternatives else "mechanism",
+        "probability": {"family": 0.99, "mechanism": 0.99, "form": 0.99},
         "moves": list(kind.moves),
         "status": "suspected" if status == "unknown" else "ambiguous" if alternatives else "named",
         "alternatives": list(alternatives),
         "parameters": {
             n: {"value": v, "unit": "u", "error": 0.01, "interval": [v - 0.02, v + 0.02]} for n, v in values.items()
         },
-        "margins": {},
-        "necessity": 9.0,
-        "at_bound": [],
+        "rivals": {},
         "experiment": kind.experiment,
     }
     document = {
@@ -72,8 +73,16 @@ def verdict(folder, effect, values, status="named", alternatives=(), session=Non
         "status": status,
         "why": "made up for a test",
         "effects": [entry],
-        "gate": {"gap": True, "p": 0.001, "p_generic": 0.001, "noise": [0.1, 0.1], "memory": 0.0},
-        "left": {"share": 0.0, "t": 0.0, "before": 9.0, "after": 1.0, "floor": 1.0},
+        "posterior": {
+            "nothing": 0.001,
+            "remainder": 0.02,
+            "mechanisms": {kind.called: 0.99},
+            "families": {},
+            "sets": [],
+            "policy": {"named": 0.95},
+            "policy_hash": "0",
+        },
+        "gap": {"seen": True, "before": 9.0, "after": 1.0, "floor": 1.0, "noise": [0.1, 0.1], "memory": 0.0},
         "located": [],
         "unjudgeable": {},
         "limits": {},

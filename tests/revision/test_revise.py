@@ -9,7 +9,7 @@ from revised_bench import verdict
 
 from tacdata import documents
 from tacdata.discrepancy.model.spec import read_spec
-from tacdata.discrepancy.verdict.document import REVISE
+from tacdata.discrepancy.report.document import REVISE
 from tacdata.errors import UsageError
 from tacdata.revision.revise import RevisionOptions, revise
 

@@ -23,7 +23,7 @@ class VerdictKind(Kind):
     def scene(self, path: Path, options: Asked) -> Scene:
         """Return it as text and bars, with readings and model before and after."""
         from tacdata import documents
-        from tacdata.discrepancy.verdict.residual_table import read
+        from tacdata.discrepancy.report.residual_table import read
         from tacdata.viewers.parts.residual_curves import residual_curves
         from tacdata.viewers.scenes.verdict import verdict_scene
 

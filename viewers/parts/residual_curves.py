@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tacdata.discrepancy.verdict.residual_table import Residuals
+from tacdata.discrepancy.report.residual_table import Residuals
 from tacdata.viewers.scene.scene import Curves
 from tacdata.viewers.scene.thinning import extremes
 

@@ -8,17 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.effects import load
 from tacdata.viewers.scene.scene import Bars, Curves, Page, Scene
 
-GATE = 0.01
-"""p-value at or below which a gap counts as one (`tacdata.discrepancy`)."""
 WIDE = 20.0
 """Ratio from which bars are drawn on a logarithmic axis."""
-SURELY = 2.33
-"""Standard errors by which a name must be better than another (`tacdata.discrepancy`)."""
-RIVALS = 3
-"""Rivals that are listed, the nearest first."""
+MECHANISMS = 12
+"""Mechanisms that have a bar, the most probable first."""
 
 
 def verdict_scene(
@@ -33,7 +28,7 @@ def verdict_scene(
         curves: Readings and model before and after, if they exist.
     """
     words = verdict_words(title, verdict, picture.name if picture else None)
-    bars = (*_left(verdict), *_slices(verdict), *_margins(verdict), *_limits(verdict))
+    bars = (*_gap(verdict), *_probabilities(verdict), *_slices(verdict), *_limits(verdict))
     scene = _scene(f"{title}: {verdict['status']}", words, bars, curves)
     if picture is None:
         return scene
@@ -76,23 +71,6 @@ def _scene(title: str, words: str, bars: tuple[Bars, ...], curves: tuple[Curves,
     return Scene(title, words, time, np.arange(len(time)), curves=curves, bars=bars, kind="verdict")
 
 
-def _distinguished(effect: dict[str, Any]) -> list[str]:
-    """Return the nearest rivals by these recordings' own margins; the experiment only where a rival is open."""
-    margins = sorted(effect.get("margins", {}).items(), key=lambda item: item[1])
-    open_to = {*effect["alternatives"], effect["mechanism"]}
-    nearest: dict[str, float] = {}
-    for name, by in margins:
-        if load(name).called not in open_to:
-            nearest.setdefault(load(name).called, by)  # of several forms of a mechanism the nearest
-    excluded = [f"{name} by {by:.1f}" for name, by in nearest.items() if by > 0][:RIVALS]
-    lines = []
-    if excluded:
-        lines.append(f"- distinguished in these recordings from: {', '.join(excluded)} standard errors")
-    if effect["alternatives"]:
-        lines.append(f"- an experiment that would distinguish them: {effect['experiment']}")
-    return lines
-
-
 def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> str:
     """Return the verdict as Markdown: the conclusion, the evidence, the next step."""
     lines = [f"# {title}: {verdict['status']}", "", verdict["why"] + ".", ""]
@@ -107,14 +85,14 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
             lines.append(f"- {name} = {value_text}{spread}" + (f" {p['unit']}" if p["unit"] != "1" else ""))
         if effect["alternatives"]:
             lines.append(f"- could also be: {', '.join(effect['alternatives'])}")
-        lines += _distinguished(effect)
-        if effect.get("confidence") is not None:
-            lines.append(f"- probability that the name is right: {effect['confidence']:.0%}")
-    gate, remainder = verdict["gate"], verdict["left"]
-    share = f" **Left** {remainder['share']:.1%} of what could be explained." if verdict["effects"] else ""
+            lines.append(f"- an experiment that would distinguish them: {effect['experiment']}")
+        share = effect["probability"]["family" if effect.get("level") == "family" else "mechanism"]
+        lines.append(f"- probability: {share:.1%}")
+    posterior = verdict["posterior"]
     lines += [
         "",
-        f"**Gap** p = {gate['p']:.3g} ({'a gap' if gate['gap'] else 'no gap'}; {GATE:g} or less is one).{share}",
+        f"**Probability** that nothing is missing {posterior['nothing']:.1%}, that something without a name is there "
+        f"{posterior['remainder']:.1%}.",
         "",
     ]
     for heading, items in (
@@ -131,11 +109,28 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
     return "\n".join(lines)
 
 
-def _left(verdict: dict[str, Any]) -> list[Bars]:
-    names, remainder = ("before", "after", "noise floor"), verdict["left"]
-    values = np.array([remainder["before"], remainder["after"], remainder["floor"]], float)
+def _gap(verdict: dict[str, Any]) -> list[Bars]:
+    gap = verdict["gap"]
+    if "after" not in gap:
+        return []
+    names = ("before", "after", "noise floor")
+    values = np.array([gap["before"], gap["after"], gap["floor"]], float)
     wide = values[0] > WIDE * min(values[1:])
     return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0, bool(wide))]
+
+
+def _probabilities(verdict: dict[str, Any]) -> list[Bars]:
+    """Return the probability of each mechanism, and of a remainder."""
+    posterior = verdict["posterior"]
+    shares = {"no effect of the library": posterior["remainder"]}
+    shares |= dict(list(posterior["mechanisms"].items())[:MECHANISMS])
+    named = posterior["policy"].get("named", 1.0)
+    values = np.array(list(shares.values()), float)
+    return [
+        Bars(
+            "probabilities", "Probability that it is missing; the line is that of a name", tuple(shares), values, named
+        )
+    ]
 
 
 def _slices(verdict: dict[str, Any]) -> list[Bars]:
@@ -147,24 +142,6 @@ def _slices(verdict: dict[str, Any]) -> list[Bars]:
     values = np.array([s[when] for s in entries for when in ("before", "after")], float)
     title = "Where it lives: mean square over the noise; 1 is the floor"
     return [Bars("slices", title, names, values, 1.0, bool(values.max() > WIDE * max(values.min(), 1e-9)))]
-
-
-def _margins(verdict: dict[str, Any]) -> list[Bars]:
-    charts = []
-    for effect in verdict["effects"]:
-        if effect["margins"]:
-            rivals = sorted(effect["margins"].items(), key=lambda pair: pair[1])
-            title = f"{effect['mechanism']}: by how many standard errors better than"
-            charts.append(
-                Bars(
-                    f"margins/{effect['effect']}",
-                    title,
-                    tuple(n for n, _ in rivals),
-                    np.array([v for _, v in rivals], float),
-                    SURELY,
-                )
-            )
-    return charts
 
 
 def _limits(verdict: dict[str, Any]) -> list[Bars]:

@@ -91,11 +91,11 @@ def parameters(truth, verdict):
 
 
 def confidences(truth, verdict, accepted):
-    """Return the confidence of every name given and whether it is right; nothing where none is given."""
+    """Return the probability of every mechanism that is named, and whether it is right."""
     made = []
     for m in verdict["effects"]:
-        given = m.get("confidence", verdict.get("confidence"))
-        if isinstance(given, int | float):
+        given = m.get("probability", {}).get("mechanism")
+        if given is not None and m["status"] == "named" and m.get("level") != "family":
             made.append((float(given), any(m["mechanism"] in accepted(h) for h in truth["effects"])))
     return made
 

@@ -12,8 +12,11 @@ from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.whitener import whiten
 from tacdata.discrepancy.search.fits import fitted
 from tacdata.discrepancy.search.problem import Problem
-from tacdata.discrepancy.search.score_tests import SPLINE_ERROR, TABLE_ERROR
 
+TABLE_ERROR = 0.0002
+"""A part of a smaller share of the rise may be interpolation error of a table [1]."""
+SPLINE_ERROR = 0.0005
+"""The same for a fitted response, whose slope and bends are inexact [1]."""
 MOST_CLUSTERS = 200
 """Of more presses, successive ones are taken together."""
 
@@ -46,7 +49,7 @@ class Cleaned:
         whitener = null.whitener_for(setting, placed)
         residual = whitener.whitened(problem.board.columns[0][:, :, None])[:, :, 0]
         if len(problem.nuisances):
-            _, values = fitted(problem, [], np.arange(len(problem.folds)))
+            values = fitted(problem, [])
             residual = residual - null.nuisances @ values[-len(problem.nuisances) :].astype(np.float32)
         channels, noise, streams = course.channels, null.noise, Streams.of(course)
         rise = streams.rise(predict(course, setting.response, placed), setting.response)[:, :channels]

@@ -24,10 +24,6 @@ LINGERS = 4.0
 """A tip at rest stays in the band so many times as long as one that presses takes through it [1]."""
 DEEP = 0.3
 """Hold: deeper than this share of the stroke [1]."""
-STOP = 0.4
-"""A stop of a staircase is no shorter [s]."""
-STAIRS = 3
-"""A staircase stops so often on its way in, and on its way out, below its top [1]."""
 
 
 def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
@@ -73,15 +69,6 @@ def _speed(time: np.ndarray, depth: np.ndarray, low: float, spacing: float) -> f
     return float((levels[1] - levels[0]) / np.median(took)) if len(took) else np.nan
 
 
-def pressing_time(course: Course) -> float:
-    """Return how long a press takes from contact to its top, as the median [s]; 0 where none touches."""
-    loading, _ = speeds(course)
-    deepest = [float(course.tip[course.episode == e, 2].max()) for e in range(course.episodes)]
-    ways = np.array([way for way in deepest if way > TOUCHING * course.span])
-    took = ways / loading
-    return float(np.nanmedian(took)) if np.isfinite(took).any() else 0.0
-
-
 def longest_hold(course: Course) -> float:
     """Return the longest time that the tip rests at depth [s].
 
@@ -98,38 +85,6 @@ def longest_hold(course: Course) -> float:
     pressed = np.concatenate(speeds(course))
     usual = float(np.nanmedian(pressed)) if np.isfinite(pressed).any() else 0.0
     return longest if usual <= 0 or longest > LINGERS * band / usual else 0.0
-
-
-def stairs(course: Course) -> bool:
-    """Return whether most presses stop at several depths on the way in, and on the way out.
-
-    A lagging reading catches up at a stop; friction and play do not.
-    """
-    band = STILL * course.stroke + SWAY * course.dither
-    count, pressed = 0, 0
-    for e in range(course.episodes):
-        rows = np.flatnonzero(course.episode == e)
-        time, depth = course.time[rows], course.tip[rows, 2]
-        if not len(rows) or depth.max() <= TOUCHING * course.span:
-            continue
-        between = (depth > DEEP / 3 * course.span) & (depth < depth.max() - 2 * band)
-        top = int(np.argmax(depth))
-        ways = between & (np.arange(len(rows)) < top), between & (np.arange(len(rows)) > top)
-        pressed += 1
-        count += all(_stops(time[way], depth[way], band) >= STAIRS for way in ways)
-    return 2 * count > pressed
-
-
-def _stops(time: np.ndarray, depth: np.ndarray, band: float) -> int:
-    """Return how often a depth stays within a band for as long as a stop."""
-    number, begin = 0, 0
-    while begin < len(depth):
-        outside = np.flatnonzero(np.abs(depth[begin:] - depth[begin]) > band)
-        end = begin + int(outside[0]) if len(outside) else len(depth)
-        stops = time[end - 1] - time[begin] >= STOP
-        number += bool(stops)
-        begin = end if stops else begin + 1
-    return number
 
 
 def _within(time: np.ndarray, depth: np.ndarray, band: float) -> float:

@@ -24,8 +24,6 @@ class Setting:
     """Effect -> prior standard deviation, for a response that is not fitted."""
     given: tuple[Placed, ...] = ()
     """Effects that the model has already, with their numbers fixed."""
-    correct_p: bool = True
-    """Whether p-values are corrected for the number of effects tried; without, each is tested alone (an ablation)."""
 
     @property
     def channel_gain(self) -> Effect | None:

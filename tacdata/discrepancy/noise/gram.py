@@ -12,13 +12,12 @@ Every later fit, fold, bootstrap and flip of sign is a small matrix problem in t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.statistics.gram_fit import Beside
 
 
 @dataclass(frozen=True)
@@ -29,22 +28,6 @@ class EpisodeGrams:
     """Products of whitened columns [1], shape (episodes, 1 + columns, 1 + columns); entry 0 is the residual."""
     rows: np.ndarray
     """Whitened values behind each episode [1], shape (episodes,)."""
-    _sums: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
-    _beside: dict[tuple[bytes, ...], Beside] = field(default_factory=dict, repr=False, compare=False)
-
-    def of(self, episodes: np.ndarray) -> np.ndarray:
-        """Return the summed Gram matrix of some episodes."""
-        key = np.asarray(episodes).tobytes()
-        if key not in self._sums:
-            self._sums[key] = self.gram[episodes].sum(axis=0)
-        return self._sums[key]
-
-    def beside(self, columns: np.ndarray, ridge: np.ndarray, episodes: np.ndarray) -> Beside:
-        """Return the same given columns that are free of bounds, fitted to some episodes."""
-        key = (columns.tobytes(), ridge.tobytes(), np.asarray(episodes).tobytes())
-        if key not in self._beside:
-            self._beside[key] = Beside(self.gram, self.of(episodes), columns, ridge)
-        return self._beside[key]
 
 
 def episode_grams(

@@ -20,13 +20,10 @@ from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.nuisances import nuisance_columns, pose_errors
 from tacdata.discrepancy.noise.whitener import Whitener
 from tacdata.discrepancy.regressors.generic import generic, slow
-from tacdata.discrepancy.statistics.gram_fit import fold_of
 from tacdata.effects import Placed
 
 LEAST_GAIN_ERROR = 0.003
 """Least standard deviation of a stream's gain in an episode: no response is exact [1]."""
-NOISE_DRAWS = 2
-"""Draws of noise by which the J test estimates how two models differ by noise alone."""
 ROUNDS = 3
 """Most alternations between estimates of pose errors and of gain errors..."""
 SETTLED = 0.1
@@ -55,14 +52,12 @@ class NullModel:
     """Their Gram matrices [1], shape (episodes, nuisances, nuisances)."""
     noise: Noise
     """Noise as an over-rich fit leaves it."""
-    folds: np.ndarray
-    """Fold of each episode, shape (episodes,), int64."""
     whitener: Whitener
     """Takes nuisances out of columns, for the model as it was given."""
     odd: np.ndarray
     """Episodes that err by far more than the others, shape (k,), int64."""
-    draws: np.ndarray
-    """White noise, drawn [noise scales], shape (m, streams, draws)."""
+    reduced: Course
+    """The rows read."""
     sizes: np.ndarray | None = None
     """Of errors of pose, over their priors [1], shape (kinds,); None: as their priors."""
     spread: float = 0.0
@@ -78,15 +73,12 @@ class NullModel:
         ridge: np.ndarray,
         beside: np.ndarray,
         noise: Noise,
-        folds: np.ndarray,
         known: Whitener | None = None,
         odd: np.ndarray | None = None,
         sizes: np.ndarray | None = None,
         spread: float = 0.0,
     ) -> NullModel:
         """Return the null model of the rows read, with its derived quantities."""
-        # A fixed seed: the same recordings must give the same verdict.
-        white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), NOISE_DRAWS))
         nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
         return cls(
             context,
@@ -97,10 +89,9 @@ class NullModel:
             nuisances,
             episode_grams(nuisances, reduced).gram,
             noise,
-            folds,
             known or Whitener(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
-            white,
+            reduced,
             sizes,
             spread,
         )
@@ -161,13 +152,10 @@ class NullModel:
         some = Whitener(fewer.reduced, noise.of(kept), context[kept], shared, errors[kept])
         return Whitener(reduced, noise, context, features, errors), some
 
-    def projected_draws(self, whitener: Whitener) -> np.ndarray:
-        """Return the cleaned draws [noise scales], shape (m, streams, draws), float32."""
-        return self._shaken if whitener is self.whitener else whitener.projected(self.draws)
-
     @cached_property
-    def _shaken(self) -> np.ndarray:
-        return self.whitener.projected(self.draws)
+    def beside_grams(self) -> np.ndarray:
+        """Gram matrices of `beside` [1], shape (episodes, k, k)."""
+        return episode_grams(self.beside, self.reduced).gram
 
 
 def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> np.ndarray:
@@ -231,7 +219,6 @@ def null_model(setting: Setting) -> NullModel:
         before = now
     whitener = Whitener(reduced, known, context, features, errors)
     beside = whitener.whitened(every[:, :, : extra.shape[2] + rich.shape[2]])
-    folds = fold_of(course.episodes)
     return NullModel.of(
         reduced,
         context,
@@ -240,7 +227,6 @@ def null_model(setting: Setting) -> NullModel:
         ridge,
         beside,
         known,
-        folds,
         whitener,
         own.odd,
         own.sizes,

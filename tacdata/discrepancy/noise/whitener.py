@@ -247,12 +247,15 @@ class Whitener:
             result[place.rows] = own.swapaxes(0, 1)
         return result
 
-    def episode_grams(self, columns: np.ndarray, beside: np.ndarray | None = None) -> EpisodeGrams:
-        """Reduce columns to `Evidence`.
+    def episode_grams(
+        self, columns: np.ndarray, beside: np.ndarray | None = None, inner: np.ndarray | None = None
+    ) -> EpisodeGrams:
+        """Reduce columns to a Gram matrix an episode.
 
         Args:
             columns: Residual first, then effects, shape (n, streams, 1 + columns).
             beside: Further columns, cleaned before, shape (n, streams, more).
+            inner: Their own Gram matrices, where these are known, shape (episodes, more, more).
         """
         course = self._course
         width = columns.shape[2] + (0 if beside is None else beside.shape[2])
@@ -266,7 +269,7 @@ class Whitener:
                     other = _turned(beside[own]).reshape(len(flat), width - few)
                     both = flat.T @ other
                     gram[number, :few, few:], gram[number, few:, :few] = both, both.T
-                    gram[number, few:, few:] = other.T @ other
+                    gram[number, few:, few:] = other.T @ other if inner is None else inner[number]
         return EpisodeGrams(gram, rows)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.discrepancy.verdict.residual_table import Residuals
+from tacdata.discrepancy.report.residual_table import Residuals
 
 FEWEST = 30
 """Readings of a field of the map, at least."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tacdata.discrepancy.verdict.residual_table import Residuals
+from tacdata.discrepancy.report.residual_table import Residuals
 
 MOST_PRESSES = 24
 """Presses that are shown."""

@@ -12,13 +12,14 @@ from tacdata.discrepancy.heading import sentence, sizes
 from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.press_curves import PressCurves, largest_changes
 from tacdata.discrepancy.plain_number import plain_number
-from tacdata.discrepancy.verdict.residual_table import Residuals
-from tacdata.discrepancy.verdict.text import LEAST_CLOSED, between_specimens, unsaid
+from tacdata.discrepancy.report.residual_table import Residuals
+from tacdata.discrepancy.report.sentence import LEAST_CLOSED, percent
+from tacdata.discrepancy.report.text import between_specimens, unsaid
 from tacdata.effects import load
 from tacdata.pages import Band, Cell, HtmlPage, Items, PageHeader, Plot, Series, Shares, Slider, Table, Tiles
 
-MOST_RIVALS = 4
-"""Rivals of an effect that have a line, the nearest."""
+MOST_SETS = 8
+"""Sets of effects with a row, the most probable first."""
 REST = "left: a press's own pose and gain, and what has no name"
 PARTED = ("phase", "depth", "rate")
 """Kinds of slices shown before and after, next to the map."""
@@ -39,14 +40,10 @@ def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
     page.add("Presses, measured and predicted", _presses(verdict, found))
     page.add("The gap on sealed presses", _shares(verdict))
     page.add(
-        "Where the gap lives" if verdict["gate"]["gap"] else "Where the residual is largest", *_where(verdict, found)
+        "Where the gap lives" if verdict["gap"]["seen"] else "Where the residual is largest", *_where(verdict, found)
     )
-    for title, lines in (
-        ("In which order effects were added, and what each explains beyond the others", _path(verdict)),
-        ("Why not the others", _rivals(verdict)),
-        ("Of these recordings", unsaid(verdict)),
-    ):
-        page.add(title, _items(lines))
+    page.add("How probable each set of effects is", _sets(verdict))
+    page.add("Of these recordings", _items(unsaid(verdict)))
     for title, lines in _folded(verdict):
         page.add(title, _items(lines), folded=True)
     return page.text
@@ -79,8 +76,10 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
     data, sealed = verdict["data"], verdict["sealed"]
     tiles = [(str(data["episodes"]), "presses"), (str(data["channels"]), "channels")]
     for e in verdict["effects"]:
-        if e["status"] == "named" and e["confidence"] is not None:
-            tiles.append((f"{100 * e['confidence']:.0f} %", f"sure of {load(e['effect']).spoken}"))
+        if e["status"] == "named":
+            family = e["level"] == "family"
+            name = e["family"] if family else load(e["effect"]).spoken
+            tiles.append((percent(e["probability"]["family" if family else "mechanism"]), f"probability of {name}"))
     if sealed["episodes"] and verdict["effects"]:
         words = f"residual of {sealed['episodes']} sealed presses, mean square over the noise (1 is noise alone)"
         tiles.append((f"{plain_number(sealed['before'], 3)} → {plain_number(sealed['after'], 3)}", words))
@@ -175,38 +174,20 @@ def _square(value: float, most: float) -> Cell:
     return Cell(plain_number(value, 3), heat=float(np.clip(np.log(max(value, 1.0)) / np.log(most), 0, 1)))
 
 
-def _path(verdict: dict[str, Any]) -> list[str]:
-    lines = []
-    for step in verdict["path"]:
-        title, share = load(step["effect"]).title, step["share"]
-        told = "dropped, or replaced by another form" if share is None else f"{100 * share:.0f} %"
-        lines.append(f"{title}: {told}")
-    return lines
-
-
-def _rivals(verdict: dict[str, Any]) -> list[str]:
-    """Return one line a rival: why it is not the name, or why it may be."""
-    lines = []
-    for e in verdict["effects"]:
-        mine, near, least = load(e["effect"]).spoken, set(e["alternatives"]), {}
-        for name, by in sorted(e["margins"].items(), key=lambda item: item[1]):
-            least.setdefault(load(name).called, by)
-        for called, by in list(least.items())[:MOST_RIVALS]:
-            other = load(called).spoken
-            if called in e.get("unphysical", ()):
-                lines.append(f"not {other}: it would need an unphysical size")
-            elif called in near:
-                form = ", but another form of it may not" if by > 0 else ""
-                lines.append(f"{other} may stand in for {mine}: {_apart(by)}{form}")
-            else:
-                lines.append(f"not {other}: {_apart(by)} than {mine}")
-    return list(dict.fromkeys(lines))
-
-
-def _apart(by: float) -> str:
-    if by > 0:
-        return f"it explains the presses worse by {by:.1f} standard errors"
-    return f"it explains the presses better by {-by:.1f} standard errors" if by < 0 else "it explains them as well"
+def _sets(verdict: dict[str, Any]) -> Table | None:
+    """Return the sets of effects with their probabilities, and whether something without a name is beside them."""
+    posterior = verdict["posterior"]
+    rows = []
+    for one in posterior["sets"][:MOST_SETS]:
+        names = " and ".join(dict.fromkeys(load(name).spoken for name in one["effects"]))
+        rows.append([names or "no effect", percent(one["probability"]), f"{one['log_evidence']:.1f}"])
+    if not rows:
+        return None
+    title = (
+        f"something that no effect explains is there besides: {percent(posterior['remainder'])} probable; the verdict "
+        "leaves out effects that explain no more than another's equation may be off"
+    )
+    return Table(("set", "probability", "log-evidence over no effect"), rows, title)
 
 
 def _folded(verdict: dict[str, Any]) -> list[tuple[str, list[str]]]:

@@ -1,4 +1,4 @@
-"""Fits of candidates to the Gram matrices: to all episodes, to some, and to all but one fold."""
+"""Fits of candidates to the Gram matrices of all presses."""
 
 from __future__ import annotations
 
@@ -8,110 +8,36 @@ import numpy as np
 
 from tacdata.discrepancy.regressors.candidates import Candidate
 from tacdata.discrepancy.search.problem import Problem
-from tacdata.discrepancy.statistics.gram_fit import Beside
-
-INFORMED = 3.0
-"""A channel's gain is estimated if presses have so many times its prior's information [1]."""
+from tacdata.discrepancy.statistics.gram_fit import solve
 
 
-def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit some candidates, with nuisances and the placed effects, to some episodes.
-
-    Returns:
-        Columns (from 0) and their coefficients; the candidates' first.
-    """
-    free, beside = _beside(problem, episodes)
-    columns, values, rest = _bounded(problem, beside, chosen)
-    return np.concatenate([columns, free]), np.concatenate([values, rest])
+def fitted(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
+    """Return the coefficients of some candidates, then those of placed effects, model errors and nuisances."""
+    return _fit(problem, chosen)[0]
 
 
-def gained(
-    problem: Problem, chosen: Sequence[Candidate], train: np.ndarray, episodes: np.ndarray | None = None
-) -> np.ndarray:
-    """Return by how much such a fit lowers half the sum of squares of episodes, shape (episodes,).
-
-    Args:
-        problem: The problem.
-        chosen: Candidates.
-        train: Episodes that are fitted.
-        episodes: Those that are looked at; those that are fitted, unless given.
-    """
-    _, beside = _beside(problem, train)
-    columns, values, _ = _bounded(problem, beside, chosen)
-    return beside.gains(columns, values, train if episodes is None else episodes)
-
-
-def _beside(problem: Problem, episodes: np.ndarray) -> tuple[np.ndarray, Beside]:
-    """Return the columns without bounds, and the Gram matrices given them."""
-    free = np.concatenate([problem.model_errors, problem.nuisances]).astype(int)
-    ridge = np.concatenate([np.ones(len(problem.model_errors)), problem.ridge])
-    return free, problem.grams.beside(free, ridge, episodes)
-
-
-def _bounded(
-    problem: Problem, beside: Beside, chosen: Sequence[Candidate]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns of candidates and placed effects, their coefficients, and those of columns without bounds."""
-    moving, own = problem.tangent.columns, [c.columns for c in chosen]
-    columns = np.concatenate([*own, moving]).astype(int)
-    rooms = np.array([k.room(problem.placed) for k in problem.tangent.knobs]).reshape(-1, 2)
-    low = np.minimum(np.concatenate([*(c.low for c in chosen), rooms[:, 0]]), -1e-12)
-    high = np.maximum(np.concatenate([*(c.high for c in chosen), rooms[:, 1]]), 1e-12)
-    ridge = np.concatenate([np.full(len(columns) - len(moving), 1e-6), np.ones(len(moving))])
-    return columns, *beside.fit(columns, ridge, low, high)
-
-
-def held_out(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
-    """Return each episode's gain over the model as it is, fitted to the other folds, shape (episodes,)."""
-    result = np.zeros(len(problem.folds))
-    for fold in np.unique(problem.folds):
-        train, rest = np.flatnonzero(problem.folds != fold), np.flatnonzero(problem.folds == fold)
-        result[rest] = gained(problem, chosen, train, rest) - gained(problem, [], train, rest)
-    return result
-
-
-def best_shapes(problem: Problem, gains: Sequence[float] | None = None) -> dict[str, Candidate]:
-    """Return each effect's candidate with the largest gain in a fit with its bounds.
-
-    Args:
-        problem: The problem.
-        gains: `shape_gains`, where they are known.
-    """
+def best_shapes(problem: Problem) -> dict[str, Candidate]:
+    """Return each effect's candidate that lowers the sum of squares most, in a fit with its bounds."""
     best: dict[str, tuple[float, Candidate]] = {}
-    for candidate, gain in zip(problem.candidates, shape_gains(problem) if gains is None else gains, strict=True):
-        name = candidate.effect.name
+    for candidate in problem.candidates:
+        gain, name = _fit(problem, [candidate])[1], candidate.effect.name
         if name not in best or gain > best[name][0]:
             best[name] = gain, candidate
     return {name: candidate for name, (_, candidate) in best.items()}
 
 
-def shape_gains(problem: Problem) -> list[float]:
-    """Return by how much each candidate lowers half the sum of squares of all episodes, in a fit with its bounds."""
-    everything = np.arange(len(problem.folds))
-    return [float(gained(problem, [candidate], everything).sum()) for candidate in problem.candidates]
-
-
-def channel_gains(problem: Problem, among: np.ndarray | None = None) -> np.ndarray:
-    """Return each channel's gain beyond the response's, as calibration finds it [1], shape (channels,).
-
-    0 where the response is fitted; NaN for channels that these presses do not stir.
-
-    Args:
-        problem: With the nuisances of calibration.
-        among: Episodes that are used, all unless given.
-    """
-    channels, effect = problem.setting.course.channels, problem.setting.channel_gain
-    if effect is None:
-        return np.zeros(channels)
-    everything = np.arange(len(problem.folds)) if among is None else among
-    _, values = fitted(problem, [], everything)
-    first = len(problem.tangent.columns) + len(problem.model_errors)
-    own = values[first : first + channels] * effect.amplitudes[0].typical
-    information = np.diag(problem.grams.of(everything))[problem.nuisances[:channels] + 1]
-    return np.where(information > INFORMED * problem.ridge[:channels], own, np.nan)
-
-
-def gains_of_halves(problem: Problem) -> np.ndarray:
-    """Return the channels' gains in the first and the second half of the session [1], shape (2, channels)."""
-    halves = np.array_split(np.arange(len(problem.folds)), 2)
-    return np.stack([channel_gains(problem, half) for half in halves])
+def _fit(problem: Problem, chosen: Sequence[Candidate]) -> tuple[np.ndarray, float]:
+    """Return coefficients, and by how much they lower half the sum of squares [1]."""
+    moving, own = problem.tangent.columns, [c.columns for c in chosen]
+    rooms = np.array([k.room(problem.placed) for k in problem.tangent.knobs]).reshape(-1, 2)
+    fixed = len(problem.model_errors) + len(problem.nuisances)
+    free, count = np.full(fixed, np.inf), sum(map(len, own))
+    columns = np.concatenate([*own, moving, problem.model_errors, problem.nuisances]).astype(int)
+    low = np.concatenate([np.minimum(np.concatenate([*(c.low for c in chosen), rooms[:, 0]]), -1e-12), -free])
+    high = np.concatenate([np.maximum(np.concatenate([*(c.high for c in chosen), rooms[:, 1]]), 1e-12), free])
+    ridge = np.concatenate(
+        [np.full(count, 1e-6), np.ones(len(moving)), np.ones(len(problem.model_errors)), problem.ridge]
+    )
+    total = problem.grams.gram.sum(axis=0)
+    values, index = solve(total, columns, ridge, low, high), columns + 1
+    return values, float(total[0, index] @ values - 0.5 * values @ total[np.ix_(index, index)] @ values)

@@ -1,13 +1,11 @@
-"""Gauss-Newton refinement: a model's parameters at their optimum on the chain itself, with cluster-robust errors."""
+"""Gauss-Newton refinement: a model's parameters at their optimum on the chain itself."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
 
 from tacdata.chain import Chain, Course, Response, predict
 from tacdata.discrepancy.data.streams import Streams
@@ -17,7 +15,7 @@ from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.gram import EpisodeGrams, episode_grams
 from tacdata.discrepancy.noise.null_model import NullModel
 from tacdata.discrepancy.noise.whitener import Whitener
-from tacdata.discrepancy.regressors.tangent import Knob, knobs_of, tangents
+from tacdata.discrepancy.regressors.tangent import Knob, tangents
 from tacdata.discrepancy.statistics.gram_fit import solve
 from tacdata.effects import Placed
 
@@ -27,10 +25,6 @@ SMALL_GAIN = 0.2
 """Gauss-Newton: it ends when half the sum of squares falls by less [1]."""
 HOPELESS = 0.01
 """Gauss-Newton: a step is not tried if to first order half the sum of squares falls by less [1]."""
-KNOWN = 0.5
-"""A shape is known if its standard error is smaller [its value]."""
-LARGEST_LEVERAGE = 0.9
-"""CR3: largest leverage of an episode [1]."""
 CONVERGED = 1.1
 """A fitted response has converged if it leaves at most so much of the residual after its next correction [1]."""
 
@@ -41,74 +35,10 @@ class Refined:
 
     placed: tuple[Placed, ...]
     response: Response
-    knobs: list[Knob]
-    """Its numbers."""
     energy: np.ndarray
     """Half the whitened sum of squares of each episode, nuisances fitted [1], shape (episodes,)."""
-    left: np.ndarray
-    """Whitened residual without nuisances [noise scales], shape (m, streams), float32."""
-    episode: np.ndarray
-    """Of each of its rows, shape (m,), int64."""
-    place: np.ndarray
-    """Group of rows that share a response's features, shape (m,), int64."""
-    projected_draws: np.ndarray
-    """Its residual of the null model's draws of noise [noise scales], shape (m, streams, draws), float32."""
-    whitener: Whitener
-    """Cleaner of its nuisances, and its response's degrees of freedom."""
     freedom: float
     """Degrees of freedom that its response takes up [1]; another response has others where effects move the pose."""
-    ending: Callable[[], _State]
-    """Tells where it might go on from its optimum: dear, and asked of few models."""
-
-    @cached_property
-    def covariance(self) -> np.ndarray:
-        """Of the knobs [their steps], as episodes scatter; 1.645 standard errors hold 90 %, shape (knobs, knobs)."""
-        return self.ending().covariance
-
-    @property
-    def loss(self) -> float:
-        """Half the whitened sum of squares, with half the response's degrees of freedom [1]: as a log-likelihood."""
-        return float(self.energy.sum()) + 0.5 * self.freedom
-
-    @property
-    def half_bic(self) -> float:
-        """Half the Bayesian information criterion, with the episodes as the sample [1]."""
-        return self.loss + 0.5 * len(self.knobs) * float(np.log(max(len(self.energy), 2)))
-
-    def errors(self, at: int) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return the standard error of each parameter of one effect, in its unit, and the parameters at a bound."""
-        error: dict[str, float] = {}
-        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        for k, knob in enumerate(self.knobs):
-            if knob.at == at:
-                p, value = knob.parameter, knob.value(self.placed)
-                size = float(spread[k]) * (abs(value) if knob.shape else p.typical)
-                error[p.name] = max(error.get(p.name, 0.0), size)
-        return error, self.bounds(at)
-
-    def bounds(self, at: int) -> tuple[str, ...]:
-        """Return the parameters of one effect that are at a bound."""
-        bound = []
-        for knob in (k for k in self.knobs if k.at == at):
-            p, value = knob.parameter, knob.value(self.placed)
-            if not knob.shape and p.low < p.default and (value <= p.low * 0.999 or value >= p.high * 0.999):
-                bound.append(p.name)
-            elif value >= p.high * 0.999:
-                bound.append(p.name)
-        return tuple(bound)
-
-    def narrowest(self, at: int) -> tuple[str, ...]:
-        """Return the shapes of one effect within a standard error of their lower bound, and known: its form ends there.
-
-        One that is not known makes no difference below, as a time constant that is shorter than a reading lasts.
-        """
-        own = [(k, knob) for k, knob in enumerate(self.knobs) if knob.at == at and knob.shape]
-        error = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) if own else np.zeros(0)
-        return tuple(
-            knob.parameter.name
-            for k, knob in own
-            if error[k] < KNOWN and knob.value(self.placed) <= knob.parameter.low * (1.001 + error[k])
-        )
 
 
 def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: int = MOST_STEPS) -> Refined:
@@ -125,7 +55,7 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
     if isinstance(response, FittedResponse) and now:
         _correct(response, setting, now)
     view = _looked(setting, response, now, null)
-    begin, ended = (setting, response, now, view), None
+    begin = setting, response, now, view
     for _ in range(steps):
         state, best = _state(*begin, null), None
         for share in (1.0, 0.3):
@@ -144,28 +74,13 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
                 best = tried, there, fresh
                 break
         if best is None:
-            ended = state
             break
         gained = view.energy.sum() - best[0].energy.sum()
         view, now, response = best
         begin = replace(setting, response=response), response, now, view
         if gained < SMALL_GAIN:
             break
-    # A run of the chain is large, and most models are never asked.
-    later = partial(_state, *begin[:3], replace(view, chain=None), null)
-    return Refined(
-        tuple(now),
-        response,
-        knobs_of(now, setting.course.channels),
-        view.energy,
-        view.left,
-        setting.course.reduced.episode,
-        null.context,
-        null.projected_draws(view.whitener),
-        view.whitener,
-        view.whitener.freedom,
-        later if ended is None else lambda: ended,
-    )
+    return Refined(tuple(now), response, view.energy, view.whitener.freedom)
 
 
 def _own(response: Response) -> Response:
@@ -191,7 +106,6 @@ class _View:
     whitener: Whitener
     """Cleaner of its nuisances."""
     energy: np.ndarray
-    left: np.ndarray
     chain: Chain | None
     """The run that predicts it, where it is kept."""
 
@@ -204,17 +118,6 @@ class _State:
     move: np.ndarray
     fall: float
     """Of half the sum of squares by the move, to first order [1]."""
-    found: EpisodeGrams
-    """Of the residual, and the derivatives by knobs and nuisances."""
-    best: np.ndarray
-    """Coefficients of those."""
-    weight: np.ndarray
-    """Of their priors [1]."""
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """Of the knobs."""
-        return _covariance(self.found, self.best, self.weight, len(self.knobs))
 
 
 def _looked(setting: Setting, response: Response, placed: list[Placed], null: NullModel) -> _View:
@@ -227,9 +130,8 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
     clean = whitener.whitened(residual)
     found = episode_grams(clean, course.reduced, null.nuisances, null.inner)
     still = _without(found.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
-    left = clean[:, :, 0] - null.nuisances @ still.astype(np.float32)
     energy = _energy(found, still) + _unconverged(rest, course, response, whitener, null.noise.scale)
-    return _View(clean, whitener, energy, left, chain)
+    return _View(clean, whitener, energy, chain)
 
 
 def _unconverged(
@@ -262,7 +164,7 @@ def _state(setting: Setting, response: Response, placed: list[Placed], view: _Vi
     high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), free])
     best = solve(found.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
     fall = float(view.energy.sum() - _energy(found, best).sum()) if k else 0.0
-    return _State(moving.knobs, best[:k], fall, found, best, weight)
+    return _State(moving.knobs, best[:k], fall)
 
 
 def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
@@ -273,36 +175,6 @@ def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.nd
 def _energy(found: EpisodeGrams, values: np.ndarray) -> np.ndarray:
     whole = np.concatenate([[1.0], -values])
     return 0.5 * np.einsum("i,eij,j->e", whole, found.gram, whole)
-
-
-def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, knobs: int) -> np.ndarray:
-    """Return the covariance of the first ``knobs`` parameters: a cluster-robust sandwich over episodes.
-
-    Errors within an episode may depend on each other in any way. Each episode's score is that of a fit without it (CR3,
-    the jackknife: Bell & McCaffrey, Survey Methodology 28, 2002, 169). Few episodes estimate their scatter badly. So
-    errors are enlarged by the ratio of the t to the normal quantile, with the degrees of freedom that the episodes'
-    shares of the information leave: 1.645 of them hold 90 %.
-    """
-    if not knobs:
-        return np.zeros((0, 0))
-    total = found.gram.sum(axis=0)[1:, 1:] + np.diag(weight)
-    through = np.linalg.pinv(total[knobs:, knobs:], hermitian=True) @ total[knobs:, :knobs]
-    beside = np.concatenate([np.eye(knobs), -through])
-    scores = (found.gram[:, 1:, 0] - np.einsum("eij,j->ei", found.gram[:, 1:, 1:], values)) @ beside
-    each = beside.T @ found.gram[:, 1:, 1:] @ beside
-    size, vectors = np.linalg.eigh(beside.T @ total @ beside)
-    good = size > 1e-12 * max(float(size[-1]), 1e-300)
-    root = (vectors[:, good] / np.sqrt(size[good])) @ vectors[:, good].T
-    heavy, axes = np.linalg.eigh(root @ each @ root)
-    # A press with all the information on a parameter has leverage 1: the jackknife without it would divide by zero.
-    left = np.einsum("eji,ej->ei", axes, scores @ root) / (1 - np.minimum(heavy, LARGEST_LEVERAGE))
-    left = np.einsum("eij,ej->ei", axes, left)
-    count, inverse = len(scores), root @ root
-    share = np.maximum(np.einsum("ki,eij,kj->ek", inverse, each, inverse), 0.0)
-    share = share / np.maximum(share.sum(axis=0), 1e-300)
-    freedom = np.maximum(1 / np.maximum(np.sum(share**2, axis=0), 1e-12) - 1, 1.0)
-    wider = stdtrit(freedom, 0.95) / ndtri(0.95)
-    return root @ (left.T @ left) @ root * np.outer(wider, wider) * ((count - 1) / count if count > 1 else 1.0)
 
 
 def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed]) -> None:

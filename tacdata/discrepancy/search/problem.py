@@ -64,11 +64,6 @@ class Problem:
         """Return the weights of the priors of `fixed`; ``moving``: weight for the placed effects [1]."""
         return np.concatenate([self.ridge, np.full(len(self.tangent.columns), moving), np.ones(len(self.model_errors))])
 
-    @property
-    def folds(self) -> np.ndarray:
-        """Fold of each episode, shape (episodes,)."""
-        return self.null.folds
-
     def without(self, at: int) -> Problem:
         """Return the problem without one placed effect, to first order: the candidates' columns stay the same."""
         gram, own = self.grams.gram.copy(), int(self.parts[at]) + 1
@@ -121,7 +116,8 @@ def prepare(
     first = last + (numerics is not None)
     more = [moving.values, errors.values, errors.parts, *([] if numerics is None else [numerics])]
     values = side_by_side([*board.columns, *(column for each in more for column in apart(each))])
-    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, beside)
+    inner = null.beside_grams if tested else null.inner
+    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, beside, inner)
     second = first + len(null.ridge)
     nuisances, rich = np.arange(first, second), np.arange(second, first + beside.shape[2])
     board = replace(board, columns=board.columns[:1])

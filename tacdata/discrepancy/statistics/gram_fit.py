@@ -69,65 +69,6 @@ def bounded(matrix: np.ndarray, target: np.ndarray, low: np.ndarray, high: np.nd
     return x
 
 
-class Beside:
-    """Gram matrices given columns that are free of bounds: these are taken out once, and fits are of a few columns."""
-
-    def __init__(self, gram: np.ndarray, total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> None:
-        """Take them out.
-
-        Args:
-            gram: Of each episode, residual first, shape (episodes, 1 + p, 1 + p).
-            total: Of the episodes that are fitted, shape (1 + p, 1 + p).
-            columns: Those that are free, counted from 0 without the residual, shape (f,).
-            ridge: Weight of a zero-mean prior on each, shape (f,).
-        """
-        self._gram, self._index = gram, columns + 1
-        self._kept = np.setdiff1d(np.arange(len(total)), self._index)
-        self._at = np.searchsorted(self._kept, np.arange(len(total)))
-        matrix = total[np.ix_(self._index, self._index)] + np.diag(ridge)
-        self._trace = float(np.trace(matrix))
-        matrix = matrix + JITTER * np.eye(len(columns)) * max(self._trace / max(len(columns), 1), 1e-12)
-        self._through = np.linalg.solve(matrix, total[self._index])
-        self._rest = total - total[:, self._index] @ self._through
-        self._left: dict[bytes, np.ndarray] = {}
-
-    def fit(
-        self, columns: np.ndarray, ridge: np.ndarray, low: np.ndarray, high: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the coefficients of some columns as `solve` does, and those of the free ones."""
-        index = columns + 1
-        matrix = self._rest[np.ix_(index, index)] + np.diag(ridge)
-        # The mean over all columns, the free ones included: `solve` adds the same jitter to all of them at once.
-        mean = (float(np.trace(matrix)) + self._trace) / max(len(index) + len(self._index), 1)
-        matrix = matrix + JITTER * np.eye(len(index)) * max(mean, 1e-12)
-        values = bounded(matrix, self._rest[index, 0], low, np.maximum(high, low + 1e-12))
-        return values, self._through[:, 0] - self._through[:, index] @ values
-
-    def gains(self, columns: np.ndarray, values: np.ndarray, episodes: np.ndarray) -> np.ndarray:
-        """Return the decrease of half the sum of squares of episodes by coefficients and the free ones."""
-        key, index = np.asarray(episodes).tobytes(), self._at[columns + 1]
-        if key not in self._left:
-            self._left[key] = self._without(self._gram[episodes])
-        remainder = self._left[key]
-        linear = remainder[:, 0, :][:, index] @ values
-        square = np.einsum("i,eij,j->e", values, remainder[:, index[:, None], index], values)
-        return 0.5 * (self._gram[episodes, 0, 0] - remainder[:, 0, 0]) + linear - 0.5 * square
-
-    def _without(self, gram: np.ndarray) -> np.ndarray:
-        """Return Gram matrices of the other columns after projecting out the free ones."""
-        through = self._through[:, self._kept]
-        half = gram[:, :, self._kept] - gram[:, :, self._index] @ through
-        return half[:, self._kept] - through.T @ half[:, self._index]
-
-
-def gains(gram: np.ndarray, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return by how much coefficients lower half the whitened sum of squares of each episode, shape (episodes,)."""
-    index = columns + 1
-    linear = gram[:, 0, :][:, index] @ values
-    square = np.einsum("i,eij,j->e", values, gram[:, index][:, :, index], values)
-    return linear - 0.5 * square
-
-
 def fold_of(episodes: int, seed: int = 0) -> np.ndarray:
     """Return the fold of each episode, shape (episodes,): all folds of a size, shuffled."""
     folds = min(FOLDS, max(episodes, 1))
@@ -165,12 +106,3 @@ def t_value(values: np.ndarray) -> float:
     spread = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
     mean = float(np.mean(values)) if len(values) else 0.0
     return mean / (spread / np.sqrt(len(values))) if spread > 1e-12 else (0.0 if abs(mean) < 1e-12 else np.inf * mean)
-
-
-LARGEST_RATIO = 6.0
-"""Clipped t: largest log-likelihood ratio that one episode contributes [1]."""
-
-
-def clipped_t(values: np.ndarray) -> float:
-    """Return the mean over its standard error with every episode's contribution bounded."""
-    return t_value(np.clip(values, -LARGEST_RATIO, LARGEST_RATIO))

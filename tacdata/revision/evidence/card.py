@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tacdata.discrepancy.heading import sizes
-from tacdata.discrepancy.verdict.sealed import WIDEST
+from tacdata.discrepancy.report.sealed_gap import WIDEST
 from tacdata.pages import Band, HtmlPage, Items, PageHeader, Paragraph, Plot, Series, Slider, Table, Tiles
 from tacdata.revision.evidence.curves import EpisodeCurves
 from tacdata.revision.evidence.table import in_words
@@ -126,13 +126,12 @@ def _parameters(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
 def _rivals(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
     rows = []
     for e in answer:
-        for name, margin in sorted(e["margins"].items(), key=lambda item: item[1])[:6]:
-            verdict = "could stand in its place" if name in e["alternatives"] or margin < 2.33 else "ruled out"
-            rows.append((f"{name} instead of {e['effect']}", f"{margin:.1f}", verdict))
+        for name, share in list(e.get("rivals", {}).items())[:6]:
+            verdict = "could stand in its place" if name in e["alternatives"] else "improbable"
+            rows.append((f"{name} instead of {e['effect']}", f"{100 * share:.1f} %", verdict))
     listed = [f"{', '.join(e['alternatives'])} for {e['mechanism']}" for e in answer if e["alternatives"]]
-    heads = ("rival", "worse by, in standard errors over episodes", "")
     words = Paragraph(f"Not separable by these recordings: {'; '.join(listed)}.") if listed else None
-    page.add("What else it could be", Table(heads, rows) if rows else None, words)
+    page.add("What else it could be", Table(("rival", "probability", ""), rows) if rows else None, words)
 
 
 def _gap(page: HtmlPage, gap: dict[str, Any]) -> None:

@@ -103,7 +103,7 @@ def noise_of(verdict: dict[str, Any], comparison: Comparison) -> np.ndarray:
         verdict: The verdict's document.
         comparison: Recordings and model; their own noise is used if the verdict states none for these channels.
     """
-    stated = verdict.get("gate", {})
+    stated = verdict.get("gap", {})
     scale, memory = np.array(stated.get("noise", ()), dtype=float), float(stated.get("memory", 0.0))
     channels = comparison.course.channels
     if len(scale) < channels or not (scale[:channels] > 0).all():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.chain import Course
-from tacdata.discrepancy.verdict.residual_slices import PHASES, phases
+from tacdata.discrepancy.report.residual_slices import PHASES, phases
 from tacdata.revision.comparison import Comparison
 from tacdata.revision.evidence.gap import GapReduction, ResidualChange
 

@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.problem import prepare
-from tacdata.effects import Placed, library, load
+from tacdata.effects import Placed, library
 from tacdata.revision.additions import of_verdict, placed_of
 from tacdata.revision.comparison import Comparison
 
@@ -34,7 +32,7 @@ def rivals(
 ) -> list[Rival]:
     """Return the verdict's own answer, and the alternatives to its first undecided effect.
 
-    An answer without alternatives is compared with its nearest rivals: the next presses make it surer.
+    An answer without alternatives is compared with the most probable others: the next presses make it surer.
 
     Args:
         comparison: Recordings and model.
@@ -62,11 +60,10 @@ def rivals(
         comparison.setting.given,
     )
     bare = prepare(setting, comparison.null, remainder)
-    everything = np.arange(len(bare.folds))
     best: dict[str, Rival] = {}
     for candidate in best_shapes(bare).values():
         note(f"next presses: {candidate.effect.name} fitted")
-        _, values = fitted(bare, [candidate], everything)
+        values = fitted(bare, [candidate])
         first = candidate.placed(values[: len(candidate.columns)], comparison.course.channels)
         model = refine(setting, [*remainder, first], comparison.null)
         name = candidate.effect.called
@@ -76,6 +73,5 @@ def rivals(
 
 
 def _nearest(entry: dict[str, Any]) -> list[str]:
-    """Return the mechanisms of the rivals that fit an effect's place least badly."""
-    margins = sorted(entry.get("margins", {}).items(), key=lambda item: item[1])
-    return list(dict.fromkeys(load(name).called for name, _ in margins))[:NEAREST]
+    """Return the most probable mechanisms in an effect's place."""
+    return list(entry.get("rivals", {}))[:NEAREST]

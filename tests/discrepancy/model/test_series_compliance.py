@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from tacdata.chain.course import Course, Tool
-from tacdata.discrepancy.data.checks import check
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.series_compliance import series_compliance
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.verdict.decide import decide
-from tacdata.discrepancy.verdict.document import document
+from tacdata.discrepancy.report.document import document
+from tacdata.discrepancy.report.judgement import concluded
 from tacdata.effects import load
 
 MATERIALS = (0.25, 1.0, 6.5)
@@ -82,14 +80,13 @@ def test_nothing_is_told_where_specimens_do_not_show_it(made):
 def test_the_verdict_is_a_set_of_the_frame_and_a_law_of_each_material():
     def judged(made):
         setting = Setting(made, FittedResponse(made), [load("latency"), load("drift")])
-        found, checks = find(setting), check(setting)
-        decision = decide(found, checks)
-        return decision, document(decision, found, checks, ([], []), {})["remarks"]
+        conclusion = concluded(made, setting)
+        return conclusion, document(conclusion, made, ([], []), {})["remarks"]
 
     bent, remarks = judged(presses(0.035))
     assert any(words.startswith("if the frame gives way by 0.034") for words in remarks), remarks
     assert bent.status == "ambiguous"
     (one,) = bent.effects
-    assert (one.finding.placed.effect.called, one.finding.rivals) == ("frame_compliance", ("stiffening",))
+    assert (one.placed.effect.called, one.alternatives) == ("frame_compliance", ("stiffening",))
     straight, remarks = judged(presses(seed=1))
     assert straight.status == "none" and not any("frame gives way" in words for words in remarks)

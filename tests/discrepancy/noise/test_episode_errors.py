@@ -10,8 +10,7 @@ from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.nuisances import FITTED_GAIN_PRIOR, pose_errors
 from tacdata.discrepancy.noise.null_model import null_model
-from tacdata.discrepancy.search.problem import prepare
-from tacdata.discrepancy.search.score_tests import score_tests
+from tacdata.discrepancy.report.judgement import concluded
 from tacdata.effects import load
 
 CLOCKED = ("wear_in", "gain_drift", "thermal_growth", "lost_steps", "softening", "permanent_set")
@@ -45,8 +44,7 @@ def test_an_episodes_own_gain_and_depth_are_told(gain):
 def test_own_gains_are_no_effect():
     made = course(episodes=48)
     setting = set_of(scaled(made, 1 + 0.02 * np.random.default_rng(3).normal(size=48)))
-    tested = score_tests(prepare(setting, null_model(setting)))
-    assert tested.p.min() > 0.01 and tested.p_generic > 0.01
+    assert concluded(setting.course, setting).status == "none"
 
 
 def test_strokes_of_a_recording_share_its_set_up():
@@ -54,11 +52,11 @@ def test_strokes_of_a_recording_share_its_set_up():
     made = course(episodes=48)
     which = np.arange(48) // 12
     apart = scaled(made, np.array([1.0, 1.02, 1.04, 1.06])[which])
-    least = []
+    stated = []
     for recording in (None, which):
         setting = set_of(replace(apart, recording=recording))
-        least.append(score_tests(prepare(setting, null_model(setting))).p.min())
-    assert least[0] <= 0.01 < least[1]
+        stated.append(concluded(setting.course, setting).status)
+    assert stated[0] != "none" and stated[1] == "none"
 
 
 @pytest.mark.parametrize(("knots", "seen"), [(7, True), (None, False)])
@@ -68,5 +66,5 @@ def test_how_a_skin_is_first_touched_is_no_adhesion(knots, seen):
     depth = np.maximum(made.tip[:, 2:], 0.0)
     noise = 0.3 * np.random.default_rng(5).normal(size=made.readings.shape)
     setting = set_of(replace(made, readings=5000 + 800 * depth * [1.0, 0.5, 0.2] + noise), ("adhesion",), knots)
-    problem = prepare(setting, null_model(setting))
-    assert (score_tests(problem).z.max() > 3.0) == seen
+    conclusion = concluded(setting.course, setting)
+    assert (conclusion.mechanisms.get("adhesion", 0.0) > 0.5) == seen

@@ -7,11 +7,9 @@ import pytest
 from pressing import course
 
 from tacdata.chain.at_rest import told_at_rest
-from tacdata.discrepancy.data.checks import check
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
-from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.verdict.decide import decide
+from tacdata.discrepancy.report.judgement import concluded
 from tacdata.effects import load
 
 FEW = ("gain_drift_whole", "gain_drift", "settling_gain", "drift", "warm_up_drift", "permanent_set", "thermal_growth")
@@ -25,8 +23,7 @@ def at_rest(levels, seed=0):
 
 def named(made):
     setting = Setting(made, FittedResponse(made), [load(name) for name in FEW])
-    told = decide(find(setting), check(setting)).effects
-    return {e.finding.placed.effect.called: e.finding.placed for e in told if e.status == "named"}
+    return {e.placed.effect.called: e.placed for e in concluded(made, setting).named}
 
 
 def warmed(made, by, tau):

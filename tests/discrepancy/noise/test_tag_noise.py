@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from pressing import course
 
-from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
 from tacdata.discrepancy.noise.readings import beside_depth
-from tacdata.discrepancy.search.find import find
-from tacdata.discrepancy.verdict.decide import decide
+from tacdata.discrepancy.report.judgement import concluded
 from tacdata.effects import load
 
 SCALES = ("travel_scale", "view_scale")
@@ -35,8 +33,7 @@ def gauged(compliance, power=1.0, seed=0):
 
 def decided(made, effects):
     """Return what may be said of presses."""
-    found = find(Setting(made, FittedResponse(made), [load(name) for name in effects]))
-    return decide(found, DataChecks(made.episodes))
+    return concluded(made, Setting(made, FittedResponse(made), [load(name) for name in effects]))
 
 
 @pytest.mark.parametrize("compliance", [0.0, 0.1])
@@ -63,8 +60,8 @@ def test_compliance_that_a_gauge_sees_is_named_whatever_power_of_load_is_read(po
     answer = decided(made, effects)
     assert answer.status == "named"
     (effect,) = answer.effects
-    assert effect.finding.placed.effect.called == "frame_compliance"
-    assert float(effect.finding.placed.values["c"]) == pytest.approx(0.05, rel=0.1)
+    assert effect.placed.effect.called == "frame_compliance"
+    assert float(effect.placed.values["c"]) == pytest.approx(0.05, rel=0.1)
 
 
 @pytest.mark.parametrize("scale", [0.004, 0.06])
@@ -79,8 +76,8 @@ def test_a_gauges_scale_is_known_so_well_and_no_better(scale):
         return
     assert answer.status == "ambiguous"
     (effect,) = answer.effects
-    assert {effect.finding.placed.effect.called, *effect.finding.rivals} == {"view_scale", "travel_scale"}
-    (value,) = effect.finding.placed.values.values()
+    assert {effect.placed.effect.called, *effect.alternatives} == {"view_scale", "travel_scale"}
+    (value,) = effect.placed.values.values()
     assert float(value) == pytest.approx(scale, rel=0.05)
 
 
@@ -92,4 +89,4 @@ def test_compliance_is_named_beside_a_gauge_of_slightly_wrong_scale():
     effects = ("carriage_compliance", "carriage_compliance_read", *SCALES, "screw_error", "latency")
     answer = decided(replace(made, tag=seen), effects)
     assert answer.status == "named"
-    assert [e.finding.placed.effect.called for e in answer.effects] == ["frame_compliance"]
+    assert [e.placed.effect.called for e in answer.effects] == ["frame_compliance"]

@@ -14,9 +14,9 @@ from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.page.heat_map import heat_map
 from tacdata.discrepancy.page.press_curves import largest_changes
 from tacdata.discrepancy.page.verdict_page import TAKEN_OUT, verdict_page
-from tacdata.discrepancy.verdict.before_and_after import beside_model
-from tacdata.discrepancy.verdict.sealed import chosen
-from tacdata.discrepancy.verdict.text import in_text
+from tacdata.discrepancy.report.before_and_after import beside_model
+from tacdata.discrepancy.report.sealed_gap import chosen
+from tacdata.discrepancy.report.text import in_text
 from tacdata.effects import library, load
 
 FEW = ("latency", "relaxation", "backlash")
@@ -26,9 +26,9 @@ FEW = ("latency", "relaxation", "backlash")
 def judged(request):
     """A verdict and the readings beside its model."""
     made = course(episodes=24, **request.param)
-    others = tuple(e.called for e in library() if e.name not in FEW)
+    others = tuple(e.called for e in library() if e.called not in FEW)
     done = judge(made, read_spec(None), without=others)
-    return done.document, beside_model(made, done.found, chosen(made))
+    return done.document, beside_model(made, (done.conclusion.before, done.conclusion.after), chosen(made))
 
 
 def figures(page):
@@ -72,11 +72,11 @@ def test_what_only_specimens_tell_together_is_drawn_into_no_press(judged):
         "family": "kinematics",
         "status": "ambiguous",
         "alternatives": ["stiffening"],
-        "margins": {},
-        "confidence": None,
+        "level": None,
+        "probability": {"family": 0.9, "mechanism": 0.5, "form": 0.5},
     }
     for gap in (True, False):
-        shown = verdict | {"status": "ambiguous", "effects": [told], "gate": verdict["gate"] | {"gap": gap}}
+        shown = verdict | {"status": "ambiguous", "effects": [told], "gap": verdict["gap"] | {"seen": gap}}
         page = verdict_page(shown, residuals)
         assert ("model with the effects" in page) == ("with the effects" in page) == gap
 
@@ -106,11 +106,11 @@ def test_what_the_effects_change_is_shown_without_what_a_press_has_of_its_own(ju
         "family": "memory of the skin",
         "status": "named",
         "alternatives": [],
-        "margins": {},
-        "confidence": 0.9,
+        "level": "mechanism",
+        "probability": {"family": 0.99, "mechanism": 0.97, "form": 0.97},
     }
     parts = [{"by": "phase", "name": "unloading", "before": 21.5, "after": 4.25}]
-    page = verdict_page(verdict | {"effects": [told], "slices": parts, "path": []}, residuals)
+    page = verdict_page(verdict | {"effects": [told], "slices": parts}, residuals)
     where = page[page.index(TAKEN_OUT.replace("'", "&#39;")) :]
     assert "own pose and gain left in" in page
     assert ">unloading<" in where and ">21.5<" in where and ">4.25<" in where
@@ -123,16 +123,13 @@ def test_a_map_of_depths_begins_at_touch(judged):
     assert made.columns[0].startswith("0 to ") and not any("e-" in words for words in made.columns)
 
 
-def test_a_rival_that_fits_worse_is_said_to_have_other_forms(judged):
+def test_the_sets_are_listed_with_their_probabilities(judged):
     verdict = deepcopy(judged[0])
-    if not verdict["effects"]:
-        assert "Why not the others" not in verdict_page(*judged)
-        return
-    effect = verdict["effects"][0]
-    effect["margins"], effect["alternatives"] = {"drift": 4.0, "creep": 9.0}, ["drift"]
+    sets = verdict["posterior"]["sets"]
+    assert sets and sum(one["probability"] for one in sets) <= 1 + 1e-9
+    verdict["posterior"]["sets"] = [{"effects": ["drift", "creep"], "probability": 0.314, "log_evidence": 7.25}]
     page = verdict_page(verdict, judged[1])
-    assert "drift may stand in" in page and "4.0 standard errors, but another form of it may not" in page
-    assert "not creep: it explains the presses worse by 9.0 standard errors than" in page
+    assert ">drift and creep<" in page and ">31 %<" in page and ">7.2<" in page
 
 
 def test_a_field_that_was_hardly_read_is_not_drawn_and_a_map_of_none_is_left_out(judged, monkeypatch):

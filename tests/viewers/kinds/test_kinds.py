@@ -9,8 +9,8 @@ from rerun.chunk import RrdReader
 from tacdata import documents, registry, schemas
 from tacdata.demonstrations.demonstration import Demonstration, FingerTrack
 from tacdata.demonstrations.paths.tracks_file import read_tracks, write_tracks
-from tacdata.discrepancy.verdict.residual_table import Residuals
-from tacdata.discrepancy.verdict.residual_table import write as write_residuals
+from tacdata.discrepancy.report.residual_table import Residuals
+from tacdata.discrepancy.report.residual_table import write as write_residuals
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import exporter
 from tacdata.replay.targets import targets_of
@@ -141,13 +141,14 @@ def verdict(tmp_path):
         "effect": "creep",
         "title": "The skin creeps",
         "stage": "skin",
+        "family": "memory of the skin",
+        "level": "mechanism",
+        "probability": {"family": 0.99, "mechanism": 0.99, "form": 0.99},
         "moves": ["signal"],
         "status": "named",
         "alternatives": [],
         "parameters": {"tau": {"value": 2.0, "unit": "s", "error": 0.1}},
-        "margins": {"relaxation": 3.5, "drift": 7.0},
-        "necessity": 9.0,
-        "at_bound": [],
+        "rivals": {"relaxation": 0.01},
         "experiment": "hold longer",
     }
     document = {
@@ -155,8 +156,16 @@ def verdict(tmp_path):
         "status": "named",
         "why": "creep is missing",
         "effects": [effect],
-        "gate": {"gap": True, "p": 0.001, "p_generic": 0.001, "noise": [1.0], "memory": 0.0},
-        "left": {"share": 0.01, "t": 0.3, "before": 8.0, "after": 1.1, "floor": 1.0},
+        "posterior": {
+            "nothing": 0.001,
+            "remainder": 0.02,
+            "mechanisms": {"creep": 0.99, "relaxation": 0.01},
+            "families": {},
+            "sets": [],
+            "policy": {"named": 0.95},
+            "policy_hash": "0",
+        },
+        "gap": {"seen": True, "before": 8.0, "after": 1.1, "floor": 1.0, "noise": [1.0], "memory": 0.0},
         "located": ["phase: hold"],
         "unjudgeable": {"tilt": "one place"},
         "limits": {"creep": 0.02, "drift": None, "tilt": 4.0},
@@ -175,7 +184,7 @@ def test_a_verdict_in_words_and_bars(verdict, tmp_path):
     assert "named" in scene.summary and "tau = 2 ± 0.1 s" in scene.summary and "hold longer" in scene.summary
     bars = {b.name: b for b in scene.bars}
     assert bars["gap"].values.tolist() == [8.0, 1.1, 1.0]
-    assert bars["margins/creep"].labels == ("relaxation", "drift")
+    assert bars["probabilities"].labels == ("no effect of the library", "creep", "relaxation")
     assert bars["limits"].labels == ("creep", "tilt"), "what is not excited has no bar"
     assert {"/bars/gap", "/bars/limits", "/about"} <= drawn(scene, tmp_path)
     assert scene_at(verdict / "verdict.json").bars[0].labels == scene.bars[0].labels

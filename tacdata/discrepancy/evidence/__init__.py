@@ -1,0 +1,1 @@
+"""Evidence: whitened columns, Gram matrices of presses, and models at their optimum."""

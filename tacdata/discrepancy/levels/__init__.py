@@ -1,1 +1,0 @@
-"""Names despite a flexible remainder, by levels: family, mechanism, form."""

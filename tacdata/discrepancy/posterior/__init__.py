@@ -1,0 +1,1 @@
+"""The posterior over sets of effects: which are missing, with which probability?"""

@@ -1,0 +1,1 @@
+"""The report: what the posterior allows to be stated, and how it is written."""

@@ -1,1 +1,0 @@
-"""From findings to a verdict: decision, document, text, pictures."""
