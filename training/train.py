@@ -14,19 +14,18 @@ import torch
 
 from tacdata import documents, provenance, schemas
 from tacdata.errors import TacdataError, UsageError
+from tacdata.training.completion import LeftOut, complete
 from tacdata.training.frames.channel_calibration import calibrate
 from tacdata.training.frames.frames import Frames
 from tacdata.training.frames.label_tensor import label_tensor
 from tacdata.training.frames.normalization import normalization
-from tacdata.training.frames.peak_regression import fit_peaks
 from tacdata.training.frames.variation import Variation
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference import checkpoint
 from tacdata.training.inference.compute import choose_device, reproducible
 from tacdata.training.inference.predictor import predict
 from tacdata.training.loss import normalized
-from tacdata.training.metrics import conformal_intervals, depth_maps, novelty
-from tacdata.training.metrics.conformal_intervals import ConformalIntervals
+from tacdata.training.metrics import depth_maps
 from tacdata.training.networks.network import Network, create
 from tacdata.training.rehearsal import Rehearsal
 from tacdata.training.settings import TrainingSettings
@@ -129,6 +128,7 @@ def train(
     pretrained: checkpoint.Checkpoint | None = None,
     simulated: Frames | None = None,
     split: Split | None = None,
+    part: bool = False,
 ) -> checkpoint.Checkpoint:
     """Train a network and write ``out``: best.safetensors, last.safetensors, metrics.jsonl.
 
@@ -143,9 +143,10 @@ def train(
         threads: CPU threads; by default one a core, at most `compute.THREADS`; others may change last bits.
         listener: Called after every step and every epoch.
         compiled: Let torch compile the network first; pays off on GPUs, and changes last bits.
-        pretrained: Start from its weights; it is calibrated again to these frames.
+        pretrained: Start from its weights; it is calibrated again to these frames (`training.pretraining.cross_fit`).
         simulated: Frames of a simulated dataset, of which each step takes as many (`training.rehearsal`).
         split: Division of the dataset; by default the settings' own.
+        part: Leave corrected maxima, intervals and training readings out, as for a part of a cross-fit.
 
     Returns:
         The checkpoint of the epoch with the lowest validation loss.
@@ -155,12 +156,8 @@ def train(
         TacdataError: If the loss is no longer finite.
     """
     place = choose_device(device)
-    if out.exists() and not resume and (not out.is_dir() or any(out.iterdir())):
-        raise UsageError(
-            f"{out} already exists",
-            "a folder that does not exist yet",
-            "choose another --out, or go on with that run by --resume",
-        )
+    if not resume:
+        check_free(out)
     with reproducible(threads):
         begun = split or divide(frames, settings.split, settings.seed)
         run = _resumed(frames, settings, out, place) if resume else _started(frames, settings, begun, place, pretrained)
@@ -186,32 +183,25 @@ def train(
             }
             _keep(run, line, out)
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
-        _correct(checkpoint.load(out, place), frames, split, pretrained)
         best = checkpoint.load(out, place)
-        if len(split.validation) > 1:
-            conformal_intervals.write(out, _calibrated(best, windows, frames, split))
-        known = novelty.gathered(frames, learned.numpy(), validated, best.content_hash, settings.mirror)
-        if known is not None:
-            novelty.write(out, known)
+        if not part:
+            parts = [LeftOut(best.network, split.train, split.validation)]
+            complete(best, best.document, frames, split.train, parts, pretrained)
     return checkpoint.load(out)
 
 
-def _calibrated(best: checkpoint.Checkpoint, windows: Windows, frames: Frames, split: Split) -> ConformalIntervals:
-    """Return how far off the best epoch's pixels are on the validation episodes."""
-    grid, maps, labels = frames.sensor.map, [], []
-    episodes = split.validation
-    for number in episodes[:: -(-len(frames.indices(episodes)) // _VALIDATED)]:
-        chosen = frames.indices((number,))
-        maps.append(predict(best.network, windows, chosen, grid.depth_max))
-        labels.append(np.clip(frames.depth[chosen], 0.0, grid.depth_max))
-    return conformal_intervals.calibrate(maps, labels, grid.pixel_pitch, best.content_hash)
+def check_free(out: Path) -> None:
+    """Refuse a folder that holds anything.
 
-
-def _correct(best: checkpoint.Checkpoint, frames: Frames, split: Split, parent: checkpoint.Checkpoint | None) -> None:
-    """Correct the maxima of the best epoch, and write it so; validation presses stay unseen."""
-    peak = fit_peaks(best.network, frames, split.train, parent.peak if parent else None)
-    if peak and peak.document != best.document.get("peak"):  # that of a resumed run which had ended is equal
-        checkpoint.save(best.path, best.network, None, {**best.document, "peak": peak.document})
+    Raises:
+        UsageError: If it does.
+    """
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise UsageError(
+            f"{out} already exists",
+            "a folder that does not exist yet",
+            "choose another --out, or go on with that run by --resume",
+        )
 
 
 def _started(

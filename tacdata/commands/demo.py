@@ -137,7 +137,7 @@ class _Place:
         """Return purpose, arguments and product of each stage after the labels."""
         session, dataset, network = str(self.session), str(self.dataset), str(self.network)
         train = ["train", dataset, "--from", "shipped", "--out", network, "--epochs", str(epochs), "--seed", str(seed)]
-        if (self.network / "last.safetensors").exists():
+        if self.network.is_dir():
             train.append("--resume")
         packed = self.dataset / "meta" / "info.json"
         return [

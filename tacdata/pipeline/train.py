@@ -9,6 +9,7 @@ from typing import TypedDict, Unpack
 from tacdata.paths import StrPath
 from tacdata.pipeline.trained_network import TrainedNetwork
 from tacdata.training.frames.data import read_frames
+from tacdata.training.pretraining.cross_fit import fit
 from tacdata.training.pretraining.recipe import recipe
 from tacdata.training.pretraining.shipped import pretrained
 from tacdata.training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
@@ -98,7 +99,12 @@ def train(
         progress(step)
         log(step)
 
-    best = train_on_frames(frames, settings, folder, device, resume, threads, listen, compiled, begun, mixed)
+    if begun:
+        best = fit(
+            frames, settings, folder, begun, device, resume, threads, listen, compiled, mixed, shape_groups=leave_out
+        )
+        return TrainedNetwork(best)
+    best = train_on_frames(frames, settings, folder, device, resume, threads, listen, compiled, None, mixed)
     if leave_out is not None:
-        calibrate_on_unseen_shapes(best, frames, leave_out, device, threads, begun, mixed, lambda group: progress)
+        calibrate_on_unseen_shapes(best, frames, leave_out, device, threads, lambda group: progress)
     return TrainedNetwork(best)

@@ -2,7 +2,7 @@
 
 A network predicts something for any readings. Far from its training data no score holds. A few hundred training frames
 are kept: each next one is the frame farthest from all chosen so far (T. F. Gonzalez, Theoretical Computer Science 38
-(1985) 293). The validation episodes set the scale: their readings count as near.
+(1985) 293). Presses left out set the scale: their readings count as near.
 
 Distances are Euclidean between square roots of readings (with their signs), so that a weak contact counts too. Single
 frames are compared, not windows: a movement that is new passes.
@@ -10,6 +10,7 @@ frames are compared, not windows: a movement that is new passes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,9 +27,9 @@ KEPT = 400
 LOOKED_AT = 20_000
 """Training frames among which they are chosen, evenly taken [count]."""
 SHARE = 0.99
-"""Share of the validation frames in contact that count as near [1]."""
+"""Share of the frames in contact of presses left out that count as near [1]."""
 FEWEST = 20
-"""Validation frames in contact needed for a result [count]."""
+"""Such frames needed for a result [count]."""
 BLOCK = 4096
 
 
@@ -67,27 +68,28 @@ class TrainingReadings:
 
 
 def gathered(
-    frames: Frames, learned: np.ndarray, validated: np.ndarray, checkpoint: str, mirror: bool = False
+    frames: Frames, parts: Sequence[tuple[np.ndarray, np.ndarray]], checkpoint: str, mirror: bool = False
 ) -> TrainingReadings | None:
-    """Choose readings that cover the training data; None if the validation episodes have too little contact.
+    """Choose readings that cover the training data; None if the presses left out have too little contact.
 
     Args:
         frames: The dataset.
-        learned: Numbers of the frames that it was trained on, shape (m,).
-        validated: Numbers of the validation frames, shape (q,).
+        parts: Numbers of the frames that were learned from, shape (m,), and of those left out then, shape (q,). Of
+            several parts, as of a cross-fit, all frames learned from are covered.
         checkpoint: SHA-256 of the checkpoint.
         mirror: Whether training mirrored its frames.
     """
-    pressed = np.array([n for n in validated if frames.depth[n].max() > CONTACT_THRESHOLD], int)
-    if len(pressed) < FEWEST or not len(learned):
+    distances, representatives = [], np.empty((0, frames.taxels.shape[1]))
+    for learned, left_out in parts:
+        pressed = left_out[frames.depth[left_out].max(axis=(1, 2)) > CONTACT_THRESHOLD]
+        representatives = _representatives(frames, learned, mirror)
+        distances.append(_nearest(_root(frames.taxels[pressed]), _root(representatives)))
+    distance = np.concatenate(distances) if distances else np.empty(0)
+    if len(distance) < FEWEST or not len(representatives):
         return None
-    readings = frames.taxels[learned[:: -(-len(learned) // LOOKED_AT)]].astype(np.float64)
-    if mirror:
-        readings = np.concatenate(_mirrored(readings, frames.sensor.taxels.rows, frames.sensor.taxels.columns))
-    # Rounded as in the file: a checkpoint that is read again must judge readings the same way.
-    representatives = np.round(readings[_covering(_root(readings))], 1)
-    far = float(np.quantile(_nearest(_root(frames.taxels[pressed]), _root(representatives)), SHARE))
-    return TrainingReadings(representatives, max(far, 1e-6), checkpoint)
+    if len(parts) > 1:
+        representatives = _representatives(frames, np.unique(np.concatenate([learned for learned, _ in parts])), mirror)
+    return TrainingReadings(representatives, max(float(np.quantile(distance, SHARE)), 1e-6), checkpoint)
 
 
 def write(run: Path, readings: TrainingReadings) -> None:
@@ -133,6 +135,15 @@ def _covering(points: np.ndarray) -> np.ndarray:
         distance = np.minimum(distance, ((points - points[selection[-1]]) ** 2).sum(axis=1))
         selection.append(int(distance.argmax()))
     return np.array(selection)
+
+
+def _representatives(frames: Frames, learned: np.ndarray, mirror: bool) -> np.ndarray:
+    """Return readings that cover the frames learned from [counts], shape (k, taxels)."""
+    readings = frames.taxels[learned[:: -(-len(learned) // LOOKED_AT)]].astype(np.float64)
+    if mirror:
+        readings = np.concatenate(_mirrored(readings, frames.sensor.taxels.rows, frames.sensor.taxels.columns))
+    # Rounded as in the file: a checkpoint that is read again must judge readings the same way.
+    return np.round(readings[_covering(_root(readings))], 1)
 
 
 def _mirrored(taxels: np.ndarray, rows: int, columns: int) -> list[np.ndarray]:

@@ -17,10 +17,11 @@ from tacdata import documents, provenance, schemas
 from tacdata.errors import FormatError, UsageError
 from tacdata.training.frames.frames import Frames
 from tacdata.training.frames.windows import Windows
-from tacdata.training.inference.checkpoint import Checkpoint
+from tacdata.training.inference.checkpoint import LAST, Checkpoint
 from tacdata.training.inference.compute import reproducible
 from tacdata.training.inference.predictor import predict
 from tacdata.training.metrics.depth_maps import score_frames
+from tacdata.training.pretraining.cross_fit import fit
 from tacdata.training.pretraining.recipe import recipe
 from tacdata.training.settings import TrainingSettings
 from tacdata.training.splits.split import VALIDATION_SHARE, Split, divide, share
@@ -135,22 +136,26 @@ def learning_curve(
                 network = pretrained.network if pretrained else None
                 if count:
                     settings = _settings(start, seed, pretrained, simulated)
-                    run = out / f"{start}-{count}-{seed}"
-                    from_start, mixed = (pretrained, simulated) if start == "pretrained" else (None, None)
-                    division = _division(held_out, numbers, seed)
-                    listener = begun(start, count, seed)
-                    network = train(
-                        frames,
-                        settings,
-                        run,
-                        device,
-                        (run / "last.safetensors").is_file(),
-                        threads,
-                        listener,
-                        pretrained=from_start,
-                        simulated=mixed,
-                        split=division,
-                    ).network
+                    run, division = out / f"{start}-{count}-{seed}", _division(held_out, numbers, seed)
+                    listener, resume = begun(start, count, seed), run.is_dir()
+                    if start == "pretrained" and pretrained:
+                        network = fit(
+                            frames,
+                            settings,
+                            run,
+                            pretrained,
+                            device,
+                            resume,
+                            threads,
+                            listener,
+                            simulated=simulated,
+                            split=division,
+                        ).network
+                    else:
+                        resume = (run / LAST).is_file()
+                        network = train(
+                            frames, settings, run, device, resume, threads, listener, split=division
+                        ).network
                 with reproducible(threads):
                     point = _scored(network, frames, held_out.test, start, count, seed)
                 document["points"].append(asdict(point))

@@ -4,6 +4,7 @@ By default the errors are those of validation episodes. These have the shapes of
 errors on a shape unlike all others are outside too often. Here shapes are dealt into groups. For each a network is
 trained on the others by the same recipe, and predicts the left-out group (cross-conformal prediction; V. Vovk,
 Annals of Mathematics and Artificial Intelligence 74 (2015) 9). The errors of all groups together make the intervals.
+A fit from pretrained weights has such networks already (`training.pretraining.cross_fit`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from tacdata.training.metrics.conformal_intervals import ConformalIntervals
 from tacdata.training.splits.split import VALIDATION_SHARE, Split, share
 from tacdata.training.train import Progress, train
 
+SOURCE = "presses of shapes left out of training"
+"""Whose errors such intervals hold."""
 _SEED = 47
 """Separates the random numbers of groups from those of training."""
 
@@ -34,8 +37,6 @@ def calibrate_on_unseen_shapes(
     groups: int,
     device: str = "auto",
     threads: int | None = None,
-    pretrained: Checkpoint | None = None,
-    simulated: Frames | None = None,
     begun: Callable[[int], Callable[[Progress], None]] = lambda group: lambda progress: None,
 ) -> ConformalIntervals:
     """Replace the intervals of a trained network by ones valid for unseen shapes; write them to its folder.
@@ -46,8 +47,6 @@ def calibrate_on_unseen_shapes(
         groups: Into how many groups the shapes are dealt; as many networks are trained.
         device: As of `train`.
         threads: As of `train`.
-        pretrained: Its start.
-        simulated: The simulated frames that were mixed in.
         begun: Called with each group's number; returns the listener of that training's progress.
 
     Raises:
@@ -55,36 +54,28 @@ def calibrate_on_unseen_shapes(
     """
     spans = frames.spans((*trained.split.train, *trained.split.validation))
     maps, labels = [], []
-    for number, held in enumerate(_dealt(spans, groups, frames.origin)):
+    for number, held in enumerate(dealt(spans, groups, frames.origin)):
         division = _without(held, spans, trained.split)
         run = trained.path.parent / f"without-{number}"
         resume = (run / checkpoint.LAST).is_file()
-        network = train(
-            frames,
-            trained.settings,
-            run,
-            device,
-            resume,
-            threads,
-            begun(number),
-            pretrained=pretrained,
-            simulated=simulated,
-            split=division,
-        )
+        network = train(frames, trained.settings, run, device, resume, threads, begun(number), split=division)
         windows, top = Windows(frames, network.network.offsets), frames.sensor.map.depth_max
         with reproducible(threads):
             for episode in division.test:
                 indices = frames.indices((episode,))
                 maps.append(predict(network.network, windows, indices, top))
                 labels.append(np.clip(frames.depth[indices], 0.0, top))
-    intervals = conformal_intervals.calibrate(
-        maps, labels, frames.sensor.map.pixel_pitch, trained.content_hash, "presses of shapes left out of training"
-    )
+    intervals = conformal_intervals.calibrate(maps, labels, frames.sensor.map.pixel_pitch, trained.content_hash, SOURCE)
     conformal_intervals.write(trained.path.parent, intervals)
     return intervals
 
 
-def _dealt(spans: tuple[EpisodeSpan, ...], groups: int, origin: str) -> list[tuple[EpisodeSpan, ...]]:
+def dealt(spans: tuple[EpisodeSpan, ...], groups: int, origin: str) -> list[tuple[EpisodeSpan, ...]]:
+    """Return presses in groups that share no shape.
+
+    Raises:
+        UsageError: If there are fewer shapes than groups, or one group.
+    """
     shapes = sorted({span.shape for span in spans})
     if not 2 <= groups <= len(shapes):
         raise UsageError(

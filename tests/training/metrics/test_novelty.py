@@ -24,7 +24,7 @@ def rows(frames, episodes):
 
 
 def known_of(frames, **options):
-    found = novelty.gathered(frames, rows(frames, LEARNED), rows(frames, VALIDATED), "a" * 64, **options)
+    found = novelty.gathered(frames, [(rows(frames, LEARNED), rows(frames, VALIDATED))], "a" * 64, **options)
     assert found is not None
     return found
 
@@ -53,7 +53,7 @@ def test_mirrored_training_knows_mirrored_presses(many):
 
 def test_nothing_is_said_without_enough_validation(many):
     few = rows(many, VALIDATED)[:10]
-    assert novelty.gathered(many, rows(many, LEARNED), few, "a" * 64) is None
+    assert novelty.gathered(many, [(rows(many, LEARNED), few)], "a" * 64) is None
 
 
 def test_what_is_written_is_read_for_its_checkpoint_alone(many, tmp_path):
