@@ -21,11 +21,11 @@ from tacdata.training.frames.windows import Windows
 from tacdata.training.inference.predictor import predict
 from tacdata.training.metrics.depth_maps import score_frames, summarize
 from tacdata.training.networks.network import Network
+from tacdata.training.pretraining.cross_fit import fit
 from tacdata.training.pretraining.recipe import recipe
 from tacdata.training.pretraining.shipped import NAME, pretrained
 from tacdata.training.scoring import baselines
 from tacdata.training.splits.split import VALIDATION_SHARE, Split, share
-from tacdata.training.train import train
 
 STREAM = 99
 """Separates the draw of presses from the rig's own random numbers."""
@@ -76,7 +76,9 @@ def main() -> None:
         division = Split("episode", given.rig, train_on, validation, tuple(sorted(held)))
         every = Split("episode", given.rig, tuple(sorted(numbers)), (), division.test)
         settings, out = recipe({"seed": given.rig}, start), given.out / f"rig-{given.rig}-{count}"
-        network = train(frames, settings, out, "cpu", threads=1, pretrained=start, split=division).network
+        fitted = fit(frames, settings, out, start, "cpu", out.is_dir(), 1, split=division)
+        network = fitted.network
+        print(count, "presses, cross-fit", fitted.document["cross_fit"], flush=True)
         for place, chosen in places.items():
             label = np.clip(frames.depth[chosen], 0.0, frames.sensor.map.depth_max)
             maps, peak = {"ridge": baselines.predictions(frames, every, chosen)["linear"]}, network.peak

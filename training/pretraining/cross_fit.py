@@ -4,9 +4,10 @@ Four networks start from the same weights. Each learns from three quarters of th
 
     weights = pretrained + share x (mean of the four - pretrained)
 
-The share is the smallest one whose error on the presses left out is no more than a standard error above the least. It is
-0 where learning surely helps no unseen press. The channels' calibration alone makes the fit then. So by that measure a
+The share is the smallest one whose error on the presses left out is at most a standard error above the least. It is 0
+where learning surely helps no unseen press. The channels' calibration alone makes the fit then. So by that measure a
 fit is never worse than the calibrated network.
+
 Weights that were fitted from one start may be averaged (M. Wortsman et al., ICML 2022). The errors of presses left out
 also give intervals and the scale of novelty.
 
@@ -46,7 +47,7 @@ from tacdata.training.train import METRICS, Progress, check_free, train
 FOLDS = 4
 """Networks, each fitted without a part of the presses [count]."""
 MANY = 24
-"""Presses beyond which one network is fitted [count]: four cost so many times more; little was gained on rig 20 with 30."""
+"""Presses beyond which one network is fitted [count]: four cost more, and gained little on rig 20 with 30."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 """Shares of the way from the pretrained weights that are tried [1]: above 1 as the pull holds each network back."""
 JUDGED = 40

