@@ -19,6 +19,7 @@ from tacdata.training.inference import checkpoint
 from tacdata.training.inference.checkpoint import Checkpoint
 from tacdata.training.inference.predictor import predict
 from tacdata.training.metrics import conformal_intervals, novelty
+from tacdata.training.metrics.pressed_area import pressed_area
 from tacdata.training.networks.network import Network
 
 MOST_FRAMES = 20_000
@@ -77,7 +78,10 @@ def complete(
             labels.append(np.clip(frames.depth[chosen], 0.0, frames.sensor.map.depth_max))
     if len(maps) > 1:
         pitch = frames.sensor.map.pixel_pitch
-        conformal_intervals.write(run, conformal_intervals.calibrate(maps, labels, pitch, identity, source))
+        few = learned[:: -(-len(frames.indices(learned)) // MOST_FRAMES)]
+        area = pressed_area([frames.depth[frames.indices((press,))] for press in few], pitch)
+        intervals = conformal_intervals.calibrate(maps, labels, pitch, identity, source, area)
+        conformal_intervals.write(run, intervals)
     readings = novelty.gathered(frames, rows, identity, best.settings.mirror)
     if readings is not None:
         novelty.write(run, readings)

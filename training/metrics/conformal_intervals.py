@@ -10,8 +10,9 @@ predicted depth and by the depth's slope there. Conformal prediction (Angelopoul
    which such a share of them is.
 
 Whole episodes are left out, because frames of one press have correlated errors. The intervals hold for presses like
-those of validation. `reliability` measures the share of errors inside on the scored episodes; on unseen
-shapes it is less. `training.pretraining.unseen_shapes` calibrates on shapes left out of training instead.
+those of validation. Outside the area that was pressed they are wider (`training.metrics.pressed_area`). Readings do not
+tell that a shape is new, so on unseen shapes less of the errors is inside. `training.pretraining.unseen_shapes`
+calibrates on shapes left out of training instead. `reliability` measures the share inside on the scored episodes.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import numpy as np
 from tacdata import documents, provenance, schemas
 from tacdata.errors import FormatError, UsageError
 from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
+from tacdata.training.metrics.pressed_area import PressedArea
 
 FILE = "spread.json"
 VALIDATION = "validation episodes"
@@ -57,6 +59,8 @@ class ConformalIntervals:
     """SHA-256 of the checkpoint that it belongs to."""
     source: str = VALIDATION
     """Calibration data, as a phrase."""
+    area: PressedArea | None = None
+    """Area that was pressed in training; None if it is not known: nothing is wider outside then."""
 
     @property
     def definition(self) -> str:
@@ -73,7 +77,8 @@ class ConformalIntervals:
             depth: Predicted maps [mm], shape (n, pixels_x, pixels_y).
             pitch: Distance of pixels [mm].
         """
-        return self.deviation[cells(depth, pitch)]
+        deviation = self.deviation[cells(depth, pitch)]
+        return deviation if self.area is None else deviation * self.area.widening(depth, pitch)[:, None, None]
 
     def half_width(self, depth: np.ndarray, pitch: float, level: float) -> np.ndarray:
         """Return half the width of a level's interval [mm], same shape as ``depth``.
@@ -97,6 +102,7 @@ class ConformalIntervals:
             "deviation": self.deviation.tolist(),
             "levels": list(LEVELS),
             "factors": list(self.factors),
+            **({"pressed": {"low": list(self.area.low), "high": list(self.area.high)}} if self.area else {}),
             "provenance": provenance.stamp("training.metrics.conformal_intervals", {"checkpoint": self.checkpoint}, {}),
         }
 
@@ -108,7 +114,12 @@ def cells(depth: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def calibrate(
-    maps: list[np.ndarray], labels: list[np.ndarray], pitch: float, checkpoint: str, source: str = VALIDATION
+    maps: list[np.ndarray],
+    labels: list[np.ndarray],
+    pitch: float,
+    checkpoint: str,
+    source: str = VALIDATION,
+    area: PressedArea | None = None,
 ) -> ConformalIntervals:
     """Calibrate on episodes that the network did not learn from.
 
@@ -118,6 +129,7 @@ def calibrate(
         pitch: Distance of pixels [mm].
         checkpoint: SHA-256 of the checkpoint.
         source: Description of the episodes.
+        area: Area that was pressed in training.
 
     Raises:
         UsageError: If there are fewer than two episodes.
@@ -133,14 +145,15 @@ def calibrate(
     total = np.sum(sums, axis=0)
     deviation, quotients = _filled(*total), []
     for depth, label, part in zip(maps, labels, parts, strict=True):
-        remaining = ConformalIntervals(_filled(*(total - sums[part])), (), checkpoint)
+        remaining = ConformalIntervals(_filled(*(total - sums[part])), (), checkpoint, source, area)
         mask = _interesting(depth, label)
         quotients.append(np.abs(depth - label)[mask] / remaining.sigma(depth, pitch)[mask])
     together = np.concatenate(quotients)
     if not len(together):
         # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
-        return ConformalIntervals(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint, source)
-    return ConformalIntervals(deviation, tuple(float(q) for q in np.quantile(together, LEVELS)), checkpoint, source)
+        return ConformalIntervals(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint, source, area)
+    factors = tuple(float(q) for q in np.quantile(together, LEVELS))
+    return ConformalIntervals(deviation, factors, checkpoint, source, area)
 
 
 def _sums(depth: np.ndarray, label: np.ndarray, pitch: float) -> np.ndarray:
@@ -203,9 +216,10 @@ def read(run: Path, checkpoint: str) -> ConformalIntervals | None:
         raise FormatError(f"{path}: cells of another release", "cells of this release", "remove it and train again")
     if document["checkpoint"] != checkpoint:
         return None
-    return ConformalIntervals(
-        deviation, tuple(document["factors"]), checkpoint, document.get("calibrated_on", VALIDATION)
-    )
+    pressed = document.get("pressed")
+    area = PressedArea(tuple(pressed["low"]), tuple(pressed["high"])) if pressed else None
+    source = document.get("calibrated_on", VALIDATION)
+    return ConformalIntervals(deviation, tuple(document["factors"]), checkpoint, source, area)
 
 
 def _interesting(depth: np.ndarray, label: np.ndarray) -> np.ndarray:
