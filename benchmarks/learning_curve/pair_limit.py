@@ -16,7 +16,7 @@ import argparse
 import numpy as np
 import run
 
-from tacdata.indenters import from_document
+from tacdata.indenters import Indenter, from_document
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.world.world import World, draw
@@ -40,7 +40,19 @@ class PairReadings:
     def counts(self, balls: np.ndarray) -> np.ndarray:
         """Return the change of the readings [counts], shape (taxels,), of balls (k, 3): place and depth [mm]."""
         tips = self._origin + balls @ self._turn.T
-        force = sum(self.world.taxel_force(tip, self._ball, 0.0) for tip in tips)
+        return self._counts(sum(self.world.taxel_force(tip, self._ball, 0.0) for tip in tips))
+
+    def of(self, state: np.ndarray, indenter: Indenter) -> np.ndarray:
+        """Return the change of the readings [counts], shape (taxels,), of one indenter.
+
+        Args:
+            state: Place and depth [mm] and yaw [rad], shape (4,).
+            indenter: The indenter.
+        """
+        tip = self._origin + state[:3] @ self._turn.T
+        return self._counts(self.world.taxel_force(tip, indenter, float(np.degrees(state[3]))))
+
+    def _counts(self, force: np.ndarray) -> np.ndarray:
         truth = self.world.truth
         closure = (force / truth.protrusion) ** (2 / 3)
         return np.array(truth.gain) * (1 / (1 - 0.8 * closure / (closure + truth.half_closure)) - 1)

@@ -1,9 +1,9 @@
-"""Share of errors inside a pixel's interval on shapes that no press trained on has.
+"""Share of errors inside a pixel's interval on presses like those trained on, at the edge and on unseen shapes.
 
     python benchmarks/learning_curve/unseen_intervals.py SOLVED --out OUT [--presses 40] [--leave-out 5] [--rigs 1]
 
-The network that ships is fitted to a rig of `run.py`. Its intervals are calibrated twice: on validation presses, and as
-`tacdata train --leave-out` does, on shapes left out in turn. Both are scored on three shapes that it never saw.
+The network that ships is fitted to a rig of `run.py` twice: with presses left out at random, and as `tacdata train
+--leave-out` does, with shapes left out in turn. No press trained on is at the edge or has one of three shapes.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from tacdata.training.frames.windows import Windows
 from tacdata.training.inference.predictor import predict
 from tacdata.training.metrics import conformal_intervals
 from tacdata.training.metrics.conformal_intervals import ConformalIntervals, reliability
+from tacdata.training.pretraining.cross_fit import fit
 from tacdata.training.pretraining.recipe import recipe
 from tacdata.training.pretraining.shipped import NAME, pretrained
-from tacdata.training.pretraining.unseen_shapes import calibrate_on_unseen_shapes
 from tacdata.training.splits.split import divide
-from tacdata.training.train import train
 
 EVERY = 5
 """Every so manieth frame of a press is scored: neighbours hardly differ."""
@@ -62,23 +61,27 @@ def main() -> None:
         kept = [rest[k] for k in chosen[: arguments.presses]]
         own = run.part(frames, kept)
         settings = recipe({"seed": rig}, start)
-        trained = train(
-            own,
-            settings,
-            arguments.out / f"rig-{rig}",
-            "cpu",
-            threads=1,
-            pretrained=start,
-            split=divide(own, "episode", rig),
-        )
-        folder = trained.path.parent
-        before = conformal_intervals.read(folder, trained.content_hash)
-        after = calibrate_on_unseen_shapes(trained, own, arguments.leave_out, "cpu", threads=1, pretrained=start)
+        fits = {
+            name: fit(
+                own,
+                settings,
+                arguments.out / f"rig-{rig}-{name.replace(' ', '-')}",
+                start,
+                "cpu",
+                threads=1,
+                split=divide(own, "episode", rig),
+                shape_groups=groups,
+            )
+            for name, groups in (("presses left out", None), ("shapes left out", arguments.leave_out))
+        }
         seen = tuple(rest[k].number for k in chosen[arguments.presses :])
-        places = {"shapes pressed in training": seen} | {
+        edge = tuple(s.number for s in frames.episodes if s.number not in unseen and run.at_edge(s, frames.sensor))
+        places = {"shapes pressed in training": seen, "edge": edge} | {
             name: tuple(s.number for s in frames.episodes if s.indenter == name) for name in run.UNSEEN
         }
-        for calibration, intervals in (("validation presses", before), ("shapes left out", after)):
+        for calibration, trained in fits.items():
+            intervals = conformal_intervals.read(trained.path.parent, trained.content_hash)
+            assert intervals, f"{calibration}: no two presses touch"
             for name, numbers in places.items():
                 row = coverage(intervals, trained.network, frames, numbers)
                 found.append({"rig": rig, "calibrated_on": calibration, "scored_on": name, **row})

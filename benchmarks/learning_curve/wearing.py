@@ -23,10 +23,10 @@ from tacdata.training.frames.windows import Windows
 from tacdata.training.inference.predictor import predict
 from tacdata.training.metrics.overlap import aligned_iou
 from tacdata.training.networks.network import Network
+from tacdata.training.pretraining.cross_fit import fit
 from tacdata.training.pretraining.recipe import recipe
 from tacdata.training.pretraining.shipped import NAME, pretrained
 from tacdata.training.splits.split import divide
-from tacdata.training.train import train
 
 PARTICIPANTS, TRIALS = 12, 5
 """As in the paper: 57 presses of 12 participants."""
@@ -47,9 +47,7 @@ def fitted(folder: Path, rig: int, presses: int, start, out: Path) -> Network:
 
     frames = run.rig_frames(folder, rig, chosen)
     settings = recipe({"seed": rig}, start)
-    return train(
-        frames, settings, out, "cpu", threads=1, pretrained=start, split=divide(frames, "episode", rig)
-    ).network
+    return fit(frames, settings, out, start, "cpu", out.is_dir(), 1, split=divide(frames, "episode", rig)).network
 
 
 def prisms(folder: Path) -> list[int]:

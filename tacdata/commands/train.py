@@ -61,7 +61,7 @@ def run(
     precision: Annotated[str, typer.Option(help="float32 or bfloat16, for cards.")] = "float32",
     compiled: Annotated[bool, typer.Option("--compile", help="Let torch compile the network; for cards.")] = False,
     leave_out: Annotated[
-        int | None, typer.Option("--leave-out", help="Intervals for unseen shapes: networks to train without some.")
+        int | None, typer.Option("--leave-out", help="Intervals for unseen shapes: groups of shapes left out in turn.")
     ] = None,
     tensorboard: Annotated[bool, typer.Option("--tensorboard", help="Metrics for TensorBoard too, in RUN.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the run's last epoch.")] = False,
@@ -113,6 +113,9 @@ def run(
     parts = ", ".join(f"{len(document['split'][part])} {part}" for part in ("train", "validation", "test"))
     print(f"episodes: {parts} (split {document['split']['name']!r})")
     _say_calibration(best, dataset)
+    if "cross_fit" in document:
+        left_out, share = (document["cross_fit"][name] for name in ("left_out", "share"))
+        print(f"fit: {sum(map(len, left_out))} presses left out in turn; weights moved by {share:g} (0: none)")
     print(f"best epoch {document['epoch']}: validation loss {document['best']['validation_loss']:.5f}")
     print(f"checkpoint {best.path}\nmetrics    {out / METRICS}")
     suggest("evaluate", out)

@@ -78,7 +78,7 @@ def train(
         device: "auto", "cpu", "cuda" or "cuda:N".
         threads: CPU threads; None takes one a core, at most 4.
         compiled: Let torch compile the network; for cards.
-        leave_out: Networks to train without some shapes, for intervals that hold on unseen shapes.
+        leave_out: Groups of shapes that are left out in turn, for intervals that hold on unseen shapes.
         tensorboard: Write metrics for TensorBoard too.
         resume: Continue after the run's last epoch.
         progress: Called after each step.
