@@ -146,10 +146,10 @@ def train(
         pretrained: Start from its weights; it is calibrated again to these frames (`training.pretraining.cross_fit`).
         simulated: Frames of a simulated dataset, of which each step takes as many (`training.rehearsal`).
         split: Division of the dataset; by default the settings' own.
-        part: Leave corrected maxima, intervals and training readings out, as for a part of a cross-fit.
+        part: Keep the last epoch alone, without corrected maxima, intervals and training readings, for a cross-fit.
 
     Returns:
-        The checkpoint of the epoch with the lowest validation loss.
+        The checkpoint of the epoch with the lowest validation loss; of a ``part`` the last one.
 
     Raises:
         UsageError: If ``out`` is taken, the split is empty, or a resumed run has other settings or data.
@@ -181,12 +181,13 @@ def train(
                 **_validate(run.network, windows, frames, validated, settings),
                 "seconds": round(time.monotonic() - began, 3),
             }
-            _keep(run, line, out)
+            _keep(run, line, out, not part)
             listener(Progress(run.epoch, settings.epochs, 0, 0, line))
+        if part:
+            return checkpoint.load(out / checkpoint.LAST, place)
         best = checkpoint.load(out, place)
-        if not part:
-            parts = [LeftOut(best.network, split.train, split.validation)]
-            complete(best, best.document, frames, split.train, parts, pretrained)
+        parts = [LeftOut(best.network, split.train, split.validation)]
+        complete(best, best.document, frames, split.train, parts, pretrained)
     return checkpoint.load(out)
 
 
@@ -377,7 +378,7 @@ def _validate(
     return {"validation_loss": float(loss), "validation_contact_rmse_mm": rmse}
 
 
-def _keep(run: _Run, line: dict[str, Any], out: Path) -> None:
+def _keep(run: _Run, line: dict[str, Any], out: Path, keep_best: bool) -> None:
     """Write the epoch down: best first, then last, so that a run interrupted between them repeats the epoch."""
     document = run.document
     document["history"] = [*document["history"], line]
@@ -385,6 +386,7 @@ def _keep(run: _Run, line: dict[str, Any], out: Path) -> None:
     better = "best" not in document or line["validation_loss"] < document["best"]["validation_loss"]
     if better:
         document["best"] = {"epoch": run.epoch, "validation_loss": line["validation_loss"]}
-        checkpoint.save(out / checkpoint.BEST, run.network, None, document)
+        if keep_best:
+            checkpoint.save(out / checkpoint.BEST, run.network, None, document)
     checkpoint.save(out / checkpoint.LAST, run.network, run.optimizer, document)
     documents.write_text(out / METRICS, "".join(json.dumps(entry) + "\n" for entry in document["history"]))

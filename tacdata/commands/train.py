@@ -40,7 +40,9 @@ def run(
     ] = None,
     split: Annotated[str, typer.Option(help="A file name in training/splits.")] = "episode",
     seed: Annotated[int, typer.Option(help="Seed of the split, the weights and the order of frames.")] = 0,
-    idle_share: Annotated[float, typer.Option(help="Share of the frames out of contact an epoch takes.")] = 1.0,
+    idle_share: Annotated[
+        float | None, typer.Option(help="Share of idle frames an epoch takes; default 1, or 0.3 with --from.")
+    ] = None,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
     batch_size: Annotated[int | None, typer.Option(min=1, help="Frames a step; default 32.")] = None,

@@ -47,7 +47,7 @@ class TrainingOptions(TypedDict, total=False):
     """Random change of the exponent [1]."""
     spread_jitter: float | None
     """Variance of a random spread of loads [mm²]."""
-    idle_share: float
+    idle_share: float | None
     """Share of the frames out of contact that an epoch takes [1]."""
     precision: str
     """"float32", or "bfloat16" for cards."""

@@ -35,7 +35,7 @@ from tacdata.training.frames.frames import Frames
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference import checkpoint
 from tacdata.training.inference.checkpoint import Checkpoint
-from tacdata.training.inference.compute import choose_device, reproducible
+from tacdata.training.inference.compute import reproducible
 from tacdata.training.loss import normalized
 from tacdata.training.networks.network import Network
 from tacdata.training.pretraining.unseen_shapes import SOURCE as UNSEEN
@@ -115,8 +115,11 @@ def fit(
         started = (run / checkpoint.LAST).is_file()
         told = _counted(listener, number, len(parts))
         left_out = replace(division, train=remaining, validation=part)
-        train(frames, settings, run, device, started, threads, told, compiled, pretrained, simulated, left_out, True)
-        members.append(checkpoint.load(run / checkpoint.LAST, choose_device(device)))
+        members.append(
+            train(
+                frames, settings, run, device, started, threads, told, compiled, pretrained, simulated, left_out, True
+            )
+        )
     with reproducible(threads):
         losses = _losses(members, pretrained, frames, settings)
         share = SHARES[chosen(losses)]
