@@ -68,7 +68,7 @@ def test_a_fit_to_few_presses_is_no_worse_than_none(known, unit, presses, tmp_pa
     division = Split("episode", 0, tuple(range(1, presses)), (0,), (15,))
     fitted = fit(unit, recipe({}, known), tmp_path / "run", known, "cpu", threads=1, split=division)
     (without, without_peak), (rmse, peak) = scores(known.network, unseen), scores(fitted.network, unseen)
-    assert fitted.document["cross_fit"]["share"] == 0.0, "no press left out surely gains by moved weights"
+    assert fitted.document["cross_fit"]["share"] <= 0.25, "no press left out surely gains by moved weights"
     assert rmse < 0.9 * without and peak < 0.7 * without_peak, (rmse, without, peak, without_peak)
 
 
