@@ -41,7 +41,7 @@ def run(
     split: Annotated[str, typer.Option(help="A file name in training/splits.")] = "episode",
     seed: Annotated[int, typer.Option(help="Seed of the split, the weights and the order of frames.")] = 0,
     idle_share: Annotated[
-        float | None, typer.Option(help="Share of idle frames an epoch takes; default 1, or 0.3 with --from.")
+        float | None, typer.Option(help="Share of the frames out of contact an epoch takes; default 1.")
     ] = None,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,

@@ -11,7 +11,7 @@ fit is never worse than the calibrated network.
 Weights that were fitted from one start may be averaged (M. Wortsman et al., ICML 2022). The errors of presses left out
 also give intervals and the scale of novelty.
 
-With many presses one network is enough. It learns from the training presses and is judged on those of validation.
+With many presses one network is enough. It learns from the training presses, and those of validation choose its epoch.
 """
 
 from __future__ import annotations
@@ -96,6 +96,11 @@ def fit(
     presses = tuple(sorted({*division.train, *division.validation}))
     if len(presses) < 2:
         raise UsageError(f"a fit to {len(presses)} press", "two presses or more", "record more")
+    if len(presses) > MANY and shape_groups is None:
+        resume = resume and (out / checkpoint.LAST).is_file()
+        return train(
+            frames, settings, out, device, resume, threads, listener, compiled, pretrained, simulated, division
+        )
     if not resume:
         check_free(out)
     elif (out / checkpoint.BEST).is_file():
@@ -104,8 +109,6 @@ def fit(
     if shape_groups is not None:
         groups = dealt(frames.spans(presses), shape_groups, frames.origin)
         parts, source = [tuple(span.number for span in group) for group in groups], UNSEEN
-    elif len(presses) > MANY:
-        parts = [division.validation]
     else:
         parts = _dealt(presses, settings.seed)
     members = []
@@ -123,8 +126,7 @@ def fit(
     with reproducible(threads):
         losses = _losses(members, pretrained, frames, settings)
         share = SHARES[chosen(losses)]
-        if len(parts) > 1:
-            division = replace(division, train=presses, validation=())
+        division = replace(division, train=presses, validation=())
         document = _document(members, division, losses, share)
         ends = [member.network for member in members]
         network = between(pretrained.network, ends, share, copy.deepcopy(ends[0]))

@@ -13,8 +13,8 @@ from tacdata.training.settings import TrainingSettings
 if TYPE_CHECKING:
     from tacdata.training.inference.checkpoint import Checkpoint
 
-FITTING: dict[str, Any] = {"epochs": 20, "learning_rate": 5e-4, "batch_size": 64, "idle_share": 0.3}
-"""Settings for fitting a pretrained network to a few recorded presses: small steps, few epochs, few idle frames."""
+FITTING: dict[str, Any] = {"epochs": 20, "learning_rate": 5e-4, "batch_size": 64}
+"""Settings for fitting a pretrained network to a few recorded presses: small steps, few epochs."""
 PULL = 1e-3
 """Weight of the pull towards the pretrained weights where no simulated frames are mixed in [1]."""
 
