@@ -27,7 +27,7 @@ MOST_FRAMES = 20_000
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class HeldOut:
     """Presses that a network did not learn from."""
 
     network: Network
@@ -43,7 +43,7 @@ def complete(
     document: dict[str, Any],
     frames: Frames,
     learned: tuple[int, ...],
-    parts: Sequence[LeftOut],
+    parts: Sequence[HeldOut],
     parent: Checkpoint | None,
     source: str = conformal_intervals.VALIDATION,
 ) -> None:

@@ -14,7 +14,7 @@ import torch
 
 from tacdata import documents, provenance, schemas
 from tacdata.errors import TacdataError, UsageError
-from tacdata.training.completion import LeftOut, complete
+from tacdata.training.completion import HeldOut, complete
 from tacdata.training.frames.channel_calibration import calibrate
 from tacdata.training.frames.frames import Frames
 from tacdata.training.frames.label_tensor import label_tensor
@@ -186,7 +186,7 @@ def train(
         if part:
             return checkpoint.load(out / checkpoint.LAST, place)
         best = checkpoint.load(out, place)
-        parts = [LeftOut(best.network, split.train, split.validation)]
+        parts = [HeldOut(best.network, split.train, split.validation)]
         complete(best, best.document, frames, split.train, parts, pretrained)
     return checkpoint.load(out)
 

@@ -58,7 +58,7 @@ def test_foreign_recordings_come_in_by_the_page(tmp_path):
         rows = np.column_stack(press_data(number))
         names = ",".join(["t", "depth", "Fz", *(f"cap{k}" for k in range(rows.shape[1] - 3))])
         np.savetxt(tmp_path / "measured" / f"run_{number}.csv", rows, "%.5f", ",", header=names, comments="")
-    propose, bring, look = commands(HOW_TO / "foreign_data.md")
+    _, propose, bring, look = commands(HOW_TO / "foreign_data.md")  # the first one is the wizard on a page
     typed(tmp_path, propose)
     proposed = yaml.safe_load((tmp_path / "mapping.yaml").read_text())
     assert proposed["position"]["depth"]["column"].startswith("depth"), "the guess that the page speaks of"

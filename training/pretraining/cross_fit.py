@@ -29,7 +29,7 @@ import torch
 
 from tacdata import documents, provenance
 from tacdata.errors import UsageError
-from tacdata.training.completion import LeftOut, complete
+from tacdata.training.completion import HeldOut, complete
 from tacdata.training.frames.channel_calibration import calibrate
 from tacdata.training.frames.frames import Frames
 from tacdata.training.frames.windows import Windows
@@ -135,7 +135,7 @@ def fit(
             network.set_calibration(fitted.gain, fitted.exponent, fitted.mixing)
             document["calibration"] = fitted.document
         apart = [
-            LeftOut(between(pretrained.network, [end], share, end), member.split.train, member.split.validation)
+            HeldOut(between(pretrained.network, [end], share, end), member.split.train, member.split.validation)
             for end, member in zip(ends, members, strict=True)
         ]
         best = Checkpoint(out / checkpoint.BEST, document, network, members[0].sensor, {})

@@ -167,6 +167,7 @@ def test_a_computer_that_stood_still_in_mid_press_lifts_and_says_so(bench, virtu
     out = tmp_path / "session"
     child = subprocess.Popen(bench, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while height(virtual) > -0.2:
+        assert child.poll() is None, child.stderr.read()
         time.sleep(0.002)
     os.kill(child.pid, signal.SIGSTOP)
     time.sleep(4.0)
