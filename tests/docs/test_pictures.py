@@ -1,7 +1,10 @@
-"""README's pictures have the layout that `tacdata pictures` draws today: sizes, panels, headings.
+"""The documents' pictures are drawn by the code of today, and README's have its layout: sizes, panels, headings.
 
 What stands in the panels is that of one run of `tacdata demo`; it takes minutes, and is not repeated here.
 """
+
+import importlib.util
+import json
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from tacdata.training.inference.prediction import PredictedMaps, write_predictio
 from tacdata.viewers.pictures import film
 
 PICTURES = HOW_TO.parent / "pictures"
+ROOT = HOW_TO.parents[1]
 HEADINGS = {"Taxel signals": (124, 138, 0, 640)}
 """Headings -> rows and columns of the page in which they stand, and nothing of the press [pixels].
 
@@ -55,6 +59,15 @@ def drawn(tmp_path_factory):
 def test_pictures_have_the_size_of_today(drawn, name):
     with Image.open(PICTURES / name) as shipped, Image.open(drawn / name) as new:
         assert shipped.size == new.size, f"draw {name} anew: tacdata demo, then tacdata pictures"
+
+
+def test_pictures_are_drawn_by_the_code_of_today():
+    spec = importlib.util.spec_from_file_location("draw", ROOT / ".dev" / "pictures.py")
+    draw = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(draw)
+    kept = json.loads((PICTURES / "code.json").read_text())
+    old = [name for name in draw.DRAWN_BY if kept.get(name) != draw.code_of(name)]
+    assert not old, f"draw anew, and look at it: .venv/bin/python .dev/pictures.py {' '.join(old)}"
 
 
 def words(picture, band):
