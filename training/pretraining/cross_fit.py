@@ -116,11 +116,22 @@ def fit(
         run = out / f"part-{number}"
         remaining = tuple(press for press in presses if press not in part)
         started = (run / checkpoint.LAST).is_file()
-        told = _counted(listener, number, len(parts))
+        counter = _counted(listener, number, len(parts))
         left_out = replace(division, train=remaining, validation=part)
         members.append(
             train(
-                frames, settings, run, device, started, threads, told, compiled, pretrained, simulated, left_out, True
+                frames,
+                settings,
+                run,
+                device,
+                started,
+                threads,
+                counter,
+                compiled,
+                pretrained,
+                simulated,
+                left_out,
+                True,
             )
         )
     with reproducible(threads):

@@ -11,8 +11,10 @@ from tacdata.importing.streams import Stream
 
 @dataclass(frozen=True)
 class LagPolicy:
-    """Limits of clocks that agree. ``better`` and ``much`` stay clear of 30 virtual labs whose skins relax or creep:
-    a shift gains at most 0.11 there, and never leads to a correlation of 0.97. No other was tuned on data.
+    """Limits of clocks that agree.
+
+    ``full_gain`` and ``other_gain`` were set on 30 virtual labs whose skins relax or creep. A shift gains at most 0.11
+    there, and never leads to a correlation of 0.97. No other limit was tuned on data.
     """
 
     windows: int = 8
@@ -22,21 +24,21 @@ class LagPolicy:
     largest: float = 5.0
     """Largest lag that is looked for [s]."""
     share: float = 0.25
-    """The same [a part's length]."""
-    alike: float = 0.9
+    """Largest lag that is looked for [a part's length]."""
+    least_correlation: float = 0.9
     """Smallest correlation of readings and position, once they are shifted [1]."""
-    same: float = 0.97
+    full_correlation: float = 0.97
     """Correlation from which a shift explains all of the difference [1]."""
-    better: float = 0.05
+    full_gain: float = 0.05
     """Smallest gain of correlation by such a shift [1]."""
-    much: float = 0.2
+    other_gain: float = 0.2
     """Smallest gain of correlation by any other shift [1]."""
     period: float = 0.02
     """Largest difference of correlation between shifts by whole periods of a motion [1]."""
     lead: float = 0.1
     """Smallest lead that no skin has [s]."""
     lag: float = 0.5
-    """Smallest lag that is told [s]; filters and skins have shorter ones."""
+    """Smallest lag that is reported [s]; filters and skins have shorter ones."""
     steps: float = 3.0
     """Smallest lead, lag or change of it [rows]."""
     straight: float = 0.9
@@ -71,7 +73,7 @@ def lag_doubts(taxels: Stream, position: Stream, policy: LagPolicy = POLICY) -> 
         for a, b in zip(np.array_split(path, count), np.array_split(answer, count), strict=True)
         if np.ptp(a) > 0.5 * np.ptp(path) and np.ptp(b) > 0
     ]
-    found = [each for each in found if each[1] >= policy.alike]
+    found = [each for each in found if each[1] >= policy.least_correlation]
     if not found:
         return ()
     lags = np.array([each[0] for each in found]) * step / 1e9
@@ -82,8 +84,12 @@ def lag_doubts(taxels: Stream, position: Stream, policy: LagPolicy = POLICY) -> 
             f"position: its clock and that of the channels drift apart: the readings' lag changes by {drift:+.3g} s in "
             "the course of the recording: give drift [ppm] under the time of one",
         )
-    lag, gain, alike = float(np.median(lags)), float(np.median(gains)), float(np.median([each[1] for each in found]))
-    is_shift = gain >= policy.much or (gain >= policy.better and alike >= policy.same)
+    lag, gain, correlation = (
+        float(np.median(lags)),
+        float(np.median(gains)),
+        float(np.median([each[1] for each in found])),
+    )
+    is_shift = gain >= policy.other_gain or (gain >= policy.full_gain and correlation >= policy.full_correlation)
     if not is_shift or abs(lag) < max(least, policy.lead if lag < 0 else policy.lag):
         return ()
     words = f"come {-lag:.3g} s before" if lag < 0 else f"come {lag:.3g} s behind"

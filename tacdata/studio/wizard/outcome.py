@@ -20,7 +20,7 @@ from tacdata.studio.wizard.table_memory import TableMemory
 COLORS = ("blue", "vermilion", "green", "purple", "amber", "sky", "ink", "grey")
 """Colours of channels; more than these are not drawn."""
 CUT = 0.1
-"""Share of the deepest depth above which a press is told from the next, as in a proposal [1]."""
+"""Share of the deepest depth above which one press is separate from the next, as in a proposal [1]."""
 SHOWN, POINTS, LONG = 24, 300, 2400
 """Presses that are drawn, points of each, and points of the whole path."""
 
