@@ -77,22 +77,22 @@ def judge(
     sealed = chosen(course)
     setting = _setting(without_readings(course, sealed), spec, without, correct_p)
     checks = check(setting)
-    found = find(setting, note, until)
-    lacking = lack_of_fit(found.final) if found.effects and until == STEPS[-1] else {}
-    found = with_families(found, lacking)
-    beside = () if adequate(found, answer_of(found)) else beside_remainder(found)
+    findings = find(setting, note, until)
+    lacking = lack_of_fit(findings.final) if findings.effects and until == STEPS[-1] else {}
+    findings = with_families(findings, lacking)
+    evidence = () if adequate(findings, answer_of(findings)) else beside_remainder(findings)
     note("the gap on sealed presses")
-    shown = gap(course, found, sealed)
-    seen = alarms(found.final, form_error(found)) if until == STEPS[-1] else ()
-    decision = decide(found, checks, beside, shown, lacking, seen)
-    before, after = ([], []) if until == "gate" else (slices(found.problem), slices(found.final))
-    written = document(decision, found, checks, (before, after), parents or {}, shown)
-    return Verdict(written, checks, found, decision, before, after)
+    sealed_gap = gap(course, findings, sealed)
+    raised = alarms(findings.final, form_error(findings)) if until == STEPS[-1] else ()
+    decision = decide(findings, checks, evidence, sealed_gap, lacking, raised)
+    slices_before, slices_after = ([], []) if until == "gate" else (slices(findings.problem), slices(findings.final))
+    written = document(decision, findings, checks, (slices_before, slices_after), parents or {}, sealed_gap)
+    return Verdict(written, checks, findings, decision, slices_before, slices_after)
 
 
 def _setting(course: Course, spec: Spec, without: tuple[str, ...], correct_p: bool) -> Setting:
     """Return the setting of a judgement: all effects are tried that the model has not."""
-    response, given = spec.response(course), spec.effects()
-    left_out = {p.effect.called for p in given} | set(without)
+    response, model_effects = spec.response(course), spec.effects()
+    left_out = {p.effect.called for p in model_effects} | set(without)
     effects = [e for e in library() if e.called not in left_out]
-    return Setting(course, response, effects, spec.nuisance, given, correct_p)
+    return Setting(course, response, effects, spec.nuisance, model_effects, correct_p)

@@ -47,12 +47,12 @@ class VerdictFolder(Displayed):
         yield str(self.document["why"]).splitlines()[0]
 
 
-def read_verdict(folder: StrPath, kept: Any = None) -> VerdictFolder:
+def read_verdict(folder: StrPath, temporary: Any = None) -> VerdictFolder:
     """Read a verdict: the folder that `tacdata discrepancy` wrote.
 
     Args:
         folder: The folder, or the file ``verdict.json`` in it.
-        kept: A temporary folder that is to live as long as the verdict.
+        temporary: A temporary folder that is to live as long as the verdict.
 
     Raises:
         UsageError: If there is no verdict.
@@ -64,4 +64,4 @@ def read_verdict(folder: StrPath, kept: Any = None) -> VerdictFolder:
         raise UsageError(
             f"{path} is no verdict: no {VERDICT} in it", "a folder of tacdata discrepancy", "check the path"
         )
-    return VerdictFolder(path, documents.read(path / VERDICT, "verdict"), kept)
+    return VerdictFolder(path, documents.read(path / VERDICT, "verdict"), temporary)

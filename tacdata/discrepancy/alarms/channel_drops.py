@@ -39,10 +39,10 @@ def channel_drops(cleaned: Cleaned) -> list[Alarm]:
     course = cleaned.problem.setting.course
     if course.channels < FEWEST_CHANNELS or len(cleaned.episodes) < FEWEST_PRESSES:
         return []
-    found = drops(press_gains(cleaned))
-    if found is None:
+    dropped_channel = drops(press_gains(cleaned))
+    if dropped_channel is None:
         return []
-    channel, far, change = found
+    channel, far, change = dropped_channel
     names = ", ".join(course.names[int(cleaned.episodes[k])] for k in far[:MOST_NAMED])
     way = "less" if change < 0 else "more"
     return [
@@ -61,28 +61,33 @@ def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
         logs: Logarithm of the gain of each press and channel, relative to the median of its channels and of its place
             [1], shape (presses, channels); NaN where it is not known.
     """
-    known = np.isfinite(logs)
-    known &= known.sum(axis=1, keepdims=True) >= FEWEST_CHANNELS
-    known &= known.sum(axis=0) >= FEWEST_PRESSES
-    if np.count_nonzero(known.any(axis=0)) < FEWEST_CHANNELS:
+    finite = np.isfinite(logs)
+    finite &= finite.sum(axis=1, keepdims=True) >= FEWEST_CHANNELS
+    finite &= finite.sum(axis=0) >= FEWEST_PRESSES
+    if np.count_nonzero(finite.any(axis=0)) < FEWEST_CHANNELS:
         return None
-    off = np.where(known, logs, 0.0)
-    scatter = np.array([_scatter(own[seen]) for own, seen in zip(off.T, known.T, strict=True)])
-    shares = np.abs(off) / np.maximum(LEAST, FAR_Z * scatter)
-    far = known & (shares > 1)
-    count, seen = far.sum(axis=0), known.sum(axis=0)
-    others, watched = far.sum() - count, known.sum() - seen
-    tails = betabinom.sf(count - 1, seen, 1 + others, RARE + watched - others)
-    test = rarest(np.where((count >= SEVERAL) & (count <= MOST * seen), tails, 1.0))
+    deviation = np.where(finite, logs, 0.0)
+    scatter = np.array(
+        [
+            _scatter(channel_deviation[presses_of_channel])
+            for channel_deviation, presses_of_channel in zip(deviation.T, finite.T, strict=True)
+        ]
+    )
+    shares = np.abs(deviation) / np.maximum(LEAST, FAR_Z * scatter)
+    far = finite & (shares > 1)
+    count, presses_of_channel = far.sum(axis=0), finite.sum(axis=0)
+    drops_of_others, watched = far.sum() - count, finite.sum() - presses_of_channel
+    tails = betabinom.sf(count - 1, presses_of_channel, 1 + drops_of_others, RARE + watched - drops_of_others)
+    test = rarest(np.where((count >= SEVERAL) & (count <= MOST * presses_of_channel), tails, 1.0))
     if not test.alarms:
         return None
-    presses, own = np.flatnonzero(far[:, test.at]), off[:, test.at]
+    presses, channel_deviation = np.flatnonzero(far[:, test.at]), deviation[:, test.at]
     # Where most presses of a place have dropped, the others seem to be the odd ones: the usual way is that of most.
-    way = 1.0 if np.sum(np.sign(own[presses])) > 0 else -1.0
-    presses = presses[np.sign(own[presses]) == way]
-    return test.at, presses, float(np.expm1(np.median(own[presses])))
+    way = 1.0 if np.sum(np.sign(channel_deviation[presses])) > 0 else -1.0
+    presses = presses[np.sign(channel_deviation[presses]) == way]
+    return test.at, presses, float(np.expm1(np.median(channel_deviation[presses])))
 
 
-def _scatter(off: np.ndarray) -> float:
+def _scatter(deviation: np.ndarray) -> float:
     """Return the usual scatter of a channel [1]; infinite where it has no presses."""
-    return float(np.quantile(np.abs(off), CALM)) / NORMAL if len(off) else np.inf
+    return float(np.quantile(np.abs(deviation), CALM)) / NORMAL if len(deviation) else np.inf

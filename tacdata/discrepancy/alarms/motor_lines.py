@@ -146,8 +146,8 @@ def _moving(course: Course) -> np.ndarray:
 
 def _even(cleaned: Cleaned) -> bool:
     """Return whether presses come so evenly that whatever they share has lines."""
-    apart = np.diff(cleaned.course.time[cleaned.begins])
-    return len(apart) < 2 or float(np.std(apart)) < EVEN * float(np.mean(apart))
+    intervals = np.diff(cleaned.course.time[cleaned.begins])
+    return len(intervals) < 2 or float(np.std(intervals)) < EVEN * float(np.mean(intervals))
 
 
 def _periodogram(cleaned: Cleaned, rows: np.ndarray) -> _Lines | None:

@@ -39,20 +39,20 @@ def press_gains(cleaned: Cleaned) -> np.ndarray:
     peak = np.array([np.abs(rise).max(axis=0) for rise in expected])
     edges = np.linspace(0.0, max(float(course.tip[:, 2].max()), 1e-9), DEPTHS + 1)
     shape = len(rows), DEPTHS, course.channels
-    both, power, deepest = np.zeros(shape), np.zeros(shape), np.zeros(len(rows), dtype=np.int64)
-    for k, own in enumerate(rows):
-        at = np.clip(np.searchsorted(edges, course.tip[own, 2], side="right") - 1, 0, DEPTHS - 1)
-        pressed = course.tip[own, 2] > 0
-        np.add.at(both[k], at[pressed], np.nan_to_num(measured[k] * expected[k])[pressed])
+    products, power, deepest = np.zeros(shape), np.zeros(shape), np.zeros(len(rows), dtype=np.int64)
+    for k, press in enumerate(rows):
+        at = np.clip(np.searchsorted(edges, course.tip[press, 2], side="right") - 1, 0, DEPTHS - 1)
+        pressed = course.tip[press, 2] > 0
+        np.add.at(products[k], at[pressed], np.nan_to_num(measured[k] * expected[k])[pressed])
         np.add.at(power[k], at[pressed], np.square(expected[k])[pressed])
         deepest[k] = at.max()
-    place = np.array([cleaned.problem.null.context[own[0]] for own in rows], dtype=np.int64)
+    place = np.array([cleaned.problem.null.context[press[0]] for press in rows], dtype=np.int64)
     if not setting.response.fitted:
         place[:] = 0  # the model knows how places differ
-    logs = _over_others(both, power, deepest, place)
+    logs = _over_others(products, power, deepest, place)
     noise, step = _grain(course.readings, measured)
-    least = np.maximum(STIRRED * peak.max(axis=0), 0.5 * step / SURE)
-    logs[(peak < least) | (SURE * np.sqrt(power.sum(axis=1)) <= noise)] = np.nan
+    smallest_rise = np.maximum(STIRRED * peak.max(axis=0), 0.5 * step / SURE)
+    logs[(peak < smallest_rise) | (SURE * np.sqrt(power.sum(axis=1)) <= noise)] = np.nan
     return _relative_to_median(logs)
 
 
@@ -60,38 +60,38 @@ def _grain(readings: np.ndarray, measured: list[np.ndarray]) -> tuple[np.ndarray
     """Return each channel's noise as presses begin, and the step of its numbers [its unit], shapes (channels,)."""
     begins = np.concatenate([rise[: max(len(rise) // 10, 1)] for rise in measured])
     noise = 1.4826 * np.nanmedian(np.abs(begins), axis=0)
-    steps = np.array([np.diff(np.unique(own[np.isfinite(own)])).min(initial=np.inf) for own in readings.T])
+    steps = np.array([np.diff(np.unique(channel[np.isfinite(channel)])).min(initial=np.inf) for channel in readings.T])
     return noise, steps
 
 
-def _over_others(both: np.ndarray, power: np.ndarray, deepest: np.ndarray, place: np.ndarray) -> np.ndarray:
+def _over_others(products: np.ndarray, power: np.ndarray, deepest: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return the median logarithm of the ratio of each press to the others of its place, shape (presses, channels).
 
     Args:
-        both: Readings times those expected, summed by depth, shape (presses, depths, channels).
+        products: Readings times those expected, summed by depth, shape (presses, depths, channels).
         power: Squares of those expected, summed by depth, of the same shape.
         deepest: Last interval of depth of each press, shape (presses,), int64.
         place: Of each press, shape (presses,), int64.
     """
-    logs = np.full(both.shape[::2], np.nan)
-    gains = np.divide(both, power, out=np.zeros_like(both), where=power > 0)
-    for k in range(len(both)):
-        others = np.flatnonzero((place == place[k]) & (np.arange(len(both)) != k))
-        if len(others) < FEWEST_EACH - 1:
+    logs = np.full(products.shape[::2], np.nan)
+    gains = np.divide(products, power, out=np.zeros_like(products), where=power > 0)
+    for k in range(len(products)):
+        neighbours = np.flatnonzero((place == place[k]) & (np.arange(len(products)) != k))
+        if len(neighbours) < FEWEST_EACH - 1:
             continue
-        shared = np.arange(both.shape[1]) <= np.minimum(deepest[k], deepest[others])[:, None]
-        weight = np.minimum(power[k], power[others]) * shared[:, :, None]
-        mine, theirs = (weight * gains[k]).sum(axis=1), (weight * gains[others]).sum(axis=1)
-        known = (mine > 0) & (theirs > 0)
-        ratio = np.log(np.where(known, mine, 1.0)) - np.log(np.where(known, theirs, 1.0))
-        enough = known.sum(axis=0) >= FEWEST_EACH - 1
-        logs[k, enough] = np.nanmedian(np.where(known, ratio, np.nan)[:, enough], axis=0)
+        shared = np.arange(products.shape[1]) <= np.minimum(deepest[k], deepest[neighbours])[:, None]
+        weight = np.minimum(power[k], power[neighbours]) * shared[:, :, None]
+        weighted, weighted_neighbours = (weight * gains[k]).sum(axis=1), (weight * gains[neighbours]).sum(axis=1)
+        positive = (weighted > 0) & (weighted_neighbours > 0)
+        ratio = np.log(np.where(positive, weighted, 1.0)) - np.log(np.where(positive, weighted_neighbours, 1.0))
+        enough = positive.sum(axis=0) >= FEWEST_EACH - 1
+        logs[k, enough] = np.nanmedian(np.where(positive, ratio, np.nan)[:, enough], axis=0)
     return logs
 
 
 def _relative_to_median(logs: np.ndarray) -> np.ndarray:
     """Return logarithms of gains less the median of their press; NaN where it has few."""
     enough = np.isfinite(logs).sum(axis=1) >= FEWEST_CHANNELS
-    found = np.full(logs.shape, np.nan)
-    found[enough] = logs[enough] - np.nanmedian(logs[enough], axis=1, keepdims=True)
-    return found
+    relative = np.full(logs.shape, np.nan)
+    relative[enough] = logs[enough] - np.nanmedian(logs[enough], axis=1, keepdims=True)
+    return relative

@@ -29,12 +29,12 @@ UNSURE = 0.25
 """A part whose size is not known within so much carries no information on it [share of the size]."""
 
 
-def constancies(found: Findings) -> tuple[dict[str, float], ...]:
+def constancies(findings: Findings) -> tuple[dict[str, float], ...]:
     """Return each effect's spread of size over the parts of each condition [share of its size], in their order.
 
     0: the same in all parts. The scatter of episodes is taken off. Conditions that do not vary are not there.
     """
-    final = found.final
+    final = findings.final
     if not final.placed:
         return ()
     conditions = _conditions(final.setting.course)
@@ -59,40 +59,40 @@ def spread(gram: np.ndarray, parts: int) -> float:
     root = np.sqrt(np.diag(information))  # parts of very different size: solved at one scale
     scaled = information / np.outer(root, root) + 1e-9 * np.eye(len(index))
     inverse = np.linalg.inv(scaled) / np.outer(root, root)
-    off = inverse @ total[index, 0]
-    scores = gram[:, index, 0] - np.einsum("eij,j->ei", gram[:, index][:, :, index], off)
+    deviation = inverse @ total[index, 0]
+    scores = gram[:, index, 0] - np.einsum("eij,j->ei", gram[:, index][:, :, index], deviation)
     # Sandwich variance with episodes as clusters: it does not rely on the noise model.
     chance = np.diag(inverse @ (scores.T @ scores) @ inverse)
-    told = np.sqrt(chance) <= UNSURE
-    if np.count_nonzero(told) < 2:
+    determined = np.sqrt(chance) <= UNSURE
+    if np.count_nonzero(determined) < 2:
         return 0.0
-    return float(np.sqrt(max(float(np.mean(np.square(off[told]) - chance[told])), 0.0)))
+    return float(np.sqrt(max(float(np.mean(np.square(deviation[determined]) - chance[determined])), 0.0)))
 
 
 def _of(final: Problem, at: int, conditions: dict[str, np.ndarray]) -> dict[str, float]:
     """Return the spread of one effect's size over the parts of each condition."""
     setting, streams = final.setting, Streams.of(final.setting.course)
-    others = [*setting.given, *(p for k, p in enumerate(final.placed) if k != at)]
-    chain = Chain(setting.course, setting.response, others)
-    own = streams.predicted(chain.again([*others, final.placed[at]])) - streams.predicted(chain.prediction)
+    other_effects = [*setting.given, *(p for k, p in enumerate(final.placed) if k != at)]
+    chain = Chain(setting.course, setting.response, other_effects)
+    signal = streams.predicted(chain.again([*other_effects, final.placed[at]])) - streams.predicted(chain.prediction)
     residual = streams.measured(setting.course) - streams.predicted(
         Chain(setting.course, setting.response, [*setting.given, *final.placed]).prediction
     )
     moving = final.tangent.values[:, :, [k for k, knob in enumerate(final.tangent.knobs) if knob.at != at]]
     whitener = final.null.whitener_for(setting, [*setting.given, *final.placed])
     clock = final.placed[at].effect.follows_clock  # its own form contains the change with time
-    told = {name: labels for name, labels in conditions.items() if not (clock and name == TIME)}
-    each = {name: [own * (labels == k) for k in range(int(labels.max()) + 1)] for name, labels in told.items()}
+    applicable = {name: labels for name, labels in conditions.items() if not (clock and name == TIME)}
+    each = {name: [signal * (labels == k) for k in range(int(labels.max()) + 1)] for name, labels in applicable.items()}
     columns = np.stack([residual, *(c for parts in each.values() for c in parts)], axis=2)
-    every = whitener.whitened(np.concatenate([columns, moving], axis=2).astype(np.float32))
-    gram = episode_grams(every, setting.course.reduced, final.null.nuisances, final.null.inner).gram
+    white = whitener.whitened(np.concatenate([columns, moving], axis=2).astype(np.float32))
+    gram = episode_grams(white, setting.course.reduced, final.null.nuisances, final.null.inner).gram
     count = columns.shape[2]
-    beside = np.arange(count - 1, gram.shape[1] - 1)
-    gram = eliminated(gram, beside, np.concatenate([np.zeros(moving.shape[2]), final.null.ridge]))
+    fixed = np.arange(count - 1, gram.shape[1] - 1)
+    gram = eliminated(gram, fixed, np.concatenate([np.zeros(moving.shape[2]), final.null.ridge]))
     result, first = {}, 1
     for name, parts in each.items():
-        chosen = np.concatenate([[0], np.arange(first, first + len(parts))])
-        result[name] = spread(gram[:, chosen][:, :, chosen], len(parts))
+        columns_of_parts = np.concatenate([[0], np.arange(first, first + len(parts))])
+        result[name] = spread(gram[:, columns_of_parts][:, :, columns_of_parts], len(parts))
         first += len(parts)
     return result
 
@@ -105,14 +105,14 @@ def _conditions(course: Course) -> dict[str, np.ndarray]:
     fast = np.zeros(course.episodes)
     for e in range(course.episodes):
         rows = (course.episode == e) & touching & ~course.first
-        moved = float(way[rows].sum())
+        distance = float(way[rows].sum())
         # Weighted by the way, so that a hold does not count as a slow press.
-        fast[e] = float((way[rows] * np.abs(course.speed[rows])).sum()) / moved if moved > 0 else np.nan
+        fast[e] = float((way[rows] * np.abs(course.speed[rows])).sum()) / distance if distance > 0 else np.nan
     deep = np.array([course.tip[course.episode == e, 2].max() for e in range(course.episodes)])
-    found = {"rate": _parts(fast), "depth": _parts(deep), TIME: np.arange(course.episodes) * 2 // course.episodes}
+    by_episode = {"rate": _parts(fast), "depth": _parts(deep), TIME: np.arange(course.episodes) * 2 // course.episodes}
     _, place = np.unique(course.site, return_inverse=True)
-    found["place"] = place * CELLS // max(int(place.max()) + 1, CELLS) if place.max() >= CELLS else place
-    varying = {n: labels[episode][:, None] for n, labels in found.items() if labels.max() > 0}
+    by_episode["place"] = place * CELLS // max(int(place.max()) + 1, CELLS) if place.max() >= CELLS else place
+    varying = {n: labels[episode][:, None] for n, labels in by_episode.items() if labels.max() > 0}
     speed = course.speed[read]
     moving = np.abs(speed) > STANDS * np.abs(course.speed).max()
     varying["phase"] = np.where(moving, np.where(speed > 0, 0, 2), 1)[:, None]

@@ -69,52 +69,54 @@ def of_family(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> Lack | No
 
 def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     """Return whether the saturated model of an effect's family explains significantly more than its law."""
-    own = of_family(finding, lacking)
-    if own is None or own.size < ANOTHER_FORM * max(finding.bought, 0.0):
+    family_lack = of_family(finding, lacking)
+    if family_lack is None or family_lack.size < ANOTHER_FORM * max(finding.bought, 0.0):
         return False
-    return own.t >= SURE_T or (own.gain >= CLEAR_GAIN and own.t >= CLEAR_T)
+    return family_lack.t >= SURE_T or (family_lack.gain >= CLEAR_GAIN and family_lack.t >= CLEAR_T)
 
 
-def fills(found: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
+def fills(findings: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     """Return whether an answer's residual is another law of an effect's family: at that level hardly anything is left.
 
     The family explains nearly all of it, and far more than any other does: models of families overlap.
     """
-    own = of_family(finding, lacking)
-    if own is None or own.t < SURE_T:
+    family_lack = of_family(finding, lacking)
+    if family_lack is None or family_lack.t < SURE_T:
         return False
-    others = max((other.gain for other in lacking.values() if other is not own), default=0.0)
-    rest = found.left.gain - own.gain
-    return own.gain >= FAR_MORE * others and rest < SHARE_LEFT * (found.left.gain + max(found.explained, 0.0))
+    best_of_others = max((rival.gain for rival in lacking.values() if rival is not family_lack), default=0.0)
+    remainder = findings.left.gain - family_lack.gain
+    return family_lack.gain >= FAR_MORE * best_of_others and remainder < SHARE_LEFT * (
+        findings.left.gain + max(findings.explained, 0.0)
+    )
 
 
-def with_families(found: Findings, lacking: Mapping[Family, Lack]) -> Findings:
+def with_families(findings: Findings, lacking: Mapping[Family, Lack]) -> Findings:
     """Return findings with a large residual that families outside the answer explain."""
-    sure = [lacking[family] for family in _others(found, lacking) if lacking[family].t >= SURE_T]
-    most = max(sure, key=lambda own: own.gain, default=None)
-    if most is None or most.gain < max(found.left.gain, MUCH * (most.gain + max(found.explained, 0.0))):
-        return found
-    return replace(found, left=Leftovers(most.gain, most.t))
+    significant = [lacking[family] for family in _others(findings, lacking) if lacking[family].t >= SURE_T]
+    largest = max(significant, key=lambda own: own.gain, default=None)
+    if largest is None or largest.gain < max(findings.left.gain, MUCH * (largest.gain + max(findings.explained, 0.0))):
+        return findings
+    return replace(findings, left=Leftovers(largest.gain, largest.t))
 
 
-def elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
+def elsewhere(findings: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
     """Return families that the answer has nothing of, and that are surely there, too, the largest first."""
-    sure = surely_elsewhere(found, lacking)
-    return [family for family in sure if lacking[family].size >= SURE_SHARE * max(found.explained, 0.0)]
+    significant = surely_elsewhere(findings, lacking)
+    return [family for family in significant if lacking[family].size >= SURE_SHARE * max(findings.explained, 0.0)]
 
 
-def surely_elsewhere(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
+def surely_elsewhere(findings: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
     """Return families outside the answer that surely explain some of its residual, however little."""
-    others = _others(found, lacking) if lacking else []
-    sure = [family for family in others if lacking[family].t >= SURE_T and lacking[family].gain >= SURE_GAIN]
-    return sorted(sure, key=lambda family: -lacking[family].size)
+    families = _others(findings, lacking) if lacking else []
+    significant = [family for family in families if lacking[family].t >= SURE_T and lacking[family].gain >= SURE_GAIN]
+    return sorted(significant, key=lambda family: -lacking[family].size)
 
 
-def _others(found: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
+def _others(findings: Findings, lacking: Mapping[Family, Lack]) -> list[Family]:
     """Return families outside the answer that explain more than these: models of families overlap."""
-    taken = {MODEL.get(f.placed.effect.family, f.placed.effect.family) for f in found.effects}
-    own = max((lacking[family].gain for family in taken if family in lacking), default=0.0)
-    return [family for family in lacking if family not in taken and lacking[family].gain > own]
+    answer_families = {MODEL.get(f.placed.effect.family, f.placed.effect.family) for f in findings.effects}
+    largest_gain = max((lacking[family].gain for family in answer_families if family in lacking), default=0.0)
+    return [family for family in lacking if family not in answer_families and lacking[family].gain > largest_gain]
 
 
 def lack_of_fit(final: Problem) -> dict[Family, Lack]:
@@ -126,19 +128,19 @@ def lack_of_fit(final: Problem) -> dict[Family, Lack]:
     setting, placed = final.setting, [*final.setting.given, *final.placed]
     course, streams = setting.course, Streams.of(setting.course)
     residual = streams.measured(course) - streams.predicted(predict(course, setting.response, placed))
-    made = saturated(course, setting.response, placed)
+    models = saturated(course, setting.response, placed)
     moving = final.tangent.values
-    columns = np.concatenate([residual[:, :, None].astype(np.float32), *made.values(), moving], axis=2)
+    columns = np.concatenate([residual[:, :, None].astype(np.float32), *models.values(), moving], axis=2)
     white = final.null.whitener_for(setting, placed).whitened(columns)
     gram = episode_grams(white, course.reduced, final.null.nuisances, final.null.inner).gram
     last = columns.shape[2] - moving.shape[2]
     fixed = np.arange(last - 1, gram.shape[1] - 1)
     gram = eliminated(gram, fixed, np.concatenate([np.full(moving.shape[2], 1e-6), final.null.ridge]))
     result, first = {}, 1
-    for family, own in made.items():
-        index = np.arange(first, first + own.shape[2])
+    for family, family_columns in models.items():
+        index = np.arange(first, first + family_columns.shape[2])
         result[family] = lack(gram[:, np.r_[0, index]][:, :, np.r_[0, index]], final.folds)
-        first += own.shape[2]
+        first += family_columns.shape[2]
     return result
 
 
@@ -149,31 +151,31 @@ def lack(gram: np.ndarray, folds: np.ndarray) -> Lack:
         gram: Residual first, shape (episodes, 1 + k, 1 + k).
         folds: Fold of each episode, shape (episodes,).
     """
-    whole = gram.sum(axis=0)
-    known = np.diag(whole)[1:]
-    kept = np.concatenate([[True], known > EXCITED * max(float(known.max(initial=0.0)), 1e-12)])
-    gram, whole = gram[:, kept][:, :, kept], whole[np.ix_(kept, kept)]
+    total_gram = gram.sum(axis=0)
+    information = np.diag(total_gram)[1:]
+    excited = np.concatenate([[True], information > EXCITED * max(float(information.max(initial=0.0)), 1e-12)])
+    gram, total_gram = gram[:, excited][:, :, excited], total_gram[np.ix_(excited, excited)]
     if gram.shape[1] < 2:
         return Lack(0.0, 0.0, 0.0)
-    best = Lack(0.0, 0.0, _size(whole))
-    mean = float(np.trace(whole[1:, 1:])) / (len(whole) - 1)
+    best = Lack(0.0, 0.0, _size(total_gram))
+    mean = float(np.trace(total_gram[1:, 1:])) / (len(total_gram) - 1)
     for strength in STRENGTHS:
         each = np.zeros(len(folds))
         for fold in np.unique(folds):
-            train, rest = folds != fold, folds == fold
+            train, test = folds != fold, folds == fold
             total = gram[train].sum(axis=0)
             weights = np.linalg.solve(total[1:, 1:] + strength * mean * np.eye(len(total) - 1), total[1:, 0])
-            inside = np.einsum("i,eij,j->e", weights, gram[rest][:, 1:, 1:], weights, optimize=True)
-            each[rest] = gram[rest][:, 0, 1:] @ weights - 0.5 * inside
+            inside = np.einsum("i,eij,j->e", weights, gram[test][:, 1:, 1:], weights, optimize=True)
+            each[test] = gram[test][:, 0, 1:] @ weights - 0.5 * inside
         if each.sum() > best.gain:
             best = Lack(float(each.sum()), t_value(each), best.size)
     return best
 
 
-def _size(whole: np.ndarray) -> float:
+def _size(total: np.ndarray) -> float:
     """Return half the sum of squares that columns explain, less that of noise [1]."""
-    root = np.sqrt(np.diag(whole)[1:])
-    information, score = whole[1:, 1:] / np.outer(root, root), whole[1:, 0] / root
+    root = np.sqrt(np.diag(total)[1:])
+    information, score = total[1:, 1:] / np.outer(root, root), total[1:, 0] / root
     power, axes = np.linalg.eigh(information)
     # Columns of a saturated model are nearly collinear: round-off along weak axes would count as explained.
     good = power > 1e-3 * power[-1]

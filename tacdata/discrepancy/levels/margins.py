@@ -33,32 +33,35 @@ class BesideRemainder:
     """Condition -> spread of its size over that condition's parts [share of its size]."""
 
 
-def beside_remainder(found: Findings) -> tuple[BesideRemainder, ...]:
+def beside_remainder(findings: Findings) -> tuple[BesideRemainder, ...]:
     """Return each effect's evidence, given the remainder, in the order of the answer.
 
     A remainder may absorb part of the difference between two effects. The other part must support the name.
     """
-    if not found.comparisons:
+    if not findings.comparisons:
         return ()
-    left, spreads = remainder(found.final), constancies(found)
-    each = zip(found.comparisons, spreads, strict=True)
-    return tuple(replace(_held_against(found, one, at, left), spreads=own) for at, (one, own) in enumerate(each))
+    remaining, spreads = remainder(findings.final), constancies(findings)
+    each = zip(findings.comparisons, spreads, strict=True)
+    return tuple(
+        replace(_held_against(findings, models, at, remaining), spreads=spread)
+        for at, (models, spread) in enumerate(each)
+    )
 
 
-def _held_against(found: Findings, one: RivalModels, at: int, left: Remainder) -> BesideRemainder:
-    null, setting = found.final.null, found.problem.setting
+def _held_against(findings: Findings, models: RivalModels, at: int, remaining: Remainder) -> BesideRemainder:
+    null, setting = findings.final.null, findings.problem.setting
     course = setting.course.reduced
-    alone = ModelError(left.columns, course, null) if left.columns.shape[2] else None
-    if one.without.placed:
-        alone = _joined(ModelError.of(one.begin, one.without, null), left)
-    need = j_statistic(one.current, one.without, one.pooled, alone)
+    error_of_nothing = ModelError(remaining.columns, course, null) if remaining.columns.shape[2] else None
+    if models.without.placed:
+        error_of_nothing = _joined(ModelError.of(models.begin, models.without, null), remaining)
+    need = j_statistic(models.current, models.without, models.pooled, error_of_nothing)
     margins = {}
-    for name, other in one.rivals.items():
-        error = _joined(ModelError.of(one.begin, other, null, len(one.without.placed)), left)
-        margins[name] = j_statistic(one.current, other, one.pooled, error)
+    for name, rival in models.rivals.items():
+        error = _joined(ModelError.of(models.begin, rival, null, len(models.without.placed)), remaining)
+        margins[name] = j_statistic(models.current, rival, models.pooled, error)
     return BesideRemainder(need, margins)
 
 
-def _joined(error: ModelError, left: Remainder) -> ModelError:
+def _joined(error: ModelError, remaining: Remainder) -> ModelError:
     """Return the model error of a model's equations together with the remainder."""
-    return replace(error, columns=np.concatenate([error.columns, left.columns], axis=2))
+    return replace(error, columns=np.concatenate([error.columns, remaining.columns], axis=2))

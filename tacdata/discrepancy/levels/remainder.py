@@ -50,13 +50,13 @@ def _size(information: np.ndarray, score: np.ndarray, square: float, values: flo
     """
     power, axes = np.linalg.eigh(information)
     good = power > 1e-9 * max(float(power[-1]), 1e-300)
-    power, turned = power[good], axes[:, good].T @ score
-    explained = np.square(turned) / power
+    power, projection = power[good], axes[:, good].T @ score
+    explained = np.square(projection) / power
     noise = max((square - float(explained.sum())) / max(values - len(power), 1.0), 1.0)
-    best, chosen = 0.0, 0.0
+    best, best_size = 0.0, 0.0
     for root in SIZES:
         grown = root**2 * power / power[-1]
         fit = 0.5 * float(np.sum(explained * grown / (1 + grown))) / noise - 0.5 * float(np.log1p(grown).sum())
         if fit > best:
-            best, chosen = fit, float(root / np.sqrt(power[-1]))
-    return chosen
+            best, best_size = fit, float(root / np.sqrt(power[-1]))
+    return best_size

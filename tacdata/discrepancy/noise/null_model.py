@@ -76,10 +76,10 @@ class NullModel:
         features: np.ndarray | None,
         errors: np.ndarray,
         ridge: np.ndarray,
-        beside: np.ndarray,
+        columns: np.ndarray,
         noise: Noise,
         folds: np.ndarray,
-        known: Whitener | None = None,
+        whitener: Whitener | None = None,
         odd: np.ndarray | None = None,
         sizes: np.ndarray | None = None,
         spread: float = 0.0,
@@ -87,18 +87,18 @@ class NullModel:
         """Return the null model of the rows read, with its derived quantities."""
         # A fixed seed: the same recordings must give the same verdict.
         white = np.random.default_rng(17).normal(size=(reduced.rows, len(noise.scale), NOISE_DRAWS))
-        nuisances = np.ascontiguousarray(beside[:, :, : len(ridge)])
+        nuisances = np.ascontiguousarray(columns[:, :, : len(ridge)])
         return cls(
             context,
             features,
             errors,
             ridge,
-            beside,
+            columns,
             nuisances,
             episode_grams(nuisances, reduced).gram,
             noise,
             folds,
-            known or Whitener(reduced, noise, context, features, errors),
+            whitener or Whitener(reduced, noise, context, features, errors),
             np.zeros(0, dtype=np.int64) if odd is None else odd,
             white,
             sizes,
@@ -117,17 +117,19 @@ class NullModel:
             placed: Its effects, given ones first.
             predicted: Its prediction, where that is known already.
         """
-        course, before = setting.course, self.whitener.features
+        course, own_features = setting.course, self.whitener.features
         features = taken_up(course, setting.response, placed)
         # Most effects leave the pose unchanged: the factors of the covariance are then reused.
-        if features is before or (features is not None and before is not None and np.array_equal(features, before)):
+        if features is own_features or (
+            features is not None and own_features is not None and np.array_equal(features, own_features)
+        ):
             return self.whitener
         errors, noise = self.errors, self.noise
         if setting.response.fitted and noise.gain_error is not None:
             episode, streams = course.reduced.episode, Streams.of(course)
-            said = predicted or predict(course, setting.response, list(placed))
-            errors = as_large(pose_errors(setting, placed, said), errors, episode)
-            rise = streams.rise(said, setting.response)
+            prediction = predicted or predict(course, setting.response, list(placed))
+            errors = as_large(pose_errors(setting, placed, prediction), errors, episode)
+            rise = streams.rise(prediction, setting.response)
             noise = replace(noise, gain_error=as_large(rise, noise.gain_error, episode))
         return Whitener(course.reduced, noise, self.context, features, errors, self.whitener)
 
@@ -139,9 +141,9 @@ class NullModel:
             fewer: The course with those that the noise was estimated from.
         """
         course, response, placed = setting.course, setting.response, list(setting.given)
-        reduced, streams, said = course.reduced, Streams.of(course), predict(course, response, placed)
-        residual = streams.measured(course) - streams.predicted(said)
-        rise = streams.rise(said, response).astype(np.float32)
+        reduced, streams, prediction = course.reduced, Streams.of(course), predict(course, response, placed)
+        residual = streams.measured(course) - streams.predicted(prediction)
+        rise = streams.rise(prediction, response).astype(np.float32)
         missing, noise, process = ~np.isfinite(residual), self.noise, self.noise.offsets
         noise = replace(
             noise,
@@ -154,12 +156,12 @@ class NullModel:
             relative_scale=None if noise.relative_scale is None else readings.relative_scale(residual, rise, reduced),
             offsets=process and process.beside(reduced),
         )
-        errors = pose_errors(setting, placed, said) * (1.0 if self.sizes is None else self.sizes)
+        errors = pose_errors(setting, placed, prediction) * (1.0 if self.sizes is None else self.sizes)
         context, features = contexts(reduced), taken_up(course, response, placed)
-        kept = np.isin(course.read, fewer.read)
-        shared = None if features is None else features[kept]
-        some = Whitener(fewer.reduced, noise.of(kept), context[kept], shared, errors[kept])
-        return Whitener(reduced, noise, context, features, errors), some
+        open_rows = np.isin(course.read, fewer.read)
+        shared = None if features is None else features[open_rows]
+        open_whitener = Whitener(fewer.reduced, noise.of(open_rows), context[open_rows], shared, errors[open_rows])
+        return Whitener(reduced, noise, context, features, errors), open_whitener
 
     def projected_draws(self, whitener: Whitener) -> np.ndarray:
         """Return the cleaned draws [noise scales], shape (m, streams, draws), float32."""
@@ -180,18 +182,18 @@ def as_large(shape: np.ndarray, reference: np.ndarray, episode: np.ndarray) -> n
         reference: In the other.
         episode: Of each row, shape (m,), int64.
     """
-    over = 1 if reference.ndim == 3 else ()
+    axes = 1 if reference.ndim == 3 else ()
     sizes = np.zeros((2, int(episode.max()) + 1, reference.shape[-1]))
     for size, values in zip(sizes, (shape, reference), strict=True):
-        np.add.at(size, episode, np.square(values, dtype=float).sum(axis=over))
+        np.add.at(size, episode, np.square(values, dtype=float).sum(axis=axes))
     by = np.sqrt(sizes[1] / np.maximum(sizes[0], 1e-300))[episode]
     return (shape * (by[:, None] if reference.ndim == 3 else by)).astype(np.float32)
 
 
 def _together(*modes: np.ndarray | None) -> np.ndarray | None:
     """Return modes of several causes, each shape (m, modes), side by side; None for none."""
-    there = [own for own in modes if own is not None]
-    return np.concatenate(there, axis=1) if there else None
+    present = [columns for columns in modes if columns is not None]
+    return np.concatenate(present, axis=1) if present else None
 
 
 def null_model(setting: Setting) -> NullModel:
@@ -204,33 +206,36 @@ def null_model(setting: Setting) -> NullModel:
     extra, ridge = nuisance_columns(setting, setting.given)
     rich = generic(course, response, list(setting.given))
     residual = streams.measured(course) - streams.predicted(predicted)
-    every = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
-    every = every.astype(np.float32)
+    candidates = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
+    candidates = candidates.astype(np.float32)
     rise = streams.rise(predicted, response).astype(np.float32)
-    measured = EpisodeErrors(residual, every, reduced, context, features, rise)
-    known = measured.noise(errors)
-    off = table_error.modes(response.error, rise, known.scale, reduced)
-    known = replace(known, random_walk=_together(known.random_walk, off))
-    left = measured.left(known, errors)
-    prior, own = errors, ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64), np.ones(reduced.episodes))
-    before, spread = np.zeros(errors.shape[2] + 1), LEAST_GAIN_ERROR
+    measured = EpisodeErrors(residual, candidates, reduced, context, features, rise)
+    noise = measured.noise(errors)
+    table_modes = table_error.modes(response.error, rise, noise.scale, reduced)
+    noise = replace(noise, random_walk=_together(noise.random_walk, table_modes))
+    unexplained = measured.left(noise, errors)
+    prior, error_sizes = (
+        errors,
+        ErrorSizes(np.ones(errors.shape[2]), np.zeros(0, dtype=np.int64), np.ones(reduced.episodes)),
+    )
+    last_sizes, spread = np.zeros(errors.shape[2] + 1), LEAST_GAIN_ERROR
     for turn in range(ROUNDS):
         # Errors of pose and of gain explain much of the same: each is estimated given the other.
-        known = replace(known, gain_error=None)
-        spread = measured.gains(known, errors, left)
-        known = replace(known, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
-        own = measured.poses(known, prior, left)
-        if turn == 0 and own.counts.min() < ODD:
+        noise = replace(noise, gain_error=None)
+        spread = measured.gains(noise, errors, unexplained)
+        noise = replace(noise, gain_error=(rise * max(spread, LEAST_GAIN_ERROR)).astype(np.float32))
+        error_sizes = measured.poses(noise, prior, unexplained)
+        if turn == 0 and error_sizes.counts.min() < ODD:
             # The fit bends to follow an outlying episode, and moves its residual to its neighbours.
-            left = measured.left(known, prior * own.sizes, own.counts)
-            own = measured.poses(known, prior, left)
-        errors = prior * own.sizes
-        now = np.array([*own.sizes, max(spread, LEAST_GAIN_ERROR)])
-        if np.all(np.abs(now - before) <= SETTLED * now):
+            unexplained = measured.left(noise, prior * error_sizes.sizes, error_sizes.counts)
+            error_sizes = measured.poses(noise, prior, unexplained)
+        errors = prior * error_sizes.sizes
+        new_sizes = np.array([*error_sizes.sizes, max(spread, LEAST_GAIN_ERROR)])
+        if np.all(np.abs(new_sizes - last_sizes) <= SETTLED * new_sizes):
             break
-        before = now
-    whitener = Whitener(reduced, known, context, features, errors)
-    beside = whitener.whitened(every[:, :, : extra.shape[2] + rich.shape[2]])
+        last_sizes = new_sizes
+    whitener = Whitener(reduced, noise, context, features, errors)
+    columns = whitener.whitened(candidates[:, :, : extra.shape[2] + rich.shape[2]])
     folds = fold_of(course.episodes)
     return NullModel.of(
         reduced,
@@ -238,11 +243,11 @@ def null_model(setting: Setting) -> NullModel:
         features,
         errors,
         ridge,
-        beside,
-        known,
+        columns,
+        noise,
         folds,
         whitener,
-        own.odd,
-        own.sizes,
+        error_sizes.odd,
+        error_sizes.sizes,
         max(spread, LEAST_GAIN_ERROR),
     )

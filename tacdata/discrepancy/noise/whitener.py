@@ -31,16 +31,19 @@ class Colour:
         decay = noise.memory ** np.clip(course.step / noise.step, 0.0, 50.0)
         decay = np.where(course.first, 0.0, decay)
         spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
-        own = 1 / ((spread / np.sqrt(np.minimum(course.averaged, 4.0)))[:, None] * noise.scale)
-        before = decay[:, None] * own
+        factor = 1 / ((spread / np.sqrt(np.minimum(course.averaged, 4.0)))[:, None] * noise.scale)
+        previous_factor = decay[:, None] * factor
         if noise.relative_scale is not None:
-            own, before = own / noise.relative_scale, before / np.roll(noise.relative_scale, 1, axis=0)
+            factor, previous_factor = (
+                factor / noise.relative_scale,
+                previous_factor / np.roll(noise.relative_scale, 1, axis=0),
+            )
         gone = None
         if noise.missing is not None:
             gone = noise.missing.copy()
             gone[1:] |= noise.missing[:-1] & ~course.first[1:, None]
-            own, before = np.where(gone, 0.0, own), np.where(gone, 0.0, before)
-        return cls(own.astype(np.float32), before.astype(np.float32), gone)
+            factor, previous_factor = np.where(gone, 0.0, factor), np.where(gone, 0.0, previous_factor)
+        return cls(factor.astype(np.float32), previous_factor.astype(np.float32), gone)
 
     def white(self, values: np.ndarray, rows: slice | np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Return columns whitened, shape (m, streams, columns), float32.
@@ -89,7 +92,7 @@ class Whitener:
         context: np.ndarray,
         features: np.ndarray | None,
         pose_errors: np.ndarray,
-        like: Whitener | None = None,
+        template: Whitener | None = None,
     ) -> None:
         """Factor the part common to all columns.
 
@@ -100,62 +103,62 @@ class Whitener:
             features: Degrees of freedom of the response, shape (n, k), or (n, streams, k) where it differs between
                 streams; None for nothing but offsets.
             pose_errors: Change by an episode's pose errors of one standard deviation, shape (n, streams, kinds).
-            like: Of the same course, context and noise, but for gains: its offsets are not factored again.
+            template: Of the same course, context and noise, but for gains: its offsets are not factored again.
         """
         self.features = features
         self._course, self._noise, offsets = course, noise, noise.offsets
         streams = len(noise.scale)
-        self._seen = seen = streams - (3 if noise.tag is not None else 0)
+        self._seen = readable = streams - (3 if noise.tag is not None else 0)
         self._colour = Colour.of(course, noise)
         flat = replace(noise, scale=np.ones(1))
-        one = Colour.of(course, replace(flat, missing=None))
+        unit_colour = Colour.of(course, replace(flat, missing=None))
         offset = whiten(np.ones((course.rows, streams, 1)), course, flat)[:, :, 0]
-        moved = self._colour.white(pose_errors, slice(None))
+        white_pose = self._colour.white(pose_errors, slice(None))
         random_walk = None
-        if noise.random_walk is not None and like is None:
+        if noise.random_walk is not None and template is None:
             each = np.broadcast_to(noise.random_walk[:, None, :], (course.rows, streams, noise.random_walk.shape[1]))
             random_walk = whiten(each, course, flat)
-        swung = None
+        white_gain = None
         if noise.gain_error is not None:
-            swung = self._colour.white(noise.gain_error[:, :, None], slice(None))[:, :, 0]
-        ahead = None
+            white_gain = self._colour.white(noise.gain_error[:, :, None], slice(None))[:, :, 0]
+        expected_offsets = None
         if offsets is not None and features is not None:
-            ahead = offsets.expected(_each(features)).astype(np.float32)
+            expected_offsets = offsets.expected(_each(features)).astype(np.float32)
         order = np.argsort(context, kind="stable")
         self._places: list[_Place] = []
         # A place at a time: columns of all rows together would not stay in a processor's cache.
         for number, group in enumerate(np.split(order, np.flatnonzero(np.diff(context[order])) + 1)):
             spans = _spans(group, course)
             episodes = course.episode[[span[0].start for span in spans]]
-            free = np.full(len(spans), np.inf)
+            flat_prior = np.full(len(spans), np.inf)
             shared = None
             if features is not None:
-                there = _each(features[group])
-                used = np.abs(there).max(axis=(0, 1)) > 1e-9
+                place_features = _each(features[group])
+                used = np.abs(place_features).max(axis=(0, 1)) > 1e-9
                 # Where noise is not equal in all streams, whitened features are not.
-                shared = _turned(one.white(there[:, :, used], group))
-                if ahead is not None:
-                    ones = _turned(one.white(np.ones((len(group), 1, 1)), group)[:, :, 0])
+                shared = _turned(unit_colour.white(place_features[:, :, used], group))
+                if expected_offsets is not None:
+                    ones = _turned(unit_colour.white(np.ones((len(group), 1, 1)), group)[:, :, 0])
                     for episode, (_, at) in zip(episodes, spans, strict=True):
-                        _follow(shared[:, at], ones[:, at], ahead[episode][:, used])
+                        _follow(shared[:, at], ones[:, at], expected_offsets[episode][:, used])
             inside = [at for _, at in spans]
-            own = EpisodeErrorModel(
-                _turned(offset[group, :seen]),
-                free if offsets is None else offsets.spread[episodes],
-                None if swung is None else _turned(swung[group, :seen]),
-                _turned(moved[group, :seen]),
-                None if shared is None else _features(shared, offset[group, :seen]),
-                None if random_walk is None else _turned(random_walk[group, :seen]),
+            model = EpisodeErrorModel(
+                _turned(offset[group, :readable]),
+                flat_prior if offsets is None else offsets.spread[episodes],
+                None if white_gain is None else _turned(white_gain[group, :readable]),
+                _turned(white_pose[group, :readable]),
+                None if shared is None else _features(shared, offset[group, :readable]),
+                None if random_walk is None else _turned(random_walk[group, :readable]),
             )
             tag = None
-            if seen < streams:
+            if readable < streams:
                 # A tag knows nothing of the response: it has a free offset for the place, and each episode's own.
                 prior = np.full(len(spans), float(noise.tag or 1.0))
-                free_offset = _turned(offset[group, seen:, None])
-                tag_errors = EpisodeErrorModel(_turned(offset[group, seen:]), prior, features=free_offset)
+                free_offset = _turned(offset[group, readable:, None])
+                tag_errors = EpisodeErrorModel(_turned(offset[group, readable:]), prior, features=free_offset)
                 tag = FactoredErrors(inside, tag_errors)
-            before = None if like is None else like._places[number].seen
-            factored = FactoredErrors(inside, own, before)
+            earlier_factors = None if template is None else template._places[number].seen
+            factored = FactoredErrors(inside, model, earlier_factors)
             self._places.append(_Place(group, episodes, spans, _turned(offset[group]), factored, tag))
 
     @property
@@ -169,38 +172,38 @@ class Whitener:
         Args:
             columns: Shape (n, streams, k).
         """
-        noise, seen, expected = self._noise, self._seen, None
+        noise, readable, expected = self._noise, self._seen, None
         if noise.offsets is not None:
-            gone = None if noise.missing is None else noise.missing[:, :seen]
-            expected = noise.offsets.expected(columns[:, :seen], gone)
-            expected = (expected / noise.scale[:seen, None]).astype(np.float32)
+            gone = None if noise.missing is None else noise.missing[:, :readable]
+            expected = noise.offsets.expected(columns[:, :readable], gone)
+            expected = (expected / noise.scale[:readable, None]).astype(np.float32)
         for place in self._places:
             part = np.empty((columns.shape[1], len(place.rows), columns.shape[2]), dtype=np.float32)
             for number, (rows, at) in zip(place.episodes, place.spans, strict=True):
                 self._colour.white(columns[rows], rows, part[:, at].swapaxes(0, 1))
                 if expected is not None:
-                    _follow(part[:seen, at], place.offset[:, at], expected[number])
-            place.seen.take_out(part[:seen])
+                    _follow(part[:readable, at], place.offset[:, at], expected[number])
+            place.seen.take_out(part[:readable])
             if place.tag is not None:
-                place.tag.take_out(part[seen:])
+                place.tag.take_out(part[readable:])
             yield place, part
 
-    def stream_scores(self, residual: np.ndarray, alone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def stream_scores(self, residual: np.ndarray, single_columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return scores and information of columns that each stand in one stream of one episode.
 
         Args:
             residual: Shape (n, streams).
-            alone: The columns of all streams and episodes, shape (n, streams).
+            single_columns: The columns of all streams and episodes, shape (n, streams).
 
         Returns:
             Scores and information [1], shapes (episodes, streams); 0 where nothing is known.
         """
-        score, known = np.zeros((2, self._course.episodes, residual.shape[1]))
-        white = whiten(alone[:, : self._seen, None], self._course, self._of_seen())[:, :, 0]
+        score, information = np.zeros((2, self._course.episodes, residual.shape[1]))
+        white = whiten(single_columns[:, : self._seen, None], self._course, self._of_seen())[:, :, 0]
         for place, part in self._parts(residual[:, :, None]):
-            own = place.seen.stream_scores(part[: self._seen, :, 0], _turned(white[place.rows]))
-            score[place.episodes, : self._seen], known[place.episodes, : self._seen] = own
-        return score, np.maximum(known, 0.0)
+            place_scores = place.seen.stream_scores(part[: self._seen, :, 0], _turned(white[place.rows]))
+            score[place.episodes, : self._seen], information[place.episodes, : self._seen] = place_scores
+        return score, np.maximum(information, 0.0)
 
     def joint_scores(self, residual: np.ndarray, columns: np.ndarray) -> list[JointScores]:
         """Return scores and information of columns of which each episode has its own, place by place.
@@ -209,24 +212,24 @@ class Whitener:
             residual: Shape (n, streams).
             columns: Shape (n, streams, k).
         """
-        found, white = [], self._colour.white(columns, slice(None))
+        scores, white = [], self._colour.white(columns, slice(None))
         for place, part in self._parts(residual[:, :, None]):
-            own = _turned(white[place.rows])
-            runs = place.seen.joint_scores(part[: self._seen, :, 0], own[: self._seen])
+            place_columns = _turned(white[place.rows])
+            runs = place.seen.joint_scores(part[: self._seen, :, 0], place_columns[: self._seen])
             if place.tag is not None:
-                more = place.tag.joint_scores(part[self._seen :, :, 0], own[self._seen :])
+                more = place.tag.joint_scores(part[self._seen :, :, 0], place_columns[self._seen :])
                 runs = [
                     replace(run, score=run.score + tag.score, information=run.information + tag.information)
                     for run, tag in zip(runs, more, strict=True)
                 ]
-            found += [replace(run, episodes=place.episodes[run.episodes]) for run in runs]
-        return found
+            scores += [replace(run, episodes=place.episodes[run.episodes]) for run in runs]
+        return scores
 
     def _of_seen(self) -> Noise:
-        noise, seen = self._noise, self._seen
-        missing = None if noise.missing is None else noise.missing[:, :seen]
-        relative = None if noise.relative_scale is None else noise.relative_scale[:, :seen]
-        return replace(noise, scale=noise.scale[:seen], missing=missing, relative_scale=relative)
+        noise, readable = self._noise, self._seen
+        missing = None if noise.missing is None else noise.missing[:, :readable]
+        relative = None if noise.relative_scale is None else noise.relative_scale[:, :readable]
+        return replace(noise, scale=noise.scale[:readable], missing=missing, relative_scale=relative)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         """Return columns whitened and without nuisances, shape (n, streams, k)."""
@@ -240,33 +243,33 @@ class Whitener:
         """Return cleaned noise, drawn white, shape (n, streams, draws): features absorb some of it."""
         result = np.zeros(white.shape, dtype=np.float32)
         for place in self._places:
-            own = _turned(white[place.rows].astype(np.float32)) * (place.offset != 0)[:, :, None]
-            place.seen.project(own[: self._seen])
+            draws = _turned(white[place.rows].astype(np.float32)) * (place.offset != 0)[:, :, None]
+            place.seen.project(draws[: self._seen])
             if place.tag is not None:
-                place.tag.project(own[self._seen :])
-            result[place.rows] = own.swapaxes(0, 1)
+                place.tag.project(draws[self._seen :])
+            result[place.rows] = draws.swapaxes(0, 1)
         return result
 
-    def episode_grams(self, columns: np.ndarray, beside: np.ndarray | None = None) -> EpisodeGrams:
+    def episode_grams(self, columns: np.ndarray, cleaned: np.ndarray | None = None) -> EpisodeGrams:
         """Reduce columns to `Evidence`.
 
         Args:
             columns: Residual first, then effects, shape (n, streams, 1 + columns).
-            beside: Further columns, cleaned before, shape (n, streams, more).
+            cleaned: Further columns, cleaned before, shape (n, streams, more).
         """
         course = self._course
-        width = columns.shape[2] + (0 if beside is None else beside.shape[2])
+        width = columns.shape[2] + (0 if cleaned is None else cleaned.shape[2])
         gram, rows = np.zeros((course.episodes, width, width)), np.zeros(course.episodes)
-        few = columns.shape[2]
+        first_width = columns.shape[2]
         for place, part in self._parts(columns):
-            for number, (own, at) in zip(place.episodes, place.spans, strict=True):
-                flat = part[:, at].reshape(-1, few)
-                gram[number, :few, :few], rows[number] = flat.T @ flat, len(flat)
-                if beside is not None:
-                    other = _turned(beside[own]).reshape(len(flat), width - few)
-                    both = flat.T @ other
-                    gram[number, :few, few:], gram[number, few:, :few] = both, both.T
-                    gram[number, few:, few:] = other.T @ other
+            for number, (episode_rows, at) in zip(place.episodes, place.spans, strict=True):
+                flat = part[:, at].reshape(-1, first_width)
+                gram[number, :first_width, :first_width], rows[number] = flat.T @ flat, len(flat)
+                if cleaned is not None:
+                    flat_cleaned = _turned(cleaned[episode_rows]).reshape(len(flat), width - first_width)
+                    cross = flat.T @ flat_cleaned
+                    gram[number, :first_width, first_width:], gram[number, first_width:, :first_width] = cross, cross.T
+                    gram[number, first_width:, first_width:] = flat_cleaned.T @ flat_cleaned
         return EpisodeGrams(gram, rows)
 
 
@@ -305,7 +308,7 @@ def _features(shared: np.ndarray, offset: np.ndarray) -> np.ndarray:
         shared: Whitened features, shape (streams or 1, n, p).
         offset: Whitened constants, 0 where nothing was read, shape (n, streams).
     """
-    there = (offset != 0).T.astype(np.float32)
+    present = (offset != 0).T.astype(np.float32)
     if len(shared) == 1 and np.array_equal(offset, np.broadcast_to(offset[:, :1], offset.shape)):
-        return there[:1, :, None] * shared
-    return there[:, :, None] * shared[: len(there)]
+        return present[:1, :, None] * shared
+    return present[:, :, None] * shared[: len(present)]

@@ -28,31 +28,31 @@ class HeatMap:
     """Of the model as it was [1], shape (rows, columns); NaN where too little was read."""
 
 
-def heat_map(found: Residuals) -> HeatMap:
+def heat_map(residuals: Residuals) -> HeatMap:
     """Return the map of all presses, an offset a press taken off."""
-    each = np.nanmean(np.square(found.standardized(found.before)), axis=1)
-    inside = found.phase > 0
-    edges = np.quantile(found.depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
-    said = [f"{edge:.2g}" if edge >= AT_TOUCH * edges[-1] else "0" for edge in edges]
-    columns = tuple(f"{low} to {high} mm" for low, high in itertools.pairwise(said))
-    within = [(found.depth >= low) & (found.depth <= high) for low, high in itertools.pairwise(edges)]
-    rate = np.abs(found.rate)
+    each = np.nanmean(np.square(residuals.standardized(residuals.before)), axis=1)
+    inside = residuals.phase > 0
+    edges = np.quantile(residuals.depth[inside], [0, 1 / 3, 2 / 3, 1]).round(6) if inside.any() else np.zeros(4)
+    edge_labels = [f"{edge:.2g}" if edge >= AT_TOUCH * edges[-1] else "0" for edge in edges]
+    columns = tuple(f"{low} to {high} mm" for low, high in itertools.pairwise(edge_labels))
+    within = [(residuals.depth >= low) & (residuals.depth <= high) for low, high in itertools.pairwise(edges)]
+    rate = np.abs(residuals.rate)
     rows, fields = [], []
-    for k, phase in enumerate(found.phases):
+    for k, phase in enumerate(residuals.phases):
         if not k:
             continue
-        own = found.phase == k
-        if phase == STILL or not own.any():
+        phase_rows = residuals.phase == k
+        if phase == STILL or not phase_rows.any():
             rows.append(phase)
-            fields.append(own)
+            fields.append(phase_rows)
             continue
-        middle = float(np.median(rate[own]))
-        for name, part in (("slow", own & (rate <= middle)), ("fast", own & (rate > middle))):
+        middle = float(np.median(rate[phase_rows]))
+        for name, part in (("slow", phase_rows & (rate <= middle)), ("fast", phase_rows & (rate > middle))):
             rows.append(f"{phase}, {name}")
             fields.append(part)
-    before = np.array([[_mean(each, row & column) for column in within] for row in fields])
-    read = np.flatnonzero(np.isfinite(before).any(axis=1))
-    return HeatMap(tuple(rows[k] for k in read), columns, before[read])
+    squares = np.array([[_mean(each, row & column) for column in within] for row in fields])
+    read = np.flatnonzero(np.isfinite(squares).any(axis=1))
+    return HeatMap(tuple(rows[k] for k in read), columns, squares[read])
 
 
 def _mean(each: np.ndarray, rows: np.ndarray) -> float:

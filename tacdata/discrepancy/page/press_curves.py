@@ -32,36 +32,36 @@ class PressCurves:
     """Standard deviation of the stream's noise [its unit]."""
 
 
-def largest_changes(found: Residuals, most: int = MOST_PRESSES) -> list[PressCurves]:
+def largest_changes(residuals: Residuals, count: int = MOST_PRESSES) -> list[PressCurves]:
     """Return the sealed presses in which the effects change most; of all presses, where none was sealed.
 
     They show where the effects matter, whether they help there or not.
     """
-    change = np.square((found.after - found.before) / found.noise.astype(np.float32))
-    square = np.square(found.standardized(found.before))
-    among = found.sealed or tuple(int(k) for k in np.unique(found.episode))
+    change = np.square((residuals.after - residuals.before) / residuals.noise.astype(np.float32))
+    square = np.square(residuals.standardized(residuals.before))
+    among = residuals.sealed or tuple(int(k) for k in np.unique(residuals.episode))
     measure = change if np.nanmax(change, initial=0.0) > 0 else square
     ranked = []
     for k in among:
-        rows = found.episode == k
+        rows = residuals.episode == k
         if rows.sum() < 3:
             continue
         each = np.nanmean(measure[rows], axis=0)
         stream = int(np.nanargmax(each)) if np.isfinite(each).any() else 0
         ranked.append((float(np.nan_to_num(each[stream])), k, stream))
-    return [_press(found, k, stream) for _, k, stream in sorted(ranked, key=lambda one: -one[0])[:most]]
+    return [_press(residuals, k, stream) for _, k, stream in sorted(ranked, key=lambda one: -one[0])[:count]]
 
 
-def _press(found: Residuals, number: int, stream: int) -> PressCurves:
-    rows = found.episode == number
-    time = found.time[rows]
+def _press(residuals: Residuals, number: int, stream: int) -> PressCurves:
+    rows = residuals.episode == number
+    time = residuals.time[rows]
     return PressCurves(
-        found.names[number],
-        found.streams[stream],
+        residuals.names[number],
+        residuals.streams[stream],
         time - time[0],
-        found.depth[rows],
-        found.measured[rows, stream],
-        found.before[rows, stream],
-        found.after[rows, stream],
-        float(found.noise[stream]),
+        residuals.depth[rows],
+        residuals.measured[rows, stream],
+        residuals.before[rows, stream],
+        residuals.after[rows, stream],
+        float(residuals.noise[stream]),
     )

@@ -27,19 +27,20 @@ FILLED = 0.5
 """Share of its fields in which a map has readings enough, at least."""
 
 
-def verdict_page(verdict: dict[str, Any], found: Residuals) -> str:
+def verdict_page(verdict: dict[str, Any], residuals: Residuals) -> str:
     """Return the page.
 
     Args:
         verdict: `schemas/verdict.schema.json`.
-        found: Readings and the model's predictions.
+        residuals: Readings and the model's predictions.
     """
     page = HtmlPage(_header(verdict))
     page.add("Size of the gap", Tiles(_tiles(verdict)))
-    page.add("Presses, measured and predicted", _presses(verdict, found))
+    page.add("Presses, measured and predicted", _presses(verdict, residuals))
     page.add("The gap on sealed presses", _shares(verdict))
     page.add(
-        "Where the gap lives" if verdict["gate"]["gap"] else "Where the residual is largest", *_where(verdict, found)
+        "Where the gap lives" if verdict["gate"]["gap"] else "Where the residual is largest",
+        *_where(verdict, residuals),
     )
     for title, lines in (
         ("In which order effects were added, and what each explains beyond the others", _path(verdict)),
@@ -91,14 +92,14 @@ def _tiles(verdict: dict[str, Any]) -> list[tuple[str, str]]:
     return tiles
 
 
-def _presses(verdict: dict[str, Any], found: Residuals) -> Slider | None:
+def _presses(verdict: dict[str, Any], residuals: Residuals) -> Slider | None:
     """Return the presses under one slider: reading, residual, and what lies beyond the model over depth."""
-    presses = largest_changes(found)
+    presses = largest_changes(residuals)
     if not presses:
         return None
     added = bool(verdict["effects"]) and not between_specimens(verdict)
     unit = verdict.get("heading", {}).get("unit", "") or "the stream's unit"
-    kind = "sealed press" if found.sealed else "press"
+    kind = "sealed press" if residuals.sealed else "press"
     panels = zip(*(_panels(press, unit, added) for press in presses), strict=True)
     return Slider(f"{kind}, largest change first", [f"{p.name}, {p.stream}" for p in presses], list(panels))
 
@@ -137,50 +138,52 @@ def _shares(verdict: dict[str, Any]) -> Shares | None:
     return Shares([*named, (REST, max(1 - sealed["closed"], 0.0))], REST)
 
 
-def _where(verdict: dict[str, Any], found: Residuals) -> list[Any]:
-    made = heat_map(found)
+def _where(verdict: dict[str, Any], residuals: Residuals) -> list[Any]:
+    heat = heat_map(residuals)
     added = bool(verdict["effects"]) and not between_specimens(verdict)
     parts = [part for part in verdict["slices"] if part["by"] in PARTED] if added else []
     title = "mean square over the noise"
     blocks: list[Any] = []
-    said = verdict["located"]
-    if made.rows and (not parts or np.isfinite(made.before).mean() >= FILLED):
+    sentences = verdict["located"]
+    if heat.rows and (not parts or np.isfinite(heat.before).mean() >= FILLED):
         title += ", before; each press's own pose and gain left in" if parts else ""
-        blocks.append(_heated(title, ("phase", *made.columns), made.rows, made.before))
+        blocks.append(_heated(title, ("phase", *heat.columns), heat.rows, heat.before))
     if parts:
         # Under poses and gains that effects do not explain, the map would hardly change.
         square = np.array([[part["before"], part["after"]] for part in parts])
         names = [part["name"] for part in parts]
         heads = (", ".join(PARTED), "before", "with the effects")
         blocks.append(_heated(f"mean square over the noise, {TAKEN_OUT}", heads, names, square))
-        said = [words for words in said if words.split(":")[0] not in PARTED]
-    after = verdict.get("located_after", ())
-    rest = [f"without a name yet: {words}" for words in after if list(after) != verdict["located"]]
-    beside = "the map holds each press's own pose and gain, too; these mean squares over the noise leave that out"
-    located = (*(() if parts else (beside,)), *said) if said else ()
-    lines = [*located, *rest]
+        sentences = [words for words in sentences if words.split(":")[0] not in PARTED]
+    located_after = verdict.get("located_after", ())
+    unnamed = [f"without a name yet: {words}" for words in located_after if list(located_after) != verdict["located"]]
+    caption = "the map holds each press's own pose and gain, too; these mean squares over the noise leave that out"
+    located = (*(() if parts else (caption,)), *sentences) if sentences else ()
+    lines = [*located, *unnamed]
     return [*blocks, *([Items(lines)] if lines else [])]
 
 
 def _heated(title: str, heads: Sequence[str], names: Sequence[str], squares: np.ndarray) -> Table:
     """Return mean squares over the noise as a table; its largest value has the deepest colour."""
-    most = max(float(np.nanmax(squares, initial=1.0)), 2.0)
-    rows = [[name, *(_square(float(value), most) for value in row)] for name, row in zip(names, squares, strict=True)]
+    largest = max(float(np.nanmax(squares, initial=1.0)), 2.0)
+    rows = [
+        [name, *(_square(float(value), largest) for value in row)] for name, row in zip(names, squares, strict=True)
+    ]
     return Table(heads, rows, title)
 
 
-def _square(value: float, most: float) -> Cell:
+def _square(value: float, largest: float) -> Cell:
     if not np.isfinite(value):
         return Cell(None)
-    return Cell(plain_number(value, 3), heat=float(np.clip(np.log(max(value, 1.0)) / np.log(most), 0, 1)))
+    return Cell(plain_number(value, 3), heat=float(np.clip(np.log(max(value, 1.0)) / np.log(largest), 0, 1)))
 
 
 def _path(verdict: dict[str, Any]) -> list[str]:
     lines = []
     for step in verdict["path"]:
         title, share = load(step["effect"]).title, step["share"]
-        told = "dropped, or replaced by another form" if share is None else f"{100 * share:.0f} %"
-        lines.append(f"{title}: {told}")
+        outcome = "dropped, or replaced by another form" if share is None else f"{100 * share:.0f} %"
+        lines.append(f"{title}: {outcome}")
     return lines
 
 
@@ -188,18 +191,18 @@ def _rivals(verdict: dict[str, Any]) -> list[str]:
     """Return one line a rival: why it is not the name, or why it may be."""
     lines = []
     for e in verdict["effects"]:
-        mine, near, least = load(e["effect"]).spoken, set(e["alternatives"]), {}
+        title, near, margin_of = load(e["effect"]).spoken, set(e["alternatives"]), {}
         for name, by in sorted(e["margins"].items(), key=lambda item: item[1]):
-            least.setdefault(load(name).called, by)
-        for called, by in list(least.items())[:MOST_RIVALS]:
-            other = load(called).spoken
-            if called in e.get("unphysical", ()):
-                lines.append(f"not {other}: it would need an unphysical size")
-            elif called in near:
+            margin_of.setdefault(load(name).called, by)
+        for mechanism, by in list(margin_of.items())[:MOST_RIVALS]:
+            rival = load(mechanism).spoken
+            if mechanism in e.get("unphysical", ()):
+                lines.append(f"not {rival}: it would need an unphysical size")
+            elif mechanism in near:
                 form = ", but another form of it may not" if by > 0 else ""
-                lines.append(f"{other} may stand in for {mine}: {_apart(by)}{form}")
+                lines.append(f"{rival} may stand in for {title}: {_apart(by)}{form}")
             else:
-                lines.append(f"not {other}: {_apart(by)} than {mine}")
+                lines.append(f"not {rival}: {_apart(by)} than {title}")
     return list(dict.fromkeys(lines))
 
 

@@ -35,14 +35,14 @@ class ModelErrors:
 
 
 def model_errors(
-    course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = ()
+    course: Course, response: Response, placed: Sequence[Placed], model_effects: Sequence[Placed] = ()
 ) -> ModelErrors:
     """Return the regressors; no columns without placed effects.
 
     A large effect whose equation is a little wrong leaves a residual that small effects explain: a part along these
     columns is no evidence of another one.
     """
-    streams, fixed = Streams.of(course), list(given)
+    streams, fixed = Streams.of(course), list(model_effects)
     none = np.zeros((len(course.read), streams.count, 0), dtype=np.float32)
     if not placed:
         return ModelErrors(none, np.zeros(0, dtype=np.int64), none)

@@ -81,7 +81,11 @@ def knobs_of(placed: Sequence[Placed], channels: int) -> list[Knob]:
 
 
 def tangents(
-    course: Course, response: Response, placed: Sequence[Placed], given: Sequence[Placed] = (), run: Chain | None = None
+    course: Course,
+    response: Response,
+    placed: Sequence[Placed],
+    model_effects: Sequence[Placed] = (),
+    run: Chain | None = None,
 ) -> Tangent:
     """Differentiate the chain by all numbers of the placed effects, the other given ones kept.
 
@@ -89,17 +93,17 @@ def tangents(
         course: The recordings.
         response: Input of the chain.
         placed: Effects whose numbers move.
-        given: Effects whose numbers stay.
+        model_effects: Effects whose numbers stay.
         run: The chain of those given, then those placed, where it was run already.
     """
     streams = Streams.of(course)
     knobs = knobs_of(placed, course.channels)
     if not knobs:
         return Tangent([], np.zeros((len(course.read), streams.count, 0), dtype=np.float32), np.zeros(0, dtype=int))
-    chain = run or Chain(course, response, [*given, *placed])
+    chain = run or Chain(course, response, [*model_effects, *placed])
     baseline = streams.predicted(chain.prediction)
     values = np.zeros((*baseline.shape, len(knobs)), dtype=np.float32)
-    for group in _groups(knobs, placed, given):
+    for group in _groups(knobs, placed, model_effects):
         steps, trial = {}, list(placed)
         for k in group:
             low, high = knobs[k].room(placed)
@@ -109,18 +113,18 @@ def tangents(
                 steps[k], trial = step, knobs[k].moved(trial, step)
         if not steps:
             continue
-        change = streams.predicted(chain.again([*given, *trial])) - baseline
+        change = streams.predicted(chain.again([*model_effects, *trial])) - baseline
         for k, step in steps.items():
             channels = slice(None) if len(group) == 1 else knobs[k].channel
             values[:, channels, k] = change[:, channels] / step
     return Tangent(knobs, values, np.arange(len(knobs)))
 
 
-def _groups(knobs: list[Knob], placed: Sequence[Placed], given: Sequence[Placed]) -> list[list[int]]:
+def _groups(knobs: list[Knob], placed: Sequence[Placed], model_effects: Sequence[Placed]) -> list[list[int]]:
     """Return knobs that are moved at once: a parameter of every channel's own, unless something else mixes channels."""
     groups: dict[tuple[int, str, int | None], list[int]] = {}
     for k, knob in enumerate(knobs):
-        companions = [*given, *(p for at, p in enumerate(placed) if at != knob.at)]
+        companions = [*model_effects, *(p for at, p in enumerate(placed) if at != knob.at)]
         is_split = any(p.effect.by_channel for p in companions)
         groups.setdefault((knob.at, knob.parameter.name, knob.channel if is_split else None), []).append(k)
     return list(groups.values())

@@ -51,12 +51,12 @@ def eliminate(setting: Setting, selection: Selection) -> Answer:
     while len(answer.findings) > 1 and max(p) > LARGEST_P:
         # Held-out episodes lie between others: a slow drift helps there, and is no effect.
         weakest = int(np.argmax(p))
-        rest = [placed for k, placed in enumerate(answer.model.placed) if k != weakest]
-        model = refine(replace(setting, response=answer.model.response), rest, selection.null, REFITS)
+        remaining = [placed for k, placed in enumerate(answer.model.placed) if k != weakest]
+        model = refine(replace(setting, response=answer.model.response), remaining, selection.null, REFITS)
         answer = _needed(setting, selection, model, SWAPS)
         p = _p_values(setting, selection, answer.model)
-    found = tuple(replace(f, corrected_p=share) for f, share in zip(answer.findings, p, strict=True))
-    return replace(answer, findings=found)
+    corrected = tuple(replace(f, corrected_p=share) for f, share in zip(answer.findings, p, strict=True))
+    return replace(answer, findings=corrected)
 
 
 def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) -> Answer:
@@ -82,15 +82,15 @@ def _needed(setting: Setting, selection: Selection, model: Refined, swaps: int) 
     problem = selection.problem
     if model is not selection.model:
         problem = prepare(replace(setting, response=model.response), null, model.placed)
-    made, compared = [], []
+    found_effects, compared = [], []
     for k in range(len(placed)):
         tried = try_rivals(model, without[k], k, problem, need[k], pooled, _late(setting, selection, placed[k]))
         if tried.better is not None and swaps > 0:
             # A rival that was behind to first order is ahead on the chain: it takes the place.
             return _needed(setting, selection, tried.better, swaps - 1)
-        made.append(_beside_another(setting, tried.finding) if maybe_two else tried.finding)
+        found_effects.append(_beside_another(setting, tried.finding) if maybe_two else tried.finding)
         compared.append(tried.comparison)
-    return Answer(tuple(made), model, problem, tuple(compared))
+    return Answer(tuple(found_effects), model, problem, tuple(compared))
 
 
 def parsimonious(setting: Setting, model: Refined, null: NullModel, pooled: Pooled) -> Refined:
@@ -98,8 +98,8 @@ def parsimonious(setting: Setting, model: Refined, null: NullModel, pooled: Pool
 
     A form that contains another always fits better.
     """
-    for at, one in enumerate(model.placed):
-        form = one.effect.nested(one.values)
+    for at, placed in enumerate(model.placed):
+        form = placed.effect.nested(placed.values)
         if form is None:
             continue
         begin = replace(setting, response=model.response)
@@ -117,25 +117,27 @@ def two_lags(
     To first order all lags are one. The chain itself must distinguish them, each alone and two at a time. A gain within
     the form error of a single one is open. A delay has no such error: a gain beyond the chain's own is a second lag.
     """
-    own = [k for k, p in enumerate(model.placed) if _is_lag(p.effect)]
-    if len(own) != 1 or len(model.placed) >= MOST_EFFECTS:
+    lags = [k for k, p in enumerate(model.placed) if _is_lag(p.effect)]
+    if len(lags) != 1 or len(model.placed) >= MOST_EFFECTS:
         return model, False
-    at, begin = own[0], replace(setting, response=model.response)
-    mine, others = model.placed[at], [*model.placed[:at], *model.placed[at + 1 :]]
-    behind = _lag(mine)
+    at, begin = lags[0], replace(setting, response=model.response)
+    single, remaining = model.placed[at], [*model.placed[:at], *model.placed[at + 1 :]]
+    lag = _lag(single)
     kin = [e for e in setting.effects if _is_lag(e)]
     pairs = [pair for pair in combinations(kin, 2) if len({e.called for e in pair}) == 2]
     # To first order two lags of half the size equal the single one, so both start where the model is.
-    both = [refine(begin, [*others, *(_behind(e, 0.5 * behind) for e in pair)], null) for pair in pairs]
-    best = min(both, key=lambda two: two.half_bic, default=model)
+    two_lag_models = [refine(begin, [*remaining, *(_behind(e, 0.5 * lag) for e in pair)], null) for pair in pairs]
+    best = min(two_lag_models, key=lambda two: two.half_bic, default=model)
     if best.half_bic >= model.half_bic or necessity(begin, best, model, null, pooled) < NEEDED_Z:
         return model, False
-    alone = [refine(begin, [*others, _behind(e, behind)], null) for e in kin if e.name != mine.effect.name]
-    if any(necessity(begin, best, one, null, pooled) < NEEDED_Z for one in alone):
+    single_lag_models = [
+        refine(begin, [*remaining, _behind(e, lag)], null) for e in kin if e.name != single.effect.name
+    ]
+    if any(necessity(begin, best, rival, null, pooled) < NEEDED_Z for rival in single_lag_models):
         return model, False
-    error = mine.effect.form_error if mine.effect.distributed else CHAIN_ERROR
+    error = single.effect.form_error if single.effect.distributed else CHAIN_ERROR
     large = model.loss - best.loss > error**2 * (nothing.loss - model.loss)
-    return (best, False) if large else (model, mine.effect.distributed)
+    return (best, False) if large else (model, single.effect.distributed)
 
 
 def _beside_another(setting: Setting, finding: FoundEffect) -> FoundEffect:
@@ -146,17 +148,17 @@ def _beside_another(setting: Setting, finding: FoundEffect) -> FoundEffect:
     return replace(finding, rivals=tuple(dict.fromkeys([*finding.rivals, *kin])))
 
 
-def _late(setting: Setting, selection: Selection, one: Placed) -> list[Placed]:
+def _late(setting: Setting, selection: Selection, placed: Placed) -> list[Placed]:
     """Return lags to begin with in the place of an effect."""
-    if not _is_lag(one.effect):
+    if not _is_lag(placed.effect):
         return list(selection.late)
-    kin = [_behind(e, _lag(one)) for e in setting.effects if _is_lag(e) and e.name != one.effect.name]
+    kin = [_behind(e, _lag(placed)) for e in setting.effects if _is_lag(e) and e.name != placed.effect.name]
     return [*selection.late, *kin]
 
 
-def _lag(one: Placed) -> float:
+def _lag(placed: Placed) -> float:
     """Return how far an effect is behind a ramp [s]."""
-    return one.effect.time_constant(one.values) + one.effect.delay(one.values)
+    return placed.effect.time_constant(placed.values) + placed.effect.delay(placed.values)
 
 
 def _is_lag(effect: Effect) -> bool:
@@ -167,20 +169,20 @@ def _is_lag(effect: Effect) -> bool:
 
 def _behind(effect: Effect, lag: float) -> Placed:
     """Return a lag that is so much behind a ramp [s]."""
-    one = effect.parameters[0]
-    return Placed(effect, {one.name: np.asarray(np.clip(lag, one.low, one.high))})
+    parameter = effect.parameters[0]
+    return Placed(effect, {parameter.name: np.asarray(np.clip(lag, parameter.low, parameter.high))})
 
 
 def _p_values(setting: Setting, selection: Selection, model: Refined) -> list[float]:
     """Return each effect's corrected p-value: of the step that asked for it, or given the others."""
-    least, result = dict(selection.least_p), []
+    least_p, result = dict(selection.least_p), []
     for at, placed in enumerate(model.placed):
-        called = placed.effect.called
-        p = least.get(called, 1.0)
+        mechanism = placed.effect.called
+        p = least_p.get(mechanism, 1.0)
         if p > ALPHA:
-            others = [p for k, p in enumerate(model.placed) if k != at]
-            bare = prepare(replace(setting, response=model.response), selection.null, others)
-            beside = dict(least_p_values(bare, score_tests(bare), ()))
-            p = min(p, beside.get(called, 1.0))
+            remaining = [p for k, p in enumerate(model.placed) if k != at]
+            bare = prepare(replace(setting, response=model.response), selection.null, remaining)
+            p_of_mechanism = dict(least_p_values(bare, score_tests(bare), ()))
+            p = min(p, p_of_mechanism.get(mechanism, 1.0))
         result.append(p)
     return result

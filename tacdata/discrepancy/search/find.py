@@ -25,32 +25,32 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
         until: The last step to make, one of `STEPS`.
     """
     note("gate: is there a gap")
-    given = gate(prepare(setting, null_model(setting)))
-    least = min(given.tests.p.min(initial=1.0), given.tests.p_generic)
-    note(f"{'there is a gap' if given.gap else 'there is no gap'}, p = {least:.3f}")
-    selection = start(setting, given)
-    if given.gap and until in STEPS[2:]:
+    gated = gate(prepare(setting, null_model(setting)))
+    least_p = min(gated.tests.p.min(initial=1.0), gated.tests.p_generic)
+    note(f"{'there is a gap' if gated.gap else 'there is no gap'}, p = {least_p:.3f}")
+    selection = start(setting, gated)
+    if gated.gap and until in STEPS[2:]:
         selection = race(setting, selection, note)
     if until != "decide":
-        return _findings(given, selection, given.problem, _fitted(selection), until)
+        return _findings(gated, selection, gated.problem, _fitted(selection), until)
     note("rivals and leftovers")
     # With the answer's noise only the residual is examined: nothing is tried there.
-    problem = prepare(setting, selection.null, tested=False, among=()) if selection.model.placed else given.problem
-    return _findings(given, selection, problem, eliminate(setting, selection), until)
+    problem = prepare(setting, selection.null, tested=False, among=()) if selection.model.placed else gated.problem
+    return _findings(gated, selection, problem, eliminate(setting, selection), until)
 
 
 def _fitted(selection: Selection) -> Answer:
     """Return the effects that fit best, without necessity and rivals."""
     model = selection.model
-    found = tuple(FoundEffect(p, *model.errors(k), (), {}, 0.0) for k, p in enumerate(model.placed))
-    return Answer(found, model, selection.problem)
+    fitted_effects = tuple(FoundEffect(p, *model.errors(k), (), {}, 0.0) for k, p in enumerate(model.placed))
+    return Answer(fitted_effects, model, selection.problem)
 
 
-def _findings(given: Gate, selection: Selection, problem: Problem, answer: Answer, until: str) -> Findings:
+def _findings(gated: Gate, selection: Selection, problem: Problem, answer: Answer, until: str) -> Findings:
     """Put together the findings.
 
     Args:
-        given: The model as it was given, with its own noise.
+        gated: The model as it was given, with its own noise.
         selection: With the noise of the answer.
         problem: The model as it was given, with that noise.
         answer: The effects.
@@ -58,14 +58,14 @@ def _findings(given: Gate, selection: Selection, problem: Problem, answer: Answe
     """
     nothing, model, final = selection.nothing, answer.model, answer.problem
     return Findings(
-        gap=given.gap,
-        tests=given.tests,
+        gap=gated.gap,
+        tests=gated.tests,
         effects=answer.findings,
         left=leftovers(final) if until == "decide" else Leftovers(0.0, 0.0),
         explained=nothing.loss - model.loss,
         energy=(nothing.energy, model.energy),
         values=problem.grams.rows,
-        given=given.problem,
+        given=gated.problem,
         problem=problem,
         final=final,
         limits=detection_limits(final),

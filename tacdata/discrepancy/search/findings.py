@@ -119,8 +119,8 @@ class Findings:
     @property
     def share_left(self) -> float:
         """Share of the explainable sum of squares that the effects leave [1]."""
-        whole = self.left.gain + max(self.explained, 0.0)
-        return self.left.gain / whole if whole > 0 else 0.0
+        explainable = self.left.gain + max(self.explained, 0.0)
+        return self.left.gain / explainable if explainable > 0 else 0.0
 
     @property
     def loudness(self) -> float:

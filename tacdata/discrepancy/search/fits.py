@@ -14,59 +14,59 @@ INFORMED = 3.0
 """A channel's gain is estimated if presses have so many times its prior's information [1]."""
 
 
-def fitted(problem: Problem, chosen: Sequence[Candidate], episodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def fitted(problem: Problem, candidates: Sequence[Candidate], episodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit some candidates, with nuisances and the placed effects, to some episodes.
 
     Returns:
         Columns (from 0) and their coefficients; the candidates' first.
     """
-    free, beside = _beside(problem, episodes)
-    columns, values, rest = _bounded(problem, beside, chosen)
-    return np.concatenate([columns, free]), np.concatenate([values, rest])
+    unbounded, conditional = _beside(problem, episodes)
+    columns, values, unbounded_values = _bounded(problem, conditional, candidates)
+    return np.concatenate([columns, unbounded]), np.concatenate([values, unbounded_values])
 
 
 def gained(
-    problem: Problem, chosen: Sequence[Candidate], train: np.ndarray, episodes: np.ndarray | None = None
+    problem: Problem, candidates: Sequence[Candidate], train: np.ndarray, episodes: np.ndarray | None = None
 ) -> np.ndarray:
     """Return by how much such a fit lowers half the sum of squares of episodes, shape (episodes,).
 
     Args:
         problem: The problem.
-        chosen: Candidates.
+        candidates: Candidates.
         train: Episodes that are fitted.
         episodes: Those that are looked at; those that are fitted, unless given.
     """
-    _, beside = _beside(problem, train)
-    columns, values, _ = _bounded(problem, beside, chosen)
-    return beside.gains(columns, values, train if episodes is None else episodes)
+    _, conditional = _beside(problem, train)
+    columns, values, _ = _bounded(problem, conditional, candidates)
+    return conditional.gains(columns, values, train if episodes is None else episodes)
 
 
 def _beside(problem: Problem, episodes: np.ndarray) -> tuple[np.ndarray, Beside]:
     """Return the columns without bounds, and the Gram matrices given them."""
-    free = np.concatenate([problem.model_errors, problem.nuisances]).astype(int)
+    unbounded = np.concatenate([problem.model_errors, problem.nuisances]).astype(int)
     ridge = np.concatenate([np.ones(len(problem.model_errors)), problem.ridge])
-    return free, problem.grams.beside(free, ridge, episodes)
+    return unbounded, problem.grams.beside(unbounded, ridge, episodes)
 
 
 def _bounded(
-    problem: Problem, beside: Beside, chosen: Sequence[Candidate]
+    problem: Problem, conditional: Beside, candidates: Sequence[Candidate]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return columns of candidates and placed effects, their coefficients, and those of columns without bounds."""
-    moving, own = problem.tangent.columns, [c.columns for c in chosen]
-    columns = np.concatenate([*own, moving]).astype(int)
+    moving, candidate_columns = problem.tangent.columns, [c.columns for c in candidates]
+    columns = np.concatenate([*candidate_columns, moving]).astype(int)
     rooms = np.array([k.room(problem.placed) for k in problem.tangent.knobs]).reshape(-1, 2)
-    low = np.minimum(np.concatenate([*(c.low for c in chosen), rooms[:, 0]]), -1e-12)
-    high = np.maximum(np.concatenate([*(c.high for c in chosen), rooms[:, 1]]), 1e-12)
+    low = np.minimum(np.concatenate([*(c.low for c in candidates), rooms[:, 0]]), -1e-12)
+    high = np.maximum(np.concatenate([*(c.high for c in candidates), rooms[:, 1]]), 1e-12)
     ridge = np.concatenate([np.full(len(columns) - len(moving), 1e-6), np.ones(len(moving))])
-    return columns, *beside.fit(columns, ridge, low, high)
+    return columns, *conditional.fit(columns, ridge, low, high)
 
 
-def held_out(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
+def held_out(problem: Problem, candidates: Sequence[Candidate]) -> np.ndarray:
     """Return each episode's gain over the model as it is, fitted to the other folds, shape (episodes,)."""
     result = np.zeros(len(problem.folds))
     for fold in np.unique(problem.folds):
-        train, rest = np.flatnonzero(problem.folds != fold), np.flatnonzero(problem.folds == fold)
-        result[rest] = gained(problem, chosen, train, rest) - gained(problem, [], train, rest)
+        train, test = np.flatnonzero(problem.folds != fold), np.flatnonzero(problem.folds == fold)
+        result[test] = gained(problem, candidates, train, test) - gained(problem, [], train, test)
     return result
 
 
@@ -106,9 +106,9 @@ def channel_gains(problem: Problem, among: np.ndarray | None = None) -> np.ndarr
     everything = np.arange(len(problem.folds)) if among is None else among
     _, values = fitted(problem, [], everything)
     first = len(problem.tangent.columns) + len(problem.model_errors)
-    own = values[first : first + channels] * effect.amplitudes[0].typical
+    channel_values = values[first : first + channels] * effect.amplitudes[0].typical
     information = np.diag(problem.grams.of(everything))[problem.nuisances[:channels] + 1]
-    return np.where(information > INFORMED * problem.ridge[:channels], own, np.nan)
+    return np.where(information > INFORMED * problem.ridge[:channels], channel_values, np.nan)
 
 
 def gains_of_halves(problem: Problem) -> np.ndarray:

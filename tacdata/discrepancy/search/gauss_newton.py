@@ -102,11 +102,11 @@ class Refined:
 
         One that is not known makes no difference below, as a time constant that is shorter than a reading lasts.
         """
-        own = [(k, knob) for k, knob in enumerate(self.knobs) if knob.at == at and knob.shape]
-        error = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) if own else np.zeros(0)
+        shapes = [(k, knob) for k, knob in enumerate(self.knobs) if knob.at == at and knob.shape]
+        error = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)) if shapes else np.zeros(0)
         return tuple(
             knob.parameter.name
-            for k, knob in own
+            for k, knob in shapes
             if error[k] < KNOWN and knob.value(self.placed) <= knob.parameter.low * (1.001 + error[k])
         )
 
@@ -121,42 +121,42 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
         steps: Most Gauss-Newton steps.
     """
     response = _own(setting.response)
-    now = list(placed)
-    if isinstance(response, FittedResponse) and now:
-        _correct(response, setting, now)
-    view = _looked(setting, response, now, null)
-    begin, ended = (setting, response, now, view), None
+    current = list(placed)
+    if isinstance(response, FittedResponse) and current:
+        _correct(response, setting, current)
+    view = _looked(setting, response, current, null)
+    begin, ended = (setting, response, current, view), None
     for _ in range(steps):
         state, best = _state(*begin, null), None
         for share in (1.0, 0.3):
             # A part s of a Newton step makes a quadratic fall by s (2 - s) of the fall of the full step.
             if state.fall * share * (2 - share) < HOPELESS:
                 continue
-            there = now
+            trial = current
             for knob, by in zip(state.knobs, share * state.move, strict=True):
                 # A shape moves by its logarithm. Beyond a factor of e^1.5 its derivative is no guide.
-                there = knob.moved(there, float(np.clip(by, -1.5, 1.5) if knob.shape else by))
+                trial = knob.moved(trial, float(np.clip(by, -1.5, 1.5) if knob.shape else by))
             fresh = _own(response)
             if isinstance(fresh, FittedResponse):
-                _correct(fresh, setting, there)
-            tried = _looked(replace(setting, response=fresh), fresh, there, null)
+                _correct(fresh, setting, trial)
+            tried = _looked(replace(setting, response=fresh), fresh, trial, null)
             if tried.energy.sum() < view.energy.sum() - 1e-6:
-                best = tried, there, fresh
+                best = tried, trial, fresh
                 break
         if best is None:
             ended = state
             break
         gained = view.energy.sum() - best[0].energy.sum()
-        view, now, response = best
-        begin = replace(setting, response=response), response, now, view
+        view, current, response = best
+        begin = replace(setting, response=response), response, current, view
         if gained < SMALL_GAIN:
             break
     # A run of the chain is large, and most models are never asked.
     later = partial(_state, *begin[:3], replace(view, chain=None), null)
     return Refined(
-        tuple(now),
+        tuple(current),
         response,
-        knobs_of(now, setting.course.channels),
+        knobs_of(current, setting.course.channels),
         view.energy,
         view.left,
         setting.course.reduced.episode,
@@ -221,19 +221,19 @@ def _looked(setting: Setting, response: Response, placed: list[Placed], null: Nu
     course, streams = setting.course, Streams.of(setting.course)
     chain = Chain(course, response, [*setting.given, *placed])
     predicted = chain.prediction
-    rest = streams.measured(course) - streams.predicted(predicted)
-    residual = rest[:, :, None].astype(np.float32)
+    difference = streams.measured(course) - streams.predicted(predicted)
+    residual = difference[:, :, None].astype(np.float32)
     whitener = null.whitener_for(replace(setting, response=response), [*setting.given, *placed], predicted)
     clean = whitener.whitened(residual)
-    found = episode_grams(clean, course.reduced, null.nuisances, null.inner)
-    still = _without(found.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
-    left = clean[:, :, 0] - null.nuisances @ still.astype(np.float32)
-    energy = _energy(found, still) + _unconverged(rest, course, response, whitener, null.noise.scale)
-    return _View(clean, whitener, energy, left, chain)
+    grams = episode_grams(clean, course.reduced, null.nuisances, null.inner)
+    still = _without(grams.gram.sum(axis=0), np.arange(len(null.ridge)), null.ridge)
+    remainder = clean[:, :, 0] - null.nuisances @ still.astype(np.float32)
+    energy = _energy(grams, still) + _unconverged(difference, course, response, whitener, null.noise.scale)
+    return _View(clean, whitener, energy, remainder, chain)
 
 
 def _unconverged(
-    rest: np.ndarray, course: Course, response: Response, whitener: Whitener, scale: np.ndarray
+    difference: np.ndarray, course: Course, response: Response, whitener: Whitener, scale: np.ndarray
 ) -> np.ndarray:
     """Return the part that a response should have absorbed and did not: half the sum of squares, shape (episodes,).
 
@@ -243,9 +243,11 @@ def _unconverged(
     if not isinstance(response, FittedResponse) or whitener.features is None:
         return np.zeros(course.episodes)
     keep = course.channels + (course.force is not None)
-    after = response.residual_after(rest[:, :keep], whitener.features)
-    now, then = (about_means(own[:, :keep] / scale[:keep], course).sum(axis=1) for own in (rest, after))
-    return 0.5 * now * max(1 - CONVERGED * float(then.sum()) / max(float(now.sum()), 1e-300), 0.0)
+    projected = response.residual_after(difference[:, :keep], whitener.features)
+    square, square_projected = (
+        about_means(values[:, :keep] / scale[:keep], course).sum(axis=1) for values in (difference, projected)
+    )
+    return 0.5 * square * max(1 - CONVERGED * float(square_projected.sum()) / max(float(square.sum()), 1e-300), 0.0)
 
 
 def _state(setting: Setting, response: Response, placed: list[Placed], view: _View, null: NullModel) -> _State:
@@ -253,29 +255,29 @@ def _state(setting: Setting, response: Response, placed: list[Placed], view: _Vi
     moving = tangents(course, response, placed, setting.given, view.chain)
     k = len(moving.knobs)
     clean = view.whitener.whitened(moving.values) if k else moving.values
-    both = np.concatenate([view.clean, clean], axis=2)
-    found = episode_grams(both, course.reduced, null.nuisances, null.inner)
+    columns = np.concatenate([view.clean, clean], axis=2)
+    grams = episode_grams(columns, course.reduced, null.nuisances, null.inner)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
-    free = np.full(len(ridge), np.inf)
-    low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -free])
-    high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), free])
-    best = solve(found.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
-    fall = float(view.energy.sum() - _energy(found, best).sum()) if k else 0.0
-    return _State(moving.knobs, best[:k], fall, found, best, weight)
+    unbounded = np.full(len(ridge), np.inf)
+    low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -unbounded])
+    high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), unbounded])
+    best = solve(grams.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
+    fall = float(view.energy.sum() - _energy(grams, best).sum()) if k else 0.0
+    return _State(moving.knobs, best[:k], fall, grams, best, weight)
 
 
 def _without(total: np.ndarray, columns: np.ndarray, ridge: np.ndarray) -> np.ndarray:
-    free = np.full(len(columns), np.inf)
-    return solve(total, columns, ridge, -free, free) if len(columns) else np.zeros(0)
+    unbounded = np.full(len(columns), np.inf)
+    return solve(total, columns, ridge, -unbounded, unbounded) if len(columns) else np.zeros(0)
 
 
-def _energy(found: EpisodeGrams, values: np.ndarray) -> np.ndarray:
-    whole = np.concatenate([[1.0], -values])
-    return 0.5 * np.einsum("i,eij,j->e", whole, found.gram, whole)
+def _energy(grams: EpisodeGrams, values: np.ndarray) -> np.ndarray:
+    weights = np.concatenate([[1.0], -values])
+    return 0.5 * np.einsum("i,eij,j->e", weights, grams.gram, weights)
 
 
-def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, knobs: int) -> np.ndarray:
+def _covariance(grams: EpisodeGrams, values: np.ndarray, weight: np.ndarray, knobs: int) -> np.ndarray:
     """Return the covariance of the first ``knobs`` parameters: a cluster-robust sandwich over episodes.
 
     Errors within an episode may depend on each other in any way. Each episode's score is that of a fit without it (CR3,
@@ -285,24 +287,26 @@ def _covariance(found: EpisodeGrams, values: np.ndarray, weight: np.ndarray, kno
     """
     if not knobs:
         return np.zeros((0, 0))
-    total = found.gram.sum(axis=0)[1:, 1:] + np.diag(weight)
+    total = grams.gram.sum(axis=0)[1:, 1:] + np.diag(weight)
     through = np.linalg.pinv(total[knobs:, knobs:], hermitian=True) @ total[knobs:, :knobs]
-    beside = np.concatenate([np.eye(knobs), -through])
-    scores = (found.gram[:, 1:, 0] - np.einsum("eij,j->ei", found.gram[:, 1:, 1:], values)) @ beside
-    each = beside.T @ found.gram[:, 1:, 1:] @ beside
-    size, vectors = np.linalg.eigh(beside.T @ total @ beside)
+    elimination = np.concatenate([np.eye(knobs), -through])
+    scores = (grams.gram[:, 1:, 0] - np.einsum("eij,j->ei", grams.gram[:, 1:, 1:], values)) @ elimination
+    each = elimination.T @ grams.gram[:, 1:, 1:] @ elimination
+    size, vectors = np.linalg.eigh(elimination.T @ total @ elimination)
     good = size > 1e-12 * max(float(size[-1]), 1e-300)
     root = (vectors[:, good] / np.sqrt(size[good])) @ vectors[:, good].T
     heavy, axes = np.linalg.eigh(root @ each @ root)
     # A press with all the information on a parameter has leverage 1: the jackknife without it would divide by zero.
-    left = np.einsum("eji,ej->ei", axes, scores @ root) / (1 - np.minimum(heavy, LARGEST_LEVERAGE))
-    left = np.einsum("eij,ej->ei", axes, left)
+    jackknife = np.einsum("eji,ej->ei", axes, scores @ root) / (1 - np.minimum(heavy, LARGEST_LEVERAGE))
+    jackknife = np.einsum("eij,ej->ei", axes, jackknife)
     count, inverse = len(scores), root @ root
     share = np.maximum(np.einsum("ki,eij,kj->ek", inverse, each, inverse), 0.0)
     share = share / np.maximum(share.sum(axis=0), 1e-300)
     freedom = np.maximum(1 / np.maximum(np.sum(share**2, axis=0), 1e-12) - 1, 1.0)
     wider = stdtrit(freedom, 0.95) / ndtri(0.95)
-    return root @ (left.T @ left) @ root * np.outer(wider, wider) * ((count - 1) / count if count > 1 else 1.0)
+    return (
+        root @ (jackknife.T @ jackknife) @ root * np.outer(wider, wider) * ((count - 1) / count if count > 1 else 1.0)
+    )
 
 
 def _correct(response: FittedResponse, setting: Setting, placed: Sequence[Placed]) -> None:

@@ -55,9 +55,9 @@ class ModelError:
     @classmethod
     def of(cls, setting: Setting, model: Refined, null: NullModel, at: int | None = None) -> ModelError:
         """Return the model error of a model's effect number ``at``; of all its effects, unless given."""
-        own = [p for k, p in enumerate(model.placed) if at is None or k == at]
-        others = [p for p in model.placed if p not in own]
-        columns = model_errors(setting.course, model.response, own, [*setting.given, *others]).values
+        effects = [p for k, p in enumerate(model.placed) if at is None or k == at]
+        remaining = [p for p in model.placed if p not in effects]
+        columns = model_errors(setting.course, model.response, effects, [*setting.given, *remaining]).values
         whitener = null.whitener_for(replace(setting, response=model.response), [*setting.given, *model.placed])
         return cls(whitener.whitened(columns), setting.course.reduced, null)
 
@@ -68,17 +68,17 @@ class ModelError:
             Their Gram matrix of each episode, and by how much more half the sum of squares of the residual falls than
             that of residual less difference: an effect that both models miss counts against neither.
         """
-        both = np.concatenate([np.stack([residual, difference], axis=2), self.columns], axis=2)
-        gram = episode_grams(both, self.course, self.null.nuisances, self.null.inner).gram
-        own = self.columns.shape[2]
-        ridge = np.concatenate([np.ones(own), self.null.ridge])
+        joined = np.concatenate([np.stack([residual, difference], axis=2), self.columns], axis=2)
+        gram = episode_grams(joined, self.course, self.null.nuisances, self.null.inner).gram
+        width = self.columns.shape[2]
+        ridge = np.concatenate([np.ones(width), self.null.ridge])
         total, index = gram.sum(axis=0), np.arange(2, gram.shape[1])
         scores = np.stack([total[index, 0], total[index, 0] - total[index, 1]])
         bare = total[np.ix_(index, index)]
         bare = bare + 1e-9 * np.eye(len(index)) * max(float(np.trace(bare)) / len(index), 1e-12)
         # A larger coefficient is an effect, not a model error: it must remain as evidence, so the prior is tightened.
-        while np.abs(np.linalg.solve(bare + np.diag(ridge), scores[0])[:own]).max(initial=0.0) > MOST_ERROR:
-            ridge[:own] *= 2
+        while np.abs(np.linalg.solve(bare + np.diag(ridge), scores[0])[:width]).max(initial=0.0) > MOST_ERROR:
+            ridge[:width] *= 2
         matrix = bare + np.diag(ridge)
         falls = 0.5 * np.einsum("ki,ik->k", scores, np.linalg.solve(matrix, scores.T))
         fall = max(float(falls[0] - falls[1]), 0.0)
@@ -106,11 +106,11 @@ class NoiseDifference:
         """
         if first.projected_draws is second.projected_draws:
             return cls(0.0, 0.0, 0.0)
-        apart = second.projected_draws - first.projected_draws
-        draws = apart.shape[2]
-        noise = max(0.5 * (float(np.square(apart).sum()) / draws + first.freedom - second.freedom), 0.0)
-        score = np.zeros((int(first.place.max()) + 1, *apart.shape[1:]))
-        np.add.at(score, first.place, second.projected_draws * apart)
+        difference = second.projected_draws - first.projected_draws
+        draws = difference.shape[2]
+        noise = max(0.5 * (float(np.square(difference).sum()) / draws + first.freedom - second.freedom), 0.0)
+        score = np.zeros((int(first.place.max()) + 1, *difference.shape[1:]))
+        np.add.at(score, first.place, second.projected_draws * difference)
         groups = int(np.count_nonzero(np.any(score, axis=2)))
         spread = float(np.var(score, axis=2, ddof=1).sum()) * (1 + 2 * np.sqrt(2 / max(groups * (draws - 1), 1)))
         return cls(noise, noise, float(np.clip(spread, noise, 2 * noise)))
@@ -121,12 +121,12 @@ class NoiseDifference:
 
     def share(self, gram: np.ndarray) -> float:
         """Return the share of a score that noise does not make [1]; products of episodes as in `j_statistic`."""
-        score, apart = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
-        return max(score - min(self.mean, apart), 0.0) / score if score > 0 else 1.0
+        score, square = float(gram[:, 0, 1].sum()), float(gram[:, 1, 1].sum())
+        return max(score - min(self.mean, square), 0.0) / score if score > 0 else 1.0
 
-    def spread(self, apart: float) -> float:
+    def spread(self, square: float) -> float:
         """Return the variance of a score over the difference's sum of squares, its variance without noise [1]."""
-        return (max(apart - self.square, 0.0) + self.variance) / apart
+        return (max(square - self.square, 0.0) + self.variance) / square
 
 
 def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelError | None = None) -> float:
@@ -148,8 +148,8 @@ def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelErr
     if error is None:
         gram = np.zeros((len(first.energy), 2, 2))
         for i, values in ((0, second.left), (1, difference)):
-            own = np.einsum("ij,ij->i", difference, values)
-            gram[:, i, 1] = gram[:, 1, i] = np.bincount(first.episode, own, minlength=len(gram))
+            products = np.einsum("ij,ij->i", difference, values)
+            gram[:, i, 1] = gram[:, 1, i] = np.bincount(first.episode, products, minlength=len(gram))
     else:
         gram, fall = error.beside(second.left, difference)
         loss -= fall
@@ -157,7 +157,7 @@ def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelErr
         return 0.0
     score = clustered_score(gram, np.zeros(1, dtype=np.int64))
     # Two models that are equally wrong score against each other: the better one must fit better, too.
-    most = float(np.sqrt(2 * loss / max(score.variance / score.expected_variance, 1.0)))
+    largest = float(np.sqrt(2 * loss / max(score.variance / score.expected_variance, 1.0)))
     # Before few clusters are paid for: a large score shrinks by more than its sound part.
     noise = NoiseDifference.of(first, second).with_amplitudes(more, less)
     sound = replace(
@@ -165,7 +165,7 @@ def j_statistic(first: Refined, second: Refined, pooled: Pooled, error: ModelErr
         total=score.total * noise.share(gram),
         expected_variance=score.expected_variance * noise.spread(float(gram[:, 1, 1].sum())),
     )
-    return min(max(sound.z_score(pooled.get(_differ_by_clock(first, second))), 0.0), most)
+    return min(max(sound.z_score(pooled.get(_differ_by_clock(first, second))), 0.0), largest)
 
 
 def necessity(setting: Setting, model: Refined, without: Refined, null: NullModel, pooled: Pooled) -> float:
@@ -179,11 +179,11 @@ def necessity(setting: Setting, model: Refined, without: Refined, null: NullMode
     return j_statistic(model, without, pooled, ModelError.of(setting, without, null))
 
 
-def _further_amplitudes(model: Refined, other: Refined) -> int:
+def _further_amplitudes(model: Refined, rival: Refined) -> int:
     """Return how many amplitudes, beyond the first, a model has that another has not."""
-    taken = {p.effect.name for p in other.placed}
-    own = [k for k in model.knobs if not k.shape and model.placed[k.at].effect.name not in taken]
-    return max(len(own) - 1, 0)
+    shared = {p.effect.name for p in rival.placed}
+    amplitudes = [k for k in model.knobs if not k.shape and model.placed[k.at].effect.name not in shared]
+    return max(len(amplitudes) - 1, 0)
 
 
 def _differ_by_clock(first: Refined, second: Refined) -> bool:

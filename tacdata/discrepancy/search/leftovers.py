@@ -77,21 +77,21 @@ def _stream_gains(problem: Problem, residual: np.ndarray, columns: np.ndarray, s
 def own_histories(problem: Problem) -> np.ndarray:
     """Return the histories of a path, alone and times depth, whitened and without nuisances, shape (m, k)."""
     null, course = problem.null, problem.setting.course
-    own = histories(course)[course.read]
+    path_histories = histories(course)[course.read]
     depth = course.reduced.tip[:, 2]
     share = np.clip((depth - max(0.0, float(depth.min()))) / course.span, 0, 1)[:, None]
-    columns = np.column_stack([own * np.minimum(share * 10, 1), own * share])[:, None, :]
+    columns = np.column_stack([path_histories * np.minimum(share * 10, 1), path_histories * share])[:, None, :]
     plain = Noise(np.ones(1), null.noise.memory, null.noise.step, null.noise.offsets)
     none = np.zeros((len(depth), 1, 1))
-    made = Whitener(course.reduced, plain, null.context, null.features, none).whitened(columns)[:, 0].astype(float)
-    return made / np.maximum(np.sqrt(np.mean(made**2, axis=0)), 1e-9)
+    white = Whitener(course.reduced, plain, null.context, null.features, none).whitened(columns)[:, 0].astype(float)
+    return white / np.maximum(np.sqrt(np.mean(white**2, axis=0)), 1e-9)
 
 
 def _ridge_gains(problem: Problem, gram: np.ndarray, columns: np.ndarray, weight: float) -> np.ndarray:
-    free = np.full(len(columns), np.inf)
+    unbounded = np.full(len(columns), np.inf)
     result = np.zeros(len(problem.folds))
     for fold in np.unique(problem.folds):
-        train, rest = problem.folds != fold, problem.folds == fold
-        values = solve(gram[train].sum(axis=0), columns, np.full(len(columns), weight), -free, free)
-        result[rest] = gains(gram[rest], columns, values)
+        train, test = problem.folds != fold, problem.folds == fold
+        values = solve(gram[train].sum(axis=0), columns, np.full(len(columns), weight), -unbounded, unbounded)
+        result[test] = gains(gram[test], columns, values)
     return result

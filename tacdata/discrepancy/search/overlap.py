@@ -23,17 +23,17 @@ def overlap(problem: Problem, candidates: Sequence[Candidate]) -> float:
         problem: Problem with columns for the placed effects.
         candidates: Shapes of one effect. Without any, the result is 0.
     """
-    beside = np.concatenate([problem.tangent.columns, problem.model_errors]).astype(int) + 1
+    fixed = np.concatenate([problem.tangent.columns, problem.model_errors]).astype(int) + 1
     gram = problem.grams.gram
-    if not len(beside) or not candidates:
+    if not len(fixed) or not candidates:
         return 0.0
-    inner = gram[:, beside][:, :, beside]
-    mean = np.einsum("eii->e", inner)[:, None, None] / len(beside)
-    inner = inner + (RIDGE * mean + 1e-300) * np.eye(len(beside))
+    inner = gram[:, fixed][:, :, fixed]
+    mean = np.einsum("eii->e", inner)[:, None, None] / len(fixed)
+    inner = inner + (RIDGE * mean + 1e-300) * np.eye(len(fixed))
     shares = []
     for candidate in candidates:
-        own = candidate.columns + 1
-        across = gram[:, beside][:, :, own]
-        explained = np.einsum("eik,eik->", across, np.linalg.solve(inner, across))
-        shares.append(float(explained) / max(float(np.einsum("ekk->", gram[:, own][:, :, own])), 1e-300))
+        columns = candidate.columns + 1
+        cross = gram[:, fixed][:, :, columns]
+        explained = np.einsum("eik,eik->", cross, np.linalg.solve(inner, cross))
+        shares.append(float(explained) / max(float(np.einsum("ekk->", gram[:, columns][:, :, columns])), 1e-300))
     return min(max(shares), 1.0)

@@ -71,23 +71,23 @@ class Problem:
 
     def without(self, at: int) -> Problem:
         """Return the problem without one placed effect, to first order: the candidates' columns stay the same."""
-        gram, own = self.grams.gram.copy(), int(self.parts[at]) + 1
-        gram[:, 0] += gram[:, own]
-        gram[:, :, 0] += gram[:, :, own]
-        kept = [k for k, knob in enumerate(self.tangent.knobs) if knob.at != at]
-        knobs = [self.tangent.knobs[k] for k in kept]
-        others = self.of_errors != at
+        gram, column = self.grams.gram.copy(), int(self.parts[at]) + 1
+        gram[:, 0] += gram[:, column]
+        gram[:, :, 0] += gram[:, :, column]
+        columns = [k for k, knob in enumerate(self.tangent.knobs) if knob.at != at]
+        knobs = [self.tangent.knobs[k] for k in columns]
+        remaining = self.of_errors != at
         return replace(
             self,
             placed=tuple(p for k, p in enumerate(self.placed) if k != at),
             grams=EpisodeGrams(gram, self.grams.rows),
             tangent=Tangent(
                 [replace(knob, at=knob.at - (knob.at > at)) for knob in knobs],
-                self.tangent.values[:, :, kept],
-                self.tangent.columns[kept],
+                self.tangent.values[:, :, columns],
+                self.tangent.columns[columns],
             ),
-            model_errors=self.model_errors[others],
-            of_errors=self.of_errors[others] - (self.of_errors[others] > at),
+            model_errors=self.model_errors[remaining],
+            of_errors=self.of_errors[remaining] - (self.of_errors[remaining] > at),
             parts=np.delete(self.parts, at),
         )
 
@@ -114,29 +114,29 @@ def prepare(
     errors = model_errors(course, response, placed, setting.given)
     count = len(board.columns) - 1
     numerics = _numerics(setting, placed) if tested else None
-    beside = null.beside if tested else null.nuisances
+    cleaned = null.beside if tested else null.nuisances
     slack = count + moving.values.shape[2]
-    said = slack + errors.values.shape[2]
-    last = said + len(placed)
+    part_start = slack + errors.values.shape[2]
+    last = part_start + len(placed)
     first = last + (numerics is not None)
     more = [moving.values, errors.values, errors.parts, *([] if numerics is None else [numerics])]
     values = side_by_side([*board.columns, *(column for each in more for column in apart(each))])
-    found = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, beside)
+    grams = null.whitener_for(setting, [*setting.given, *placed]).episode_grams(values, cleaned)
     second = first + len(null.ridge)
-    nuisances, rich = np.arange(first, second), np.arange(second, first + beside.shape[2])
+    nuisances, rich = np.arange(first, second), np.arange(second, first + cleaned.shape[2])
     board = replace(board, columns=board.columns[:1])
     return Problem(
         setting,
         null,
         tuple(placed),
         board,
-        found,
+        grams,
         moving.at(count),
-        np.arange(slack, said),
+        np.arange(slack, part_start),
         nuisances,
         rich,
         _rise(setting, null),
-        np.arange(said, last),
+        np.arange(part_start, last),
         errors.at,
         None if numerics is None else last,
     )
@@ -144,12 +144,14 @@ def prepare(
 
 def _numerics(setting: Setting, placed: Sequence[Placed]) -> np.ndarray | None:
     """Return the interpolation error of a response, shape (m, streams, 1); None if it has no numerics."""
-    rough = setting.response.rougher()
-    if rough is None:
+    coarse = setting.response.rougher()
+    if coarse is None:
         return None
-    streams, every = Streams.of(setting.course), [*setting.given, *placed]
-    now, other = (streams.predicted(predict(setting.course, r, every)) for r in (setting.response, rough))
-    return (now - other)[:, :, None].astype(np.float32)
+    streams, effects = Streams.of(setting.course), [*setting.given, *placed]
+    fine_signal, coarse_signal = (
+        streams.predicted(predict(setting.course, r, effects)) for r in (setting.response, coarse)
+    )
+    return (fine_signal - coarse_signal)[:, :, None].astype(np.float32)
 
 
 def _rise(setting: Setting, null: NullModel) -> float:

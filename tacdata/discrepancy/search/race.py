@@ -61,20 +61,20 @@ class Selection:
 def start(setting: Setting, gate: Gate) -> Selection:
     """Return the selection without effects."""
     nothing = refine(setting, [], gate.problem.null)
-    least = least_p_values(gate.problem, gate.tests, ())
-    return Selection(gate.problem.null, nothing, nothing, gate.problem, gate.tests, (), least)
+    least_p = least_p_values(gate.problem, gate.tests, ())
+    return Selection(gate.problem.null, nothing, nothing, gate.problem, gate.tests, (), least_p)
 
 
 def race(setting: Setting, selection: Selection, note: Note) -> Selection:
     """Add effects, or pairs of them, as long as episodes ask for them."""
     selection = replace(selection, late=tuple(delays(setting)))
     while len(selection.model.placed) < MOST_EFFECTS:
-        chosen = shortlist(selection.problem, selection.tests)
-        if not chosen:
+        sets = shortlist(selection.problem, selection.tests)
+        if not sets:
             break
-        tried = dict.fromkeys(" with ".join(c.effect.spoken for c in one) for one in chosen)
+        tried = dict.fromkeys(" with ".join(c.effect.spoken for c in candidates) for candidates in sets)
         note(f"fit: {', '.join(tried)}")
-        best = _winner(selection, chosen)
+        best = _winner(selection, sets)
         if best is None or _is_minor(selection, best):
             break
         selection = _added(setting, selection, best)
@@ -89,22 +89,22 @@ def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None
         selection: So far; late effects are tried with the first effect, or alone.
         sets: Effects to add.
     """
-    late = selection.late
+    lags = selection.late
     problem, everything = selection.problem, np.arange(len(selection.problem.folds))
     tried = []
-    for chosen in sets:
-        _, values = fitted(problem, chosen, everything)
+    for candidates in sets:
+        _, values = fitted(problem, candidates, everything)
         first, at = [], 0
-        for candidate in chosen:
-            own = values[at : at + len(candidate.columns)]
-            first.append(candidate.placed(own, problem.setting.course.channels))
+        for candidate in candidates:
+            candidate_values = values[at : at + len(candidate.columns)]
+            first.append(candidate.placed(candidate_values, problem.setting.course.channels))
             at += len(candidate.columns)
         tried.append(refine(problem.setting, [*problem.placed, *first], problem.null))
     # To first order a long delay is not seen. So delays and filters are also started from the lag that readings and
     # path show by themselves.
     if not problem.placed and sets:
-        best = [p for p in min(tried, key=lambda model: model.half_bic).placed if p.effect.called not in _called(late)]
-        starts = [[p] for p in late] + [[p, *best[:1]] for p in late if best]
+        best = [p for p in min(tried, key=lambda model: model.half_bic).placed if p.effect.called not in _called(lags)]
+        starts = [[p] for p in lags] + [[p, *best[:1]] for p in lags if best]
         tried += [refine(problem.setting, start, problem.null) for start in starts]
     if not tried:
         return None
@@ -130,9 +130,9 @@ def physical_first(tried: list[Refined], current: Refined) -> list[Refined]:
     """
     ordered = sorted(tried, key=lambda model: model.half_bic)
     worth = PHYSICAL * (current.half_bic - ordered[0].half_bic)
-    ahead = [not _at_bound(m, current) and current.half_bic - m.half_bic >= worth for m in ordered]
+    preferred = [not _at_bound(m, current) and current.half_bic - m.half_bic >= worth for m in ordered]
     # Two models of the same effects are compared by no number: arrays have no one truth.
-    return [m for first in (True, False) for m, is_ahead in zip(ordered, ahead, strict=True) if is_ahead == first]
+    return [m for first in (True, False) for m, is_ahead in zip(ordered, preferred, strict=True) if is_ahead == first]
 
 
 def _at_bound(model: Refined, current: Refined) -> bool:
@@ -161,23 +161,23 @@ def _added(setting: Setting, selection: Selection, best: Refined) -> Selection:
     model = refine(replace(setting, response=best.response), best.placed, null, REFITS)
     problem = prepare(replace(setting, response=model.response), null, model.placed)
     tests = score_tests(problem, seed=len(best.placed))
-    least = least_p_values(problem, tests, selection.least_p)
-    return Selection(null, nothing, model, problem, tests, (*selection.explained, *added), least, selection.late)
+    least_p = least_p_values(problem, tests, selection.least_p)
+    return Selection(null, nothing, model, problem, tests, (*selection.explained, *added), least_p, selection.late)
 
 
 def least_p_values(
-    problem: Problem, tests: ScoreTests, before: tuple[tuple[str, float], ...]
+    problem: Problem, tests: ScoreTests, earlier: tuple[tuple[str, float], ...]
 ) -> tuple[tuple[str, float], ...]:
     """Return the least corrected p-value of each mechanism, those of earlier tests included."""
-    least = dict(before)
+    least_p = dict(earlier)
     for candidate, p in zip(problem.candidates, tests.p, strict=True):
-        least[candidate.called] = min(least.get(candidate.called, 1.0), float(p))
-    return tuple(least.items())
+        least_p[candidate.called] = min(least_p.get(candidate.called, 1.0), float(p))
+    return tuple(least_p.items())
 
 
-def shares(model: Refined, before: int, more: float) -> list[tuple[Effect, float]]:
-    """Return a model's effects but the first ``before``, each with an equal share of the part that they explain."""
-    added = [p.effect for p in model.placed[before:]]
+def shares(model: Refined, count: int, more: float) -> list[tuple[Effect, float]]:
+    """Return a model's effects but the first ``count``, each with an equal share of the part that they explain."""
+    added = [p.effect for p in model.placed[count:]]
     return [(effect, more / len(added)) for effect in added]
 
 
@@ -197,16 +197,16 @@ def model_error_energy(
             complete without.
     """
 
-    def error(one: Effect) -> float:
-        own = [c for c in problem.candidates if c.effect.name == one.name] if problem else []
-        alike = overlap(problem, own) if problem else 1.0
-        kin = [OTHER_FORMS if effect.group == one.group else 1.0 for effect, _ in explained]
+    def error(effect: Effect) -> float:
+        candidates = [c for c in problem.candidates if c.effect.name == effect.name] if problem else []
+        alike = overlap(problem, candidates) if problem else 1.0
+        kin = [OTHER_FORMS if earlier.group == effect.group else 1.0 for earlier, _ in explained]
         return sum(
-            much * (alike * (wide * effect.form_error) ** 2 + response.form_error**2)
-            for wide, (effect, much) in zip(kin, explained, strict=True)
+            part * (alike * (factor * earlier.form_error) ** 2 + response.form_error**2)
+            for factor, (earlier, part) in zip(kin, explained, strict=True)
         )
 
-    return min(error(one) for one in further)
+    return min(error(effect) for effect in further)
 
 
 def without_minor(tried: list[Refined], current: Refined) -> Refined:
@@ -217,11 +217,11 @@ def without_minor(tried: list[Refined], current: Refined) -> Refined:
         current: Model that they were added to.
     """
     best = tried[0]
-    fewer = [other for other in tried if len(other.placed) < len(best.placed)]
+    fewer = [model for model in tried if len(model.placed) < len(best.placed)]
     if not fewer:
         return best
     explained = shares(fewer[0], len(current.placed), current.loss - fewer[0].loss)
-    there = [p.effect.name for p in fewer[0].placed]
-    further = [p.effect for p in best.placed if p.effect.name not in there]
+    fewer_names = [p.effect.name for p in fewer[0].placed]
+    further = [p.effect for p in best.placed if p.effect.name not in fewer_names]
     minor = MINOR * model_error_energy(explained, further or [p.effect for p in best.placed[-1:]], best.response)
     return fewer[0] if fewer[0].loss - best.loss < minor else best

@@ -55,13 +55,7 @@ class Tried:
 
 
 def try_rivals(
-    current: Refined,
-    without: Refined,
-    at: int,
-    beside: Problem,
-    need: float,
-    pooled: Pooled,
-    late: Sequence[Placed] = (),
+    current: Refined, without: Refined, at: int, full: Problem, need: float, pooled: Pooled, lags: Sequence[Placed] = ()
 ) -> Tried:
     """Try other effects in the place of one.
 
@@ -69,20 +63,24 @@ def try_rivals(
         current: The model with all effects.
         without: The model without the one.
         at: Its number.
-        beside: Candidates in addition to all effects: they rank the rivals that are worth preparing without the one.
+        full: Candidates in addition to all effects: they rank the rivals that are worth preparing without the one.
         need: The one's necessity.
         pooled: Shrinkage priors.
-        late: Delays and filters to begin with: to first order long ones are not seen.
+        lags: Delays and filters to begin with: to first order long ones are not seen.
     """
-    begin, mine, null = replace(beside.setting, response=without.response), current.placed[at], beside.null
-    told, taken = beside.without(at), {p.effect.called for p in current.placed}
-    late_ones = {p.effect.name for p in late}
-    explained = shape_gains(told)
-    best_told = best_shapes(told, explained)
-    wanted = _worth_preparing(
-        told, explained, best_told, taken, lambda e: e.called == mine.effect.called or e.name in late_ones
+    begin, tested, null = replace(full.setting, response=without.response), current.placed[at], full.null
+    reduced, answer_mechanisms = full.without(at), {p.effect.called for p in current.placed}
+    late_ones = {p.effect.name for p in lags}
+    explained = shape_gains(reduced)
+    best_told = best_shapes(reduced, explained)
+    worthwhile = _worth_preparing(
+        reduced,
+        explained,
+        best_told,
+        answer_mechanisms,
+        lambda e: e.called == tested.effect.called or e.name in late_ones,
     )
-    bare = prepare(begin, null, without.placed, tested=False, among=wanted)
+    bare = prepare(begin, null, without.placed, tested=False, among=worthwhile)
     best, everything = best_shapes(bare), np.arange(len(bare.folds))
     each = _first_order_gains(bare, best)
     margins, losses, rivals, models = {}, {}, [], {}
@@ -92,64 +90,66 @@ def try_rivals(
     def in_its_place(name: str) -> Refined:
         _, values = fitted(bare, [best[name]], everything)
         first = best[name].placed(values[: len(best[name].columns)], begin.course.channels)
-        starts = [first, *(p for p in late if p.effect.name == name)]
-        made = [refine(begin, [*without.placed, start], null) for start in starts]
-        return min(made, key=lambda model: model.half_bic)
+        starts = [first, *(p for p in lags if p.effect.name == name)]
+        models_of_starts = [refine(begin, [*without.placed, start], null) for start in starts]
+        return min(models_of_starts, key=lambda model: model.half_bic)
 
-    long = [p.effect.name for p in late if p.effect.called not in taken and p.effect.name in best]
-    for name in dict.fromkeys([*_close(taken, best, each), *long]):
-        other = models[name] = in_its_place(name)
-        level = required_margin(mine.effect, best[name].effect)
-        margins[name], losses[name] = j_statistic(current, other, pooled), other.loss - current.loss
+    long = [p.effect.name for p in lags if p.effect.called not in answer_mechanisms and p.effect.name in best]
+    for name in dict.fromkeys([*_close(answer_mechanisms, best, each), *long]):
+        rival = models[name] = in_its_place(name)
+        level = required_margin(tested.effect, best[name].effect)
+        margins[name], losses[name] = j_statistic(current, rival, pooled), rival.loss - current.loss
         if margins[name] >= level:
             # Its equation may be wrong by a little: the part explained by that does not count against it.
-            error = ModelError.of(begin, other, null, len(without.placed))
-            margins[name] = j_statistic(current, other, pooled, error)
-        by_spectra = margins[name] < max(level, RIVAL_Z) and spectra.both(mine.effect, best[name].effect)
+            error = ModelError.of(begin, rival, null, len(without.placed))
+            margins[name] = j_statistic(current, rival, pooled, error)
+        by_spectra = margins[name] < max(level, RIVAL_Z) and spectra.both(tested.effect, best[name].effect)
         if by_spectra:
-            margins[name], losses[name] = spectra.compared(mine.effect, best[name].effect)
+            margins[name], losses[name] = spectra.compared(tested.effect, best[name].effect)
         if (
             margins[name] < -AHEAD
-            and not _unphysical(other, current)
-            and (better is None or other.half_bic < better.half_bic)
-            and (by_spectra or other.half_bic < current.half_bic)
-            and j_statistic(other, without, pooled) > (need if margins[name] > -RIVAL_Z else min(need, NEEDED_Z))
+            and not _unphysical(rival, current)
+            and (better is None or rival.half_bic < better.half_bic)
+            and (by_spectra or rival.half_bic < current.half_bic)
+            and j_statistic(rival, without, pooled) > (need if margins[name] > -RIVAL_Z else min(need, NEEDED_Z))
         ):
-            better = other
-        richer = len(other.knobs) > len(current.knobs)
-        behind = other.half_bic - current.half_bic if richer else 0.0
-        if stands_in(margins[name], level, behind, best[name].effect.family is mine.effect.family):
+            better = rival
+        richer = len(rival.knobs) > len(current.knobs)
+        deficit = rival.half_bic - current.half_bic if richer else 0.0
+        if stands_in(margins[name], level, deficit, best[name].effect.family is tested.effect.family):
             rivals.append(best[name].called)
     forms: dict[str, float] = {}
-    for name in _forms(mine.effect, best, each):
-        other = in_its_place(name)
-        forms[name] = j_statistic(current, other, pooled)
-        ahead = forms[name] < -AHEAD and other.half_bic < current.half_bic
+    for name in _forms(tested.effect, best, each):
+        rival = in_its_place(name)
+        forms[name] = j_statistic(current, rival, pooled)
+        better_form = forms[name] < -AHEAD and rival.half_bic < current.half_bic
         # A form that contains this one is ahead by chance, or by a part of the other effects' model error.
-        wider = other.placed[-1].effect.nested(other.placed[-1].values)
-        if ahead and wider is not None and wider.effect.name == mine.effect.name:
-            ahead = necessity(begin, other, current, null, pooled) >= NEEDED_Z
-        if better is None and ahead and not _unphysical(other, current):
-            better = other
+        wider = rival.placed[-1].effect.nested(rival.placed[-1].values)
+        if better_form and wider is not None and wider.effect.name == tested.effect.name:
+            better_form = necessity(begin, rival, current, null, pooled) >= NEEDED_Z
+        if better is None and better_form and not _unphysical(rival, current):
+            better = rival
     error, bounds = current.errors(at)
-    rest = {name: c for name, c in best_told.items() if name not in best}
-    apart = _still(bare) - _still(told)
-    chosen = _chosen(bare, best | rest, each | {n: g + apart for n, g in _first_order_gains(told, rest).items()})
-    found = FoundEffect(
-        mine,
+    unprepared = {name: c for name, c in best_told.items() if name not in best}
+    shift = _still(bare) - _still(reduced)
+    bootstrap = _chosen(
+        bare, best | unprepared, each | {n: g + shift for n, g in _first_order_gains(reduced, unprepared).items()}
+    )
+    finding = FoundEffect(
+        tested,
         error,
         (*bounds, *current.narrowest(at)),
         tuple(dict.fromkeys(rivals)),
         margins,
         need,
         losses,
-        _share(chosen, lambda e: e.called == mine.effect.called),
-        selected_family=_share(chosen, lambda e: e.family is mine.effect.family),
+        _share(bootstrap, lambda e: e.called == tested.effect.called),
+        selected_family=_share(bootstrap, lambda e: e.family is tested.effect.family),
         forms=forms,
         bought=without.loss - current.loss,
         unphysical=_only_unphysical(current, best, models),
     )
-    return Tried(found, better, RivalModels(begin, current, without, models, pooled))
+    return Tried(finding, better, RivalModels(begin, current, without, models, pooled))
 
 
 @dataclass
@@ -168,15 +168,15 @@ class Spectra:
     """Power of the radius, and whether shares grow with depth -> the best spectrum in the effect's place."""
 
     @staticmethod
-    def both(mine: Effect, rival: Effect) -> bool:
+    def both(effect: Effect, rival: Effect) -> bool:
         """Return whether both are such laws, with time constants that depend on different powers of the radius."""
-        powers = mine.times_by_radius, rival.times_by_radius
+        powers = effect.times_by_radius, rival.times_by_radius
         return None not in powers and powers[0] != powers[1]
 
-    def compared(self, mine: Effect, rival: Effect) -> tuple[float, float]:
+    def compared(self, effect: Effect, rival: Effect) -> tuple[float, float]:
         """Return by how many standard errors over episodes the first's is better, and how far the other is behind."""
-        law = mine if mine.times_by_radius == 0.0 else rival
-        first, second = (self._fit(law, e.times_by_radius or 0.0) for e in (mine, rival))
+        law = effect if effect.times_by_radius == 0.0 else rival
+        first, second = (self._fit(law, e.times_by_radius or 0.0) for e in (effect, rival))
         return j_statistic(first, second, self.pooled), second.loss - first.loss
 
     def _fit(self, law: Effect, by_radius: float) -> Refined:
@@ -187,7 +187,7 @@ class Spectra:
         return self.fits[key]
 
 
-def stands_in(margin: float, level: float, behind: float, kin: bool = True) -> bool:
+def stands_in(margin: float, level: float, deficit: float, kin: bool = True) -> bool:
     """Return whether a rival explains the episodes about as well as an effect.
 
     A rival with more parameters that fits about as well is excluded, unless the episodes prefer it significantly. The
@@ -196,32 +196,32 @@ def stands_in(margin: float, level: float, behind: float, kin: bool = True) -> b
     Args:
         margin: By how many standard errors over episodes the effect is better (J test).
         level: From which on the rival is out.
-        behind: By how much half the BIC of a rival with more numbers is larger.
+        deficit: By how much half the BIC of a rival with more numbers is larger.
         kin: Whether the rival is of the effect's family.
     """
-    return margin < level and (behind <= SIMPLER or margin < -(RIVAL_Z if kin else AHEAD))
+    return margin < level and (deficit <= SIMPLER or margin < -(RIVAL_Z if kin else AHEAD))
 
 
-def required_margin(mine: Effect, rival: Effect) -> float:
+def required_margin(effect: Effect, rival: Effect) -> float:
     """Return by how many standard errors an effect must be ahead of a rival [1].
 
     `RIVAL_Z` where both are as likely beforehand. Prior odds shift it as a likelihood ratio does (half a square of a
     standard score is a log-likelihood). Nothing is so much likelier that the episodes need not support it.
     """
-    return float(np.sqrt(max(RIVAL_Z**2 + 2 * np.log(rival.odds / mine.odds), LEAST_MARGIN**2)))
+    return float(np.sqrt(max(RIVAL_Z**2 + 2 * np.log(rival.odds / effect.odds), LEAST_MARGIN**2)))
 
 
-def _unphysical(other: Refined, current: Refined) -> bool:
+def _unphysical(rival: Refined, current: Refined) -> bool:
     """Return whether only the other model needs an amplitude at a physical bound: it takes no place then."""
-    return _bound(other) and not _bound(current)
+    return _bound(rival) and not _bound(current)
 
 
 def _only_unphysical(current: Refined, best: dict[str, Candidate], models: dict[str, Refined]) -> tuple[str, ...]:
     """Return the mechanisms of which every form that was tried needs an unphysical size."""
     sizes: dict[str, list[bool]] = {}
-    for name, other in models.items():
-        sizes.setdefault(best[name].called, []).append(_unphysical(other, current))
-    return tuple(called for called, each in sizes.items() if all(each))
+    for name, rival in models.items():
+        sizes.setdefault(best[name].called, []).append(_unphysical(rival, current))
+    return tuple(mechanism for mechanism, each in sizes.items() if all(each))
 
 
 def _bound(model: Refined) -> bool:
@@ -230,29 +230,35 @@ def _bound(model: Refined) -> bool:
 
 
 def _worth_preparing(
-    told: Problem, gain: list[float], best: dict[str, Candidate], taken: set[str], always: Callable[[Effect], bool]
+    reduced: Problem,
+    gain: list[float],
+    best: dict[str, Candidate],
+    answer_mechanisms: set[str],
+    always: Callable[[Effect], bool],
 ) -> set[Form]:
     """Return the effects and shapes that may be close in the place of one.
 
     Args:
-        told: Without the one to first order: columns are those given it.
+        reduced: Without the one to first order: columns are those given it.
         gain: Part that each of its candidates explains.
         best: Effect -> its best shapes.
-        taken: Mechanisms of the whole answer.
+        answer_mechanisms: Mechanisms of the whole answer.
         always: Effects that are prepared whatever they explain.
     """
-    still = _still(told)
+    still = _still(reduced)
     # The others are not at their optimum without the one: the part that their parameters explain is no rival's.
-    bare = replace(told, model_errors=told.model_errors[:0])
-    moved = _still(bare) - _still(replace(bare, tangent=Tangent([], told.tangent.values, told.tangent.columns[:0])))
-    each = {name: own - moved for name, own in _first_order_gains(told, best).items()}
-    near = _close(taken, best, each, SLACK, PREPARED)
-    most = {name: float((own + moved - still).sum()) for name, own in each.items()}
+    bare = replace(reduced, model_errors=reduced.model_errors[:0])
+    gain_of_effects = _still(bare) - _still(
+        replace(bare, tangent=Tangent([], reduced.tangent.values, reduced.tangent.columns[:0]))
+    )
+    each = {name: own - gain_of_effects for name, own in _first_order_gains(reduced, best).items()}
+    near = _close(answer_mechanisms, best, each, SLACK, PREPARED)
+    largest = {name: float((own + gain_of_effects - still).sum()) for name, own in each.items()}
     return {
         c.form
-        for c, own in zip(told.candidates, gain, strict=True)
+        for c, own in zip(reduced.candidates, gain, strict=True)
         if (c.effect.name in near or always(c.effect))
-        and own - still.sum() >= most[c.effect.name] - (1 - ALIKE) * abs(most[c.effect.name])
+        and own - still.sum() >= largest[c.effect.name] - (1 - ALIKE) * abs(largest[c.effect.name])
     }
 
 
@@ -268,29 +274,33 @@ def _still(problem: Problem) -> np.ndarray:
 
 
 def _close(
-    taken: set[str], best: dict[str, Candidate], each: dict[str, np.ndarray], slack: float = 1.0, most: int = TOP
+    answer_mechanisms: set[str],
+    best: dict[str, Candidate],
+    each: dict[str, np.ndarray],
+    slack: float = 1.0,
+    count: int = TOP,
 ) -> list[str]:
     """Return the effects worth trying, the best first.
 
     Args:
-        taken: Mechanisms that the answer has.
+        answer_mechanisms: Mechanisms that the answer has.
         best: Effect -> its best shapes.
         each: Effect -> by how much it alone lowers half the sum of squares of each episode.
         slack: Below 1 others count that are farther behind [1].
-        most: How many are returned.
+        count: How many are returned.
     """
     score = {name: float(gain.sum()) for name, gain in each.items()}
     top = max(score.values(), default=0.0)
     first = each[max(score, key=lambda n: score[n])] if score else np.zeros(1)
-    close = [n for n, s in score.items() if s >= slack * CLOSE * top and best[n].called not in taken]
+    close = [n for n, s in score.items() if s >= slack * CLOSE * top and best[n].called not in answer_mechanisms]
     close = [n for n in close if score[n] > slack * BEHIND * top or clipped_t(first - each[n]) < FAR_Z / slack]
-    return sorted(close, key=lambda n: -score[n])[:most]
+    return sorted(close, key=lambda n: -score[n])[:count]
 
 
-def _forms(mine: Effect, best: dict[str, Candidate], each: dict[str, np.ndarray]) -> list[str]:
+def _forms(effect: Effect, best: dict[str, Candidate], each: dict[str, np.ndarray]) -> list[str]:
     """Return other forms of an effect's mechanism, the best to first order."""
-    own = [n for n, c in best.items() if c.called == mine.called and n != mine.name]
-    return sorted(own, key=lambda n: -float(each[n].sum()))[:OTHER_FORMS]
+    forms = [n for n, c in best.items() if c.called == effect.called and n != effect.name]
+    return sorted(forms, key=lambda n: -float(each[n].sum()))[:OTHER_FORMS]
 
 
 def _chosen(problem: Problem, best: dict[str, Candidate], each: dict[str, np.ndarray]) -> list[Effect]:
@@ -305,6 +315,6 @@ def _chosen(problem: Problem, best: dict[str, Candidate], each: dict[str, np.nda
     return [best[names[k]].effect for k in top]
 
 
-def _share(chosen: list[Effect], among: Callable[[Effect], bool]) -> float:
+def _share(sample_effects: list[Effect], among: Callable[[Effect], bool]) -> float:
     """Return the share of bootstrap samples in which one of a kind explains most [1]."""
-    return float(np.mean([among(e) for e in chosen])) if chosen else 0.0
+    return float(np.mean([among(e) for e in sample_effects])) if sample_effects else 0.0

@@ -64,15 +64,15 @@ def score_tests(problem: Problem, seed: int = 0) -> ScoreTests:
     scores = [clustered_score(gram, c.columns) for c in problem.candidates]
     clock = [c.effect.follows_clock for c in problem.candidates]
     priors = _priors(problem, scores, "")
-    z = np.array([s.z_score(priors[own]) for s, own in zip(scores, clock, strict=True)])
+    z = np.array([s.z_score(priors[kind]) for s, kind in zip(scores, clock, strict=True)])
     if z.max(initial=0.0) > PRESENT_Z:
         # A true effect makes the scores of all that resemble it scatter: the prior is estimated given it.
         best = problem.candidates[int(np.argmax(z))]
-        beside = np.concatenate([problem.fixed, best.columns]).astype(int)
+        conditioned = np.concatenate([problem.fixed, best.columns]).astype(int)
         ridge = np.concatenate([problem.fixed_ridge(0.0), np.zeros(len(best.columns))])
-        rest = eliminated(problem.grams.gram, beside, ridge)
-        priors = _priors(problem, [clustered_score(rest, c.columns) for c in problem.candidates], best.called)
-        z = np.array([s.z_score(priors[own]) for s, own in zip(scores, clock, strict=True)])
+        conditional = eliminated(problem.grams.gram, conditioned, ridge)
+        priors = _priors(problem, [clustered_score(conditional, c.columns) for c in problem.candidates], best.called)
+        z = np.array([s.z_score(priors[kind]) for s, kind in zip(scores, clock, strict=True)])
     # The same numbers for all candidates, so that their null scores are as correlated as they are.
     null = np.stack([s.bootstrap(normal) for s in scores], axis=1) if scores else np.zeros((DRAWS, 1))
     largest = null.max(axis=1)
@@ -99,8 +99,8 @@ def _numerics(problem: Problem, gram: np.ndarray, candidate: Candidate) -> bool:
     if not candidate.effect.unjudgeable(setting.course, StandIn(True)):
         return False
     index, total = candidate.columns + 1, gram.sum(axis=0)
-    least = max(TABLE_ERROR * problem.rise, NUMERICS_FACTOR * _along_numerics(problem, total, index))
-    return _explained(total, index, 0) < least**2
+    smallest = max(TABLE_ERROR * problem.rise, NUMERICS_FACTOR * _along_numerics(problem, total, index))
+    return _explained(total, index, 0) < smallest**2
 
 
 def _along_numerics(problem: Problem, total: np.ndarray, index: np.ndarray) -> float:
@@ -130,12 +130,12 @@ def _test_generic(problem: Problem, gram: np.ndarray, seed: int, largest: np.nda
     table = np.stack([_flipped(gram, total, g, signs) for g in groups], axis=1)
     root = np.cbrt(np.maximum(table, 0.0))  # nearly normal (Wilson & Hilferty, PNAS 17, 1931, 684)
     z = (root - root[1:].mean(axis=0)) / (root[1:].std(axis=0) + 1e-12)
-    least = SPLINE_ERROR if problem.setting.response.fitted else TABLE_ERROR
+    error = SPLINE_ERROR if problem.setting.response.fitted else TABLE_ERROR
     numerics = NUMERICS_FACTOR * np.array([_along_numerics(problem, total, g + 1) for g in groups])
-    beyond = 2 * (table[0] - table[1:].mean(axis=0)) > np.maximum(least * problem.rise, numerics) ** 2
+    beyond = 2 * (table[0] - table[1:].mean(axis=0)) > np.maximum(error * problem.rise, numerics) ** 2
     z[0] = np.where(beyond, z[0], np.minimum(z[0], 0.0))
-    most = np.maximum(z[1:].max(axis=1), largest)
-    return float((1 + (most >= z[0].max()).sum()) / (DRAWS + 1))
+    largest_each = np.maximum(z[1:].max(axis=1), largest)
+    return float((1 + (largest_each >= z[0].max()).sum()) / (DRAWS + 1))
 
 
 def _flipped(gram: np.ndarray, total: np.ndarray, columns: np.ndarray, signs: np.ndarray) -> np.ndarray:

@@ -15,14 +15,14 @@ MOST_VALUES = 2_000_000
 """Values of each kind in the file; of more, every second, third, ... reading is kept."""
 
 
-def beside_model(course: Course, findings: Findings, sealed: np.ndarray, most: int = MOST_VALUES) -> Residuals:
+def beside_model(course: Course, findings: Findings, sealed: np.ndarray, value_limit: int = MOST_VALUES) -> Residuals:
     """Return the readings with the predictions of the model before and after.
 
     Args:
         course: All recordings, the sealed ones with their readings.
         findings: Findings without those.
         sealed: Which episodes were sealed.
-        most: Values of each kind that are kept at most.
+        value_limit: Values of each kind that are kept at most.
     """
     streams, reduced, first, last = Streams.of(course), course.reduced, findings.problem, findings.final
     measured = streams.measured(course)
@@ -30,7 +30,7 @@ def beside_model(course: Course, findings: Findings, sealed: np.ndarray, most: i
     placed = [*last.setting.given, *last.placed, *(f.placed for f in gains_beyond_calibration(findings))]
     final_prediction = streams.predicted(predict(course, last.setting.response, placed))
     scale = first.null.noise
-    stride = max(int(np.ceil(measured.size / most)), 1)
+    stride = max(int(np.ceil(measured.size / value_limit)), 1)
     rows = slice(None, None, stride)
     return Residuals(
         episode=reduced.episode[rows].astype(np.int32),

@@ -17,11 +17,11 @@ LARGEST_Z = 12.0
 """Larger margins are clipped to this [standard errors]."""
 
 
-def features(found: Findings, finding: FoundEffect, count: int) -> dict[str, float]:
+def features(findings: Findings, finding: FoundEffect, count: int) -> dict[str, float]:
     """Return the features of an effect's confidence, each about 0 to 1.
 
     Args:
-        found: Findings of the search.
+        findings: Findings of the search.
         finding: One effect of the answer.
         count: Number of effects in the answer.
     """
@@ -32,20 +32,20 @@ def features(found: Findings, finding: FoundEffect, count: int) -> dict[str, flo
         "need": float(np.clip(finding.necessity, 0, LARGEST_Z)) / LARGEST_Z,
         "selected": finding.selected,
         "decoys": 1.0 if p is None else float(np.clip(-np.log10(max(p, 1e-3)) / 3, 0, 1)),  # the file's name for it
-        "explained": 1 - float(np.clip(found.share_left, 0, 1)),
-        "left": float(np.clip(found.left.t, 0, LARGEST_Z)) / LARGEST_Z,
+        "explained": 1 - float(np.clip(findings.share_left, 0, 1)),
+        "left": float(np.clip(findings.left.t, 0, LARGEST_Z)) / LARGEST_Z,
         "others": (count - 1) / 3,
-        "episodes": float(np.clip(np.log10(len(found.energy[0])) / 2, 0, 1)),
+        "episodes": float(np.clip(np.log10(len(findings.energy[0])) / 2, 0, 1)),
     }
 
 
 def confidence(values: dict[str, float]) -> float | None:
     """Return the probability that a name with such features is right; None without a map."""
-    given = known()
-    if given is None:
+    weights = known()
+    if weights is None:
         return None
-    score = given["intercept"] + sum(w * values.get(name, 0.0) for name, w in given["weights"].items())
-    low, high = given["range"]
+    score = weights["intercept"] + sum(w * values.get(name, 0.0) for name, w in weights["weights"].items())
+    low, high = weights["range"]
     return float(np.clip(1 / (1 + np.exp(-score)), low, high))
 
 

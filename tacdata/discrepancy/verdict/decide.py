@@ -114,92 +114,95 @@ class Decision:
 
 
 def decide(
-    found: Findings,
+    findings: Findings,
     checks: DataChecks,
-    beside: tuple[BesideRemainder, ...] = (),
-    shown: Gap | None = None,
+    evidence: tuple[BesideRemainder, ...] = (),
+    sealed_gap: Gap | None = None,
     lacking: Mapping[Family, Lack] | None = None,
-    seen: tuple[Alarm, ...] = (),
+    raised: tuple[Alarm, ...] = (),
 ) -> Decision:
     """Decide the status of findings.
 
     Args:
-        found: Findings of the search.
+        findings: Findings of the search.
         checks: Limits and contradictions of the recordings.
-        beside: Evidence of each effect found, given a remainder; empty where there is no remainder.
-        shown: Gap on sealed episodes. It can withdraw a name, never give one.
+        evidence: Evidence of each effect found, given a remainder; empty where there is no remainder.
+        sealed_gap: Gap on sealed episodes. It can withdraw a name, never give one.
         lacking: Lack of fit: the part of the answer's residual that each family's saturated model explains.
-        seen: Alarms. They turn the status none into unknown.
+        raised: Alarms. They turn the status none into unknown.
     """
     lacking = lacking or {}
-    answer = answer_of(found)
-    status, reason = _status(found, answer)
-    if reason is Reason.QUIET and (given := compliance_of_specimens(found)):
-        answer, status, reason = given, "ambiguous", Reason.RIVALS
-    if reason is Reason.QUIET and seen:
+    answer = answer_of(findings)
+    status, reason = _status(findings, answer)
+    if reason is Reason.QUIET and (specimen_effects := compliance_of_specimens(findings)):
+        answer, status, reason = specimen_effects, "ambiguous", Reason.RIVALS
+    if reason is Reason.QUIET and raised:
         status, reason = "unknown", Reason.ALARM
-    own = {f.placed.effect.name: b for f, b in zip(found.effects, beside, strict=False)}
+    own = {f.placed.effect.name: b for f, b in zip(findings.effects, evidence, strict=False)}
     levels = [finest(f) for f in answer]
-    sealed = shown is not None and bool(len(shown.names))
-    if reason is Reason.LEFTOVERS and not refuted(shown) and (borne_out(shown) or not sealed):
+    sealed = sealed_gap is not None and bool(len(sealed_gap.names))
+    if reason is Reason.LEFTOVERS and not refuted(sealed_gap) and (borne_out(sealed_gap) or not sealed):
         first = leading(answer)
-        levels = [beside_much(found, f, own.get(f.placed.effect.name), shown) for f in answer]
+        levels = [beside_much(findings, f, own.get(f.placed.effect.name), sealed_gap) for f in answer]
         if first is None or levels[first] is None:
             levels = [None for _ in answer]
-        if not any(levels) and first is not None and fills(found, answer[first], lacking):
+        if not any(levels) and first is not None and fills(findings, answer[first], lacking):
             # The remainder is another law of the same family. At the level of families nothing is left unexplained,
             # so the rivals that only the remainder admits are dropped.
-            answer[first] = answer_of(replace(found, left=Leftovers(0.0, 0.0)))[first]
+            answer[first] = answer_of(replace(findings, left=Leftovers(0.0, 0.0)))[first]
             levels[first] = finest(answer[first]) and Level.FAMILY
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
-        elif first is not None and stands(found, answer[first], own.get(answer[first].placed.effect.name), shown):
+        elif first is not None and stands(
+            findings, answer[first], own.get(answer[first].placed.effect.name), sealed_gap
+        ):
             status, reason = "ambiguous", Reason.RIVALS
     if reason is Reason.RIVALS:
-        sure = beside_open(found, answer, levels)
-        if any(sure) and not all(sure):
-            levels, status, reason = sure, INCOMPLETE, Reason.INCOMPLETE
-    if status == "named" and lends_form(found, answer):
+        clear_levels = beside_open(findings, answer, levels)
+        if any(clear_levels) and not all(clear_levels):
+            levels, status, reason = clear_levels, INCOMPLETE, Reason.INCOMPLETE
+    if status == "named" and lends_form(findings, answer):
         levels, status, reason = [Level.FAMILY], INCOMPLETE, Reason.INCOMPLETE
-    early = [seems_early(f, answer) for f in answer]
-    asked = [status == "named" or k != leading(answer) for k in range(len(answer))]
-    parts = [ask and stands_in(found, f, lacking) for ask, f in zip(asked, answer, strict=True)]
-    open_ones = [e or part for e, part in zip(early, parts, strict=True)]
+    early_effects = [seems_early(f, answer) for f in answer]
+    candidates = [status == "named" or k != leading(answer) for k in range(len(answer))]
+    parts = [ask and stands_in(findings, f, lacking) for ask, f in zip(candidates, answer, strict=True)]
+    open_ones = [e or part for e, part in zip(early_effects, parts, strict=True)]
     if status in ("named", INCOMPLETE) and any(open_ones):
         # One of several names may be a form of the unexplained part: only the other names are certain.
         levels = [None if doubt else level for doubt, level in zip(open_ones, levels, strict=True)]
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
-    rough = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
+    doubtful_forms = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
     # Another law of the family is present, too, or is the true one: only the family is certain.
-    levels = [Level.FAMILY if own else level for own, level in zip(rough, levels, strict=True)]
-    if status in ("named", INCOMPLETE) and (any(rough) or elsewhere(found, lacking)):
+    levels = [Level.FAMILY if own else level for own, level in zip(doubtful_forms, levels, strict=True)]
+    if status in ("named", INCOMPLETE) and (any(doubtful_forms) or elsewhere(findings, lacking)):
         status, reason = INCOMPLETE, Reason.INCOMPLETE
     if any(trades := traded(answer, levels)):
         levels = [None if trade else level for trade, level in zip(trades, levels, strict=True)]
         if status in ("named", INCOMPLETE):
             status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
-    if status in ("named", INCOMPLETE) and refuted(shown):
+    if status in ("named", INCOMPLETE) and refuted(sealed_gap):
         status, reason = "unknown", Reason.SEALED
-    if status in ("named", INCOMPLETE) and not borne_out(shown):
+    if status in ("named", INCOMPLETE) and not borne_out(sealed_gap):
         # Behind a closed gate, sealed episodes alone show a gain. A name whose sealed interval holds zero is suspected.
-        unshown = shown is not None and sealed and shown.interval[0] <= 0
-        if unshown or (status == "named" and not found.gap):
+        unshown = sealed_gap is not None and sealed and sealed_gap.interval[0] <= 0
+        if unshown or (status == "named" and not findings.gap):
             levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
     if checks.contradictions:
         status, reason = "unknown", Reason.CONTRADICTION
     elif checks.too_few:
         status, reason = "unknown", Reason.TOO_FEW
-    made = zip(answer, levels, strict=True)
-    lone = lone_press(found.given) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
+    effects = zip(answer, levels, strict=True)
+    lone = lone_press(findings.given) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
     return Decision(
         status,
         reason,
         tuple(
-            _decided(f, status, found, len(answer), level, own.get(f.placed.effect.name), shown) for f, level in made
+            _decided(f, status, findings, len(answer), level, own.get(f.placed.effect.name), sealed_gap)
+            for f, level in effects
         ),
         lone,
         lacking,
-        seen,
+        raised,
     )
 
 
@@ -213,12 +216,12 @@ def _within_bounds(finding: FoundEffect) -> FoundEffect:
     return replace(finding, rivals=tuple(name for name in finding.rivals if name not in finding.unphysical))
 
 
-def lends_form(found: Findings, answer: list[FoundEffect]) -> bool:
+def lends_form(findings: Findings, answer: list[FoundEffect]) -> bool:
     """Return whether the residual is large enough to make a delay and a filter indistinguishable.
 
     The two differ only at the edges of a press, where a residual of this size hides the difference.
     """
-    if len(answer) != 1 or found.left.t < LEFT_T or found.share_left < SHARE_LEFT:
+    if len(answer) != 1 or findings.left.t < LEFT_T or findings.share_left < SHARE_LEFT:
         return False
     effect = answer[0].placed.effect
     return effect.at_rest is AtRest.CATCHES_UP and effect.family is Family.DELAY_AND_FILTER
@@ -255,22 +258,24 @@ def leading(answer: list[FoundEffect]) -> int | None:
     return max(raced, key=lambda k: answer[k].bought, default=None)
 
 
-def stands(found: Findings, finding: FoundEffect, beside: BesideRemainder | None, shown: Gap | None = None) -> bool:
+def stands(
+    findings: Findings, finding: FoundEffect, evidence: BesideRemainder | None, sealed_gap: Gap | None = None
+) -> bool:
     """Return whether an effect, or one collinear with it, is present although much is unexplained.
 
     It is needed, and explains more than the remainder or certainly most of the sealed gap. Its size is the same in
     all conditions: a remainder has no reason to follow it into each of them.
     """
-    if beside is None or not beside.spreads or not _needed(finding) or _unphysical(finding):
+    if evidence is None or not evidence.spreads or not _needed(finding) or _unphysical(finding):
         return False
-    closes = shown is not None and shown.interval[0] >= SURELY_CLOSED and bool(len(shown.names))
+    closes = sealed_gap is not None and sealed_gap.interval[0] >= SURELY_CLOSED and bool(len(sealed_gap.names))
     far = closes and all(by >= SETTLED_Z for by in finding.margins.values())
-    most = FAR_SIZE if far else ALIKE_SIZE
-    return (closes or finding.bought >= found.left.gain) and max(beside.spreads.values()) <= most
+    largest_spread = FAR_SIZE if far else ALIKE_SIZE
+    return (closes or finding.bought >= findings.left.gain) and max(evidence.spreads.values()) <= largest_spread
 
 
 def beside_much(
-    found: Findings, finding: FoundEffect, beside: BesideRemainder | None, shown: Gap | None = None
+    findings: Findings, finding: FoundEffect, evidence: BesideRemainder | None, sealed_gap: Gap | None = None
 ) -> Level | None:
     """Return the finest level of an effect although much is unexplained; None if none holds.
 
@@ -280,10 +285,10 @@ def beside_much(
     level = finest(bare)
     if level is not None and bare.rivals != finding.rivals:
         level = Level.FAMILY
-    if level is None or beside is None or not stands(found, finding, beside, shown):
+    if level is None or evidence is None or not stands(findings, finding, evidence, sealed_gap):
         return None
-    same = max(beside.spreads.values()) <= SAME_SIZE
-    fine = level is not Level.FAMILY and same and not _untried_kin(found, finding)
+    same = max(evidence.spreads.values()) <= SAME_SIZE
+    fine = level is not Level.FAMILY and same and not _untried_kin(findings, finding)
     return Level.MECHANISM if fine else Level.FAMILY
 
 
@@ -293,19 +298,20 @@ def _unphysical(finding: FoundEffect) -> bool:
     return bool(set(finding.at_bound) - shapes)
 
 
-def _untried_kin(found: Findings, finding: FoundEffect) -> set[str]:
+def _untried_kin(findings: Findings, finding: FoundEffect) -> set[str]:
     """Return mechanisms of its group with the same behaviour at rest that were no rivals in the J test.
 
     They differ only in their exact form, and a remainder can hide that difference.
     """
-    mine, tried = finding.placed.effect, {load(name).called for name in finding.margins}
-    every = {c.effect.called: c.effect for c in found.given.candidates}
+    effect, tried = finding.placed.effect, {load(name).called for name in finding.margins}
+    candidates = {c.effect.called: c.effect for c in findings.given.candidates}
     kin = {
-        called
-        for called, e in every.items()
-        if mine.at_rest is not None and (e.family, e.group, e.at_rest) == (mine.family, mine.group, mine.at_rest)
+        mechanism
+        for mechanism, e in candidates.items()
+        if effect.at_rest is not None
+        and (e.family, e.group, e.at_rest) == (effect.family, effect.group, effect.at_rest)
     }
-    return kin - tried - {mine.called}
+    return kin - tried - {effect.called}
 
 
 def _needed(finding: FoundEffect) -> bool:
@@ -316,53 +322,53 @@ def _needed(finding: FoundEffect) -> bool:
     return needed
 
 
-def _status(found: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
+def _status(findings: Findings, answer: list[FoundEffect]) -> tuple[str, Reason]:
     """Return status and reason by the tests of the search alone."""
-    if found.until != "decide":
-        return ("unknown" if found.gap else "none"), Reason.STOPPED
+    if findings.until != "decide":
+        return ("unknown" if findings.gap else "none"), Reason.STOPPED
     # One test in a hundred rejects by chance: without an effect, leftovers must confirm the gap.
-    chance = found.tests.p_generic > GATE and found.left.t < GAP_T
-    if not answer and (not found.gap or chance):
-        if len(found.problem.null.odd):
+    chance = findings.tests.p_generic > GATE and findings.left.t < GAP_T
+    if not answer and (not findings.gap or chance):
+        if len(findings.problem.null.odd):
             return "unknown", Reason.ODD
-        if found.loudness > LOUD:
-            return "unknown", Reason.UNEXPLAINED if found.gap else Reason.LOUD
+        if findings.loudness > LOUD:
+            return "unknown", Reason.UNEXPLAINED if findings.gap else Reason.LOUD
         return "none", Reason.QUIET
     if not answer:
-        return "unknown", Reason.ODD if len(found.problem.null.odd) else Reason.UNEXPLAINED
-    if not adequate(found, answer):
+        return "unknown", Reason.ODD if len(findings.problem.null.odd) else Reason.UNEXPLAINED
+    if not adequate(findings, answer):
         return "unknown", Reason.LEFTOVERS
     if any(settled(f) != "named" for f in answer):
         return "ambiguous", Reason.RIVALS
     return "named", Reason.NAMED
 
 
-def answer_of(found: Findings) -> list[FoundEffect]:
+def answer_of(findings: Findings) -> list[FoundEffect]:
     """Return the effects of the answer with all their rivals, and the gains beyond calibration."""
-    course, own = found.problem.setting.course, []
-    for f in found.effects:
+    course, effects = findings.problem.setting.course, []
+    for f in findings.effects:
         effect = f.placed.effect
         alike = lookalikes(course, effect, f.placed.values)
-        rivals = [name for name in dict.fromkeys([*f.rivals, *alike, *_hidden(found, f)]) if name != effect.called]
+        rivals = [name for name in dict.fromkeys([*f.rivals, *alike, *_hidden(findings, f)]) if name != effect.called]
         # An unphysical size is no argument against a rival that these presses cannot distinguish.
         unphysical = tuple(name for name in f.unphysical if name in rivals and name not in alike)
-        own.append(replace(f, rivals=tuple(rivals), unphysical=unphysical))
+        effects.append(replace(f, rivals=tuple(rivals), unphysical=unphysical))
     # An effect at its bound that explains no more than the model error of another is no evidence of a second effect.
-    own = [f for f in own if not (f.at_bound and lent(found, f))]
-    return [*(f for f in own if not calibration_error(f)), *gains_beyond_calibration(found)]
+    effects = [f for f in effects if not (f.at_bound and lent(findings, f))]
+    return [*(f for f in effects if not calibration_error(f)), *gains_beyond_calibration(findings)]
 
 
-def adequate(found: Findings, answer: list[FoundEffect]) -> bool:
+def adequate(findings: Findings, answer: list[FoundEffect]) -> bool:
     """Return whether the answer leaves little to explain.
 
     Real effects differ in form from any library. The residual of a single effect is its model error if every rival
     would leave at least twice as much.
     """
-    if found.left.t < LEFT_T or found.share_left < SHARE_LEFT:
+    if findings.left.t < LEFT_T or findings.share_left < SHARE_LEFT:
         return True
-    if len(answer) != 1 or settled(answer[0]) != "named" or found.share_left >= SHARE_LEFT_ALONE:
+    if len(answer) != 1 or settled(answer[0]) != "named" or findings.share_left >= SHARE_LEFT_ALONE:
         return False
-    return all(loss > found.left.gain for loss in answer[0].losses.values())
+    return all(loss > findings.left.gain for loss in answer[0].losses.values())
 
 
 def settled(finding: FoundEffect) -> str:
@@ -370,31 +376,31 @@ def settled(finding: FoundEffect) -> str:
     return "named" if _needed(finding) and not finding.rivals and not finding.at_bound else "ambiguous"
 
 
-def _hidden(found: Findings, finding: FoundEffect) -> list[str]:
+def _hidden(findings: Findings, finding: FoundEffect) -> list[str]:
     """Return rivals that lose less than the answer leaves: in another form they might win."""
-    if found.left.t < LEFT_T:
+    if findings.left.t < LEFT_T:
         return []
-    near = [name for name, loss in finding.losses.items() if loss < found.left.gain]
+    near = [name for name, loss in finding.losses.items() if loss < findings.left.gain]
     return [load(name).called for name in near if finding.margins[name] < SETTLED_Z]
 
 
 def _decided(
     finding: FoundEffect,
     verdict: str,
-    found: Findings,
+    findings: Findings,
     count: int,
     level: Level | None,
-    beside: BesideRemainder | None,
-    shown: Gap | None,
+    evidence: BesideRemainder | None,
+    sealed_gap: Gap | None,
 ) -> Decided:
     """Return an effect with its status: never named where the verdict gives no name, so it can be read alone."""
-    values = features(found, finding, count)
+    values = features(findings, finding, count)
     if level is not None and not _of_one_family(finding):
         finding = _within_bounds(finding)
     if verdict == INCOMPLETE:
-        return Decided(finding, "suspected" if level is None else "named", values, None, level, beside)
+        return Decided(finding, "suspected" if level is None else "named", values, None, level, evidence)
     status = "suspected" if verdict == "unknown" else settled(finding) if level is not None else "ambiguous"
-    if beside is not None and not stands(found, finding, beside, shown):
+    if evidence is not None and not stands(findings, finding, evidence, sealed_gap):
         status = "suspected"
-    sure = confidence(values) if status == "named" else None
-    return Decided(finding, status, values, sure, None if status == "suspected" else level, beside)
+    probability = confidence(values) if status == "named" else None
+    return Decided(finding, status, values, probability, None if status == "suspected" else level, evidence)

@@ -81,37 +81,39 @@ class LikelihoodRatio:
         return {"observed": self.observed, "expected": self.expected, "share": self.share, "error": error}
 
 
-def likelihood_ratio(course: Course, found: Findings) -> LikelihoodRatio | None:
+def likelihood_ratio(course: Course, findings: Findings) -> LikelihoodRatio | None:
     """Return the likelihood ratio of sealed episodes; None where no effect was found.
 
     Args:
         course: All recordings, with the readings that the search did not have.
-        found: Findings without them.
+        findings: Findings without them.
     """
-    model, beyond = found.final, [f.placed for f in gains_beyond_calibration(found)]
-    fewer, given = found.problem.setting.course, list(model.setting.given)
-    kept = np.isin(course.read, fewer.read)
-    if kept.all() or not (model.placed or beyond):
+    model, beyond = findings.final, [f.placed for f in gains_beyond_calibration(findings)]
+    fewer, model_effects = findings.problem.setting.course, list(model.setting.given)
+    open_rows = np.isin(course.read, fewer.read)
+    if open_rows.all() or not (model.placed or beyond):
         return None
-    setting = replace(model.setting, course=course, given=(*given, *model.placed))
-    every, some = model.null.whiteners(setting, fewer)
+    setting = replace(model.setting, course=course, given=(*model_effects, *model.placed))
+    whitener, open_whitener = model.null.whiteners(setting, fewer)
     streams = Streams.of(course)
-    without = streams.predicted(predict(course, found.problem.setting.response, given))
+    without = streams.predicted(predict(course, findings.problem.setting.response, model_effects))
     change = streams.predicted(predict(course, setting.response, [*setting.given, *beyond])) - without
     nuisances, ridge = nuisance_columns(setting, setting.given)
     nuisances = _beside(nuisances, beyond, course.channels)
     columns = side_by_side([streams.measured(course) - without, change, *apart(nuisances)])
-    shown = some.episode_grams(columns[kept]).gram
-    before = _marginal(shown.sum(axis=0), ridge)
-    after = _marginal(every.episode_grams(columns).gram.sum(axis=0), ridge)
-    power = float(after[1, 1] - before[1, 1])
+    open_grams = open_whitener.episode_grams(columns[open_rows]).gram
+    open_marginal = _marginal(open_grams.sum(axis=0), ridge)
+    full_marginal = _marginal(whitener.episode_grams(columns).gram.sum(axis=0), ridge)
+    power = float(full_marginal[1, 1] - open_marginal[1, 1])
     if power <= 0:
         return LikelihoodRatio(0.0, 0.0)
-    each = eliminated(shown, np.arange(1, shown.shape[1] - 1), ridge)
+    each = eliminated(open_grams, np.arange(1, open_grams.shape[1] - 1), ridge)
     score = each[:, 0, 1] - each[:, 1, 1]
     # At least 1: where open episodes scatter less by chance, sealed ones must not refute an answer more easily.
     scatter = max(float(np.sum(np.square(score))) / max(float(each[:, 1, 1].sum()), 1e-12), 1.0)
-    return LikelihoodRatio(power, float(after[0, 1] - before[0, 1]) / power, scatter, max(float(before[1, 1]), 1e-12))
+    return LikelihoodRatio(
+        power, float(full_marginal[0, 1] - open_marginal[0, 1]) / power, scatter, max(float(open_marginal[1, 1]), 1e-12)
+    )
 
 
 def _beside(nuisances: np.ndarray, beyond: list[Placed], channels: int) -> np.ndarray:
@@ -119,13 +121,13 @@ def _beside(nuisances: np.ndarray, beyond: list[Placed], channels: int) -> np.nd
     if not beyond:
         return nuisances
     sizes = [np.broadcast_to(next(iter(p.values.values())), channels) for p in beyond]
-    taken = np.linalg.qr(np.stack(sizes, axis=1).astype(float))[0]
+    directions = np.linalg.qr(np.stack(sizes, axis=1).astype(float))[0]
     result = nuisances.copy()
-    result[:, :, :channels] -= (nuisances[:, :, :channels] @ taken) @ taken.T
+    result[:, :, :channels] -= (nuisances[:, :, :channels] @ directions) @ directions.T
     return result
 
 
 def _marginal(gram: np.ndarray, ridge: np.ndarray) -> np.ndarray:
     """Return the Gram matrix of the first two columns with the others integrated out, shape (2, 2)."""
-    beside = gram[2:, 2:] + np.diag(ridge)
-    return gram[:2, :2] - gram[:2, 2:] @ np.linalg.solve(beside, gram[2:, :2])
+    further = gram[2:, 2:] + np.diag(ridge)
+    return gram[:2, :2] - gram[:2, 2:] @ np.linalg.solve(further, gram[2:, :2])

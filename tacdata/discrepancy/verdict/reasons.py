@@ -199,9 +199,9 @@ def _closed(decision: Decision, gap: Gap | None) -> str:
     return f"{part} of the gap on sealed presses" if share >= LEAST_CLOSED else ""
 
 
-def _nameless(findings: Findings, least: float) -> str:
-    """Return a clause on the unexplained share; empty below ``least`` [1]."""
-    if findings.left.t < LEFT_T or findings.share_left < least:
+def _nameless(findings: Findings, share_limit: float) -> str:
+    """Return a clause on the unexplained share; empty below ``share_limit`` [1]."""
+    if findings.left.t < LEFT_T or findings.share_left < share_limit:
         return ""
     part = f"{100 * findings.share_left:.0f} %" if findings.share_left >= SPEAKS_FROM else "less than 1 %"
     return f"; {part} of what could be explained has no name yet"
@@ -289,9 +289,9 @@ def _best(effects: Sequence[Decided]) -> str:
 
 def _open(group: list[FoundEffect]) -> str:
     """Return a clause on effects with the same rivals, and those rivals."""
-    called = {m.placed.effect.called for m in group}
+    mechanisms = {m.placed.effect.called for m in group}
     names = list(dict.fromkeys(m.placed.effect.spoken for m in group))
-    rivals = [name for name in dict.fromkeys(r for m in group for r in m.rivals) if name not in called]
+    rivals = [name for name in dict.fromkeys(r for m in group for r in m.rivals) if name not in mechanisms]
     words = f"{names[0]} fits best" if len(names) == 1 else f"{_listed(names, 'and')} together fit best"
     if rivals:
         families = list(dict.fromkeys(load(name).family.value for name in rivals))

@@ -132,17 +132,17 @@ def outstanding(names: Sequence[str], energy: np.ndarray, values: np.ndarray) ->
     ]
 
 
-def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 1.0) -> list[str]:
-    """Return sentences on the notable slices, ``alone`` first, then each kind, with mean squares [noise floor].
+def in_words(residual_slices: list[Slice], single: list[str] | None = None, total: float = 1.0) -> list[str]:
+    """Return sentences on the notable slices, ``single`` first, then each kind, with mean squares [noise floor].
 
     Args:
-        found: The slices.
-        alone: Sentences on single episodes.
-        whole: The mean square of all [noise floor].
+        residual_slices: The slices.
+        single: Sentences on single episodes.
+        total: The mean square of all [noise floor].
     """
-    words, alike = list(alone or []), []
-    for by in dict.fromkeys(s.by for s in found):
-        members = [s for s in found if s.by == by]
+    words, alike = list(single or []), []
+    for by in dict.fromkeys(s.by for s in residual_slices):
+        members = [s for s in residual_slices if s.by == by]
         high = [s for s in members if s.mean_square > NOTABLE and s.t > NOTABLE_T]
         if not high:
             continue
@@ -155,4 +155,4 @@ def in_words(found: list[Slice], alone: list[str] | None = None, whole: float = 
         usual = [level for _, level in alike]
         extent = _range(min(usual), max(usual))
         words.append(f"{', '.join(by for by, _ in alike)}: everywhere alike, {extent}")
-    return words or [SPREAD.format(whole) if whole > NOTABLE else NOWHERE]
+    return words or [SPREAD.format(total) if total > NOTABLE else NOWHERE]

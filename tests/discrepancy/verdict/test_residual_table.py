@@ -39,7 +39,7 @@ def test_residuals_are_read_back_with_the_sealed_episodes(late, tmp_path):
 
 def test_the_file_stays_small_and_curves_do_not_run_from_press_to_press(late):
     own, found = late
-    table = beside_model(own, found, chosen(own), most=600)
+    table = beside_model(own, found, chosen(own), value_limit=600)
     assert table.measured.size <= 600 and table.every > 1
     curves = {c.name: c for c in residual_curves(table)}
     assert curves["readings/channel_2"].labels == ("measured", "before", "after")
@@ -50,7 +50,7 @@ def test_the_file_stays_small_and_curves_do_not_run_from_press_to_press(late):
 def test_a_torn_file_is_named(late, tmp_path):
     own, found = late
     path = tmp_path / "residuals.parquet"
-    write(path, beside_model(own, found, chosen(own), most=600), "a" * 64)
+    write(path, beside_model(own, found, chosen(own), value_limit=600), "a" * 64)
     path.write_bytes(path.read_bytes()[:500])
     with pytest.raises(FormatError, match=r"residuals\.parquet"):
         read(path)

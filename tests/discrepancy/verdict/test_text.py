@@ -226,7 +226,7 @@ def test_an_alarm_is_no_reassurance_and_no_name():
     """Without one the same findings are `none`."""
     seen = Alarm("channels are late by times of their own", "look at the order of reading")
     assert decide(quiet(), DataChecks(20)).status == "none"
-    decision = decide(quiet(), DataChecks(20), seen=(seen,))
+    decision = decide(quiet(), DataChecks(20), raised=(seen,))
     assert (decision.status, decision.reason, decision.effects) == ("unknown", Reason.ALARM, ())
     words = reason_in_words(decision, quiet(), DataChecks(20))
     assert words == "no effect of the library shows, but channels are late by times of their own"
