@@ -19,13 +19,13 @@ OPEN = ("waiting", "planning", "running")
 def farm_entry(root: Path, store: Path) -> LabEntry:
     """Return the entry of a farm's store. Raises as `documents.read`."""
     submissions = [documents.read(path, "submission") for path in sorted((store / "submissions").glob("*.json"))]
-    pending = [one for one in submissions if one["state"] in OPEN]
-    wanted, done = (sum(one.get(key, 0) for one in pending) for key in ("episodes", "labelled"))
-    failed = sum(one.get("failed", 0) for one in submissions)
+    pending = [submission for submission in submissions if submission["state"] in OPEN]
+    total, done = (sum(submission.get(key, 0) for submission in pending) for key in ("episodes", "labelled"))
+    failed = sum(submission.get("failed", 0) for submission in submissions)
     address = running_at(store / LOCK)
     words = f"runs at {address}" if address else "does not run"
     words += f"; {len(pending)} of {len(submissions)} submissions open" if submissions else "; no submissions"
-    words += f", {done} of {wanted} presses labelled" if pending else ""
+    words += f", {done} of {total} presses labelled" if pending else ""
     start = command("farm", "up", "--root", store.parent.relative_to(root))
     return LabEntry(
         "Label farm",
@@ -37,7 +37,7 @@ def farm_entry(root: Path, store: Path) -> LabEntry:
         commands=(command("farm", "status", "--url", address),) if address else (start,),
         running=bool(address),
         address=address,
-        share=done / wanted if wanted else None,
+        share=done / total if total else None,
     )
 
 

@@ -68,24 +68,26 @@ class Inventory:
         self.root = root.resolve()
         self._tasks: list[Task] = []
         self._searched = -SEARCH
-        self._kept: dict[tuple[str, Path], tuple[tuple[int, ...], LabEntry]] = {}
+        self._cache: dict[tuple[str, Path], tuple[tuple[int, ...], LabEntry]] = {}
 
     def entries(self) -> list[LabEntry]:
         """Return the entries by section, the newest first; a damaged one has its error as its sentence."""
         if time.monotonic() - self._searched >= SEARCH:
-            self._tasks, self._searched = self._found(), time.monotonic()
-        found = [self._entry(task) for task in self._tasks if task[1].exists()]
-        return sorted(found, key=lambda entry: (SECTIONS.index(entry.section), -entry.order, entry.path))
+            self._tasks, self._searched = self._tasks_of_folder(), time.monotonic()
+        current = [self._entry(task) for task in self._tasks if task[1].exists()]
+        return sorted(current, key=lambda entry: (SECTIONS.index(entry.section), -entry.order, entry.path))
 
-    def _found(self) -> list[Task]:
+    def _tasks_of_folder(self) -> list[Task]:
         kind = kind_of(self.root)
         kinds = {self.root: kind} if kind.holds(self.root) else contents(self.root)
         tasks = [_task(path, kind) for path, kind in kinds.items()]
         for section, name, make in (("Health", "health.json", health_entry), ("Label farm", LOCK, farm_entry)):
             tasks += [(section, path.parent, make) for path in self._placed(name)]
         folders = {folder for _, folder, _ in tasks}
-        taken = folders if kind.holds(self.root) else folders - {self.root}
-        tasks += [(MEASURED, path, measured_entry) for path in measured_sources(self.root, self._placed("*.*"), taken)]
+        occupied = folders if kind.holds(self.root) else folders - {self.root}
+        tasks += [
+            (MEASURED, path, measured_entry) for path in measured_sources(self.root, self._placed("*.*"), occupied)
+        ]
         pages = [path for path in self._placed("*.html") if not folders & set(path.parents) - {self.root}]
         return tasks + [("Pages", path, page_entry) for path in pages]
 
@@ -97,16 +99,16 @@ class Inventory:
     def _entry(self, task: Task) -> LabEntry:
         section, path, make = task
         state = tuple(_changed(path / part) for part in WATCHED)
-        kept = self._kept.get((section, path))
-        if kept is not None and kept[0] == state and not kept[1].running:
-            return kept[1]
+        cached = self._cache.get((section, path))
+        if cached is not None and cached[0] == state and not cached[1].running:
+            return cached[1]
         try:
             entry = make(self.root, path)
         except Exception as error:  # whatever is damaged, the others are listed
             words = f"{error.given}; {error.remedy}" if isinstance(error, TacdataError) else f"not readable: {error!r}"
             words = words.replace(f"{self.root}/", "")
             entry = LabEntry(section, path.relative_to(self.root).as_posix(), words, "bad")
-        self._kept[section, path] = state, entry
+        self._cache[section, path] = state, entry
         return entry
 
 

@@ -12,16 +12,16 @@ ENDINGS = (".csv", ".tsv", ".xlsx", ".mat", ".npz", ".npy", ".parquet", ".db3", 
 """Endings of measured files, none of which the other verbs write beside sessions."""
 
 
-def measured_sources(root: Path, files: list[Path], taken: set[Path]) -> list[Path]:
+def measured_sources(root: Path, files: list[Path], occupied: set[Path]) -> list[Path]:
     """Return what is to be imported: folders of measured files alone, and files that lie beside other entries.
 
     Args:
         root: The lab's folder.
         files: Files near it.
-        taken: Folders of other entries; files inside them are theirs.
+        occupied: Folders of other entries; files inside them are theirs.
     """
-    measured = [path for path in files if path.suffix in ENDINGS and not taken & set(path.parents)]
-    mixed = {parent for folder in taken for parent in folder.parents}
+    measured = [path for path in files if path.suffix in ENDINGS and not occupied & set(path.parents)]
+    mixed = {parent for folder in occupied for parent in folder.parents}
     tops = {path: root / path.relative_to(root).parts[0] for path in measured}
     return sorted({path if top in mixed else top for path, top in tops.items()})
 

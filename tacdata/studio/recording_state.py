@@ -38,12 +38,12 @@ class RecordingState:
     """Latest change of a recording [s since 1970]."""
 
 
-def recording_state(folder: Path, wanted: int) -> RecordingState:
+def recording_state(folder: Path, planned: int) -> RecordingState:
     """Return the state of a session's recording.
 
     Args:
         folder: The session.
-        wanted: Presses of its plan.
+        planned: Presses of its plan.
     """
     finished = list(file_names.finished(folder).values())
     taps = sorted(folder.glob("sync_tap-*.mcap"))
@@ -51,18 +51,18 @@ def recording_state(folder: Path, wanted: int) -> RecordingState:
     changes = {path: _changed(path) for path in (*finished, *taps, *file_names.unfinished(folder))}
     newest = max(changes, key=changes.__getitem__, default=None)
     if newest is None:
-        return RecordingState(0, wanted, None, False, None, None, "", _changed(folder))
+        return RecordingState(0, planned, None, False, None, None, "", _changed(folder))
     age = time.time() - changes[newest]
     is_partial, is_interrupted = newest.name.endswith(file_names.PARTIAL), ".interrupted-" in newest.name
-    remaining = wanted - len(finished)
+    remaining = planned - len(finished)
     running = age < QUIET and remaining > 0 and not is_interrupted
-    steps = [after - before for before, after in pairwise(ended)][-RECENT:]
+    steps = [later - earlier for earlier, later in pairwise(ended)][-RECENT:]
     seconds = remaining * statistics.median(steps) - (time.time() - ended[-1]) if running and steps else None
     cut = [path for path in changes if path.name.endswith(file_names.PARTIAL) and not (running and path == newest)]
     interrupted = [path for path in changes if ".interrupted-" in path.name]
     return RecordingState(
         len(finished),
-        wanted,
+        planned,
         newest if running and is_partial else None,
         running,
         None if seconds is None else max(seconds, 0.0),

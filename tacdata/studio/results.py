@@ -37,10 +37,10 @@ def network_entry(root: Path, folder: Path) -> LabEntry:
     name, file = folder.relative_to(root), folder / "scores" / "scores.json"
     if not file.is_file():
         trained = (folder / CHECKPOINT).is_file()
-        words, after = (
+        words, next_step = (
             ("not evaluated", command("evaluate", name)) if trained else ("predictions", command("view", name, "--web"))
         )
-        return _entry(root, folder, "Networks", words, commands=(after,))
+        return _entry(root, folder, "Networks", words, commands=(next_step,))
     scores = documents.read(file, "scores")
     table = scores["contact_frames"]
     medians = [f"{words} {table[key]['median']:.3f} mm" for key, words in ERRORS.items() if key in table]
@@ -59,7 +59,7 @@ def verdict_entry(root: Path, folder: Path) -> LabEntry:
     """Return the entry of a verdict."""
     name, verdict = folder.relative_to(root), documents.read(folder / "verdict.json", "verdict")
     recordings = verdict.get("heading", {}).get("recordings", ())
-    found = COMMAND.findall("\n".join(verdict["next"]))
+    next_steps = COMMAND.findall("\n".join(verdict["next"]))
     return _entry(
         root,
         folder,
@@ -67,7 +67,7 @@ def verdict_entry(root: Path, folder: Path) -> LabEntry:
         sentence(verdict["why"])[0],
         "good" if verdict["status"] == "named" else "",
         (verdict["status"], *(f"of {Path(path).name}" for path in recordings)),
-        (*found, command("view", name, "--web")),
+        (*next_steps, command("view", name, "--web")),
     )
 
 

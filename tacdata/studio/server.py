@@ -54,8 +54,8 @@ def application(inventory: Inventory, token: str) -> FastAPI:
     @routes.get("/list")
     def entries() -> dict[str, Any]:
         with one_at_a_time:
-            found = inventory.entries()
-        return {"root": str(inventory.root), "sections": SECTIONS, "entries": [_plain(entry) for entry in found]}
+            current = inventory.entries()
+        return {"root": str(inventory.root), "sections": SECTIONS, "entries": [_plain(entry) for entry in current]}
 
     @routes.get("/file/{name:path}")
     def file(name: str) -> FileResponse:

@@ -110,22 +110,22 @@ def with_choices(base: Mapping, files: dict[str, FileEntry], tables: Tables, cho
     Raises:
         FormatError: If a quantity has columns of two files, there is no channel, or a value is outside the schema.
     """
-    before = choices_of(base, {alias: table for alias, table in tables.items() if alias in base.files})
+    earlier = choices_of(base, {alias: table for alias, table in tables.items() if alias in base.files})
     entries = {
-        alias: replace(files[alias], clock=_clock(alias, base, files[alias], before, choices)) for alias in files
+        alias: replace(files[alias], clock=_clock(alias, base, files[alias], earlier, choices)) for alias in files
     }
     clocks = {alias: entry.clock or SourceClock() for alias, entry in entries.items()}
-    own = {
+    stream_clocks = {
         id(stream): stream.clock
         for stream in (base.taxels, base.position, *base.measured.values())
-        if stream and stream.clock is not base.files[stream.file].clock and _kept(before, choices, "time", stream.file)
+        if stream and stream.clock is not base.files[stream.file].clock and _kept(earlier, choices, "time", stream.file)
     }
 
     def clock_of(stream: ColumnsEntry | PositionEntry | None, file: str) -> SourceClock:
         """Return a clock of its own that a stream keeps, else the file's."""
-        return own.get(id(stream), clocks[file]) if stream and stream.file == file else clocks[file]
+        return stream_clocks.get(id(stream), clocks[file]) if stream and stream.file == file else clocks[file]
 
-    taxels = _taxels(base.taxels, before, choices)
+    taxels = _taxels(base.taxels, earlier, choices)
     taxels = replace(taxels, clock=clock_of(base.taxels, taxels.file))
     position = _position(base.position, choices)
     if position:
@@ -134,14 +134,14 @@ def with_choices(base: Mapping, files: dict[str, FileEntry], tables: Tables, cho
     for key in FURTHER:
         if columns := choices.of_role(key):
             file, entry = _one_file(columns, key), base.measured.get(key)
-            chosen = _chosen_columns(entry, key, before, choices, file)
-            measured[key] = replace(chosen, clock=clock_of(entry, file))
+            columns_entry = _chosen_columns(entry, key, earlier, choices, file)
+            measured[key] = replace(columns_entry, clock=clock_of(entry, file))
     specimen: str | KnownValue = base.specimen if isinstance(base.specimen, str) else ""
     if columns := choices.of_role("specimen"):
         specimen = KnownValue(file=columns[0].file, column=columns[0].column)
     elif choices.specimen:
-        kept = isinstance(base.specimen, KnownValue) and base.specimen.part == choices.specimen
-        specimen = base.specimen if kept else KnownValue(choices.specimen)
+        same_specimen = isinstance(base.specimen, KnownValue) and base.specimen.part == choices.specimen
+        specimen = base.specimen if same_specimen else KnownValue(choices.specimen)
     numbering = choices.of_role("trial")
     used = {taxels.file, *(entry.file for entry in measured.values()), *(each.file for each in numbering)}
     used |= {position.file} if position else set()
@@ -159,9 +159,13 @@ def with_choices(base: Mapping, files: dict[str, FileEntry], tables: Tables, cho
         measured=measured,
         trials=TrialRule(column=numbering[0].column) if numbering else choices.trials,
         contact=contact,
-        known_from=base.known_from if choices.contact == before.contact else BY_HAND if contact else Mapping.known_from,
+        known_from=base.known_from
+        if choices.contact == earlier.contact
+        else BY_HAND
+        if contact
+        else Mapping.known_from,
         specimen=specimen,
-        indenter=base.indenter if choices.radius == before.radius else _sphere(choices.radius),
+        indenter=base.indenter if choices.radius == earlier.radius else _sphere(choices.radius),
     )
     document = document_of(mapping)
     documents.check(document, "import_mapping", "the mapping")
@@ -183,9 +187,9 @@ def _columns(table: SourceTable, selector: Selector | None) -> list[str]:
     return [inner for name in names for inner in ([f"{name}[{k}]" for k in range(table.inner(name))] or [name])]
 
 
-def _kept(before: Choices, choices: Choices, role: str, file: str) -> bool:
+def _kept(earlier: Choices, choices: Choices, role: str, file: str) -> bool:
     """Return whether the columns of a role in a file, with their units, are the same as before."""
-    first, second = ([each for each in side.of_role(role) if each.file == file] for side in (before, choices))
+    first, second = ([each for each in side.of_role(role) if each.file == file] for side in (earlier, choices))
     return first == second
 
 
@@ -200,12 +204,12 @@ def _one_file(columns: list[ColumnRole], words: str) -> str:
     return files[0]
 
 
-def _clock(alias: str, base: Mapping, entry: FileEntry, before: Choices, choices: Choices) -> SourceClock:
+def _clock(alias: str, base: Mapping, entry: FileEntry, earlier: Choices, choices: Choices) -> SourceClock:
     """Return the clock of a file: as before where nothing of it was changed."""
     names = [each for each in choices.of_role("time") if each.file == alias]
     clock = (base.files.get(alias) or entry).clock or SourceClock()
     layout, rate = choices.formats.get(alias), choices.rates.get(alias)
-    if alias in base.files and _kept(before, choices, "time", alias):
+    if alias in base.files and _kept(earlier, choices, "time", alias):
         return replace(clock, format=layout, rate=rate if clock.rate is not None and rate else clock.rate)
     if not names:
         return SourceClock(rate=rate or clock.rate or 50.0)
@@ -214,20 +218,20 @@ def _clock(alias: str, base: Mapping, entry: FileEntry, before: Choices, choices
 
 
 def _chosen_columns(
-    entry: ColumnsEntry | None, role: str, before: Choices, choices: Choices, file: str
+    entry: ColumnsEntry | None, role: str, earlier: Choices, choices: Choices, file: str
 ) -> ColumnsEntry:
     """Return the columns of a quantity: by the selector of before where they are the same."""
     columns = choices.of_role(role)
     names = [each.column for each in columns]
     first = columns[0]
-    same = entry and entry.file == file and names == [each.column for each in before.of_role(role)]
+    same = entry and entry.file == file and names == [each.column for each in earlier.of_role(role)]
     start = entry if entry and entry.file == file else ColumnsEntry(file=file, clock=SourceClock())
     return replace(
         start, columns=entry.columns if same and entry else short(names), unit=first.unit, scale=first.scale, long=None
     )
 
 
-def _taxels(entry: ColumnsEntry, before: Choices, choices: Choices) -> ColumnsEntry:
+def _taxels(entry: ColumnsEntry, earlier: Choices, choices: Choices) -> ColumnsEntry:
     columns = choices.of_role("channels")
     if not columns and entry.long:
         return entry
@@ -236,7 +240,9 @@ def _taxels(entry: ColumnsEntry, before: Choices, choices: Choices) -> ColumnsEn
     file = _one_file(columns, "channels")
     timed = any(each.file == file for each in choices.of_role("time"))
     counters = [each.column for each in choices.of_role("counter") if each.file == file and timed]
-    return replace(_chosen_columns(entry, "channels", before, choices, file), counter=counters[0] if counters else None)
+    return replace(
+        _chosen_columns(entry, "channels", earlier, choices, file), counter=counters[0] if counters else None
+    )
 
 
 def _position(entry: PositionEntry | None, choices: Choices) -> PositionEntry | None:
@@ -250,15 +256,15 @@ def _position(entry: PositionEntry | None, choices: Choices) -> PositionEntry | 
             f"two columns for one axis ({names})", "one depth or one height", "give the other another role"
         )
     file = _one_file(columns, "the position")
-    kept = entry if entry and entry.file == file else None
+    base = entry if entry and entry.file == file else None
     axes: dict[str, Quantity] = {
-        key: value for key, value in (kept.axes if kept else {}).items() if isinstance(value, float) and key in "xy"
+        key: value for key, value in (base.axes if base else {}).items() if isinstance(value, float) and key in "xy"
     }
     for each in sorted(columns, key=lambda each: AXES.index(each.role)):
-        known = [axis for axis in (kept.columns if kept else {}).values() if axis.column == each.column]
-        axis = known[0] if known else Axis(each.column)
+        same_column = [axis for axis in (base.columns if base else {}).values() if axis.column == each.column]
+        axis = same_column[0] if same_column else Axis(each.column)
         axes[each.role] = replace(axis, unit=each.unit, scale=each.scale)
-    start = kept or PositionEntry(file=file, clock=SourceClock(), axes={})
+    start = base or PositionEntry(file=file, clock=SourceClock(), axes={})
     return replace(start, axes=axes)
 
 

@@ -76,10 +76,10 @@ def _press(press: ImportedPress, number: int) -> dict[str, Any]:
     depth = np.interp(time_ns, press.position.time_ns, press.registration["origin"][2] - press.position.values[:, 2])
     change = press.taxels.values[pick] - _first(press.taxels.values)
     spans = np.nan_to_num(np.nanmax(np.abs(change), axis=0, initial=0.0))
-    most = sorted(np.argsort(-spans, kind="stable")[: len(COLORS)].tolist())
+    largest = sorted(np.argsort(-spans, kind="stable")[: len(COLORS)].tolist())
     unit, trial = press.taxels.unit or "as read", press.record["trial"]
-    hidden = f", {len(most)} of {len(spans)}" if len(most) < len(spans) else ""
-    channels = [_series(press.taxels.names[k], color, change[:, k]) for k, color in zip(most, COLORS, strict=False)]
+    hidden = f", {len(largest)} of {len(spans)}" if len(largest) < len(spans) else ""
+    channels = [_series(press.taxels.names[k], color, change[:, k]) for k, color in zip(largest, COLORS, strict=False)]
     name = f"press {number}" + f" ({trial})" * bool(trial)
     return {
         "name": name,
@@ -110,8 +110,8 @@ def _path(mapping: Mapping, run: TrialRun, memory: TableMemory) -> dict[str, Any
         time_ns, depth = _read(mapping.position, memory.tables(files)[mapping.position.file], presses[0])
     except TacdataError:
         return None
-    shown = np.isfinite(depth) & (time_ns != NEVER)
-    time_ns, depth = time_ns[shown], depth[shown]
+    finite = np.isfinite(depth) & (time_ns != NEVER)
+    time_ns, depth = time_ns[finite], depth[finite]
     if len(depth) < 2:
         return None
     names = ", ".join(file.paths[0].name for file in files.files.values())
@@ -121,15 +121,17 @@ def _path(mapping: Mapping, run: TrialRun, memory: TableMemory) -> dict[str, Any
         pick = picked(len(depth), LONG)
         series = [_series("as read", "ink", depth[pick])]
         return _figure(f"{title}; time goes back, so rows are drawn", "depth [mm]", pick.astype(float), series, x="row")
-    members, kept = np.zeros(len(depth), int), np.zeros(len(depth), bool)
+    members, covered = np.zeros(len(depth), int), np.zeros(len(depth), bool)
     tolerance = 0.5 * float(np.median(np.abs(np.diff(time_ns))))
     for number, press in enumerate(presses, 1):
-        own = np.sort(press.position.time_ns - press.record["time_shift_ns"])
-        members[(time_ns >= own[0] - tolerance) & (time_ns <= own[-1] + tolerance)] = number
-        after = np.searchsorted(own, time_ns)
-        distances = [np.abs(time_ns - own[np.clip(rows, 0, len(own) - 1)]) for rows in (after - 1, after)]
-        kept |= np.minimum(*distances) <= tolerance
-    aside = (members > 0) & ~kept
+        press_times = np.sort(press.position.time_ns - press.record["time_shift_ns"])
+        members[(time_ns >= press_times[0] - tolerance) & (time_ns <= press_times[-1] + tolerance)] = number
+        following = np.searchsorted(press_times, time_ns)
+        distances = [
+            np.abs(time_ns - press_times[np.clip(rows, 0, len(press_times) - 1)]) for rows in (following - 1, following)
+        ]
+        covered |= np.minimum(*distances) <= tolerance
+    aside = (members > 0) & ~covered
     pick = np.union1d(picked(len(depth), LONG), np.flatnonzero(aside)[:LONG])
     depth, members, aside = depth[pick], members[pick], aside[pick]
     series = [

@@ -85,18 +85,18 @@ def application(wizard: Wizard, token: str) -> FastAPI:
             return wizard.tried(choices)
 
     @routes.post("/write")
-    def write(asked: WriteRequest) -> dict[str, Any]:
+    def write(request: WriteRequest) -> dict[str, Any]:
         with one_at_a_time:
-            answer = wizard.written(asked.choices, asked.file, asked.replace)
+            answer = wizard.written(request.choices, request.file, request.replace)
         if "command" in answer:
             say(f"{answer['file']} is written\nnext: {answer['command']}")
         return answer
 
     @routes.post("/import")
-    def imported(asked: ImportRequest) -> dict[str, Any]:
+    def imported(request: ImportRequest) -> dict[str, Any]:
         with one_at_a_time:
-            answer = wizard.imported(asked.file, asked.session)
-        say(f"{answer['recordings']} recordings in {asked.session}")
+            answer = wizard.imported(request.file, request.session)
+        say(f"{answer['recordings']} recordings in {request.session}")
         return answer
 
     api.include_router(routes)

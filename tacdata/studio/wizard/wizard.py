@@ -128,12 +128,12 @@ class Wizard:
 
     def imported(self, file: str, session: str) -> dict[str, Any]:
         """Import by a mapping's file and check the session. Raises as `tacdata.import_files`."""
-        made = import_files(self.source, file, session)
-        report = check(made.folder)
+        session_import = import_files(self.source, file, session)
+        report = check(session_import.folder)
         return {
-            "recordings": made.recordings,
-            "refused": list(made.refused),
-            "notes": list(made.notes),
+            "recordings": session_import.recordings,
+            "refused": list(session_import.refused),
+            "notes": list(session_import.notes),
             "usable": report.usable,
             "check": report.text,
             "commands": [
