@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
@@ -27,16 +25,9 @@ SEALED = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 """Policy of every file from the folder: a page in it asks nothing of any address, this one included."""
 
 
-@contextmanager
-def studio_server(inventory: Inventory, port: int) -> Iterator[str]:
-    """Serve the page while the context lasts, on the loopback, to whoever knows its address.
-
-    Yields:
-        The address to open.
-    """
-    token = secrets.token_urlsafe(16)
-    with loopback.serving(application(inventory, token), port) as address:
-        yield f"{address}/{token}/"
+def studio_server(inventory: Inventory, port: int) -> AbstractContextManager[str]:
+    """Serve the page of a lab's folder. See `loopback.page_server`."""
+    return loopback.page_server(lambda token: application(inventory, token), port)
 
 
 def application(inventory: Inventory, token: str) -> FastAPI:

@@ -11,6 +11,7 @@ from threading import Thread
 
 import uvicorn
 from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 
 from tacdata.errors import TacdataError
@@ -43,6 +44,27 @@ def guard(api: FastAPI, token: str, headers: dict[str, str]) -> None:
     @api.exception_handler(TacdataError)
     async def in_words(_: Request, error: TacdataError) -> JSONResponse:
         return JSONResponse({"error": str(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
+
+    @api.exception_handler(RequestValidationError)
+    async def unfit(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        return JSONResponse({"error": f"{first['loc'][-1]}: {first['msg']}"}, HTTPStatus.UNPROCESSABLE_ENTITY)
+
+
+@contextmanager
+def page_server(application: Callable[[str], FastAPI], port: int) -> Iterator[str]:
+    """Serve a page while the context lasts, on the loopback, to whoever knows its address.
+
+    Args:
+        application: Application of a token, which its paths begin with and `guard` checks.
+        port: Port; 0 takes any that is free.
+
+    Yields:
+        The address to open.
+    """
+    token = secrets.token_urlsafe(16)
+    with serving(application(token), port) as address:
+        yield f"{address}/{token}/"
 
 
 @contextmanager

@@ -7,16 +7,14 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from http import HTTPStatus
 from importlib.resources import files
 from pathlib import Path
 from threading import Lock
 from typing import Any
 from urllib.parse import quote
 
-from fastapi import APIRouter, FastAPI, Request
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
+from fastapi import APIRouter, FastAPI
+from fastapi.responses import FileResponse, HTMLResponse
 from pydantic import BaseModel, Field
 
 from tacdata.dataset.flags import Flag, read_flags, read_history
@@ -25,7 +23,6 @@ from tacdata.pages import live_page
 from tacdata.viewers.browse import loopback
 from tacdata.viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
 from tacdata.viewers.browse.flagging import flag_episode, unflag_episode
-from tacdata.viewers.browse.loopback import guard
 from tacdata.viewers.browse.noting import note_stretch, notes_of, unnote_stretch
 from tacdata.viewers.rerun.shield import LOOPBACK, shielded
 from tacdata.viewers.rerun.window import GRPC_PORT, WEB_PORT, any_port, free_port, quiet_environment, running
@@ -176,13 +173,7 @@ def application(pages: Pages) -> FastAPI:
     """Return the application that answers the page's requests under its address."""
     api = FastAPI(openapi_url=None)
     routes = APIRouter(prefix=f"/{pages.token}")
-
-    guard(api, pages.token, {"Access-Control-Allow-Origin": pages.viewer})
-
-    @api.exception_handler(RequestValidationError)
-    async def unfit(_: Request, error: RequestValidationError) -> JSONResponse:
-        first = error.errors()[0]
-        return JSONResponse({"error": f"{first['loc'][-1]}: {first['msg']}"}, HTTPStatus.UNPROCESSABLE_ENTITY)
+    loopback.guard(api, pages.token, {"Access-Control-Allow-Origin": pages.viewer})
 
     @routes.get("/")
     def page() -> HTMLResponse:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager
-from http import HTTPStatus
+from contextlib import AbstractContextManager
 from importlib.resources import files
 from threading import Lock
 from typing import Any
 
-from fastapi import APIRouter, FastAPI, Request
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import HTMLResponse, JSONResponse
+from fastapi import APIRouter, FastAPI
+from fastapi.responses import HTMLResponse
 from pydantic import BaseModel
 
 from tacdata.pages import live_page
@@ -46,16 +42,9 @@ class ImportRequest(BaseModel):
     session: str
 
 
-@contextmanager
-def wizard_server(wizard: Wizard, port: int) -> Iterator[str]:
-    """Serve the page while the context lasts, on the loopback, to whoever knows its address.
-
-    Yields:
-        The address to open.
-    """
-    token = secrets.token_urlsafe(16)
-    with loopback.serving(application(wizard, token), port) as address:
-        yield f"{address}/{token}/"
+def wizard_server(wizard: Wizard, port: int) -> AbstractContextManager[str]:
+    """Serve the page of the wizard. See `loopback.page_server`."""
+    return loopback.page_server(lambda token: application(wizard, token), port)
 
 
 def application(wizard: Wizard, token: str) -> FastAPI:
@@ -64,11 +53,6 @@ def application(wizard: Wizard, token: str) -> FastAPI:
     routes = APIRouter(prefix=f"/{token}")
     loopback.guard(api, token, HEADERS)
     one_at_a_time = Lock()  # requests run in threads of their own; two must not write one file
-
-    @api.exception_handler(RequestValidationError)
-    async def unfit(_: Request, error: RequestValidationError) -> JSONResponse:
-        first = error.errors()[0]
-        return JSONResponse({"error": f"{first['loc'][-1]}: {first['msg']}"}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
     @routes.get("/")
     def page() -> HTMLResponse:
