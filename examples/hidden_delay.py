@@ -41,7 +41,7 @@ def write_presses(folder: Path, count: int = 24) -> None:
 def tacdata(*arguments: object) -> None:
     """Run a verb, as a person would."""
     print("$ tacdata", *arguments, flush=True)
-    subprocess.run([sys.executable, "-m", "tacdata.cli", *map(str, arguments)], check=True)
+    subprocess.run([sys.executable, "-m", "tacdata", *map(str, arguments)], check=True)
 
 
 parser = argparse.ArgumentParser(description=__doc__)

@@ -34,24 +34,39 @@ VARIABLE = "TACDATA_PLUGINS"
 GROUP = "tacdata."
 """Groups of entry points begin so."""
 HELP = "docs/how_to/plug_ins.md"
+KINDS = frozenset(
+    "adhesions commands devices effects exporters formats indenters kinds laws materials networks portraits principles "
+    "shipped splits strategies".split()
+)
+"""Folders in a plug-in folder."""
+MISTAKEN = {"verbs": "commands"} | {kind.removesuffix("s"): kind for kind in KINDS}
+"""Names of folders that mean one of `KINDS`."""
 
 
 def add_folder(folder: StrPath) -> None:
     """Add a plug-in folder for this process and the processes that it starts.
 
     Raises:
-        UsageError: If there is no such folder, or no folder of a room in it.
+        UsageError: If there is no such folder, or no folder of a kind in it (`KINDS`).
     """
     place = Path(folder).resolve()
-    if not place.is_dir() or not any(each.is_dir() for each in place.iterdir()):
-        raise UsageError(
-            f"{folder} is no folder of plug-ins",
-            "a folder with a folder for each room: devices/my_board.py, effects/my_effect.py, ...",
-            f"make one; {HELP} explains it",
-        )
+    _check_folder(place)
     folders = os.environ.get(VARIABLE, "")
     if str(place) not in folders.split(os.pathsep):
         os.environ[VARIABLE] = os.pathsep.join(filter(None, (folders, str(place))))
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a plug-in folder that is not there, has no folder of a kind, or one under a name that means another."""
+    inside = {each.name for each in folder.iterdir() if each.is_dir()} if folder.is_dir() else set()
+    mistaken = sorted(inside & MISTAKEN.keys())
+    if mistaken or not inside & KINDS:
+        remedy = f"rename {mistaken[0]} to {MISTAKEN[mistaken[0]]}" if mistaken else f"make one; {HELP} explains it"
+        raise UsageError(
+            f"{folder} is no folder of plug-ins" + (f": it holds {mistaken[0]}" if mistaken else ""),
+            f"a folder with folders in it, for example devices/my_board.py: {', '.join(sorted(KINDS))}",
+            remedy,
+        )
 
 
 def add_project(folder: Path) -> None:
@@ -197,10 +212,12 @@ def _plug_in_places(room: str, variable: str) -> tuple[str, ...]:
     """Return the folders of a room's plug-ins.
 
     Raises:
-        UsageError: If a plug-in has the name of a member that ships.
+        UsageError: If there is no such folder, or a plug-in has the name of a member that ships.
     """
-    places = [Path(folder) / _kind(room) for folder in variable.split(os.pathsep) if folder]
-    places = [str(place) for place in places if place.is_dir()]
+    named = [Path(folder) for folder in variable.split(os.pathsep) if folder]
+    for folder in named:
+        _check_folder(folder)
+    places = [str(folder / _kind(room)) for folder in named if (folder / _kind(room)).is_dir()]
     for place in places:
         _refuse_shipped({module.name for module in pkgutil.iter_modules([place])}, room, place)
     return tuple(places)

@@ -42,7 +42,7 @@ class StageError(TacdataError):
 
 def command_line(arguments: list[str]) -> list[str]:
     """Return the process arguments of ``tacdata ARGUMENTS`` in this installation."""
-    return [sys.executable, "-m", "tacdata.cli", *arguments]
+    return [sys.executable, "-m", "tacdata", *arguments]
 
 
 def written(arguments: list[str]) -> str:

@@ -74,7 +74,7 @@ def first_plan(path: Path) -> None:
 def tacdata(*arguments: object) -> None:
     """Run a verb, as a person would."""
     print("$ tacdata", *arguments, flush=True)
-    subprocess.run([sys.executable, "-m", "tacdata.cli", *map(str, arguments)], check=True)
+    subprocess.run([sys.executable, "-m", "tacdata", *map(str, arguments)], check=True)
 
 
 def loop(folder: Path, speed: float, rounds: int = ROUNDS) -> str:

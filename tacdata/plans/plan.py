@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
 from tacdata import documents
+from tacdata.display import Displayed
 from tacdata.errors import FormatError
 from tacdata.indenters import Indenter, from_document
 from tacdata.paths import StrPath
@@ -135,8 +137,8 @@ class MotionSettings:
     """Sideways distance over which a press with ``approach_from`` comes to its site [mm]."""
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(Displayed):
     """A named list of presses, with their indenters and motion settings.
 
     Example:
@@ -158,6 +160,17 @@ class Plan:
     """Reaction when the board freezes, saturates or becomes slow: "stop", "pause" or "go on"."""
     document: dict[str, Any] | None = None
     """The file's document, unchanged."""
+
+    def description(self) -> Iterator[str]:
+        """Yield the plan: presses, shapes, depths, sites."""
+        sites = {(press.x, press.y) for press in self.presses}
+        yield f"Plan {self.name}: {len(self.presses)} presses at {len(sites)} sites"
+        if self.presses:
+            depths = [press.depth for press in self.presses]
+            yield f"{min(depths):g} to {max(depths):g} mm deep"
+            yield f"indenters {', '.join(dict.fromkeys(press.indenter_name for press in self.presses))}"
+        if self.purpose:
+            yield self.purpose
 
     @classmethod
     def from_document(cls, document: dict[str, Any], origin: str, folder: Path | None = None) -> Plan:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib.resources import files
@@ -11,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from tacdata import documents, provenance, registry, schemas
+from tacdata.display import Displayed
 from tacdata.errors import FormatError
 from tacdata.paths import StrPath
 from tacdata.sensor.adhesion import Adhesion
 from tacdata.sensor.material import Material
 from tacdata.sensor.skin import Skin
 from tacdata.sensor.transduction import Transduction
+
+SHIPPED = "tacprint"
+"""Name of the sensor that ships."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +114,8 @@ class DepthMap:
         return self.pixel_pitch * (np.arange(self.pixels_y) - (self.pixels_y - 1) / 2)
 
 
-@dataclass(frozen=True)
-class Sensor:
+@dataclass(frozen=True, repr=False)
+class Sensor(Displayed):
     """One taxel skin. Frame: x along columns, y along rows, z outward, origin at the array's centre on z = 0.
 
     Example:
@@ -149,6 +154,17 @@ class Sensor:
         for name in ("skin", "contact", "map"):
             document[name] = getattr(self, name).document
         return document
+
+    def description(self) -> Iterator[str]:
+        """Yield the sensor: array, skin, material, map."""
+        taxels, skin, material, grid = self.taxels, self.skin, self.material, self.map
+        pitch = f"{taxels.pitch_x:g} × {taxels.pitch_y:g} mm"
+        yield f"Sensor {self.name}: {taxels.columns} × {taxels.rows} taxels, {pitch} apart, {taxels.rate:g} Hz"
+        yield f"skin {skin.size_x:g} × {skin.size_y:g} mm, {skin.thickness:g} mm thick"
+        yield f"{material.law}, E {material.youngs_modulus:g} MPa, Poisson's ratio {material.poisson_ratio:g}"
+        yield f"depth maps of {grid.pixels_x} × {grid.pixels_y} pixels, {grid.pixel_pitch:g} mm apart"
+        if self.assumptions:
+            yield f"{len(self.assumptions)} values are assumptions (`assumptions` has the reasons)"
 
     @cached_property
     def content_hash(self) -> str:
@@ -247,7 +263,7 @@ def _check_contact(sensor: Sensor, origin: str) -> None:
 
 
 def read_sensor(path: StrPath) -> Sensor:
-    """Read a sensor file; the plug-ins that it names are available from then on.
+    """Read a sensor file, or the one that ships by its name ``tacprint``; the plug-ins that it names are available.
 
     Raises:
         UsageError: If it does not exist, or its folder of plug-ins.
@@ -263,6 +279,8 @@ def read_sensor(path: StrPath) -> Sensor:
         array([-7.5, -7.5])
     """
     path = Path(path)
+    if str(path) == SHIPPED and not path.exists():
+        return default_sensor()
     document = documents.read(path, "sensor")
     if "plugins" in document:
         registry.add_folder(path.parent / document["plugins"])
@@ -282,5 +300,5 @@ def default_sensor() -> Sensor:
         >>> round(sensor.material.shear_modulus, 3)  # MPa
         0.102
     """
-    text = (files("tacdata.sensor") / "tacprint.yaml").read_text()
-    return Sensor.from_document(documents.parsed(text, "tacprint.yaml"), "tacprint.yaml")
+    file = f"{SHIPPED}.yaml"
+    return Sensor.from_document(documents.parsed((files("tacdata.sensor") / file).read_text(), file), file)

@@ -150,6 +150,19 @@ def test_folders_that_hold_no_plug_ins_are_refused(lab):
         read_rig(rig_file(lab, plugins="nowhere"))
     with pytest.raises(UsageError, match="no folder of plug-ins"):
         td.add_plugins(lab / "devices")
+    (lab / "indenters").rename(lab / "indenter")
+    with pytest.raises(UsageError, match="rename indenter to indenters"):
+        td.add_plugins(lab)
+
+
+def test_the_environment_names_no_folder_in_vain(lab, monkeypatch):
+    monkeypatch.setenv(registry.VARIABLE, str(lab.parent / "nowhere"))
+    with pytest.raises(UsageError, match="nowhere is no folder of plug-ins"):
+        td.indenter("lab_ball", radius=3.0)
+
+
+def test_the_kinds_of_plug_ins_are_the_registries():
+    assert set(registry.KINDS) == {each.room.rsplit(".", 1)[-1] for each in catalogue.registries().values()}
 
 
 def test_a_plug_in_cannot_take_the_name_of_a_member_that_ships(lab):

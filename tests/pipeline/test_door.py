@@ -76,10 +76,12 @@ def nouns(dataset):
         "dataset": dataset,
         "network": network,
         "prediction": network.predict(episode),
+        "sensor": td.read_sensor("tacprint"),
+        "plan": td.read_session(SESSION).plan,
     }
 
 
-@pytest.mark.parametrize("name", ["session", "episode", "label", "dataset", "network", "prediction"])
+@pytest.mark.parametrize("name", ["session", "episode", "label", "dataset", "network", "prediction", "sensor", "plan"])
 def test_a_noun_describes_and_draws_itself(name, nouns, tmp_path):
     noun = nouns[name]
     text = repr(noun)

@@ -50,7 +50,7 @@ class PredictedMaps(Displayed):
         """Yield the lines of its description: maps, network, deepest pixel."""
         frames, *pixels = self.depth.shape
         yield f"Prediction for episode {self.episode}: {frames} maps of {pixels[0]} × {pixels[1]} pixels"
-        yield f"network {self.network} ({self.checkpoint[:12]}), which knew the episode as: {self.part}"
+        yield f"network {self.network} ({self.checkpoint[:12]}); role of the episode in its training: {self.part}"
         yield f"deepest pixel {self.depth.max(initial=0.0):.3g} mm"
 
 

@@ -5,10 +5,13 @@ A file ``viewers/portraits/my_noun.py`` draws the class ``MyNoun``, which derive
 
 from __future__ import annotations
 
+from collections.abc import Sequence, Set
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tacdata.plans import Press
 from tacdata.sensor import DepthMap
 
 SIZE = 9.0, 3.4
@@ -29,6 +32,18 @@ def depth_map(axes: Axes, depth: np.ndarray, title: str, grid: DepthMap | None =
     axes.figure.colorbar(image, ax=axes, label="depth [mm]", shrink=0.85)
     unit = "mm" if grid else "pixel"
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", title=title)
+
+
+def sites(axes: Axes, presses: Sequence[Press], open_ones: Set[int] = frozenset()) -> None:
+    """Draw the sites of presses, coloured by depth [mm]; open circles are those of some indices."""
+    if presses:
+        x, y, depth = np.array([(press.x, press.y, press.depth) for press in presses]).T
+        points = axes.scatter(x, y, c=depth, cmap="viridis", zorder=2)
+        axes.figure.colorbar(points, ax=axes, label="depth [mm]")
+        colors = points.to_rgba(depth)
+        hollow = [press.index in open_ones for press in presses]
+        points.set(array=None, edgecolors=colors, facecolors=np.where(np.c_[hollow], 0.0, colors))
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
 
 
 def curves(axes: Axes, seconds: np.ndarray, values: np.ndarray, label: str) -> None:

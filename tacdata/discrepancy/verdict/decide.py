@@ -117,7 +117,7 @@ def decide(
     findings: Findings,
     checks: DataChecks,
     evidence: tuple[BesideRemainder, ...] = (),
-    sealed_gap: Gap | None = None,
+    gap: Gap | None = None,
     lacking: Mapping[Family, Lack] | None = None,
     raised: tuple[Alarm, ...] = (),
 ) -> Decision:
@@ -127,7 +127,7 @@ def decide(
         findings: Findings of the search.
         checks: Limits and contradictions of the recordings.
         evidence: Evidence of each effect found, given a remainder; empty where there is no remainder.
-        sealed_gap: Gap on sealed episodes. It can withdraw a name, never give one.
+        gap: Gap on sealed episodes. It can withdraw a name, never give one.
         lacking: Lack of fit: the part of the answer's residual that each family's saturated model explains.
         raised: Alarms. They turn the status none into unknown.
     """
@@ -138,12 +138,12 @@ def decide(
         answer, status, reason = specimen_effects, "ambiguous", Reason.RIVALS
     if reason is Reason.QUIET and raised:
         status, reason = "unknown", Reason.ALARM
-    own = {f.placed.effect.name: b for f, b in zip(findings.effects, evidence, strict=False)}
+    evidence_of = {f.placed.effect.name: b for f, b in zip(findings.effects, evidence, strict=False)}
     levels = [finest(f) for f in answer]
-    sealed = sealed_gap is not None and bool(len(sealed_gap.names))
-    if reason is Reason.LEFTOVERS and not refuted(sealed_gap) and (borne_out(sealed_gap) or not sealed):
+    sealed = gap is not None and bool(len(gap.names))
+    if reason is Reason.LEFTOVERS and not refuted(gap) and (borne_out(gap) or not sealed):
         first = leading(answer)
-        levels = [beside_much(findings, f, own.get(f.placed.effect.name), sealed_gap) for f in answer]
+        levels = [beside_much(findings, f, evidence_of.get(f.placed.effect.name), gap) for f in answer]
         if first is None or levels[first] is None:
             levels = [None for _ in answer]
         if not any(levels) and first is not None and fills(findings, answer[first], lacking):
@@ -154,7 +154,7 @@ def decide(
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
         elif first is not None and stands(
-            findings, answer[first], own.get(answer[first].placed.effect.name), sealed_gap
+            findings, answer[first], evidence_of.get(answer[first].placed.effect.name), gap
         ):
             status, reason = "ambiguous", Reason.RIVALS
     if reason is Reason.RIVALS:
@@ -173,37 +173,30 @@ def decide(
         status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
     doubtful_forms = [level is not None and another_form(f, lacking) for f, level in zip(answer, levels, strict=True)]
     # Another law of the family is present, too, or is the true one: only the family is certain.
-    levels = [Level.FAMILY if own else level for own, level in zip(doubtful_forms, levels, strict=True)]
+    levels = [Level.FAMILY if doubt else level for doubt, level in zip(doubtful_forms, levels, strict=True)]
     if status in ("named", INCOMPLETE) and (any(doubtful_forms) or elsewhere(findings, lacking)):
         status, reason = INCOMPLETE, Reason.INCOMPLETE
     if any(trades := traded(answer, levels)):
         levels = [None if trade else level for trade, level in zip(trades, levels, strict=True)]
         if status in ("named", INCOMPLETE):
             status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
-    if status in ("named", INCOMPLETE) and refuted(sealed_gap):
+    if status in ("named", INCOMPLETE) and refuted(gap):
         status, reason = "unknown", Reason.SEALED
-    if status in ("named", INCOMPLETE) and not borne_out(sealed_gap):
+    if status in ("named", INCOMPLETE) and not borne_out(gap):
         # Behind a closed gate, sealed episodes alone show a gain. A name whose sealed interval holds zero is suspected.
-        unshown = sealed_gap is not None and sealed and sealed_gap.interval[0] <= 0
+        unshown = gap is not None and sealed and gap.interval[0] <= 0
         if unshown or (status == "named" and not findings.gap):
             levels, status, reason = [None for _ in answer], "ambiguous", Reason.RIVALS
     if checks.contradictions:
         status, reason = "unknown", Reason.CONTRADICTION
     elif checks.too_few:
         status, reason = "unknown", Reason.TOO_FEW
-    effects = zip(answer, levels, strict=True)
     lone = lone_press(findings.given) if reason in (Reason.LOUD, Reason.ODD, Reason.UNEXPLAINED) else None
-    return Decision(
-        status,
-        reason,
-        tuple(
-            _decided(f, status, findings, len(answer), level, own.get(f.placed.effect.name), sealed_gap)
-            for f, level in effects
-        ),
-        lone,
-        lacking,
-        raised,
-    )
+    decided = [
+        _decided(f, status, findings, len(answer), level, evidence_of.get(f.placed.effect.name), gap)
+        for f, level in zip(answer, levels, strict=True)
+    ]
+    return Decision(status, reason, tuple(decided), lone, lacking, raised)
 
 
 def _of_one_family(finding: FoundEffect) -> bool:
@@ -258,9 +251,7 @@ def leading(answer: list[FoundEffect]) -> int | None:
     return max(raced, key=lambda k: answer[k].bought, default=None)
 
 
-def stands(
-    findings: Findings, finding: FoundEffect, evidence: BesideRemainder | None, sealed_gap: Gap | None = None
-) -> bool:
+def stands(findings: Findings, finding: FoundEffect, evidence: BesideRemainder | None, gap: Gap | None = None) -> bool:
     """Return whether an effect, or one collinear with it, is present although much is unexplained.
 
     It is needed, and explains more than the remainder or certainly most of the sealed gap. Its size is the same in
@@ -268,14 +259,14 @@ def stands(
     """
     if evidence is None or not evidence.spreads or not _needed(finding) or _unphysical(finding):
         return False
-    closes = sealed_gap is not None and sealed_gap.interval[0] >= SURELY_CLOSED and bool(len(sealed_gap.names))
+    closes = gap is not None and gap.interval[0] >= SURELY_CLOSED and bool(len(gap.names))
     far = closes and all(by >= SETTLED_Z for by in finding.margins.values())
     largest_spread = FAR_SIZE if far else ALIKE_SIZE
     return (closes or finding.bought >= findings.left.gain) and max(evidence.spreads.values()) <= largest_spread
 
 
 def beside_much(
-    findings: Findings, finding: FoundEffect, evidence: BesideRemainder | None, sealed_gap: Gap | None = None
+    findings: Findings, finding: FoundEffect, evidence: BesideRemainder | None, gap: Gap | None = None
 ) -> Level | None:
     """Return the finest level of an effect although much is unexplained; None if none holds.
 
@@ -285,7 +276,7 @@ def beside_much(
     level = finest(bare)
     if level is not None and bare.rivals != finding.rivals:
         level = Level.FAMILY
-    if level is None or evidence is None or not stands(findings, finding, evidence, sealed_gap):
+    if level is None or evidence is None or not stands(findings, finding, evidence, gap):
         return None
     same = max(evidence.spreads.values()) <= SAME_SIZE
     fine = level is not Level.FAMILY and same and not _untried_kin(findings, finding)
@@ -391,7 +382,7 @@ def _decided(
     count: int,
     level: Level | None,
     evidence: BesideRemainder | None,
-    sealed_gap: Gap | None,
+    gap: Gap | None,
 ) -> Decided:
     """Return an effect with its status: never named where the verdict gives no name, so it can be read alone."""
     values = features(findings, finding, count)
@@ -400,7 +391,7 @@ def _decided(
     if verdict == INCOMPLETE:
         return Decided(finding, "suspected" if level is None else "named", values, None, level, evidence)
     status = "suspected" if verdict == "unknown" else settled(finding) if level is not None else "ambiguous"
-    if evidence is not None and not stands(findings, finding, evidence, sealed_gap):
+    if evidence is not None and not stands(findings, finding, evidence, gap):
         status = "suspected"
     probability = confidence(values) if status == "named" else None
     return Decided(finding, status, values, probability, None if status == "suspected" else level, evidence)
