@@ -117,7 +117,7 @@ def _sized(entry: dict[str, Any], unit: str) -> str:
         if written["error"] > abs(value):
             continue  # it is not known
         percent = p.unit == "1" and not p.grid and p.typical < 1
-        where = f" on the channel that has most of {len(values)}" if len(values) > 1 else ""
+        where = f" on the channel with most, of {len(values)}" if len(values) > 1 else ""
         parts.append(f"{p.meaning} {_interval(value, written['error'], _unit(p.unit, unit), percent)}{where}")
     return f"size of {effect.spoken}: {'; '.join(parts)}" if parts else ""
 

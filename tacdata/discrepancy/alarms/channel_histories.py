@@ -157,20 +157,20 @@ def _told(cleaned: Cleaned, best: Best) -> Alarm:
     names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
     peak = float(best.size[order[0]])
     share = plain_number(100 * peak / cleaned.largest, 2)
-    large = f"by up to about {plain_number(peak, 2)} in readings, {share} % of the largest rise"
+    large = f"the largest change is about {plain_number(peak, 2)} in readings, {share} % of the largest rise"
     changes = f", and that goes with {best.over}" if best.over else ""
     if best.kind == LATE:
         delay = 1e3 * float(np.abs(best.weight).max())
         where = f" {best.history}" if best.history else ""
-        finding = f"channels are late by times of their own{where}{changes}: {large} (some {plain_number(delay, 2)} ms)"
+        finding = f"channels are late by times of their own{where}, up to {plain_number(delay, 2)} ms{changes}; {large}"
         following = "look at the order and the times at which channels are read; press at three speeds"
     elif best.kind == OFFSET:
         finding = (
-            f"channels move with the path whatever presses them, each its own way ({best.history}{changes}): {large}"
+            f"channels move with the path whatever presses them, each its own way ({best.history}{changes}); {large}"
         )
         following = "make the same paths beside the skin, in the air: what stays is of a cable or a plug that moves"
     else:
-        finding = f"channels read more or less of a press by {best.history}, each its own way{changes}: {large}"
+        finding = f"channels read more or less of a press by {best.history}, each its own way{changes}; {large}"
         following = "look at what lies over these channels (torn, loose, dirty), and press there slowly, down and up"
         if "before" in best.history:
             following = "hold at one depth for a minute, wait as long between presses: do channels settle apart?"
@@ -178,4 +178,4 @@ def _told(cleaned: Cleaned, best: Best) -> Alarm:
         following = "make the same presses at the begin and the end of a session; say what was changed in between"
     elif best.over:
         following = "make the same presses cold and warm"
-    return Alarm(f"{finding}; most on {names}", following)
+    return Alarm(f"{finding}, on {names}", following)

@@ -56,8 +56,8 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
     hertz, large = _told(cleaned, motion, best.at)
     return [
         Alarm(
-            f"while the path moves, and not while it stands, readings swing at {hertz}, {large}: a motor's drive is "
-            "heard",
+            f"readings swing at {hertz}, while the path moves and not while it stands: a motor's drive is heard; "
+            f"{large}",
             "move the rig beside the skin, in the air, with motors on and off; look at the ground "
             "and at cables near them",
         )
@@ -75,7 +75,7 @@ def hum(cleaned: Cleaned) -> list[Alarm]:
     hertz, large = _told(cleaned, standstill, best.at)
     return [
         Alarm(
-            f"while the path stands, readings swing at {hertz}, {large}: hum of the mains, or a beat with it",
+            f"readings swing at {hertz}, while the path stands: hum of the mains, or a beat with it; {large}",
             "record without contact with motors and lamps off and on; look at the ground and at the cables' shields",
         )
     ]
@@ -133,8 +133,9 @@ def _told(cleaned: Cleaned, lines: _Lines, at: int) -> tuple[str, str]:
     order = np.argsort(-size)[:MOST_NAMED]
     names = ", ".join(cleaned.problem.setting.course.channel_names[c] for c in order)
     share = plain_number(100 * float(size[order[0]]) / cleaned.largest, 2)
-    large = f"by up to about {plain_number(float(size[order[0]]), 2)}, {share} % of the largest rise"
-    return f"{lines.frequency[at]:.3g} Hz, or an alias of it", f"{large}; most on {names}"
+    peak = plain_number(float(size[order[0]]), 2)
+    large = f"the largest swing is about {peak} in readings, {share} % of the largest rise"
+    return f"{lines.frequency[at]:.3g} Hz or an alias of it", f"{large}, on {names}"
 
 
 def _moving(course: Course) -> np.ndarray:

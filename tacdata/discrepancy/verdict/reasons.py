@@ -107,9 +107,9 @@ def _seen(decision: Decision) -> str:
 def _against(gap: Gap | None) -> str:
     """Return the evidence of sealed episodes against an answer as a clause."""
     if gap is None or gap.ratio is None:
-        return "the sealed ones do not bear it out"
+        return "the sealed presses do not bear it out"
     share, error = 100 * gap.ratio.share, 100 * gap.ratio.error
-    return f"the sealed ones do not bear it out (they show {share:.0f} % of it, with a standard error of {error:.0f} %)"
+    return f"the sealed presses do not bear it out (they show {share:.0f} % of it, standard error {error:.0f} %)"
 
 
 def _lone(decision: Decision, findings: Findings, lead: str) -> str:
@@ -225,7 +225,9 @@ def _undecided(decision: Decision, gap: Gap | None) -> str:
     words += f". Either way {' and '.join(facts)}" if facts else ""
     words += f"; {', '.join(bounds)} would need an unphysical size" if bounds else ""
     words += f"; {', '.join(formed)} fits best where its equation ends: the form is another one" if formed else ""
-    return words + (f"; more presses must say whether {', '.join(weak)} is needed" if weak else "")
+    words += f"; more presses must say whether {', '.join(weak)} is needed" if weak else ""
+    clear = not (any(f.rivals or f.at_bound for f in answer) or weak or any(e.level for e in decision.effects))
+    return words + (f"; {_against(gap)}" if clear else "")
 
 
 def _needed(effects: Sequence[Decided]) -> str:

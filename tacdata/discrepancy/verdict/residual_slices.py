@@ -16,7 +16,7 @@ NOTABLE = 1.3
 """A slice is notable from this mean square on [noise floor]..."""
 NOTABLE_T = 3.0
 """...and from so many standard errors over episodes on [1]."""
-NOWHERE = "nowhere does the residual stand out from the noise"
+NOWHERE = "the residual stands out from the noise nowhere"
 SPREAD = "no part stands out in most presses; over all of them it is {:.2f}"
 
 

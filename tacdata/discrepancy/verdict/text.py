@@ -7,7 +7,7 @@ from typing import Any
 from tacdata.discrepancy.heading import origin, sentence, sizes
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.search.gate import GATE
-from tacdata.discrepancy.verdict.residual_slices import figure
+from tacdata.discrepancy.verdict.residual_slices import NOWHERE, figure
 from tacdata.effects import library, load
 
 MOST_RIVALS = 6
@@ -42,7 +42,9 @@ def in_text(verdict: dict[str, Any]) -> str:
     for e in verdict["effects"]:
         lines += _effect(e)[:1] if unknown else _effect(e)
     lines += [_gate(verdict), *_sizes(verdict)]
-    if verdict["located"]:
+    if verdict["located"] == [NOWHERE]:
+        lines += [NOWHERE]
+    elif verdict["located"]:
         lines += [f"where the residual is largest, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located"])]
     if verdict.get("located_after") not in (None, [], verdict["located"]):
         lines += [
@@ -95,8 +97,8 @@ def _gate(verdict: dict[str, Any]) -> str:
     if not gate["gap"]:
         words = "not within a specimen, only between specimens" if between_specimens(verdict) else "none beyond chance"
     return (
-        f"is there a gap? {words}: p = {gate['p']:.3f} along the known effects, {gate['p_generic']:.3f} along patterns "
-        f"of none of them ({GATE:g} or less is a gap)"
+        f"is there a gap? {words}: p = {gate['p']:.3f} for the known effects, {gate['p_generic']:.3f} for other "
+        f"patterns ({GATE:g} or less is a gap)"
     )
 
 
@@ -183,12 +185,12 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
     """Return lines on the mean squares of the residual; before and after only if the answer has effects."""
     remainder, sealed, none = verdict["left"], verdict["sealed"], not verdict["effects"]
     lines = [f"residual, {MEAN_SQUARE}:"]
-    nuisances = "their own pose and gain"
+    nuisances = "each press's own pose and gain"
     final = "" if none else f" before, {figure(remainder['after'])} after"
     remark = "" if none or remainder["after"] > LOW else "; below 1, since part of it had been taken for noise"
-    lines.append(f"  presses that were fitted, {nuisances} taken out: {figure(remainder['before'])}{final}{remark}")
+    lines.append(f"  fitted presses, without {nuisances}: {figure(remainder['before'])}{final}{remark}")
     if sealed["episodes"]:
-        head = f"  {sealed['episodes']} sealed presses, {nuisances} left in: {figure(sealed['before'])}"
+        head = f"  {sealed['episodes']} sealed presses, with {nuisances}: {figure(sealed['before'])}"
         lines.append(f"{head}{'' if none else _closed(sealed, verdict['status'].startswith('named'))}")
         if sealed["ceiling"] < BEST * sealed["before" if none else "after"]:
             lines.append(

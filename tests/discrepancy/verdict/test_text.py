@@ -15,6 +15,7 @@ from tacdata.discrepancy.levels.margins import Level
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason, decide
 from tacdata.discrepancy.verdict.document import REVISE, following
+from tacdata.discrepancy.verdict.likelihood_ratio import LikelihoodRatio
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.discrepancy.verdict.text import in_text
@@ -73,12 +74,12 @@ def line(text, beginning):
 def test_where_nothing_is_missing_no_share_of_it_is_left_and_each_number_says_what_it_is():
     text = in_text(document("none", share=1.0, sealed={"before": 42.429, "after": 42.429, "ceiling": 12.478}))
     assert "could be explained" not in text and "before" not in text and "closed" not in text
-    assert line(text, "presses that were").endswith("their own pose and gain taken out: 3.32")
-    assert line(text, "4 sealed") == "  4 sealed presses, their own pose and gain left in: 42.4"
+    assert line(text, "fitted presses") == "  fitted presses, without each press's own pose and gain: 3.32"
+    assert line(text, "4 sealed") == "  4 sealed presses, with each press's own pose and gain: 42.4"
     assert line(text, "a regression").endswith("would bring the sealed ones to 12.5")
     assert line(text, "residual").endswith("as a mean square over the noise (1 is noise alone):")
     same = in_text(document("none", sealed={"before": 57.954, "after": 57.954, "ceiling": 57.954}))
-    assert line(same, "4 sealed").endswith("pose and gain left in: 58.0") and "a regression" not in same
+    assert line(same, "4 sealed").endswith("own pose and gain: 58.0") and "a regression" not in same
 
 
 def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
@@ -127,7 +128,7 @@ def test_what_is_worse_is_not_called_better():
 
 def test_a_gap_that_becomes_wider_on_sealed_episodes_is_told_of():
     worse = line(in_text(document("unknown", [effect("power_creep")])), "4 sealed")
-    assert worse == "  4 sealed presses, their own pose and gain left in: 18.5 before, 20.4 after, worse by 10 %"
+    assert worse == "  4 sealed presses, with each press's own pose and gain: 18.5 before, 20.4 after, worse by 10 %"
     closed = {"after": 2.0, "ceiling": 1.286, "closed": 0.94, "interval": [0.9, 1.0], "certain": True}
     better = line(in_text(document("named", [effect("power_creep")], sealed=closed)), "4 sealed")
     assert "2.00 after, 94 % of the gap closed (90 %: 90 to 100 %)" in better
@@ -402,3 +403,11 @@ def test_what_is_there_is_told_from_what_more_presses_must_show():
     assert words == (
         "frame compliance is there; gain drift may be there, too; more presses must say whether gain drift is needed"
     )
+
+
+def test_an_effect_without_a_rival_is_open_for_a_reason():
+    ratio = LikelihoodRatio(power=4.0, share=0.6)
+    shown = Gap(np.array([2.0]), np.array([2.1]), np.array([1.0]), ("press",), {}, ratio)
+    decision = Decision("ambiguous", Reason.RIVALS, (Decided(finding("softening"), "ambiguous", {}, None),))
+    words = reason_in_words(decision, quiet(), DataChecks(20), shown)
+    assert words.startswith("softening fits best; the sealed presses do not bear it out (they show ")
