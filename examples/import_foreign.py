@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tacdata.importing.imported_session import import_session
-from tacdata.recording import read_episode, read_session
+import tacdata as td
 
 MAPPING = Path(__file__).with_suffix(".yaml")
 GRAM = 9.80665e-3
@@ -38,8 +37,8 @@ with tempfile.TemporaryDirectory() as name:
     source.mkdir()
     for number in range(3):
         write(source / f"press_{number}", number)
-    made = import_session(source, MAPPING, Path(name) / "session")
-    episodes = [read_episode(path) for path in read_session(made.folder).episodes]
+    made = td.import_files(source, MAPPING, Path(name) / "session")
+    episodes = list(td.read_session(made.folder))
     force = episodes[0].measured[0]
     depth = episodes[0].tip_at(force.sample_ns)[:, 2]
     error = np.abs(force.values[:, 0] - 0.5 * np.maximum(depth, 0.0) ** 1.5).max()

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from tacdata.sensor import read_sensor
+import tacdata as td
 
-sensor = read_sensor(Path(__file__).with_name("own_sensor.yaml"))
+sensor = td.read_sensor(Path(__file__).with_name("own_sensor.yaml"))
 material = sensor.material
 print(f"{sensor.name}: {sensor.taxels.count} taxels, a map of {sensor.map.shape} pixels")
 print(f"shear modulus {material.shear_modulus:.4f} MPa, bulk modulus {material.bulk_modulus:.4f} MPa")

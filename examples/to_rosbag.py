@@ -11,8 +11,7 @@ import numpy as np
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from tacdata.example import copy_session
-from tacdata.recording import read_episode
+import tacdata as td
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 KIND = {name.rsplit("/", 1)[-1]: TYPES.types[name] for name in TYPES.types}
@@ -52,7 +51,7 @@ if __name__ == "__main__":
     work = Path(tempfile.mkdtemp())
     source, target = map(Path, sys.argv[1:3]) if len(sys.argv) > 2 else (work / "session", work / "bag")
     if len(sys.argv) < 3:
-        copy_session(source)
+        td.example_session(source)
         source = source / "episode-000000.mcap"
-    for topic, count in write(read_episode(source), target).items():
+    for topic, count in write(td.read_episode(source), target).items():
         print(f"{topic}: {count} messages")

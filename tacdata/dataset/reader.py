@@ -167,8 +167,8 @@ def read_dataset(root: StrPath, cache_folder: StrPath | None = None) -> Dataset:
         LostProvenanceWarning: If an edit dropped metadata that is dispensable or recoverable.
 
     Example:
-        >>> from tacdata.dataset import read_dataset
-        >>> dataset = read_dataset("dataset", "cache")
+        >>> import tacdata as td
+        >>> dataset = td.read_dataset("dataset", "cache")
         >>> len(dataset.episodes), dataset.fps
         (2, 30)
         >>> dataset["observation.state"].shape  # frames, taxels

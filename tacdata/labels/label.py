@@ -84,9 +84,8 @@ class Label(Displayed):
     """The depth maps of one episode, one per taxel frame.
 
     Example:
-        >>> from pathlib import Path
-        >>> from tacdata.labels import read_label
-        >>> label = read_label(Path("session/labels/episode-000000.parquet"))
+        >>> import tacdata as td
+        >>> label = td.read_label("session/labels/episode-000000.parquet")
         >>> bool(label.depth.min() >= 0), label.time_ns.dtype
         (True, dtype('int64'))
     """

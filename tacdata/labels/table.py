@@ -77,9 +77,8 @@ def read(path: StrPath) -> Label:
         FormatError: If it is damaged, no label file, or of another major format version.
 
     Example:
-        >>> from pathlib import Path
-        >>> from tacdata.labels import read_label
-        >>> label = read_label(Path("session/labels/episode-000000.parquet"))
+        >>> import tacdata as td
+        >>> label = td.read_label("session/labels/episode-000000.parquet")
         >>> label.signed.shape  # frames and pixels
         (170, 35, 26)
         >>> round(float(label.signed.max()), 1)  # deepest pixel, mm

@@ -21,9 +21,8 @@ class Press:
     """One press: contact configuration and motion, in the sensor frame.
 
     Example:
-        >>> from tacdata.indenters.sphere import Sphere
-        >>> from tacdata.plans import Press
-        >>> press = Press(Sphere(4.0), depth=0.8, x=2.0)
+        >>> import tacdata as td
+        >>> press = td.Press(td.indenter("sphere", radius=4.0), depth=0.8, x=2.0)
         >>> print(press)
         sphere (radius 4) at x 2, y 0 mm, 0.8 mm deep
     """
@@ -142,14 +141,11 @@ class Plan(Displayed):
     """A named list of presses, with their indenters and motion settings.
 
     Example:
-        >>> from tacdata.plans import Plan
-        >>> from tacdata.plans.shipped.shipped_plan import PlanOptions, shipped_plan
-        >>> from tacdata.sensor import default_sensor
-        >>> document = shipped_plan("training", default_sensor(), PlanOptions(presses=6, seed=1))
-        >>> plan = Plan.from_document(document, "training")
-        >>> len(plan.presses)
-        6
-        >>> plan.check_against(default_sensor())  # raises FormatError if a press misses the skin
+        >>> import tacdata as td
+        >>> session = td.read_session("session")
+        >>> len(session.plan.presses)
+        2
+        >>> session.plan.check_against(session.sensor)  # raises FormatError if a press misses the skin
     """
 
     name: str

@@ -116,16 +116,16 @@ class Episode(Displayed):
     """One recorded press: taxel readings, tip path, tags and everything that is attached to them.
 
     Example:
-        >>> from tacdata.recording import PHASES, read_episode
-        >>> episode = read_episode("session/episode-000000.mcap")
+        >>> import tacdata as td
+        >>> episode = td.read_episode("session/episode-000000.mcap")
         >>> episode.tared.shape, round(float(episode.times[-1]), 1)  # frames and taxels; seconds
         ((170, 24), 5.6)
         >>> times = episode.taxels.sample_ns
         >>> round(float(episode.tip_at(times)[:, 2].max()), 3)  # largest depth, mm
         0.8
-        >>> held = episode.phase_at(times) == PHASES.index("hold")
-        >>> episode.taxels.counts[held].mean(axis=0).shape  # mean reading of each taxel during the hold
-        (24,)
+        >>> table = episode.to_pandas()
+        >>> [phase for phase in table["phase"].unique() if phase]
+        ['rest', 'approach', 'press', 'hold', 'release']
     """
 
     path: Path

@@ -34,8 +34,8 @@ class Session(Displayed):
     """A session folder: its recordings and its document. Iterating reads its episodes one by one.
 
     Example:
-        >>> from tacdata.recording import read_session
-        >>> session = read_session("session")
+        >>> import tacdata as td
+        >>> session = td.read_session("session")
         >>> len(session), [episode.press.depth for episode in session]
         (2, [0.8, 0.8])
         >>> session[1].number
@@ -107,8 +107,8 @@ def read_session(folder: StrPath) -> Session:
         FormatError: If its document is damaged or names recordings that are missing.
 
     Example:
-        >>> from tacdata.recording import read_session
-        >>> session = read_session("session")
+        >>> import tacdata as td
+        >>> session = td.read_session("session")
         >>> [path.name for path in session.episodes]
         ['episode-000000.mcap', 'episode-000001.mcap']
         >>> session.remaining  # presses of the plan that are not recorded yet

@@ -119,11 +119,11 @@ class Sensor(Displayed):
     """One taxel skin. Frame: x along columns, y along rows, z outward, origin at the array's centre on z = 0.
 
     Example:
-        >>> from tacdata.sensor import Sensor, default_sensor
-        >>> sensor = default_sensor()
+        >>> import tacdata as td
+        >>> sensor = td.read_sensor("tacprint")
         >>> document = sensor.document
         >>> document["skin"]["thickness"] = 3.0
-        >>> thinner = Sensor.from_document(document, "my sensor")
+        >>> thinner = td.Sensor.from_document(document, "my sensor")
         >>> thinner.content_hash == sensor.content_hash  # its labels are other ones
         False
     """
@@ -270,9 +270,8 @@ def read_sensor(path: StrPath) -> Sensor:
         FormatError: If it is damaged or contradicts itself.
 
     Example:
-        >>> from pathlib import Path
-        >>> from tacdata.sensor import read_sensor
-        >>> sensor = read_sensor(Path("examples/own_sensor.yaml"))
+        >>> import tacdata as td
+        >>> sensor = td.read_sensor("examples/own_sensor.yaml")
         >>> sensor.name, sensor.taxels.columns, sensor.taxels.rows
         ('flat_pad', 4, 4)
         >>> sensor.taxels.centers[0]  # of the first taxel, mm

@@ -66,9 +66,8 @@ def read_episode(path: StrPath) -> Episode:
         FormatError: If it is not a recording, or was cut off before its attachments.
 
     Example:
-        >>> from pathlib import Path
-        >>> from tacdata.recording import read_episode
-        >>> episode = read_episode(Path("session/episode-000000.mcap"))
+        >>> import tacdata as td
+        >>> episode = td.read_episode("session/episode-000000.mcap")
         >>> episode.taxels.counts.shape  # frames, taxels
         (170, 24)
         >>> episode.press.indenter
