@@ -67,19 +67,19 @@ def complete(
     run, identity = best.path.parent, checkpoint.load(best.path).content_hash
     maps, labels, rows = [], [], []
     for part in parts:
-        own = part.learned == learned
-        _set(part.network, peak if own else fit_peaks(part.network, frames, part.learned, prior))
+        same_presses = part.learned == learned
+        _set(part.network, peak if same_presses else fit_peaks(part.network, frames, part.learned, prior))
         windows = Windows(frames, part.network.offsets, part.network.get_buffer("mean").device)
         rows.append((frames.indices(part.learned), frames.indices(part.presses)))
         step = -(-len(rows[-1][1]) // MOST_FRAMES)
         for number in part.presses[::step]:
-            chosen = frames.indices((number,))
-            maps.append(predict(part.network, windows, chosen, frames.sensor.map.depth_max))
-            labels.append(np.clip(frames.depth[chosen], 0.0, frames.sensor.map.depth_max))
+            part_frames = frames.indices((number,))
+            maps.append(predict(part.network, windows, part_frames, frames.sensor.map.depth_max))
+            labels.append(np.clip(frames.depth[part_frames], 0.0, frames.sensor.map.depth_max))
     if len(maps) > 1:
         pitch = frames.sensor.map.pixel_pitch
-        few = learned[:: -(-len(frames.indices(learned)) // MOST_FRAMES)]
-        area = pressed_area([frames.depth[frames.indices((press,))] for press in few], pitch)
+        sample = learned[:: -(-len(frames.indices(learned)) // MOST_FRAMES)]
+        area = pressed_area([frames.depth[frames.indices((press,))] for press in sample], pitch)
         intervals = conformal_intervals.calibrate(maps, labels, pitch, identity, source, area)
         conformal_intervals.write(run, intervals)
     readings = novelty.gathered(frames, rows, identity, best.settings.mirror)

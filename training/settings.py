@@ -64,10 +64,10 @@ class TrainingSettings:
         Raises:
             UsageError: Naming the first such setting.
         """
-        for name, least in (("epochs", 1), ("batch_size", 1), ("seed", 0)):
+        for name, minimum in (("epochs", 1), ("batch_size", 1), ("seed", 0)):
             value = getattr(self, name)
-            if value < least:
-                raise UsageError(f"{name} = {value}", f"an integer of at least {least}", f"change --{name}")
+            if value < minimum:
+                raise UsageError(f"{name} = {value}", f"an integer of at least {minimum}", f"change --{name}")
         for name, positive in (("learning_rate", True), ("weight_decay", False)):
             value = getattr(self, name)
             if not (0 < value < 1 or (value == 0 and not positive)):

@@ -90,10 +90,10 @@ class _Run:
             "pretrained": pretrained.content_hash if pretrained else None,
             "simulated": simulated.dataset_hash if simulated else None,
         }
-        for name, now in brought.items():
-            if (before := self.document.get(name)) != now and self.epoch:
+        for name, content in brought.items():
+            if (earlier := self.document.get(name)) != content and self.epoch:
                 raise UsageError(
-                    f"resuming a run whose {name} is {(before or 'none')[:12]} with {(now or 'none')[:12]}",
+                    f"resuming a run whose {name} is {(earlier or 'none')[:12]} with {(content or 'none')[:12]}",
                     "what it was started with",
                     "give the same --from and --simulated, or start a new run",
                 )
@@ -113,7 +113,7 @@ class _Run:
         if not self.origin:
             return loss
         weights = zip(self.network.parameters(), self.origin, strict=True)
-        return loss + self.pull * torch.stack([(now - then).square().sum() for now, then in weights]).sum()
+        return loss + self.pull * torch.stack([(weight - then).square().sum() for weight, then in weights]).sum()
 
 
 def train(
@@ -170,11 +170,11 @@ def train(
         learned = torch.as_tensor(frames.indices(split.train))
         validated = frames.indices(split.validation)
         validated = validated[:: -(-len(validated) // _VALIDATED)]
-        taken = torch.from_numpy(_always(frames, learned.numpy(), settings))
+        always = torch.from_numpy(_always(frames, learned.numpy(), settings))
         while run.epoch < settings.epochs:
             began = time.monotonic()
             run.epoch += 1
-            train_loss = _epoch(run, windows, depth, learned, taken, frames, settings, listener)
+            train_loss = _epoch(run, windows, depth, learned, always, frames, settings, listener)
             line = {
                 "epoch": run.epoch,
                 "train_loss": train_loss,
@@ -224,8 +224,8 @@ def _started(
         pretrained.check_unseen(frames.dataset_hash, frames.origin)
         # The normalization comes with the weights: they learned on signals of that scale.
         network.load_state_dict(pretrained.network.state_dict())
-        known = pretrained.document["normalization"]
-        mean, sd = (np.asarray(known[name], dtype=np.float32) for name in ("mean", "sd"))
+        statistics = pretrained.document["normalization"]
+        mean, sd = (np.asarray(statistics[name], dtype=np.float32) for name in ("mean", "sd"))
     else:
         mean, sd = normalization(readings)
     network.set_normalization(mean, sd)
@@ -268,16 +268,16 @@ def _resumed(frames: Frames, settings: TrainingSettings, out: Path, place: torch
             "the same dataset",
             "resume with it, or start a new run",
         )
-    before = last.settings.document
-    if settings.schedule != "constant" and settings.epochs != before["epochs"]:
+    earlier_settings = last.settings.document
+    if settings.schedule != "constant" and settings.epochs != earlier_settings["epochs"]:
         raise UsageError(
-            f"resuming {out} with {settings.epochs} epochs instead of {before['epochs']}",
+            f"resuming {out} with {settings.epochs} epochs instead of {earlier_settings['epochs']}",
             f"the same number: the {settings.schedule} schedule is laid out over them",
             "resume with that number, or start a new run",
         )
-    changed = [k for k, v in settings.document.items() if k != "epochs" and v != before[k]]
+    changed = [k for k, v in settings.document.items() if k != "epochs" and v != earlier_settings[k]]
     if changed:
-        words = "; ".join(f"{k} {settings.document[k]} instead of {before[k]}" for k in changed)
+        words = "; ".join(f"{k} {settings.document[k]} instead of {earlier_settings[k]}" for k in changed)
         raise UsageError(
             f"resuming {out} with {words}",
             "the settings that it was started with; epochs may grow",
@@ -307,15 +307,15 @@ def _epoch(
     run: _Run,
     windows: Windows,
     depth: torch.Tensor,
-    chosen: torch.Tensor,
-    taken: torch.Tensor,
+    indices: torch.Tensor,
+    always: torch.Tensor,
     frames: Frames,
     settings: TrainingSettings,
     listener: Callable[[Progress], None],
 ) -> float:
-    """Run one pass over the training frames ``chosen`` (m,) and return the mean loss over them.
+    """Run one pass over the training frames ``indices`` (m,) and return the mean loss over them.
 
-    Frames with ``taken`` (m,) false take part at random.
+    Frames with ``always`` (m,) false take part at random.
     """
     run.network.train()
     for group in run.optimizer.param_groups:
@@ -325,8 +325,8 @@ def _epoch(
     torch.manual_seed(1_000_003 * settings.seed + run.epoch)
     place = windows.taxels.device
     if settings.idle_share < 1.0:
-        chosen = chosen[taken | (torch.rand(len(chosen)) < settings.idle_share)]
-    order = chosen[torch.randperm(len(chosen))].to(place)
+        indices = indices[always | (torch.rand(len(indices)) < settings.idle_share)]
+    order = indices[torch.randperm(len(indices))].to(place)
     batches = order.split(settings.batch_size)
     # Summed on the device: reading the loss of each step would wait for the GPU.
     total = torch.zeros((), device=place)
@@ -334,8 +334,8 @@ def _epoch(
         label = normalized(depth[batch.to(depth.device)].to(place), frames.sensor.map.depth_max)
         signals, label = varied(run.network.calibrated(windows.batch(batch)), label)
         if run.rehearsal:
-            more, known = run.rehearsal.batch(len(batch))
-            signals, label = torch.cat([signals, more]), torch.cat([label, known])
+            more, rehearsed = run.rehearsal.batch(len(batch))
+            signals, label = torch.cat([signals, more]), torch.cat([label, rehearsed])
         with torch.autocast(place.type, torch.bfloat16, enabled=settings.precision == "bfloat16"):
             prediction = run.forward(signals)
         # In float32: bfloat16 has three digits, and the mean is over a thousand pixels.
@@ -361,18 +361,18 @@ def _always(frames: Frames, learned: np.ndarray, settings: TrainingSettings) -> 
         return np.ones(len(learned), bool)
     touching = np.zeros(len(frames.depth), bool)
     for span in frames.episodes:
-        here = slice(span.start, span.stop)
-        touching[here] = frames.depth[here].max(axis=(1, 2)) > depth_maps.CONTACT_THRESHOLD
+        rows = slice(span.start, span.stop)
+        touching[rows] = frames.depth[rows].max(axis=(1, 2)) > depth_maps.CONTACT_THRESHOLD
     return touching[learned]
 
 
 def _validate(
-    network: Network, windows: Windows, frames: Frames, chosen: np.ndarray, settings: TrainingSettings
+    network: Network, windows: Windows, frames: Frames, indices: np.ndarray, settings: TrainingSettings
 ) -> dict[str, float | None]:
-    """Return loss and median contact-region RMSE [mm] over the frames ``chosen``."""
+    """Return loss and median contact-region RMSE [mm] over the frames ``indices``."""
     top = frames.sensor.map.depth_max
-    prediction = predict(network, windows, chosen, top)
-    label = frames.depth[chosen]
+    prediction = predict(network, windows, indices, top)
+    label = frames.depth[indices]
     loss = settings.loss(torch.from_numpy(prediction) / top, normalized(torch.from_numpy(label), top))
     rmse = depth_maps.summarize(depth_maps.score_frames(prediction, label).contact_rmse).median
     return {"validation_loss": float(loss), "validation_contact_rmse_mm": rmse}

@@ -209,7 +209,7 @@ def main() -> None:
             networks=arguments.network,
             simulated=simulated,
             threads=1,
-            told=lambda point: print(point, flush=True),
+            report=lambda point: print(point, flush=True),
         )
         for run in sorted(folder.glob("*-*-*")):
             from tacdata.training.inference import checkpoint

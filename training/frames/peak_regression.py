@@ -73,14 +73,14 @@ def fit_peaks(
     features, targets, weights = [], [], []
     for number in episodes:
         span = frames.spans((number,))[0]
-        chosen = np.flatnonzero(frames.valid[span.start : span.stop]) + span.start
-        peak = np.clip(frames.depth[chosen].max(axis=(1, 2)), 0.0, top)
-        chosen, peak = chosen[peak > LEAST], peak[peak > LEAST]
-        step = -(-len(chosen) // FRAMES) or 1
-        chosen, peak = chosen[::step], peak[::step]
-        if not len(chosen):
+        rows = np.flatnonzero(frames.valid[span.start : span.stop]) + span.start
+        peak = np.clip(frames.depth[rows].max(axis=(1, 2)), 0.0, top)
+        rows, peak = rows[peak > LEAST], peak[peak > LEAST]
+        step = -(-len(rows) // FRAMES) or 1
+        rows, peak = rows[::step], peak[::step]
+        if not len(rows):
             continue
-        signals = network.calibrated(windows.batch(torch.as_tensor(chosen, device=place)))
+        signals = network.calibrated(windows.batch(torch.as_tensor(rows, device=place)))
         depth = network.respond(signals)
         columns, largest = peak_features(depth, signals, network)
         features.append(columns.double().cpu().numpy())

@@ -159,10 +159,10 @@ def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
         channel_calibration = ChannelCalibration.from_document(calibration, sensor.taxels)
         network.set_calibration(channel_calibration.gain, channel_calibration.exponent, channel_calibration.mixing)
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
-    found = Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
-    if peak := found.peak:
+    loaded = Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
+    if peak := loaded.peak:
         network.set_peak(peak.mean, peak.scale, peak.weight)
-    return found
+    return loaded
 
 
 def restore(optimizer: torch.optim.Optimizer, state: dict[str, torch.Tensor]) -> None:

@@ -111,7 +111,7 @@ def predicted_centroids(depth: np.ndarray) -> np.ndarray:
     Args:
         depth: Predicted depth map [mm], shape (pixels_x, pixels_y).
     """
-    owner = hills(depth, prominence=PREDICTED_PROMINENCE, least=PREDICTED_LEAST)
+    owner = hills(depth, prominence=PREDICTED_PROMINENCE, smallest_prominence=PREDICTED_LEAST)
     if owner.max(initial=-1) < 1:
         return _centroids(depth, owner)
     high = hills(depth, prominence=ROUND_PROMINENCE)
@@ -152,7 +152,7 @@ def hills(
     depth: np.ndarray,
     threshold: float = CONTACT_THRESHOLD,
     prominence: float = PROMINENCE,
-    least: float = LEAST_PROMINENCE,
+    smallest_prominence: float = LEAST_PROMINENCE,
 ) -> np.ndarray:
     """Return which hill each pixel deeper than the threshold belongs to, the deepest hill is 0; -1 elsewhere.
 
@@ -160,7 +160,7 @@ def hills(
         depth: Depth map [mm], shape (pixels_x, pixels_y).
         threshold: Depth above which a pixel belongs to a contact [mm].
         prominence: Least prominence over the hill's own depth [1].
-        least: Least prominence [mm].
+        smallest_prominence: Least prominence [mm].
     """
     rows, columns = depth.shape
     # A border around the map, so that every pixel has eight neighbours.
@@ -191,7 +191,7 @@ def hills(
         neighbours = {standing(flooded[neighbour]) for neighbour in higher}
         highest = min(neighbours)  # hills are numbered from the deepest
         for hill in neighbours - {highest}:
-            if tops[hill] - height < max(prominence * tops[hill], least):
+            if tops[hill] - height < max(prominence * tops[hill], smallest_prominence):
                 joined[hill] = highest
     assigned = np.array([standing(hill) if hill >= 0 else -1 for hill in flooded])
     _, numbered = np.unique(np.append(assigned, -1), return_inverse=True)

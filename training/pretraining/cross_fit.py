@@ -145,13 +145,13 @@ def fit(
             fitted = calibrate(frames, division.train)
             network.set_calibration(fitted.gain, fitted.exponent, fitted.mixing)
             document["calibration"] = fitted.document
-        apart = [
+        held_out = [
             HeldOut(between(pretrained.network, [end], share, end), member.split.train, member.split.validation)
             for end, member in zip(ends, members, strict=True)
         ]
         best = Checkpoint(out / checkpoint.BEST, document, network, members[0].sensor, {})
         documents.write_text(out / METRICS, "".join(json.dumps(line) + "\n" for line in document["history"]))
-        complete(best, document, frames, division.train, apart, pretrained, source)
+        complete(best, document, frames, division.train, held_out, pretrained, source)
     for number in range(len(parts)):
         shutil.rmtree(out / f"part-{number}")
     return checkpoint.load(out)
@@ -251,12 +251,12 @@ def _ended(out: Path, settings: TrainingSettings, frames: Frames, pretrained: Ch
     Raises:
         UsageError: If it is another one.
     """
-    found = checkpoint.load(out)
-    before = found.document["settings"], found.document["dataset"]["hash"], found.document.get("pretrained")
-    if before != (settings.document, frames.dataset_hash, pretrained.content_hash):
+    trained = checkpoint.load(out)
+    recorded = trained.document["settings"], trained.document["dataset"]["hash"], trained.document.get("pretrained")
+    if recorded != (settings.document, frames.dataset_hash, pretrained.content_hash):
         raise UsageError(
             f"resuming {out}, a fit that has ended, with other settings, presses or another start",
             "the same ones",
             "fit into a new folder",
         )
-    return found
+    return trained

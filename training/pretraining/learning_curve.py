@@ -69,7 +69,7 @@ def learning_curve(
     simulated: Frames | None = None,
     device: str = "auto",
     threads: int | None = None,
-    told: Callable[[CurvePoint], None] = lambda point: None,
+    report: Callable[[CurvePoint], None] = lambda point: None,
     begun: Callable[[str, int, int], Callable[[Progress], None]] = lambda *_: lambda progress: None,
 ) -> dict[str, Any]:
     """Train and score every point of the curve; finished points in ``out`` are kept.
@@ -85,7 +85,7 @@ def learning_curve(
         simulated: Simulated frames to mix in.
         device: As of `train`.
         threads: As of `train`.
-        told: Called with every point.
+        report: Called with every point.
         begun: Called with start, presses and seed before each run; returns the listener of its progress.
 
     Returns:
@@ -161,7 +161,7 @@ def learning_curve(
                 document["points"].append(asdict(point))
                 # Written after each point, so that an interrupted curve goes on from there.
                 documents.write(out / FILE, document, "learning_curve")
-                told(point)
+                report(point)
     return document
 
 

@@ -54,8 +54,8 @@ def calibrate_on_unseen_shapes(
     """
     spans = frames.spans((*trained.split.train, *trained.split.validation))
     maps, labels = [], []
-    for number, held in enumerate(dealt(spans, groups, frames.origin)):
-        division = _without(held, spans, trained.split)
+    for number, test_group in enumerate(dealt(spans, groups, frames.origin)):
+        division = _without(test_group, spans, trained.split)
         run = trained.path.parent / f"without-{number}"
         resume = (run / checkpoint.LAST).is_file()
         network = train(frames, trained.settings, run, device, resume, threads, begun(number), split=division)

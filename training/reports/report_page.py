@@ -207,8 +207,8 @@ def _run(result: HtmlPage, run: Scored, document: dict[str, Any]) -> None:
     half_x, half_y = (n * pixels.pixel_pitch / 2 for n in pixels.shape)
     for name, episode, frame, error in cases:
         span, link = episode.span, f"{run.name} {split['name']} {name}"
-        here = slice(span.start, span.stop)
-        seconds = (frames.time_ns[here] - frames.time_ns[span.start]) * 1e-9
+        frame_rows = slice(span.start, span.stop)
+        seconds = (frames.time_ns[frame_rows] - frames.time_ns[span.start]) * 1e-9
         for words, values in (
             ("label", episode.label[frame]),
             ("prediction", episode.depth[frame]),
@@ -217,7 +217,7 @@ def _run(result: HtmlPage, run: Scored, document: dict[str, Any]) -> None:
             extent = (-half_x, half_x, -half_y, half_y)
             caption = f"{name}, episode {span.number}: {words}"
             blocks.append(PixelMap(caption, values.T, "mm", 0.0, top, extent, [(span.x, span.y)], link=link))
-        signals = frames.taxels[here]
+        signals = frames.taxels[frame_rows]
         curves = [Series(f"taxel {k}", signals[:, k], COLORS[k % len(COLORS)]) for k in range(signals.shape[1])]
         caption = f"{name}, episode {span.number}: {span.indenter}, {span.depth:.2f} mm, at {seconds[frame]:.2f} s"
         blocks.append(Plot(caption, "time [s]", "signal [counts]", curves, seconds, most=MOST_SIGNALS))

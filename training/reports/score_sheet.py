@@ -108,7 +108,7 @@ def _ahead(document: dict[str, Any]) -> list[str]:
     """Return a first line that names the baselines that are ahead of the network; empty if none is."""
     words = []
     for name, table in ahead(document).items():
-        cells = [f"{title(metric)} {number(its)} for {number(own)}" for metric, (its, own) in table.items()]
+        cells = [f"{title(metric)} {number(its)} for {number(score)}" for metric, (its, score) in table.items()]
         words.append(f"{name} in {', '.join(cells)}")
     return [f"**A predictor without a network is ahead (median):** {'; '.join(words)}.", ""] if words else []
 

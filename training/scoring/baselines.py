@@ -42,15 +42,15 @@ def ahead(document: Mapping[str, Any], larger: tuple[str, ...] = ("iou",)) -> di
         document: Scores (`schemas/scores.schema.json`).
         larger: Metrics of which the larger value is the better one.
     """
-    found: dict[str, dict[str, tuple[float, float]]] = {}
+    better_baselines: dict[str, dict[str, tuple[float, float]]] = {}
     for name, table in document["baselines"].items():
         for metric, values in table.items():
-            its, own = values["median"], document["contact_frames"][metric]["median"]
+            its, score = values["median"], document["contact_frames"][metric]["median"]
             # Where the network sees no contact in any frame, it has no centroid at all.
-            better = its is not None and (own is None or (its > own if metric in larger else its < own))
+            better = its is not None and (score is None or (its > score if metric in larger else its < score))
             if better:
-                found.setdefault(name, {})[metric] = its, float("nan") if own is None else own
-    return found
+                better_baselines.setdefault(name, {})[metric] = its, float("nan") if score is None else score
+    return better_baselines
 
 
 def _moments(frames: Frames, learned: np.ndarray, signals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -58,17 +58,17 @@ def contact_rows(matches: Sequence[ContactMatch], pitch: float) -> list[dict[str
     return [row for row in rows if row["presses"]]
 
 
-def _row(chosen: list[ContactMatch], contacts: str, low: float | None, high: float | None) -> dict[str, Any]:
-    complete = sum(not m.missed for m in chosen)
-    interval = binomtest(complete, len(chosen)).proportion_ci(method="wilson") if chosen else (None, None)
-    errors = np.concatenate([m.error for m in chosen]) if chosen else np.zeros(0)
+def _row(matches: list[ContactMatch], contacts: str, low: float | None, high: float | None) -> dict[str, Any]:
+    complete = sum(not m.missed for m in matches)
+    interval = binomtest(complete, len(matches)).proportion_ci(method="wilson") if matches else (None, None)
+    errors = np.concatenate([m.error for m in matches]) if matches else np.zeros(0)
     return {
         "contacts": contacts,
         "above_mm": low,
         "up_to_mm": high,
-        "presses": len(chosen),
-        "all_found": {"count": complete, "of": len(chosen), "wilson_95": list(interval)},
-        "missed": sum(m.missed for m in chosen),
-        "invented": sum(m.invented for m in chosen),
+        "presses": len(matches),
+        "all_found": {"count": complete, "of": len(matches), "wilson_95": list(interval)},
+        "missed": sum(m.missed for m in matches),
+        "invented": sum(m.invented for m in matches),
         "centroid_error": asdict(summarize(errors)),
     }

@@ -106,8 +106,8 @@ def evaluate(
         FormatError: If the dataset is of another sensor, or lacks episodes of the split.
     """
     trained.check_sensor(frames.sensor, frames.origin)
-    own = frames.dataset_hash == trained.document["dataset"]["hash"]
-    numbers = trained.split.test if own else tuple(e.number for e in frames.episodes)
+    same_dataset = frames.dataset_hash == trained.document["dataset"]["hash"]
+    numbers = trained.split.test if same_dataset else tuple(e.number for e in frames.episodes)
     spans = frames.spans(numbers)
     # Raises if no frame of these episodes is valid, before the network runs.
     frames.indices(numbers)
@@ -126,12 +126,12 @@ def evaluate(
             )
             listener(count, len(spans))
     pace = milliseconds_per_frame(network.to("cpu"), Windows(frames, network.offsets))
-    episodes, part, identity = tuple(results), "test" if own else "other dataset", trained.content_hash
+    episodes, part, identity = tuple(results), "test" if same_dataset else "other dataset", trained.content_hash
     document = {
         "version": schemas.version("scores"),
         **_identity(trained, identity, frames, part, episodes),
         **_agreement(episodes),
-        "baselines": _baselines(trained, frames, episodes) if own else {},
+        "baselines": _baselines(trained, frames, episodes) if same_dataset else {},
         **_prescribed(episodes, frames),
         "contacts": contact_scores.scored(_at_full_depth(episodes), frames.sensor.map.pixel_pitch),
         **_uncertainty(trained, identity, episodes, frames),
@@ -146,10 +146,10 @@ def evaluate(
 
 
 def _result(frames: Frames, span: EpisodeSpan, depth: np.ndarray) -> EpisodeResult:
-    here = slice(span.start, span.stop)
-    label = np.clip(frames.depth[here], 0.0, frames.sensor.map.depth_max)
+    frame_rows = slice(span.start, span.stop)
+    label = np.clip(frames.depth[frame_rows], 0.0, frames.sensor.map.depth_max)
     scores = depth_maps.score_frames(depth, label)
-    return EpisodeResult(span, depth, label, frames.valid[here], scores, at_full_depth(frames, span))
+    return EpisodeResult(span, depth, label, frames.valid[frame_rows], scores, at_full_depth(frames, span))
 
 
 def _identity(
@@ -191,11 +191,13 @@ def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
     names = sorted({e.span.indenter for e in episodes})
     by_indenter = []
     for name in names:
-        mine = [e for e in episodes if e.span.indenter == name]
-        part = _joined([e.scores.where(e.valid & e.scores.labelled) for e in mine])
-        by_indenter.append({"indenter": name, "episodes": len(mine), "frames": len(part.iou), "metrics": _table(part)})
+        by_shape = [e for e in episodes if e.span.indenter == name]
+        part = _joined([e.scores.where(e.valid & e.scores.labelled) for e in by_shape])
+        by_indenter.append(
+            {"indenter": name, "episodes": len(by_shape), "frames": len(part.iou), "metrics": _table(part)}
+        )
     missed = int((~touching.predicted).sum())
-    apart = ~scores.labelled
+    unlabelled = ~scores.labelled
     return {
         "contact_threshold_mm": depth_maps.CONTACT_THRESHOLD,
         "frames": {
@@ -212,8 +214,8 @@ def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
         ),
         "false_contact": _proportion(
             "frames out of contact whose predicted map has a pixel above the contact threshold",
-            int(scores.predicted[apart].sum()),
-            int(apart.sum()),
+            int(scores.predicted[unlabelled].sum()),
+            int(unlabelled.sum()),
         ),
     }
 
@@ -221,8 +223,8 @@ def _agreement(episodes: tuple[EpisodeResult, ...]) -> dict[str, Any]:
 def _by_depth(episodes: tuple[EpisodeResult, ...]) -> list[dict[str, Any]]:
     """Return the table by the largest labelled depth of a frame: where contact only begins, regions are few pixels."""
     touching = [e.valid & e.scores.labelled for e in episodes]
-    scores = _joined([e.scores.where(chosen) for e, chosen in zip(episodes, touching, strict=True)])
-    deepest = np.concatenate([e.label[chosen].max(axis=(1, 2)) for e, chosen in zip(episodes, touching, strict=True)])
+    scores = _joined([e.scores.where(mask) for e, mask in zip(episodes, touching, strict=True)])
+    deepest = np.concatenate([e.label[mask].max(axis=(1, 2)) for e, mask in zip(episodes, touching, strict=True)])
     rows = []
     for low, high in itertools.pairwise((depth_maps.CONTACT_THRESHOLD, *DEPTHS, np.inf)):
         part = scores.where((deepest > low) & (deepest <= high))
@@ -278,19 +280,19 @@ def _uncertainty(
     trained: Checkpoint, identity: str, episodes: tuple[EpisodeResult, ...], frames: Frames
 ) -> dict[str, Any]:
     """Return the share of errors in each interval; empty if the run was not calibrated."""
-    known = conformal_intervals.read(trained.path.parent, identity)
-    if known is None:
+    intervals = conformal_intervals.read(trained.path.parent, identity)
+    if intervals is None:
         return {}
     maps, labels = ([getattr(e, name)[e.valid] for e in episodes] for name in ("depth", "label"))
-    levels = conformal_intervals.reliability(known, maps, labels, frames.sensor.map.pixel_pitch)
-    return {"uncertainty": {"definition": known.definition, "levels": levels}}
+    levels = conformal_intervals.reliability(intervals, maps, labels, frames.sensor.map.pixel_pitch)
+    return {"uncertainty": {"definition": intervals.definition, "levels": levels}}
 
 
 def _press_table(scores: list[PressScore]) -> dict[str, Any]:
     """Summarize presses; a truncated reference region counts in ``position_all`` alone, a lost one never."""
 
-    def values(kept: list[float | None]) -> np.ndarray:
-        return np.array([np.nan if v is None else abs(v) for v in kept])
+    def values(numbers: list[float | None]) -> np.ndarray:
+        return np.array([np.nan if v is None else abs(v) for v in numbers])
 
     with_region = [s for s in scores if s.reference_region]
     return {

@@ -104,10 +104,10 @@ def _predicted(frames: Frames, trained: Checkpoint, kinds: dict[str, tuple[Press
         return predict(network, windows, trial.full, frames.sensor.map.depth_max).mean(axis=0)
 
     with reproducible():
-        known = {t.span.number: mapped(t) for found in kinds.values() for t in found}
+        maps = {t.span.number: mapped(t) for trials in kinds.values() for t in trials}
 
     def of(trial: PressTrial) -> np.ndarray:
-        return known[trial.span.number]
+        return maps[trial.span.number]
 
     tables: dict[str, Any] = {}
     if kinds[POSITION_TRIAL]:
@@ -120,24 +120,24 @@ def _predicted(frames: Frames, trained: Checkpoint, kinds: dict[str, tuple[Press
     return tables
 
 
-def _centre_depth(found: tuple[PressTrial, ...], of: MapOf, frames: Frames) -> dict[str, Any]:
+def _centre_depth(trials: tuple[PressTrial, ...], of: MapOf, frames: Frames) -> dict[str, Any]:
     grid = frames.sensor.map
-    scored = [score_press(t.span.number, of(t), t.label, t.tip, grid) for t in found]
+    scored = [score_press(t.span.number, of(t), t.label, t.tip, grid) for t in trials]
     errors = np.array([np.nan if s.centre_depth_error is None else s.centre_depth_error for s in scored])
     return {**_summary(np.abs(errors)), "bias": None if np.isnan(errors).all() else float(np.nanmean(errors))}
 
 
-def _position(found: tuple[PressTrial, ...], of: MapOf, frames: Frames, threshold: float) -> dict[str, Any]:
+def _position(trials: tuple[PressTrial, ...], of: MapOf, frames: Frames, threshold: float) -> dict[str, Any]:
     grid = frames.sensor.map
-    scored = [score_press(t.span.number, of(t), t.label, t.tip, grid, threshold) for t in found]
+    scored = [score_press(t.span.number, of(t), t.label, t.tip, grid, threshold) for t in trials]
     errors = np.array([np.nan if s.position_error is None else s.position_error for s in scored])
-    whole = np.array([s.reference_region and not s.truncated for s in scored])
-    return {"threshold_mm": threshold, "all": _summary(errors), "not_truncated": _summary(errors[whole])}
+    complete = np.array([s.reference_region and not s.truncated for s in scored])
+    return {"threshold_mm": threshold, "all": _summary(errors), "not_truncated": _summary(errors[complete])}
 
 
-def _wearing(found: tuple[PressTrial, ...], of: MapOf) -> dict[str, Any]:
+def _wearing(trials: tuple[PressTrial, ...], of: MapOf) -> dict[str, Any]:
     by_person: dict[str, list[float]] = {}
-    for trial in found:
+    for trial in trials:
         overlap = aligned_iou(of(trial), trial.label)
         # No region predicted where one was pressed is no overlap.
         by_person.setdefault(trial.span.specimen or "unknown", []).append(0.0 if overlap is None else overlap)
@@ -151,14 +151,14 @@ def _wearing(found: tuple[PressTrial, ...], of: MapOf) -> dict[str, Any]:
 
 
 def _summary(values: np.ndarray) -> dict[str, Any]:
-    kept = values[np.isfinite(values)]
-    if not len(kept):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return {"mean": None, "sd": None, "median": None, "p95": None, "count": 0, "left_out": len(values)}
     return {
-        "mean": float(kept.mean()),
-        "sd": float(kept.std(ddof=1)) if len(kept) > 1 else None,
-        "median": float(np.median(kept)),
-        "p95": float(np.percentile(kept, 95)),
-        "count": len(kept),
-        "left_out": len(values) - len(kept),
+        "mean": float(finite.mean()),
+        "sd": float(finite.std(ddof=1)) if len(finite) > 1 else None,
+        "median": float(np.median(finite)),
+        "p95": float(np.percentile(finite, 95)),
+        "count": len(finite),
+        "left_out": len(values) - len(finite),
     }

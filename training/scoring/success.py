@@ -75,20 +75,20 @@ def rates(attempts: list[Attempt], groups: Mapping[str, set[str]] | None = None)
         UsageError: If a group names a position that no trial has.
     """
     positions = list(dict.fromkeys(a.position for a in attempts if a.position))
-    for name, wanted in (groups or {}).items():
-        if unknown := sorted(wanted - set(positions)):
+    for name, group_positions in (groups or {}).items():
+        if unknown := sorted(group_positions - set(positions)):
             raise UsageError(
                 f"group {name}: positions {', '.join(unknown)} are in no trial", ", ".join(positions), "correct --group"
             )
-    found = []
+    measured = []
     for condition in dict.fromkeys(a.condition for a in attempts):
-        mine = [a for a in attempts if a.condition == condition]
-        found.append(rate(condition, "all", mine))
+        of_condition = [a for a in attempts if a.condition == condition]
+        measured.append(rate(condition, "all", of_condition))
         parts = {**(groups or {}), **{f"position {p}": {p} for p in positions}}
-        for name, wanted in parts.items():
-            if chosen := [a for a in mine if a.position in wanted]:
-                found.append(rate(condition, name, chosen))
-    return found
+        for name, group_positions in parts.items():
+            if of_group := [a for a in of_condition if a.position in group_positions]:
+                measured.append(rate(condition, name, of_group))
+    return measured
 
 
 def read_attempts(path: StrPath) -> list[Attempt]:
@@ -137,13 +137,13 @@ def counted(text: str) -> Rate:
     return Rate(name or text, "all", won, of, _wilson(won, of))
 
 
-def markdown(found: list[Rate]) -> str:
+def markdown(measured: list[Rate]) -> str:
     """Return the rates as a Markdown table."""
-    with_adjustments = any(r.adjustments for r in found)
+    with_adjustments = any(r.adjustments for r in measured)
     heads = ["Condition", "Trials", "Successes", "Rate (%)", "95 % Wilson (%)"]
     heads += ["Adjustments, mean ± SD"] if with_adjustments else []
     lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * 2 + " ---: |" * (len(heads) - 2)]
-    for r in found:
+    for r in measured:
         low, high = (100 * bound for bound in r.interval)
         cells = [r.condition, r.group, f"{r.successes}/{r.trials}", f"{100 * r.successes / r.trials:.1f}"]
         cells.append(f"{low:.1f} to {high:.1f}")
@@ -155,27 +155,27 @@ def markdown(found: list[Rate]) -> str:
 
 
 def _attempt(line: dict[str, str | None], where: str) -> Attempt:
-    said = (line["success"] or "").strip().lower()
+    outcome = (line["success"] or "").strip().lower()
     adjustments = (line.get("adjustments") or "").strip()
     condition = (line["condition"] or "").strip()
-    if said not in TRUE | FALSE or not condition or (adjustments and not adjustments.isdecimal()):
+    if outcome not in TRUE | FALSE or not condition or (adjustments and not adjustments.isdecimal()):
         raise FormatError(
-            f"{where}: condition {condition!r}, success {said!r}, adjustments {adjustments!r}",
+            f"{where}: condition {condition!r}, success {outcome!r}, adjustments {adjustments!r}",
             "a condition, success 0 or 1, adjustments empty or a whole number",
             "correct the line",
         )
     position = (line.get("position") or "").strip()
-    return Attempt(condition, said in TRUE, position, int(adjustments) if adjustments else None)
+    return Attempt(condition, outcome in TRUE, position, int(adjustments) if adjustments else None)
 
 
 def published_rates() -> list[Rate]:
     """Return the paper's counts of Exp. 3 as rates."""
-    found = []
+    counts = []
     for condition, entry in published.SUCCESS.items():
         for group, moves in (("all", "adjustments"), ("edge", "adjustments_edge")):
             won, of = entry[group]  # ty: ignore[not-iterable]
-            found.append(Rate(condition, group, won, of, _wilson(won, of), entry.get(moves)))  # ty: ignore[invalid-argument-type]
-    return found
+            counts.append(Rate(condition, group, won, of, _wilson(won, of), entry.get(moves)))  # ty: ignore[invalid-argument-type]
+    return counts
 
 
 def _wilson(successes: int, trials: int) -> tuple[float, float]:

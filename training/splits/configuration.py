@@ -13,8 +13,8 @@ def held_out(episodes: tuple[EpisodeSpan, ...], sensor: Sensor, generator: np.ra
     """Return every episode of 15 % of the configurations (indenter, site and depth, to 0.01 mm)."""
     kinds = sorted({_configuration(e) for e in episodes})
     order = generator.permutation(len(kinds))[: share(len(kinds), TEST_SHARE)]
-    chosen = {kinds[i] for i in order}
-    return {e.number for e in episodes if _configuration(e) in chosen}
+    test_kinds = {kinds[i] for i in order}
+    return {e.number for e in episodes if _configuration(e) in test_kinds}
 
 
 def _configuration(episode: EpisodeSpan) -> tuple[str, int, int, int]:

@@ -17,5 +17,5 @@ def held_out(episodes: tuple[EpisodeSpan, ...], sensor: Sensor, generator: np.ra
     names = sorted({e.specimen for e in episodes})
     counts = {name: sum(e.specimen == name for e in episodes) for name in names}
     order = sorted(generator.permutation(names).tolist(), key=lambda name: counts[name])
-    chosen = set(order[: share(len(names), TEST_SHARE)])
-    return {e.number for e in episodes if e.specimen in chosen}
+    test_specimens = set(order[: share(len(names), TEST_SHARE)])
+    return {e.number for e in episodes if e.specimen in test_specimens}

@@ -66,10 +66,10 @@ def divide(frames: Frames, name: str, seed: int) -> Split:
     rule = registry.load_module(ROOM, BASE, name)
     generator = np.random.default_rng(seed)
     test = rule.held_out(frames.episodes, frames.sensor, generator)
-    rest = [e.number for e in frames.episodes if e.number not in test]
+    training = [e.number for e in frames.episodes if e.number not in test]
     count = share(len(frames.episodes), VALIDATION_SHARE)
-    validation = set(generator.permutation(rest)[:count].tolist()) if len(rest) > 1 else set()
-    train = tuple(n for n in rest if n not in validation)
+    validation = set(generator.permutation(training)[:count].tolist()) if len(training) > 1 else set()
+    train = tuple(n for n in training if n not in validation)
     split = Split(name, seed, train, tuple(sorted(validation)), tuple(sorted(test)))
     for part in ("train", "validation", "test"):
         if not getattr(split, part):
