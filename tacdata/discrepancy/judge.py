@@ -78,6 +78,7 @@ def judge(
     setting = _setting(without_readings(course, sealed), spec, without, correct_p)
     checks = check(setting)
     findings = find(setting, note, until)
+    until = findings.until
     lacking = lack_of_fit(findings.final) if findings.effects and until == STEPS[-1] else {}
     findings = with_families(findings, lacking)
     evidence = () if adequate(findings, answer_of(findings)) else beside_remainder(findings)

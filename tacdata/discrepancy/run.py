@@ -50,6 +50,7 @@ def run(
     Raises:
         UsageError: If ``out`` exists, or there is nothing to read.
         FormatError: If recordings and spec do not fit together.
+        KeyboardInterrupt: If interrupted; after the gate the verdict so far is written first.
     """
     if out.exists():
         raise UsageError(f"{out} exists", "a new folder", "choose another --out")
@@ -77,6 +78,10 @@ def run(
         effects = [e.finding for e in verdict.decision.effects]
         revised = spec.with_effects([f.placed for f in effects], [f.error for f in effects], VERDICT)
         documents.write(out / SPEC, revised, "model_spec")
+    if verdict.found.until != until:
+        interrupt = KeyboardInterrupt()
+        interrupt.add_note(f"  kept: {out}: {document['why']}")
+        raise interrupt
     return Written(document, text, out)
 
 

@@ -79,6 +79,19 @@ def test_imported_recordings_are_judged_into_a_folder(session, tmp_path):
         ) == pytest.approx([0.08, 0.08], abs=0.01)
 
 
+@pytest.mark.parametrize(("step", "last"), [("eliminate", "fit"), ("race", "locate")])
+def test_an_interrupt_keeps_the_verdict_so_far(session, tmp_path, monkeypatch, step, last):
+    def interrupt(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"tacdata.discrepancy.search.find.{step}", interrupt)
+    with pytest.raises(KeyboardInterrupt) as raised:
+        run([session], read_spec(None), tmp_path / "verdict")
+    assert raised.value.__notes__[0].startswith(f"  kept: {tmp_path / 'verdict'}: stopped after {last}: a gap")
+    written = documents.read(tmp_path / "verdict" / "verdict.json", "verdict")
+    assert written["status"] == "unknown" and bool(written["effects"]) == (last == "fit")
+
+
 def test_nothing_is_overwritten_and_bad_input_is_answered_in_words(session, tmp_path):
     with pytest.raises(UsageError, match="exists"):
         run([session], read_spec(None), tmp_path)

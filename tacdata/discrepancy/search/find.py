@@ -19,6 +19,8 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
 
     Noise and nuisances, regressors, gate, race (forward selection), backward elimination with rivals, leftovers.
 
+    From the gate on, an interrupt ends the search and keeps the findings so far.
+
     Args:
         setting: Recordings, response, library.
         note: Called with each step.
@@ -29,14 +31,20 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
     least_p = min(gated.tests.p.min(initial=1.0), gated.tests.p_generic)
     note(f"{'there is a gap' if gated.gap else 'there is no gap'}, p = {least_p:.3f}")
     selection = start(setting, gated)
-    if gated.gap and until in STEPS[2:]:
-        selection = race(setting, selection, note)
-    if until != "decide":
-        return _findings(gated, selection, gated.problem, _fitted(selection), until)
-    note("rivals and leftovers")
-    # With the answer's noise only the residual is examined: nothing is tried there.
-    problem = prepare(setting, selection.null, tested=False, among=()) if selection.model.placed else gated.problem
-    return _findings(gated, selection, problem, eliminate(setting, selection), until)
+    try:
+        if gated.gap and until in STEPS[2:]:
+            for added in race(setting, selection, note):
+                selection = added
+        if until == "decide":
+            note("rivals and leftovers")
+            # With the answer's noise only the residual is examined: nothing is tried there.
+            placed = selection.model.placed
+            problem = prepare(setting, selection.null, tested=False, among=()) if placed else gated.problem
+            return _findings(gated, selection, problem, eliminate(setting, selection), until)
+    except KeyboardInterrupt:
+        until = "fit" if selection.model.placed else "locate"
+        note(f"stopped after {until}")
+    return _findings(gated, selection, gated.problem, _fitted(selection), until)
 
 
 def _fitted(selection: Selection) -> Answer:

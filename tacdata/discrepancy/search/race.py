@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,8 +65,8 @@ def start(setting: Setting, gate: Gate) -> Selection:
     return Selection(gate.problem.null, nothing, nothing, gate.problem, gate.tests, (), least_p)
 
 
-def race(setting: Setting, selection: Selection, note: Note) -> Selection:
-    """Add effects, or pairs of them, as long as episodes ask for them."""
+def race(setting: Setting, selection: Selection, note: Note) -> Iterator[Selection]:
+    """Add effects, or pairs of them, as long as episodes ask for them; yield each selection."""
     selection = replace(selection, late=tuple(delays(setting)))
     while len(selection.model.placed) < MOST_EFFECTS:
         sets = shortlist(selection.problem, selection.tests)
@@ -79,7 +79,7 @@ def race(setting: Setting, selection: Selection, note: Note) -> Selection:
             break
         selection = _added(setting, selection, best)
         note(f"so far: {', '.join(dict.fromkeys(p.effect.spoken for p in selection.model.placed))}")
-    return selection
+        yield selection
 
 
 def _winner(selection: Selection, sets: list[list[Candidate]]) -> Refined | None:
