@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tacdata.discrepancy.plain_number import plain_number
-from tacdata.effects import load
+from tacdata.effects import Parameter, load
 from tacdata.recording import read_session
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.session import FILE
@@ -21,6 +21,8 @@ BREAKS = (r"(?<=[;.?]) ", r"(?<=:) ", r"(?<=,) ", " ")
 """Where a sentence may end, the best place first."""
 Z90 = 1.645
 """Standard errors either way of a 90 % interval."""
+EQUAL = 0.01
+"""Places whose ranges differ by less have one size [1]."""
 YEAR_2000 = 946684800
 """Seconds since 1970. Imported clocks may begin at zero: that is no date."""
 
@@ -116,10 +118,23 @@ def _sized(entry: dict[str, Any], unit: str) -> str:
         value = max(values, key=abs)
         if written["error"] > abs(value):
             continue  # it is not known
-        percent = p.unit == "1" and not p.grid and p.typical < 1
         where = f" on the channel with most, of {len(values)}" if len(values) > 1 else ""
+        if (whole := written.get("whole")) is not None:
+            parts.append(f"{_whole(p, value, written['error'], whole, unit)}{where}")
+            continue
+        percent = p.unit == "1" and not p.grid and p.typical < 1
         parts.append(f"{p.meaning} {_interval(value, written['error'], _unit(p.unit, unit), percent)}{where}")
     return f"size of {effect.spoken}: {'; '.join(parts)}" if parts else ""
+
+
+def _whole(parameter: Parameter, value: float, error: float, whole: dict[str, Any], unit: str) -> str:
+    """Return a share as the size that it stands for: a length, or readings of the places with least and most."""
+    meaning, low, high = parameter.meaning.split(" over ")[0].rstrip(","), whole["low"], whole["high"]
+    unit = _unit(whole["unit"], unit)
+    if high - low <= EQUAL * high:
+        return f"{meaning} {_interval(high * value, high * error, unit, False)}"
+    least, most = (plain_number(value * end, 3) for end in (low, high))
+    return f"{meaning} {least} to {most} {unit}, {_interval(value, error, '', True)} of {parameter.of}"
 
 
 def _unit(named: str, readings: str) -> str:

@@ -12,6 +12,7 @@ from tacdata.effects.effect import (
     Parameter,
     Placed,
     Scale,
+    Whole,
     library,
     load,
 )
@@ -28,6 +29,7 @@ __all__ = [
     "Parameter",
     "Placed",
     "Scale",
+    "Whole",
     "library",
     "load",
 ]

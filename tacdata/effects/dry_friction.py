@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tacdata.chain.memory import play, slipping
-from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values
+from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values, Whole
 
 FEW = 4
 """Most channels with a friction of their own size; more share the pattern of a load."""
@@ -28,7 +28,14 @@ class DryFriction(Effect):
     parameters = (
         Parameter("a", "1", "width of the loop over the largest load without it", 0.08, 0.0, 5.0),
         Parameter(
-            "w", "1", "way by which it turns, over the deepest press", 0.01, 0.0005, 0.1, grid=(0.004, 0.02, 0.06)
+            "w",
+            "1",
+            "way by which it turns, over the deepest press",
+            0.01,
+            0.0005,
+            0.1,
+            grid=(0.004, 0.02, 0.06),
+            of=Whole.DEEPEST,
         ),
     )
     at_rest = AtRest.STAYS
@@ -59,8 +66,19 @@ class SealFriction(DryFriction):
     )
     source = "Coulomb, behind an elastic way (Jenkins, J. Appl. Mech. 29, 1962, 457)"
     parameters = (
-        Parameter("F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
-        Parameter("w", "1", "way by which it turns, over half the stroke", 0.02, 0.001, 0.3, grid=(0.005, 0.02, 0.08)),
+        Parameter(
+            "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
+        ),
+        Parameter(
+            "w",
+            "1",
+            "way by which it turns, over half the stroke",
+            0.02,
+            0.001,
+            0.3,
+            grid=(0.005, 0.02, 0.08),
+            of=Whole.HALF_STROKE,
+        ),
     )
 
     def apply(self, state: State, values: Values) -> State:
@@ -86,9 +104,22 @@ class FrictionClearance(SealFriction):
     source = "Jenkins element with a gap; Coble et al., Dataset Friction Damper with Backlash (2022)"
     experiment = "strokes to three depths: after each reversal the force is zero over the same way"
     parameters = (
-        Parameter("F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
-        Parameter("b", "1", "clearance over half the stroke", 0.1, 0.005, 1.0, grid=(0.05, 0.14, 0.35)),
-        Parameter("w", "1", "way by which it rises, over half the stroke", 0.03, 0.001, 0.3, grid=(0.015, 0.05)),
+        Parameter(
+            "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
+        ),
+        Parameter(
+            "b", "1", "clearance over half the stroke", 0.1, 0.005, 1.0, grid=(0.05, 0.14, 0.35), of=Whole.HALF_STROKE
+        ),
+        Parameter(
+            "w",
+            "1",
+            "way by which it rises, over half the stroke",
+            0.03,
+            0.001,
+            0.3,
+            grid=(0.015, 0.05),
+            of=Whole.HALF_STROKE,
+        ),
     )
 
     def turn(self, state: State, values: Values) -> np.ndarray:
@@ -108,7 +139,9 @@ class EffortFriction(SealFriction):
     source = "Coulomb; the regulator of the position asks for the effort"
     experiment = "strokes at three rates with stops: the step at each start is the same, and over at each stop"
     parameters = (
-        Parameter("F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
+        Parameter(
+            "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
+        ),
         Parameter("c", "1", "rate by which it turns, over the largest", 0.05, 0.001, 1.0, grid=(0.02,)),
     )
 

@@ -56,6 +56,17 @@ type Values = dict[str, np.ndarray]
 """Value of every parameter, 0-d, or of shape (channels,) if it is ``per_channel``."""
 
 
+class Whole(StrEnum):
+    """Quantity of the recordings that a parameter may be a share of."""
+
+    DEEPEST = "the deepest press"
+    """Depth of the deepest press [mm]."""
+    HALF_STROKE = "half the stroke"
+    """Half the range of depths [mm]."""
+    RANGE = "the range of the readings"
+    """Range of the readings of a place [their unit]."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A number of an effect."""
@@ -78,6 +89,8 @@ class Parameter:
     """Values to try of a shape parameter; empty for an amplitude."""
     per_channel: bool = False
     """Whether it has a value for each channel."""
+    of: Whole | None = None
+    """Quantity that it is a share of; None for none."""
 
 
 class Family(StrEnum):

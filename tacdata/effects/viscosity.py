@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values
+from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values, Whole
 
 UNIT_RATE = 1.0
 """Rate at which the share is given [mm/s]."""
@@ -46,7 +46,16 @@ class Drag(Viscosity):
     source = "n = 1: a dashpot; n = 2: a fluid through an orifice"
     experiment = "strokes at three rates over a decade: the loop's height grows with the rate, and a stop ends it"
     parameters = (
-        Parameter("D", "1", "drag at full rate over the range of the readings", 0.1, -1.0, 1.0, per_channel=True),
+        Parameter(
+            "D",
+            "1",
+            "drag at full rate over the range of the readings",
+            0.1,
+            -1.0,
+            1.0,
+            per_channel=True,
+            of=Whole.RANGE,
+        ),
         Parameter("n", "1", "power of the rate", 1.0, 0.5, 2.0, grid=(1.0, 2.0)),
     )
 

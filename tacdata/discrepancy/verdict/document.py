@@ -9,17 +9,18 @@ import numpy as np
 import yaml
 
 from tacdata import provenance, schemas
-from tacdata.chain import Course
+from tacdata.chain import Course, predict
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.sufficiency import one_rate
 from tacdata.discrepancy.model.series_compliance import series_compliance
+from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.score_tests import DRAWS
 from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.discrepancy.verdict.residual_slices import Slice, beside, in_words, outstanding
 from tacdata.discrepancy.verdict.sealed import Gap
-from tacdata.effects import Family, load
+from tacdata.effects import Family, Whole, load
 
 Z90 = 1.645
 """Standard errors either way of a 90 % interval."""
@@ -73,7 +74,7 @@ def document(
         "version": schemas.version("verdict"),
         "status": decision.status,
         "why": reason_in_words(decision, findings, checks, gap),
-        "effects": [_effect(e) for e in decision.surest_first],
+        "effects": [_effect(e, findings.final.setting) for e in decision.surest_first],
         "gate": {
             "gap": findings.gap,
             "p": float(tests.p.min(initial=1.0)),
@@ -134,7 +135,7 @@ def located(parts: list[Slice], findings: Findings) -> list[str]:
     return in_words(parts, outliers, mean_square)
 
 
-def _effect(decided: Decided) -> dict[str, Any]:
+def _effect(decided: Decided, setting: Setting) -> dict[str, Any]:
     finding = decided.finding
     effect = finding.placed.effect
     parameters = {}
@@ -144,6 +145,8 @@ def _effect(decided: Decided) -> dict[str, Any]:
         entry: dict[str, Any] = {"value": value.tolist(), "unit": p.unit, "error": error}
         if error is not None and value.ndim == 0:
             entry["interval"] = [float(value) - Z90 * error, float(value) + Z90 * error]
+        if p.of is not None:
+            entry["whole"] = _whole(p.of, setting, int(np.argmax(np.abs(value))))
         parameters[p.name] = entry
     written = {
         "mechanism": effect.called,
@@ -177,6 +180,16 @@ def _effect(decided: Decided) -> dict[str, Any]:
             "spreads": {name: round(by, 4) for name, by in decided.beside.spreads.items()},
         }
     return written
+
+
+def _whole(of: Whole, setting: Setting, channel: int) -> dict[str, Any]:
+    """Return the least and the largest value of a quantity that a parameter is a share of, and its unit."""
+    course = setting.course
+    if of is Whole.RANGE:
+        swings = setting.response.swing(predict(course, setting.response, list(setting.given)).signal)[:, channel]
+        return {"low": float(swings.min()), "high": float(swings.max()), "unit": "reading"}
+    length = course.span if of is Whole.DEEPEST else 0.5 * course.stroke
+    return {"low": length, "high": length, "unit": "mm"}
 
 
 def _bounded(margins: dict[str, float]) -> dict[str, float]:

@@ -99,6 +99,18 @@ def test_the_head_has_size_interval_session_and_date():
     ]
 
 
+def test_friction_is_a_force_and_a_clearance_is_a_length():
+    rubs = {"value": [0.1, -0.4], "unit": "1", "error": 0.02, "whole": {"low": 2.0, "high": 3.0, "unit": "reading"}}
+    gap = {"value": 0.105, "unit": "1", "error": 0.002, "whole": {"low": 27.5, "high": 27.5, "unit": "mm"}}
+    entry = effect("friction_clearance") | {"parameters": {"F": rubs, "b": gap}}
+    heading = {"recordings": ["/data/monday"], "folder": "v", "recorded": "", "unit": "kip"}
+    head = in_text(document("named", [entry]) | {"heading": heading}).splitlines()[1]
+    assert head == (
+        "  size of dry friction: friction -0.8 to -1.2 kip, -40 % (90 %: -43.3 to -36.7) of the range of the readings "
+        "on the channel with most, of 2; clearance 2.89 mm (90 %: 2.8 to 2.98)"
+    )
+
+
 def test_the_first_sentence_has_thirty_words_and_an_unknown_verdict_two_hundred():
     clauses = [" ".join(["word"] * 12) for _ in range(40)]
     for between in ("; ", ". ", ", ", ": ", " "):
