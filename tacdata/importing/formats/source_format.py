@@ -53,7 +53,6 @@ CONVERSIONS = {
     ".h5": "in Python: h5py.File(name)[dataset][:], then numpy.savez(new_name, ...)",
     ".hdf5": "in Python: h5py.File(name)[dataset][:], then numpy.savez(new_name, ...)",
     ".tdms": "in LabVIEW or Excel: export it as .csv or .xlsx",
-    ".bag": "rosbags-convert --src name.bag --dst folder, then import the folder",
     **dict.fromkeys((".zip", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz", ".zst"), "unpack it, and import the folder"),
     ".sqlite": "in Python: pandas.read_sql(...).to_parquet(new_name)",
     ".pkl": "in Python: pandas.read_pickle(name).to_parquet(new_name)",

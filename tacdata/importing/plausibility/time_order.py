@@ -32,6 +32,8 @@ class OrderPolicy:
     """Fewest rows of a stretch, on average [rows]. Below it rows of several recordings alternate."""
     turned: float = 0.95
     """Smallest share of steps back in a file that begins with its last row [1]."""
+    leap_ns: int = 200 * 86_400_000_000_000
+    """Smallest step ahead that no measurement has: the clock was set [ns]."""
     coarse: float = 0.2
     """Largest share of rows that repeat a time [1]. Above it the clock is too coarse for them."""
 
@@ -43,6 +45,7 @@ TICKS = {1_000: "microseconds", 1_000_000: "milliseconds"}
 """Ticks that boards count, as micros() and millis() do [ns]."""
 COUNTED = 8
 """Width of the narrowest counter of rows [bit]."""
+SECONDS_OF_A_YEAR = 31_557_600.0
 DAY_NS = 86_400_000_000_000
 """After a day the seconds since midnight begin again, and after seven those of satellites [ns]."""
 
@@ -76,6 +79,8 @@ def time_order(time_ns: np.ndarray, where: str, *, tick_ns: float = 0.0, policy:
     rows = np.flatnonzero(time_ns != NEVER)
     times = time_ns[rows]
     notes = [f"{where}: {len(time_ns) - len(rows)} rows without a time are left out"] * (len(rows) < len(time_ns))
+    rows, times, words = _since_set(rows, times, policy)
+    notes += [f"{where}: {words}"] * bool(words)
     steps = np.diff(times)
     if len(steps) and (steps < 0).mean() > policy.turned:
         notes.append(f"{where}: its first row is the latest; the rows are turned")
@@ -116,6 +121,25 @@ def time_order(time_ns: np.ndarray, where: str, *, tick_ns: float = 0.0, policy:
             "of its own"
         )
     return TimeOrder(stretches, ordered, tuple(notes), back_words)
+
+
+def _since_set(rows: np.ndarray, time_ns: np.ndarray, policy: OrderPolicy) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return the rows of the larger side of a step by years, their times [ns], and the others in words.
+
+    A clock that begins at 1970 or 2000 is set later, in the middle of a log.
+    """
+    leaps = np.flatnonzero(np.diff(time_ns) > policy.leap_ns) + 1
+    if len(leaps) != 1:
+        return rows, time_ns, ""
+    cut = int(leaps[0])
+    before = 2 * cut <= len(rows)
+    years = float(time_ns[cut] - time_ns[cut - 1]) / 1e9 / SECONDS_OF_A_YEAR
+    kept = slice(cut, None) if before else slice(cut)
+    words = (
+        f"time goes ahead by {years:.3g} years in row {int(rows[cut]) + 1}, as of a clock that is set: the "
+        f"{cut if before else len(rows) - cut} rows {'before' if before else 'from there on'} are left out"
+    )
+    return rows[kept], time_ns[kept], words
 
 
 def _step_back(rows: np.ndarray, time_ns: np.ndarray, cut: int) -> str:

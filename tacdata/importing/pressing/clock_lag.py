@@ -21,6 +21,8 @@ class LagPolicy:
     """Parts of a recording in each of which the lag is found [count]."""
     rows: int = 50
     """Fewest rows of a part [rows]."""
+    sparse: float = 20.0
+    """Largest ratio of a recording's length to that of its rows without gaps [1]."""
     largest: float = 5.0
     """Largest lag that is looked for [s]."""
     share: float = 0.25
@@ -62,6 +64,8 @@ def lag_doubts(taxels: Stream, position: Stream, policy: LagPolicy = POLICY) -> 
     step = max(float(np.median(np.diff(stream.time_ns))) for stream in (taxels, position))
     if step <= 0 or (end - begin) / step < policy.rows:
         return ()
+    if (end - begin) / step > policy.sparse * min(len(taxels.time_ns), len(position.time_ns)):
+        return ()  # a gap, as of a clock that jumps, would fill the memory
     grid = np.arange(begin, end, step)
     path = position.values[:, int(np.argmax(np.ptp(position.values, axis=0)))]
     path = np.interp(grid, position.time_ns, path)

@@ -24,6 +24,8 @@ class PathPolicy:
     """Smallest jump of a dropout [path's range]."""
     faster: float = 5.0
     """Smallest ratio of its steps to those of the path elsewhere [1]."""
+    unanswered: float = 2.0
+    """The same of a jump to which no reading answers, for speeds [1]."""
     rare: float = 0.02
     """Largest share of rows in dropouts [1]. Above it they are taps of the machine."""
     ramps: float = 0.3
@@ -75,7 +77,7 @@ def without_faults(streams: ImportedStreams, policy: PathPolicy = POLICY) -> Imp
             "{trusted: true} keeps them and bridges the gaps)"
         )
         taxels = taxels.chosen(np.flatnonzero(~inside))
-    doubts += _jumps(position, policy)
+    doubts += _jumps(position, taxels, policy)
     return replace(streams, position=position, taxels=taxels, doubts=(*streams.doubts, *doubts))
 
 
@@ -181,6 +183,15 @@ def _followed(position: Stream, taxels: Stream, begin: int, end: int, policy: Pa
     return bool(change > _least(taxels, policy))
 
 
+def _answered(position: Stream, taxels: Stream, row: int, policy: PathPolicy) -> bool:
+    """Return whether the readings change from a row of the path to the next."""
+    ends = position.time_ns[row : row + 2]
+    if ends[0] < taxels.time_ns[0] or ends[1] > taxels.time_ns[-1]:
+        return True
+    before, after = _readings_at(taxels, ends)
+    return bool(np.linalg.norm(np.nan_to_num(after - before)) > _least(taxels, policy))
+
+
 def _least(taxels: Stream, policy: PathPolicy) -> float:
     """Return the smallest change of the readings that is an answer [their unit]."""
     noise = np.nanmedian(np.abs(np.diff(taxels.values, axis=0)), axis=0)
@@ -216,7 +227,7 @@ def _in_gaps(position: Stream, taxels: Stream, update_ns: float, policy: PathPol
     return inside, gaps
 
 
-def _jumps(position: Stream, policy: PathPolicy) -> list[str]:
+def _jumps(position: Stream, taxels: Stream, policy: PathPolicy) -> list[str]:
     """Return a doubt about steps that are faster than the machine and do not come back; [] for a set point."""
     spans = np.diff(position.time_ns)
     near = spans <= policy.gap * np.median(spans)
@@ -225,7 +236,11 @@ def _jumps(position: Stream, policy: PathPolicy) -> list[str]:
     if len(moving) < 10 or not _in_ramps(steps, np.zeros(len(position.values), dtype=bool), policy):
         return []
     limit = max(policy.share * _span(position.values), policy.faster * float(moving[int(0.95 * len(moving))]))
-    sharp = np.flatnonzero(steps > limit)
+    speeds = steps / np.maximum(spans, 1)
+    usual = float(np.quantile(speeds[steps > 0], 0.95))
+    slips = np.flatnonzero((steps > policy.share * _span(position.values)) & (speeds > policy.unanswered * usual))
+    slips = [row for row in slips.tolist() if not _answered(position, taxels, row, policy)]
+    sharp = np.union1d(np.flatnonzero(steps > limit), slips).astype(int)
     if not len(sharp) or len(sharp) > max(policy.rare * len(steps), 1):
         return []
     row = int(sharp[0])

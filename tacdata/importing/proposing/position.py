@@ -113,9 +113,9 @@ def _turned(
         questions.append(Question(text, "contact"))
     if "trial" not in kind.roles and motion.pause:
         proposed = replace(proposed, trials=TrialRule(gap=motion.pause))
-        pause = f"{motion.pauses} pauses of more than {motion.pause:g} s"
+        pause = f"{motion.pauses} pause{'s' * (motion.pauses > 1)} of more than {motion.pause:g} s"
         questions.append(Question(f"{pause}: each is taken for the end of a trial", "trials"))
-    elif "trial" not in kind.roles and motion.strokes > 1 and is_depth:
+    elif "trial" not in kind.roles and motion.strokes > 1:
         above = f"{motion.above * _in_mm(kind.table, name, axis):.2g}"
         proposed = replace(proposed, trials=TrialRule(press_above=float(above)))
         stretches = f"each stretch deeper than {above} mm is taken for a trial"
