@@ -40,7 +40,6 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
 
     from tacdata import documents
     from tacdata.importing.formats.source_format import read_table
-    from tacdata.importing.mapping import ReadOptions
     from tacdata.indenters import from_document
     from tacdata.plans import read_plan
     from tacdata.recording.files.reader import read_recording
@@ -76,6 +75,9 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
 
     parquet.write_table(pa.table(columns), folder / "a.parquet")
     feather.write_feather(pa.table(columns), folder / "a.feather")
+    with pa.ipc.new_stream(folder / "a.arrow", pa.table(columns).schema) as stream:
+        stream.write_table(pa.table(columns))
+    found["arrow"] = (folder / "a.arrow").read_bytes(), ".arrow", table
     found["parquet"] = (folder / "a.parquet").read_bytes(), ".parquet", table
     found["feather"] = (folder / "a.feather").read_bytes(), ".feather", table
     from openpyxl import Workbook
@@ -123,13 +125,53 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
 
     found["urdf"] = urdf.encode(), ".urdf", robot
     found["mcap"] = _recording(folder), ".mcap", read_recording
-    for ending in (".mcap", ".db3"):
+    found["mcap.json"] = _json_log(), ".mcap", topic_of("/board")
+    for part in ("zarr.json", "c/0"):
+        store = _store(folder / f"whole_{part.partition('.')[0].replace('/', '')}.zarr", columns)
 
-        def topic(path: Path) -> object:
-            return read_table(path, ReadOptions(table="/taxels"))
+        def array(path: Path, place: Path = store / "cap0" / part, store: Path = store) -> object:
+            place.write_bytes(path.read_bytes())
+            return read_table(store)
 
-        found[f"bag{ending}"] = _bag(folder, ending), ending, topic
+        found[f"zarr {part}"] = (store / "cap0" / part).read_bytes(), "." + part.rpartition(".")[2].strip("c/0"), array
+    for ending in (".mcap", ".db3", ".bag"):
+        found[f"bag{ending}"] = _bag(folder, ending), ending, topic_of("/taxels")
     return found
+
+
+def topic_of(name: str) -> Callable[[Path], object]:
+    """Return a reader of one topic of a bag."""
+    from tacdata.importing.formats.source_format import read_table
+    from tacdata.importing.mapping import ReadOptions
+
+    return lambda path: read_table(path, ReadOptions(table=name))
+
+
+def _json_log() -> bytes:
+    """Return an MCAP file of another writer, with messages in JSON."""
+    from mcap.writer import Writer
+
+    stream = io.BytesIO()
+    writer = Writer(stream, chunk_size=1024)
+    writer.start(profile="", library="lab")
+    schema = writer.register_schema("board", "jsonschema", b"{}")
+    channel = writer.register_channel("/board", "json", schema)
+    for number in range(100):
+        time_ns = 10**18 + number * 10**7
+        content = json.dumps({"stamp": {"sec": number, "nsec": 5}, "c": [float(number), 1.0]}).encode()
+        writer.add_message(channel, log_time=time_ns, publish_time=time_ns, data=content)
+    writer.finish()
+    return stream.getvalue()
+
+
+def _store(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    """Write a Zarr store of some columns, one chunk each."""
+    import zarr
+
+    group = zarr.open_group(str(path), mode="w")
+    for name, values in columns.items():
+        group.create_array(name, data=values, chunks=(len(values),))
+    return path
 
 
 def _press_table() -> bytes:
@@ -167,21 +209,24 @@ def _stop(*_: object) -> None:
 
 
 def _bag(folder: Path, ending: str) -> bytes:
-    """Return a bag of ROS 2 with one topic of readings."""
+    """Return a bag of ROS 2, or 1 for .bag, with one topic of readings."""
+    from rosbags.rosbag1 import Writer as First
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
-    types = get_typestore(Stores.ROS2_HUMBLE)
+    first = ending == ".bag"
+    types = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
     floats = types.types["std_msgs/msg/Float32MultiArray"]
     layout = types.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
     plugin = StoragePlugin.MCAP if ending == ".mcap" else StoragePlugin.SQLITE3
-    bag = folder / f"bag{ending[1:]}"
-    with Writer(bag, version=9, storage_plugin=plugin) as writer:
+    bag = folder / (f"whole{ending}" if first else f"bag{ending[1:]}")
+    pack = types.serialize_ros1 if first else types.serialize_cdr
+    with First(bag) if first else Writer(bag, version=9, storage_plugin=plugin) as writer:
         connection = writer.add_connection("/taxels", floats.__msgtype__, typestore=types)
         for number in range(100):
             message = floats(layout=layout, data=np.arange(6, dtype=np.float32) + number)
-            writer.write(connection, 10**18 + number * 10**7, types.serialize_cdr(message, floats.__msgtype__))
-    return next(bag.glob(f"*{ending}")).read_bytes()
+            writer.write(connection, 10**18 + number * 10**7, pack(message, floats.__msgtype__))
+    return bag.read_bytes() if first else next(bag.glob(f"*{ending}")).read_bytes()
 
 
 def _recording(folder: Path) -> bytes:

@@ -169,7 +169,7 @@ def table_in_markdown(folder: Path) -> None:
 
 @measured(5, told="another number of columns|left out|column")
 def touching_columns(folder: Path) -> None:
-    """Columns of a fixed width whose wide numbers touch (-10.00000-11.00000): rows refused or counted, no shifted column."""
+    """Columns of a fixed width whose wide numbers touch (-10.00000-11.00000): refused or counted, none shifted."""
     rows = presses() * [1, 1, -1, -1]
     lines = ["        t    depth        c0        c1",
              *("".join(f"{v:10.5f}" if k < 2 else f"{v:9.5f}" for k, v in enumerate(r)) for r in rows)]  # fmt: skip

@@ -88,7 +88,7 @@ def appended_log(folder: Path) -> None:
     rows = presses()
     cells = texts(rows[:200])
     rows[200:, 0] -= rows[200, 0]
-    write(folder, cells + [list(NAMES)] + texts(rows[200:]))
+    write(folder, [*cells, list(NAMES), *texts(rows[200:])])
 
 
 @measured(1)
@@ -104,7 +104,7 @@ def two_times(folder: Path) -> None:
 def two_boards(folder: Path) -> None:
     """Two boards write into one table; the second one's clock is 300 s behind: split, told or refused."""
     rows = presses()
-    cells = [row for pair in zip(texts(rows + [300, 0, 0, 0]), texts(rows), strict=True) for row in pair]
+    cells = [row for pair in zip(texts(np.add(rows, [300, 0, 0, 0])), texts(rows), strict=True) for row in pair]
     write(folder, [[*row, "AB"[k % 2]] for k, row in enumerate(cells)], (*NAMES, "board"))
 
 

@@ -53,7 +53,7 @@ def fill_of_masks(folder: Path) -> None:
 
 @measured(3, told="scale_factor|packed|attribute")
 def packed_store(folder: Path) -> None:
-    """A store's packed integers with scale_factor, add_offset and _FillValue (xarray): 10 to 11.2 pF, told or refused."""
+    """A store's packed integers with scale_factor, add_offset and _FillValue (xarray): 10 to 11.2 pF, or told."""
     import zarr
 
     rows = presses()

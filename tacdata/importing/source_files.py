@@ -302,7 +302,7 @@ def _matches(source: Path, pattern: str) -> list[Hit]:
     for path in files_below(source):
         if match := re.fullmatch(regex, composed(path.relative_to(source).as_posix())):
             hits.append((match.groupdict(), path))
-    return sorted(hits, key=lambda item: [_natural(value) for value in item[0].values()])
+    return sorted(hits, key=lambda item: [natural(value) for value in (*item[0].values(), item[1].as_posix())])
 
 
 def _regex(pattern: str) -> str:
@@ -325,7 +325,8 @@ def _regex(pattern: str) -> str:
     return "".join(re.sub(r"^(\*\*/|\*|\{\w+\})$", part, t) if k % 2 else re.escape(t) for k, t in enumerate(tokens))
 
 
-def _natural(text: str) -> list[tuple[int, int, str]]:
+def natural(text: str) -> list[tuple[int, int, str]]:
+    """Return the key by which names are sorted with their numbers by size."""
     return [(1, int(t), "") if t.isdigit() else (0, 0, t) for t in re.split(r"(\d+)", text) if t]
 
 

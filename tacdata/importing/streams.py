@@ -18,6 +18,9 @@ from tacdata.importing.source_table import INNER, SourceTable, axis, numbers, se
 from tacdata.importing.times import NEVER, future, times
 from tacdata.importing.units import factor, quantity_of, split_unit
 
+OTHERS = 0.3
+"""Share of rows without any value of a stream from which they are rows of other streams [1]."""
+
 
 @dataclass(frozen=True)
 class Stream:
@@ -151,11 +154,16 @@ def _timed(
         doubts = (*lost, *doubts)
     doubts = (*doubts, *future(time_ns, where)) if zero == "unix" else doubts
     zero = "aligned" if clock.offset is not None else f"own: {entry.file}" if zero == "own" else zero
+    time_ns, others = _without_others(time_ns, values)
     order = time_order(time_ns, where, tick_ns=tick_ns)
+    if others:
+        order = replace(order, notes=tuple(note for note in order.notes if "without a time" not in note))
     stretches = []
     for rows in order.stretches:
         apart_ns, shared = spread(order.time_ns[rows] + clock.offset_ns)
         notes = [*table.notes]
+        if others:
+            notes.append(f"{name}: {others} rows have no value of it and one time each: they are of other streams")
         if shared:
             notes.append(
                 f"{name}: {shared} of {len(rows)} rows have the time of the row before; they are spread evenly up to "
@@ -176,6 +184,15 @@ def _timed(
             )
         )
     return stretches
+
+
+def _without_others(time_ns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return times [ns] without those of rows of other streams in one table, and how many these are."""
+    empty = np.isnan(values).all(axis=1)
+    if not OTHERS < empty.mean() < 1:
+        return time_ns, 0
+    timed = int((empty & (time_ns != NEVER)).sum())
+    return np.where(empty, NEVER, time_ns), timed
 
 
 def _clock_name(clock: SourceClock) -> str:

@@ -13,6 +13,7 @@ from tacdata.importing.mapping import SourceClock
 from tacdata.importing.source_table import SourceTable, single, unit_of
 from tacdata.importing.text.layout import THOUSANDS
 from tacdata.importing.text.months import in_english
+from tacdata.importing.text.times_of_day import DAY, digits_of_day, times_of_day
 from tacdata.importing.units import FACTORS, clock_unit, factor, plain
 
 YEAR_2000, YEAR_2100 = 946_684_800.0, 4_102_444_800.0
@@ -21,8 +22,6 @@ SINCE_1904 = 2_082_844_800.0
 """From LabVIEW's zero to that of Unix [s]."""
 DAY_ZERO = {"datenum": 719_529.0, "excel": 25_569.0}
 """Clocks that count days: the day on which 1970 begins, in MATLAB's datenum and in Excel's serial time [d]."""
-DAY = 86_400.0
-"""Length of a day [s]."""
 FASTEST = 100_000.0
 """Rows a second above which times are no times of a tactile sensor [Hz]: the unit is another one."""
 FASTEST_UNSAID, FASTEST_DATE, SLOWEST_UNSAID = 5000.0, 500.0, 1.0
@@ -59,13 +58,15 @@ def times(table: SourceTable, clock: SourceClock, where: str) -> tuple[np.ndarra
         clock = replace(clock, zero=clock.zero or "own", unit=f"1/{clock.rate:.12g} s")
     unit = plain(unit_of(table, name, where, clock.unit) or clock_unit(name))
     values = table.column(name)
-    if values.dtype == object and (clocked := _times_of_day(values)) is not None:
+    if values.dtype == object and (clocked := times_of_day(values)) is not None:
         return _shifted(clocked, clock), clock.zero or "shared"
     if values.dtype == object or unit == "datetime":
         return _shifted_ns(_datetimes(values, clock.format, f"{where}: {name}"), clock), "unix"
     if unit in DAY_ZERO:
         return _of_days(values, unit, clock), clock.zero or "unix"
     if unit.lower() in NO_UNIT:
+        if (clocked := digits_of_day(values)) is not None:
+            return _shifted(clocked, clock), clock.zero or "shared"
         unit = _guessed(values)
         _refuse_unsaid(values, unit, f"{where}: {name}")
     scale = factor(unit, "s", f"{where}: {name}")
@@ -212,48 +213,6 @@ def _refuse_fast(values: np.ndarray, unit: str, scale: float, where: str) -> Non
 def _steps(values: np.ndarray) -> np.ndarray:
     steps = np.diff(values.astype(float))
     return steps[np.isfinite(steps) & (steps > 0)]
-
-
-def _times_of_day(values: np.ndarray) -> np.ndarray | None:
-    """Return seconds since the first midnight [s], shape (n,), of texts like 12:34:56.789; None for other texts.
-
-    Excel shows times as 34:56.7 and begins again every hour: seconds are then counted from the first one.
-    """
-    texts = [str(text).strip() for text in values.tolist() if text is not None]
-    if any(re.fullmatch(DURATION, text) for text in texts) and all(
-        re.fullmatch(r"-?\d+:\d{2}:\d{2}.*", t) for t in texts
-    ):
-        return np.array([np.nan if text is None else _duration(str(text)) for text in values.tolist()])
-    forms = {
-        r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?": 86_400,
-        r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?\s*[AaPp]\.?[Mm]\.?": 86_400,
-        r"\d{1,2}:\d{2}[.,]\d+": 3600,
-    }
-    turn = next((turn for form, turn in forms.items() if all(re.fullmatch(form, text) for text in texts)), 0)
-    if not texts or not turn:
-        return None
-    seconds = np.full(len(values), np.nan)
-    for row, text in enumerate(values.tolist()):
-        if text is not None:
-            digits = str(text).strip().rstrip(" .AaMmPp")
-            half = str(text).strip()[len(digits) :].lstrip()
-            *hours, minutes, tail = digits.replace(",", ".").split(":")
-            hour = int(hours[0] if hours else 0)
-            hour = hour % 12 + 12 * (half[0] in "Pp") if half else hour
-            seconds[row] = 3600 * hour + 60 * int(minutes) + float(tail)
-    # A fall by more than half a turn is midnight (or the hour); a smaller one is a row out of order.
-    back = np.diff(seconds, prepend=seconds[0]) < -turn / 2
-    return seconds + turn * np.cumsum(back)
-
-
-DURATION = r"-\d+:\d{2}:\d{2}([.,]\d+)?|(2[4-9]|[3-9]\d|\d{3,}):\d{2}:\d{2}([.,]\d+)?"
-"""A time since a start and no time of day: with a sign, or of more than 24 hours."""
-
-
-def _duration(text: str) -> float:
-    hours, minutes, seconds = text.strip().replace(",", ".").lstrip("-").split(":")
-    size = 3600 * int(hours) + 60 * int(minutes) + float(seconds)
-    return -size if text.strip().startswith("-") else size
 
 
 DATES = (

@@ -134,9 +134,14 @@ PREFIXES = "fpnumkMG"
 """Letters before a unit that make it larger or smaller."""
 
 
+INCH = dict.fromkeys(('"', "\u2033", "\u201d", "''"), "in")
+"""Signs of inches."""
+
+
 def plain(unit: str) -> str:
     """Return a unit's name in ASCII, as the tables have it."""
-    name = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg").rstrip(".")
+    name = unit.strip().removeprefix("\u00c2")  # UTF-8 that was read as Latin-1
+    name = INCH.get(name, name).replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0", "deg").rstrip(".")
     return SPELLED.get(name.lower(), name)
 
 

@@ -37,6 +37,8 @@ TAIL, FEWEST = 16 * 1024, 20
 """Bytes and rows at a file's end from which a truncated number is recognized."""
 UNREADABLE = 0.01
 """Largest share of a column's cells that hold no number and are missing [1]; above it the file is refused."""
+WORDS, OF_WORDS = 5, 0.05
+"""Most different words that may stand for no value, and the largest share of their cells [1]."""
 SNIFFED, HEAD = 256 * 1024, 4096
 """Bytes from which the layout is recognized; among which a header's cells may hold line breaks."""
 STATED_RATE = re.compile(
@@ -363,7 +365,9 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path,
     grouped = next((row for row in wrong if THOUSANDS.fullmatch((texts[row] or "").strip())), None)
     row = wrong[0] if grouped is None else grouped
     cell = repr((texts[row] or "").strip()[:SHOWN])
-    if grouped is not None or len(wrong) > UNREADABLE * len(texts):
+    words = {(texts[row] or "").strip() for row in wrong}
+    share = OF_WORDS if len(words) <= WORDS else UNREADABLE
+    if grouped is not None or len(wrong) > share * len(texts):
         raise FormatError(
             f"{path}: column {name}, row {row + 1} of the data: {cell}",
             f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,10 @@ from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
 LINES = (".jsonl", ".ndjson")
+BROKEN = 0.01
+"""Largest share of lines that are no JSON and are left out [1]."""
+MOST_FIELDS = 4096
+"""A longer list holds rows, and no description of fields."""
 FEWEST = 10
 """Fewer rows are settings, and no recording."""
 
@@ -28,7 +33,8 @@ class Json(SourceFormat):
         """Read the lists that have rows. See the base."""
         text = path.read_text(encoding="utf-8-sig")
         by_line = path.suffix.lower() in LINES
-        content = _by_line(path, text) if by_line else json.loads(text)
+        doubts: list[str] = []
+        content = _by_line(path, text, doubts) if by_line else json.loads(text)
         arrays = {name: _array(values) for name, values in _lists(content).items()}
         table = rows_of(path, arrays, options)
         if table.rows < FEWEST:
@@ -37,22 +43,43 @@ class Json(SourceFormat):
                 "lists of as many values, or rows",
                 "leave it out, or save what was recorded as a table",
             )
-        return table
+        stated = _units(content)
+        units = {name: unit for name in table.columns if (unit := stated.get(name.rpartition(".")[2]))}
+        return replace(table, units={**units, **table.units}, doubts=tuple(doubts))
 
 
-def _by_line(path: Path, text: str) -> list[Any]:
-    """Return the value of each line."""
-    rows = []
-    for number, line in enumerate(text.splitlines(), 1):
+def _by_line(path: Path, text: str, doubts: list[str]) -> list[Any]:
+    """Return the value of each line. Few lines that are cut off are left out and counted in ``doubts``."""
+    rows, broken = [], []
+    lines = text.splitlines()
+    for number, line in enumerate(lines, 1):
         try:
             rows += [json.loads(line)] if line.strip() else []
-        except json.JSONDecodeError as error:
-            raise FormatError(
-                f"{path}, line {number}: no JSON ({line[:40]})",
-                "a value a line",
-                "take that line out of a copy, as a recording that broke off leaves one, and import the copy",
-            ) from error
+        except json.JSONDecodeError:
+            broken.append(number)
+    if len(broken) > max(BROKEN * len(lines), 1):
+        raise FormatError(
+            f"{path}: {len(broken)} of {len(lines)} lines are no JSON, first line {broken[0]} "
+            f"({lines[broken[0] - 1][:40]})",
+            "a value a line",
+            "correct a copy, and import the copy",
+        )
+    if broken:
+        cut = f"{len(broken)} line{'s are' if len(broken) > 1 else ' is'} cut off or no JSON"
+        doubts.append(f"{path.name}: {cut}, first line {broken[0]}: left out")
     return rows
+
+
+def _units(value: Any) -> dict[str, str]:
+    """Return the units of fields by name that a schema in the file states, as of a table with a schema."""
+    if isinstance(value, dict):
+        name, unit = value.get("name"), value.get("unit") or value.get("units")
+        if isinstance(name, str) and isinstance(unit, str):
+            return {name: unit}
+        return {name: unit for part in value.values() for name, unit in _units(part).items()}
+    if isinstance(value, list) and len(value) < MOST_FIELDS:
+        return {name: unit for part in value for name, unit in _units(part).items()}
+    return {}
 
 
 def _lists(value: Any, name: str = "") -> dict[str, list[Any]]:

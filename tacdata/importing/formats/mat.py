@@ -92,6 +92,8 @@ def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
     """Return the arrays of a variable by name; the names of other contents are added to ``lost``."""
     if isinstance(value, dict):
         fields: dict[str, np.ndarray] = {}
+        if signals := _signals(value):
+            return {f"{name}.{key}" if name else key: array for key, array in signals.items()}
         for key, inner in value.items():
             fields |= _flatten(f"{name}.{key}" if name else key, inner, lost)
         return fields
@@ -105,6 +107,25 @@ def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
         return {name or "array": array}
     lost.append(name or "array")
     return {}
+
+
+def _signals(value: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Return the signals of Simulink's structure with time by their labels; {} of another structure."""
+    signals = value.get("signals")
+    signals = (
+        [signals] if isinstance(signals, dict) else list(signals) if isinstance(signals, list | np.ndarray) else []
+    )
+    time = np.atleast_1d(np.squeeze(np.asarray(value.get("time", ()))))
+    if not signals or not all(isinstance(each, dict) and "values" in each for each in signals) or time.ndim > 1:
+        return {}
+    arrays = {"time": time}
+    for number, each in enumerate(signals):
+        values, label = np.asarray(each["values"]), each.get("label")
+        if len(np.atleast_1d(values)) != len(time) or values.dtype.kind not in "biuf":
+            return {}
+        key = label if isinstance(label, str) and label and label not in arrays else f"signal{number}"
+        arrays[key] = values
+    return arrays
 
 
 def _are_columns(value: Any) -> bool:

@@ -82,6 +82,10 @@ def _upright(
     """Return arrays with time as their first axis, by the mapping or the shape of a lone array; and a note."""
     if options.transpose is not None:
         return {name: array.T if options.transpose and array.ndim == 2 else array for name, array in arrays.items()}, []
+    if lying := _lying(arrays):
+        shapes = ", ".join(f"{name} {' x '.join(map(str, array.shape))}" for name, array in arrays.items())
+        words = "the second axis is taken for time (transpose: false under the file takes the first)"
+        return lying, [f"{path.name}: {shapes} values; {words}"]
     lone = next(iter(arrays.values())) if len(arrays) == 1 else None
     if lone is None or lone.ndim != 2 or lone.dtype.names or lone.shape[1] <= LONG * lone.shape[0]:
         return arrays, []
@@ -90,6 +94,15 @@ def _upright(
     shape = " x ".join(map(str, lone.shape))
     words = "its second axis is taken for time (transpose: false under the file takes the first)"
     return dict.fromkeys(arrays, lone.T), [f"{path.name}: {shape} values; {words}"]
+
+
+def _lying(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return arrays turned, if all of them lie: few rows of one great length; {} if they do not."""
+    tables = {name: array for name, array in arrays.items() if array.ndim == 2 and min(array.shape) > 1}
+    lengths = {array.shape[1] for array in tables.values()}
+    if len(tables) < 2 or len(lengths) > 1 or any(len(a) * LONG > a.shape[1] or a.dtype.names for a in tables.values()):
+        return {}
+    return {name: array.T if name in tables else array for name, array in arrays.items()}
 
 
 def _flat(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -12,19 +12,24 @@ from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
+IN_FILE, FIRST = b"ARROW1", b"FEA1"
+"""First bytes of Arrow's file format and of the first Feather; its stream format has none."""
+
 
 class Parquet(SourceFormat):
     """Columns of an Arrow table; a list column becomes a table of its own."""
 
-    endings = (".parquet", ".feather")
+    endings = (".parquet", ".feather", ".arrow", ".ipc")
 
     def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read all columns; nulls become NaN. See the base."""
         import pyarrow as pa
         from pyarrow import feather, parquet
 
-        if path.suffix == ".feather":
-            table = feather.read_table(path)
+        if path.suffix != ".parquet":
+            with path.open("rb") as stream:
+                in_file = stream.read(len(IN_FILE)).startswith((IN_FILE, FIRST))
+            table = feather.read_table(path) if in_file else pa.ipc.open_stream(path).read_all()
         else:
             file = parquet.ParquetFile(path)
             # Every value takes the 8 bytes of a float64.
@@ -44,9 +49,10 @@ class Parquet(SourceFormat):
         notes: list[str] = []
         columns = {name: _column(table.column(k), f"{path.name}: {name}", notes) for k, name in enumerate(names)}
         units = {
-            field.name: field.metadata[b"unit"].decode()
+            field.name: field.metadata[key].decode()
             for field in table.schema
-            if field.metadata and b"unit" in field.metadata
+            for key in (b"unit", b"units")
+            if field.metadata and key in field.metadata
         }
         typed = {field.name: str(field.type.unit) for field in table.schema if pa.types.is_duration(field.type)}
         typed |= {field.name: "ns" for field in table.schema if pa.types.is_timestamp(field.type)}

@@ -19,6 +19,7 @@ from tacdata import registry
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
+from tacdata.importing.text.written_numbers import with_numbers
 
 AUTOMATIC = ReadOptions()
 """Options of a file that is read as it is recognized."""
@@ -95,7 +96,7 @@ def read_table(path: Path, options: ReadOptions = AUTOMATIC) -> SourceTable:
         table: SourceTable = kind.read(path, options)
     if not table.rows:
         raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
-    return table
+    return with_numbers(table)
 
 
 def tables_in(path: Path) -> tuple[str, ...]:
@@ -108,9 +109,29 @@ def tables_in(path: Path) -> tuple[str, ...]:
 def _kind(path: Path, options: ReadOptions) -> tuple[SourceFormat, str]:
     if not path.exists():
         raise UsageError(f"no file {path}", "a file of measured data", "check the path and the mapping's files")
+    if path.is_file():
+        _refuse_stand_in(path)
     name = options.format or _by_ending(path)
     kind: type[Any] = registry.load(ROOM, BASE, name, SourceFormat)
     return kind(), name
+
+
+def _refuse_stand_in(path: Path) -> None:
+    """Refuse a file that stands for the data and does not hold them.
+
+    Raises:
+        FormatError: Naming what it is.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(256).lstrip(b"\xef\xbb\xbf \r\n\t").lower()
+    if head.startswith(b"version https://git-lfs"):
+        raise FormatError(f"{path} is a pointer of Git LFS", "the file that it points to", "run: git lfs pull")
+    if path.suffix.lower() != ".xls" and head.startswith((b"<!doctype html", b"<html")):
+        raise FormatError(
+            f"{path} is a page of HTML, as of a log-in",
+            "a file of measured data",
+            "open it in a browser, and download the file again",
+        )
 
 
 def refuse_growth(path: Path, size: float, largest: int = LARGEST) -> None:

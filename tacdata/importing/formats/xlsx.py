@@ -19,12 +19,15 @@ from tacdata.importing.formats.csv import table_of
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth, zipped_size
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
+from tacdata.importing.units import OTHERS, plain, quantity_of
 
 TABS = ReadOptions(delimiter="tab", decimal=".")
 MERGED = re.compile(rb'<(?:\w+:)?mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
 HIDDEN = re.compile(rb'<(?:\w+:)?row [^>]*hidden="(?:1|true)"[^>]*>')
 NUMBERED = re.compile(rb'\br="(\d+)"')
 """How a sheet marks merged ranges, hidden rows and the number of a row."""
+SHOWN_UNIT = re.compile(r'[0#?]\\? ?"([^"]+)"')
+"""A text behind the digits of a number format."""
 MOST_MARKED = 300_000_000
 """Largest sheet whose marks are read [byte]."""
 LARGEST_SHEETS = 32 * 1024 * 1024
@@ -86,17 +89,20 @@ def _first_table(path: Path, book: Any, options: ReadOptions) -> tuple[SourceTab
         if text := _as_text(sheet, _marks(path, sheet), notes[sheet.title]):
             sheets[sheet.title] = text
     hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != sheet_name]
-    for name, data in sheets.items():
+    for name, data, decimal in [(name, data, decimal) for decimal in ".," for name, data in sheets.items()]:
         try:
+            formats = _units_of_formats(book[name])
             table = table_of(
                 path,
                 data,
-                replace(options, delimiter=TABS.delimiter, decimal=TABS.decimal),
+                replace(options, delimiter=TABS.delimiter, decimal=decimal),
                 [f"{path.name}: {note}" for note in notes[name]],
             )
         except FormatError as error:
             refused = refused or error
             continue
+        units = {name: unit for name, unit in zip(table.columns, formats, strict=False) if unit}
+        table = replace(table, units={**units, **table.units})
         return table, name, [*(title for title in sheets if title != name), *(f"{title} (hidden)" for title in hidden)]
     raise FormatError(
         f"{path}: no sheet with rows of numbers ({', '.join(sheets)})" if refused else f"{path} holds no rows",
@@ -128,6 +134,19 @@ def _marks(path: Path, sheet: Any) -> _Marks:
         merged.append((int(top) - 1, int(bottom) - 1, _column_number(left), _column_number(right)))
     rows = (NUMBERED.search(match[0]) for match in HIDDEN.finditer(text))
     return _Marks(tuple(merged), frozenset(int(match[1]) - 1 for match in rows if match))
+
+
+def _units_of_formats(sheet: Any) -> list[str]:
+    """Return the unit that the number format of each column shows behind its numbers, as 0.0" um" does; "" for none."""
+    units: list[str] = []
+    for row in sheet.iter_rows(max_row=HEAD):
+        for number, cell in enumerate(row):
+            units += [""] * (number + 1 - len(units))
+            if isinstance(cell.value, int | float) and (match := SHOWN_UNIT.search(str(cell.number_format))):
+                unit = match[1].strip()
+                if quantity_of(unit) or plain(unit).lower() in OTHERS:
+                    units[number] = plain(unit)
+    return units
 
 
 def _column_number(letters: str) -> int:

@@ -43,6 +43,7 @@ class Zarr(SourceFormat):
             raise FormatError(f"{path} is no folder", "a folder with arrays", "unpack it, or give another ending")
         arrays: dict[str, np.ndarray] = {}
         notes: list[str] = []
+        units: dict[str, str] = {}
         for folder in _arrays(path):
             name = folder.relative_to(path).as_posix()
             array = zarr.open_array(str(folder), mode="r")
@@ -56,6 +57,8 @@ class Zarr(SourceFormat):
             if array.nchunks > array.nchunks_initialized:
                 values, words = _without_lost(array, folder, values)
                 notes.append(f"{path.name}: {name}: {words}")
+            values, unit = _by_attributes(values, dict(array.attrs))
+            units |= {name.removeprefix("data/"): unit} if unit else {}
             arrays[name] = np.char.strip(values) if values.dtype.kind == "U" else values
         ends = arrays.pop(ENDS, None)
         columns = {
@@ -64,7 +67,22 @@ class Zarr(SourceFormat):
         if ends is not None and len(ends):
             columns["episode"] = np.searchsorted(ends, np.arange(int(ends[-1])), side="right")
         table = rows_of(path, columns, options)
-        return replace(table, notes=(*notes, *table.notes))
+        return replace(table, units={**units, **table.units}, notes=(*notes, *table.notes))
+
+
+def _by_attributes(values: np.ndarray, attributes: dict[str, Any]) -> tuple[np.ndarray, str]:
+    """Return an array's values by its attributes, and its unit: fill value, scale and offset as netCDF has them.
+
+    "milliseconds since 2026-01-31" is the unit milliseconds.
+    """
+    unit = str(attributes.get("units") or attributes.get("unit") or "").partition(" since ")[0]
+    if values.dtype.kind not in "iuf" or not {"_FillValue", "scale_factor", "add_offset"} & set(attributes):
+        return values, unit
+    result = values.astype(float)
+    fill = attributes.get("_FillValue")
+    if isinstance(fill, (int, float)):
+        result[values == fill] = np.nan
+    return result * float(attributes.get("scale_factor", 1.0)) + float(attributes.get("add_offset", 0.0)), unit
 
 
 def _without_lost(array: Any, folder: Path, values: np.ndarray) -> tuple[np.ndarray, str]:

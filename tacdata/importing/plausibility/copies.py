@@ -1,4 +1,4 @@
-"""Rows that a logger wrote twice: equal to the row before in every column, the time included."""
+"""Rows that a logger wrote twice: equal to the row before, or to an earlier one, in every column with the time."""
 
 from __future__ import annotations
 
@@ -32,6 +32,7 @@ def without_copies(table: SourceTable, time: str, policy: CopyPolicy = POLICY) -
     """
     if table.rows < 2 or len(table.columns) < 2 or any(len(v) != table.rows for v in table.columns.values()):
         return table
+    table = _without_sent_again(table, time, policy)
     same_time = _repeats(table.column(time))
     if not same_time.any():
         return table
@@ -49,6 +50,33 @@ def without_copies(table: SourceTable, time: str, policy: CopyPolicy = POLICY) -
         f"in row {row + 1}: they are left out"
     )
     columns = {name: values[~copies] for name, values in table.columns.items()}
+    return replace(table, columns=columns, doubts=(*table.doubts, doubt))
+
+
+def _without_sent_again(table: SourceTable, time: str, policy: CopyPolicy) -> SourceTable:
+    """Return a table without rows that came before, with their time and all values, as a logger sends them again."""
+    clock = table.column(time)
+    if clock.dtype == object or not (np.diff(clock.astype(float)) < 0).any():
+        return table
+    seen: set[bytes] = set()
+    again = np.zeros(table.rows, dtype=bool)
+    parts = [values.astype(str) if values.dtype == object else values for values in table.columns.values()]
+    for row in range(table.rows):
+        content = b"".join(values[row].tobytes() for values in parts)
+        again[row] = content in seen
+        seen.add(content)
+    left = clock.astype(float)[~again]
+    noise = np.ones(table.rows, dtype=bool)
+    for name, values in table.columns.items():
+        if name != time:
+            noise &= _repeats(values)
+    if not again.any() or (np.diff(left) < 0).any() or noise[1:].mean() > policy.usual:
+        return table
+    doubt = (
+        f"{table.path.name}: {int(again.sum())} rows came before, with their time and all of their values, the first "
+        f"in row {int(np.flatnonzero(again)[0]) + 1}: they are left out"
+    )
+    columns = {name: values[~again] for name, values in table.columns.items()}
     return replace(table, columns=columns, doubts=(*table.doubts, doubt))
 
 

@@ -13,8 +13,8 @@ from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
 from tacdata.importing.proposing.roles import is_whole, roles_of
-from tacdata.importing.proposing.trial_parts import PartsInOrder, parts_in_order
-from tacdata.importing.source_files import check_source, files_below, is_one, joined, side_by_side, titles_of
+from tacdata.importing.proposing.trial_parts import MOST, PartsInOrder, is_split_log, parts_in_order
+from tacdata.importing.source_files import check_source, files_below, is_one, joined, natural, side_by_side, titles_of
 from tacdata.importing.source_table import SourceTable
 
 SHOWN = 30
@@ -80,7 +80,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
             "CSV, Excel, JSON, NPZ, Parquet or MATLAB files, or bags of ROS 2",
             next(iter(remedies)) if len(remedies) == 1 else "check the path, or convert the files",
         )
-    kinds = _of_same_columns(kinds)
+    kinds = _of_same_columns(_split_logs(source, kinds, paths))
     lines = []
     for key, entry in kinds.items():
         kind, _, inside = key.partition(INSIDE)
@@ -145,6 +145,30 @@ def _of_same_columns(kinds: dict[str, FoundKind]) -> dict[str, FoundKind]:
             continue
         first = kinds[keys[0]]
         result[pattern] = replace(first, count=sum(kinds[key].count for key in keys), words=_words(keys, pattern))
+    return result
+
+
+def _split_logs(source: Path, kinds: dict[str, FoundKind], paths: list[Path]) -> dict[str, FoundKind]:
+    """Put the files of a log that goes on from file to file together, by those of the first folder."""
+    result = {}
+    for key, entry in kinds.items():
+        head, _, tail = key.rpartition("#")
+        first = source / entry.path
+        siblings = [path for path in paths if path.parent == first.parent and path.suffix == first.suffix]
+        siblings = [path for path in siblings if numberless(path.stem) == numberless(first.stem)][:MOST]
+        if entry.count < 2 or INSIDE in key or not head or "/" in tail or len(siblings) < 2:
+            result[key] = entry
+            continue
+        try:
+            tables = [read_table(path, entry.options) for path in sorted(siblings, key=lambda path: natural(path.name))]
+        except TacdataError:  # named where it is imported
+            result[key] = entry
+            continue
+        if not is_split_log(tables):
+            result[key] = entry
+            continue
+        pattern = f"{head}*{tail}"
+        result[pattern] = replace(entry, table=joined(tables), parts=(pattern,), join="rows")
     return result
 
 

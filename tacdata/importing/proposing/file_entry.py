@@ -33,7 +33,13 @@ def proposed_file(kind: SourceKind) -> ProposedFile:
     found, (outer, _, inside) = kind.found, kind.kind.partition(INSIDE)
     path, parts = pattern(outer) if found.count > 1 or "#" in inside else (found.path, 0)
     paths, table, questions = (path,), found.options.table, ()
-    if found.join:
+    if len(found.parts) == 1:
+        paths = (pattern(found.parts[0])[0],)
+        text = (
+            f"{found.parts[0]}: each file goes on where the one before it ends: they are parts of one log (join: rows)"
+        )
+        questions = (Question(text),)
+    elif found.join:
         outers, sheets = zip(*(part.partition(INSIDE)[::2] for part in found.parts), strict=True)
         same = len(set(outers)) == 1
         place = PLACES.get(found.join, "below each other, the clock continued")

@@ -19,6 +19,8 @@ from tacdata.importing.source_table import SourceTable, unit_of
 from tacdata.importing.times import times
 from tacdata.importing.units import factor
 
+ENDS, FAR = 3, 5.0
+"""Most first rows that are no positions [rows], and their smallest distance from all others [their range]."""
 SHORTEST = 0.02
 """Strokes below are hardly in mm [mm]."""
 
@@ -35,13 +37,16 @@ class ProposedPosition:
     questions: tuple[Question, ...] = ()
 
 
-def proposed_position(kind: SourceKind, clock: SourceClock, channels: list[str]) -> ProposedPosition:
+def proposed_position(
+    kind: SourceKind, clock: SourceClock, channels: list[str], *, pauses: bool = True
+) -> ProposedPosition:
     """Return the position in a kind of file that has a depth or a height.
 
     Args:
         kind: The kind.
         clock: Its clock.
         channels: The sensor's channels, which follow the position where they are in the same file.
+        pauses: Whether a pause of the clock may end a trial.
     """
     table, roles = kind.table, kind.roles
     pressing = "depth" if "depth" in roles else "z"
@@ -63,8 +68,8 @@ def proposed_position(kind: SourceKind, clock: SourceClock, channels: list[str])
     entry = PositionEntry(file=kind.alias, clock=clock, axes=dict[str, Quantity](axes))
     try:
         time_ns, _ = times(table, clock, "")
-        path = table.column(names[pressing]).astype(float)
-        motion = pressing_axis(time_ns, path, _deviation(table, channels, path))
+        path = _without_ends(table.column(names[pressing]).astype(float))
+        motion = pressing_axis(time_ns, path, _deviation(table, channels, path), pauses=pauses)
     except (FormatError, ValueError):  # reported where the clock was read
         return ProposedPosition(entry, questions=tuple(questions))
     return _turned(entry, kind, axes, motion, channels, questions)
@@ -151,6 +156,18 @@ def _in_mm(table: SourceTable, name: str, axis: Axis) -> float:
         return factor(unit_of(table, name if axis.expression else axis.column, name, axis.unit) or "mm", "mm", "")
     except FormatError:
         return 1.0
+
+
+def _without_ends(path: np.ndarray) -> np.ndarray:
+    """Return a path [as in the file] without first rows that lie far from all others, as of a logger that begins at 0.
+
+    Shape (rows,), NaN there.
+    """
+    for rows in range(1, ENDS + 1):
+        others = path[rows:]
+        if len(others) > ENDS and abs(others[0] - path[rows - 1]) > FAR * np.ptp(others[np.isfinite(others)]) > 0:
+            return np.concatenate([np.full(rows, np.nan), others])
+    return path
 
 
 def _deviation(table: SourceTable, channels: list[str], axis: np.ndarray) -> np.ndarray | None:

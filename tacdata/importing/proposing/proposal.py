@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tacdata.errors import FormatError
 from tacdata.importing.mapping import ColumnsEntry, FileEntry, ForeignSensor, Mapping, SourceClock, TrialRule
 from tacdata.importing.mapping_document import document_of
 from tacdata.importing.proposing.description import FoundKind
@@ -19,6 +22,7 @@ from tacdata.importing.proposing.shapes import counting_column, varying
 from tacdata.importing.proposing.source_kind import SourceKind, source_kinds, widest
 from tacdata.importing.proposing.specimens import place_in_path, specimen_of
 from tacdata.importing.proposing.stream_clocks import clock_by, own_clocks
+from tacdata.importing.times import NEVER, times
 from tacdata.importing.units import plain
 
 AXES = ("depth", "z", "x", "y")
@@ -65,6 +69,9 @@ def proposed_mapping(source: Path, found: dict[str, FoundKind]) -> Proposal:
     ranked = sorted(kinds, key=lambda kind: (not varying(kind.table, axes[kind.alias]), -len(axes[kind.alias])))
     moving = next((kind for kind in ranked if {"depth", "z"} & set(kind.roles)), None)
     place = proposed_position(moving, clock_of[moving.alias], wide.channels) if moving else NO_POSITION
+    if moving and moving is not wide and place.trials.gap and not _pauses(wide, taxels.clock, place.trials.gap):
+        # A position that is sent only when it changes rests between two messages, and the readings go on.
+        place = proposed_position(moving, clock_of[moving.alias], wide.channels, pauses=False)
     specimens = [specimen_of(kind) for kind in kinds]
     specimen = next((value for value, _ in specimens if value), None)
     numbering = [kind.roles["trial"][0] for kind in kinds if "trial" in kind.roles]
@@ -73,7 +80,8 @@ def proposed_mapping(source: Path, found: dict[str, FoundKind]) -> Proposal:
     shared: tuple[str, ...] = ()
     if position and clocks:
         shared = (f"{clocks[1]} is taken for the clock of the channels, and {clocks[0]} for the one of the position",)
-        position = replace(position, clock=clock_by(wide.table, clocks[0]))
+        place = proposed_position(wide, clock_by(wide.table, clocks[0]), [])
+        position = replace(place.entry or position, clock=clock_by(wide.table, clocks[0]))
         taxels = replace(taxels, clock=clock_by(wide.table, clocks[1]))
     measured = _measured(ranked, clock_of)
     used = {taxels.file, position and position.file, *(entry.file for entry in measured.values())}
@@ -118,6 +126,15 @@ def _taxels(kind: SourceKind, clock: SourceClock) -> tuple[ColumnsEntry, tuple[s
         return replace(entry, columns="", long={"channel": roles["number"][0], "value": roles["value"][0]}), doubts
     counter = counting_column(table, roles) if roles.get("time") else ""
     return replace(entry, counter=counter or None), doubts
+
+
+def _pauses(kind: SourceKind, clock: SourceClock, gap: float) -> bool:
+    """Return whether the clock of a kind of file has a step longer than a gap [s]."""
+    try:
+        time_ns, _ = times(kind.table, clock, "")
+    except FormatError:  # reported where the clock was read
+        return True
+    return bool((np.diff(time_ns[time_ns != NEVER]) > gap * 1e9).any())
 
 
 def _measured(kinds: list[SourceKind], clocks: dict[str, SourceClock]) -> dict[str, ColumnsEntry]:

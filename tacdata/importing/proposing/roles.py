@@ -17,7 +17,7 @@ BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|act
 """Bodies whose coordinates a column may hold."""
 GUESSES = {
     "time": (
-        r"(x_value|time|t|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
+        r"(x_value|time|t|utc|gmt|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
         r"([_ ]?(time|zeit|uhrzeit))?|\w+_(time_?)?stamp(_(ns|us|ms|s|sec))?"
     ),
     "depth": (
@@ -50,11 +50,15 @@ GUESSES = {
     ),
     "state": (
         r"(segment|segm|state|status|moving|flag|block|mode|phase|enabled?|valid)(_?(id|no|nr|number|index))?"
+        r"|(rel(ative)?_)?humidity|rh|rssi|snr|signal_strength|(barometric|air|ambient)_pressure|dew_?point"
         r"|(\w+_)?(flag|fault|alarm|warning|status|state|error(_code)?)|is_\w+|battery\w*|cpu\w*"
     ),
     "orientation": r"(rot(ation)?|quat(ernion)?|orientation|q)_?[xyzw]|roll|pitch|yaw",
     "joint": r"(joint|axis|q)_?\d(_?(pos(ition)?|angle|vel(ocity)?|torque|effort))?",
-    "derived": r"grad(ient)?|derivative|slope|rms|std(_?dev)?|variance|r_?(2|squared)",
+    "derived": (
+        r"((true|eng(ineering)?|nominal|tensile|compressive|shear)_?)?(stress|spannung)"
+        r"|grad(ient)?|derivative|slope|rms|std(_?dev)?|variance|r_?(2|squared)"
+    ),
     "strain": (
         r"((true|eng(ineering)?|nominal|axial|tensile|compressive|compression|shear|hencky|log(arithmic)?|applied)_?)?"
         r"(strain|stretch|elongation|dehnung|stauchung)(_?ratio)?"

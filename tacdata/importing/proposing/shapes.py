@@ -24,6 +24,8 @@ class ShapePolicy:
     """Roughness of numbers without noise [range]; smaller ones are rounding."""
     counts: float = 0.9
     """Smallest share of steps of 1 in a counter of rows [1]."""
+    parts: float = 0.02
+    """Largest share of steps of 1 in a counter of cycles or parts [1]."""
     returns: float = 0.3
     """Largest distance of a drive's last value from its first [its range]."""
 
@@ -49,7 +51,7 @@ def without_signal(table: SourceTable, names: list[str], policy: ShapePolicy = P
 
     A constant among columns of one name and different numbers is a dead channel, and stays.
     """
-    reasons = {name: _reason(table, name) for name in names} if table.rows >= policy.rows else {}
+    reasons = {name: _reason(table, name, policy) for name in names} if table.rows >= policy.rows else {}
     families: dict[str, list[str]] = {}
     for name in reasons:
         families.setdefault(NUMBER.sub("#", name), []).append(name)
@@ -58,7 +60,7 @@ def without_signal(table: SourceTable, names: list[str], policy: ShapePolicy = P
     return idle if len(idle) < len(names) else {}
 
 
-def _reason(table: SourceTable, name: str) -> str:
+def _reason(table: SourceTable, name: str, policy: ShapePolicy) -> str:
     values = table.column(name)
     if values.dtype == object or values.ndim > 1:
         return ""
@@ -68,7 +70,11 @@ def _reason(table: SourceTable, name: str) -> str:
         return "constant"
     if len(levels) == 2 and np.isin(levels, (0, 1)).all():
         return "a flag"
-    return "a counter of rows" if len(finite) == len(values) and (np.diff(finite) == 1).all() else ""
+    steps = np.diff(finite)
+    if len(finite) == len(values) and (steps == 1).all():
+        return "a counter of rows"
+    is_count = (finite == np.rint(finite)).all() and np.isin(steps, (0, 1)).all()
+    return "a counter of parts" if is_count and steps.mean() <= policy.parts else ""
 
 
 def counting_column(table: SourceTable, roles: dict[str, list[str]], policy: ShapePolicy = POLICY) -> str:

@@ -30,13 +30,25 @@ def own_clocks(kind: SourceKind, position: PositionEntry) -> tuple[str, str] | N
     if len(clocks) < 2 or name not in places or not channels or channels[0] not in places:
         return None
 
+    present = {column: ~_missing(kind.table, column) for column in (*clocks, name, channels[0])}
+
     def before(name: str | int) -> str:
-        """Return the last clock before a column, else the first one behind it."""
+        """Return the only clock with values in the rows of a column, else the last before it or the first behind."""
+        together = [clock for clock in clocks if np.array_equal(present[clock], present[str(name)])]
+        if len(together) == 1:
+            return together[0]
         nearer = [clock for clock in clocks if places.index(clock) < places.index(str(name))]
         return nearer[-1] if nearer else clocks[0]
 
     ours, theirs = before(name), before(channels[0])
     return None if ours == theirs else (ours, theirs)
+
+
+def _missing(table: SourceTable, name: str | int) -> np.ndarray:
+    """Return which rows of a column have no value, shape (rows,), bool."""
+    values = table.column(str(name))
+    values = values.reshape(len(values), -1)[:, 0]
+    return np.array([value is None for value in values]) if values.dtype == object else np.isnan(values.astype(float))
 
 
 def _rises(table: SourceTable, name: str) -> bool:

@@ -14,6 +14,8 @@ PAUSE, TIMES = 1.0, 10.0
 """A pause is longer than this [s], and than this many steps between rows."""
 SURE = 0.5
 """Correlation of position and readings above which the sign is certain."""
+LEAP = 2e7
+"""A step ahead that is no pause: the clock was set [s]."""
 LIFTED, CLEAR = 0.2, 0.05
 """A length that stays farther from 0 than this share of its range is a height. Presses are cut at the other."""
 
@@ -37,13 +39,16 @@ class PressingAxis:
     """Depth that cuts strokes apart [as in the file]."""
 
 
-def pressing_axis(time_ns: np.ndarray, axis: np.ndarray, deviation: np.ndarray | None) -> PressingAxis:
+def pressing_axis(
+    time_ns: np.ndarray, axis: np.ndarray, deviation: np.ndarray | None, *, pauses: bool = True
+) -> PressingAxis:
     """Return how an axis moves.
 
     Args:
         time_ns: Time of each row [ns], shape (rows,).
         axis: Its position [as in the file], shape (rows,).
         deviation: How far the readings are from rest (any scale), shape (rows,); None if not known.
+        pauses: Whether pauses of the clock are looked for.
 
     Raises:
         ValueError: If fewer than three rows have both.
@@ -51,9 +56,17 @@ def pressing_axis(time_ns: np.ndarray, axis: np.ndarray, deviation: np.ndarray |
     valid = np.isfinite(axis) & (time_ns != NEVER)
     if valid.sum() < 3:
         raise ValueError("fewer than three rows with a time and a position")
+    known = np.isfinite(deviation) & (time_ns != NEVER) if deviation is not None else valid
+    if deviation is not None and (known & valid).sum() < 3 <= known.sum():  # rows of position and readings alternate
+        deviation = np.interp(time_ns, time_ns[known], deviation[known])
     time_ns, axis = time_ns[valid], axis[valid]
     sign = 1 if axis.mean() >= axis[0] else -1  # a trial begins away from the skin
-    if deviation is not None and np.ptp(axis) > 0 and np.nanstd(deviation[valid]) > 0:
+    if (
+        deviation is not None
+        and np.ptp(axis) > 0
+        and np.isfinite(deviation[valid]).any()
+        and (np.nanstd(deviation[valid]) > 0)
+    ):
         joint = np.isfinite(deviation[valid])
         correlation = float(np.corrcoef(axis[joint], deviation[valid][joint])[0, 1])
         sign = sign if abs(correlation) < SURE else int(np.sign(correlation))
@@ -63,7 +76,7 @@ def pressing_axis(time_ns: np.ndarray, axis: np.ndarray, deviation: np.ndarray |
     lifted = bool(axis.min() * axis.max() > 0 and low > LIFTED * (high - low))
     steps = np.diff(time_ns) / 1e9
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    long = np.sort(steps[(steps > PAUSE) & (steps > TIMES * usual)])
+    long = np.sort(steps[pauses & (steps > PAUSE) & (steps > TIMES * usual) & (steps < LEAP)])
     pause = float(f"{(long[0] + max(steps[steps < long[0]], default=0.0)) / 2:.2g}") if len(long) else 0.0
     down = sign * axis - (sign * axis).min()
     edges = [0, *(np.flatnonzero(steps > pause) + 1).tolist(), len(down)] if pause else [0, len(down)]

@@ -23,6 +23,8 @@ ORDER = tuple(
     )
 )
 """Words of parts of a trial, in the order of time."""
+NEXT = 1.5
+"""Largest step from the end of a part of a log to the next part [usual steps]."""
 MOST = 4
 """Most parts of a trial [count]."""
 
@@ -67,6 +69,16 @@ def parts_in_order(tables: dict[str, SourceTable]) -> PartsInOrder | None:
     keys = min(fitting, key=lambda keys: (_disorder(keys), abs(paths[keys[0]][0])))
     through = all(times[b][0] >= times[a][-1] for a, b in pairwise(keys))
     return PartsInOrder(keys, "rows" if through else "continued")
+
+
+def is_split_log(tables: list[SourceTable]) -> bool:
+    """Return whether the clock of each table goes on by one step where that of the table before it ends."""
+    names = [roles_of(table).get("time", [""])[0] for table in tables]
+    clocks = [_numbers(table, name) for table, name in zip(tables, names, strict=True)]
+    if len(tables) < 2 or not names[0] or len(set(names)) > 1 or any(len(clock) < 3 for clock in clocks):
+        return False
+    usual = float(np.median(np.diff(clocks[0])))
+    return usual > 0 and all(0 < later[0] - clock[-1] <= NEXT * usual for clock, later in pairwise(clocks))
 
 
 def _disorder(keys: tuple[str, ...]) -> int:

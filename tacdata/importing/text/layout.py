@@ -97,6 +97,8 @@ SAMPLE, TAIL = 2000, 100
 
 LABELS = ("unit", "units", "einheit")
 """Words before the units of a line that are no unit."""
+ROW_NAME = "row"
+"""Name of a column of row names that the header leaves out."""
 LINES_OF_HEADER = 6
 """A header with numbers has hardly more lines."""
 
@@ -154,11 +156,22 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     header = header or _commented_header(lines[skip:], lines_of_data[first], delimiter, width)
     if not options.header:
         header, first = [], next(k for k, row in enumerate(rows) if len(row) == width)
+    sample = [row for row in rows[first:] if len(row) == width]
+    if header and len(header[-1]) == width - 1 and _are_row_names(sample):
+        header = [[ROW_NAME, *row] if len(row) == width - 1 else row for row in header]
     names, units = _names(header, width)
     start = _line_of(lines, lines_of_data[first], skip)
-    sample = [row for row in rows[first:] if len(row) == width]
     kinds = tuple(_kind([row[k] for row in sample], decimal) for k in range(width))
     return TextLayout(delimiter, decimal, start, names, units, kinds)
+
+
+def _are_row_names(rows: list[list[str]]) -> bool:
+    """Return whether the first column names or numbers the rows, as R writes it without a name in the header."""
+    first, last = [row[0] for row in rows], [row[-1] for row in rows]
+    if len(rows) < 2 or not all(last):  # a delimiter at the end of each row makes an empty column instead
+        return False
+    begin = int(first[0]) if first[0].isdigit() else -1
+    return first == [str(begin + k) for k in range(len(first))] or not any(is_number(name, ".") for name in first)
 
 
 def _as_given(options: ReadOptions) -> str:
@@ -210,7 +223,7 @@ def _commented_header(lines: list[str], first: str, delimiter: str, width: int) 
 def split(line: str, delimiter: str) -> list[str]:
     """Return the fields of a line, without quotes and blanks around them."""
     if delimiter == " ":
-        return line.split()
+        return [field.strip('"') for field in line.split()]
     return [field.strip() for field in next(csv.reader([line], delimiter=delimiter))]
 
 

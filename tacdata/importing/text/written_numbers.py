@@ -1,0 +1,60 @@
+"""Numbers that a table holds as texts: with a decimal comma, or with a unit in each cell."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from tacdata.importing.source_table import SourceTable
+from tacdata.importing.text.layout import MISSING, THOUSANDS
+from tacdata.importing.units import factor, plain, quantity_of
+
+FEWEST = 20
+"""Fewest different texts of measured numbers; fewer may be names of trials."""
+WRITTEN = re.compile(r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,+-].{0,9})?")
+"""A number, with a unit behind it or without."""
+PADDED = re.compile(r"0\d+")
+"""A number that is rather a name."""
+
+
+def with_numbers(table: SourceTable) -> SourceTable:
+    """Return a table whose columns of numbers written as texts are numbers [unit of the cells].
+
+    Columns with a text that is none stay as they are, and so do those of few different texts.
+    """
+    columns, units, notes = dict(table.columns), dict(table.units), list(table.notes)
+    for name, values in table.columns.items():
+        if values.dtype != object or values.ndim > 1:
+            continue
+        texts = ["" if value is None else str(value).strip() for value in values.tolist()]
+        if (read := _read(["" if text in MISSING else text for text in texts])) is None:
+            continue
+        columns[name], unit = read
+        if unit:
+            units.setdefault(name, unit)
+            notes.append(f"{table.path.name}: the cells of {name} hold their units; they are read in {unit}")
+    return replace(table, columns=columns, units=units, notes=tuple(notes))
+
+
+def _read(texts: list[str]) -> tuple[np.ndarray, str] | None:
+    """Return texts as numbers, shape (rows,), and their unit; None if they are not all numbers of one quantity."""
+    matches = {text: WRITTEN.fullmatch(text) for text in dict.fromkeys(texts) if text}
+    if len(matches) < FEWEST or not all(matches.values()):
+        return None
+    parts = {text: (match[1], (match[2] or "").strip()) for text, match in matches.items() if match}
+    written = [number for number, _ in parts.values()]
+    commas = any("," in number for number in written)
+    if any(PADDED.fullmatch(number) for number in written) or (commas and any("." in number for number in written)):
+        return None
+    if commas and all(THOUSANDS.fullmatch(number) for number in written if "," in number):
+        return None  # "1,200" may be 1.2 or 1200
+    names = {plain(unit) for _, unit in parts.values()}
+    ours = {quantity_of(unit) for unit in names}
+    if len(names) > 1 and (len(ours) > 1 or None in ours):
+        return None
+    unit = next(iter(names)) if len(names) == 1 else str(next(iter(ours)))
+    scale = {name: factor(name, unit, "") if len(names) > 1 else 1.0 for name in names}
+    numbers = {text: float(number.replace(",", ".")) * scale[plain(each)] for text, (number, each) in parts.items()}
+    return np.array([numbers.get(text, np.nan) for text in texts]), unit
