@@ -8,7 +8,7 @@ from pathlib import Path
 from tacdata.studio.entry import LabEntry, command, local_minute
 
 SECTION = "Measured files"
-ENDINGS = (".csv", ".tsv", ".xlsx", ".mat", ".npz", ".npy", ".parquet", ".db3", ".zarr")
+ENDINGS = (".csv", ".tsv", ".xlsx", ".mat", ".npz", ".npy", ".parquet", ".arrow", ".db3", ".bag", ".zarr")
 """Endings of measured files, none of which the other verbs write beside sessions."""
 
 

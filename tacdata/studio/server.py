@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
@@ -11,12 +12,15 @@ from typing import Any
 from urllib.parse import quote
 
 from fastapi import APIRouter, FastAPI
-from fastapi.responses import FileResponse, HTMLResponse
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
 
 from tacdata.errors import UsageError
 from tacdata.pages import live_page
-from tacdata.studio.entry import PAGES
+from tacdata.studio.entry import PAGES, LabEntry
 from tacdata.studio.inventory import SECTIONS, Inventory
+from tacdata.studio.measured import SECTION as MEASURED
+from tacdata.studio.wizard.server import wizard_server
+from tacdata.studio.wizard.wizard import Wizard
 from tacdata.viewers.browse import loopback
 
 PORT = 9097
@@ -25,16 +29,25 @@ SEALED = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 """Policy of every file from the folder: a page in it asks nothing of any address, this one included."""
 
 
-def studio_server(inventory: Inventory, port: int) -> AbstractContextManager[str]:
-    """Serve the page of a lab's folder. See `loopback.page_server`."""
-    return loopback.page_server(lambda token: application(inventory, token), port)
+@contextmanager
+def studio_server(inventory: Inventory, port: int) -> Iterator[str]:
+    """Serve the page of a lab's folder, and the wizards that it opens. See `loopback.page_server`."""
+    with ExitStack() as wizards:
+        yield wizards.enter_context(loopback.page_server(lambda token: application(inventory, token, wizards), port))
 
 
-def application(inventory: Inventory, token: str) -> FastAPI:
-    """Return the application: page, list, files that a browser shows."""
+def application(inventory: Inventory, token: str, wizards: ExitStack) -> FastAPI:
+    """Return the application: page, list, files that a browser shows, import wizards.
+
+    Args:
+        inventory: The lab's folder.
+        token: First part of every path.
+        wizards: Holds the servers of wizards that were opened.
+    """
     api = FastAPI(openapi_url=None)
     routes = APIRouter(prefix=f"/{token}")
     loopback.guard(api, token, {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"})
+    opened: dict[str, str] = {}  # measured files -> address of their wizard
     one_at_a_time = Lock()  # requests run in threads of their own, the list has one memory
 
     @routes.get("/")
@@ -54,8 +67,29 @@ def application(inventory: Inventory, token: str) -> FastAPI:
         kind = "text/plain; charset=utf-8" if path.suffix == ".md" else None
         return FileResponse(path, media_type=kind, headers={"Content-Security-Policy": SEALED})
 
+    @routes.get("/import/{name:path}")
+    def wizard(name: str) -> RedirectResponse:
+        with one_at_a_time:
+            if name not in opened:
+                opened[name] = wizards.enter_context(wizard_server(wizard_of(inventory, name), 0))
+        return RedirectResponse(opened[name])
+
     api.include_router(routes)
     return api
+
+
+def wizard_of(inventory: Inventory, name: str) -> Wizard:
+    """Return the import wizard of measured files in the list.
+
+    Raises:
+        UsageError: If the list has no such entry.
+    """
+    known = [entry.path for entry in inventory.entries() if entry.section == MEASURED]
+    if name not in known:
+        raise UsageError(f"no measured files {name!r}", ", ".join(known) or "none", "open them from the list")
+    source = inventory.root / name
+    session = inventory.root / f"{source.stem}-session"
+    return Wizard.of(source, inventory.root / f"{source.stem}-mapping.yaml", session)
 
 
 def shown_file(root: Path, name: str) -> Path:
@@ -74,5 +108,8 @@ def shown_file(root: Path, name: str) -> Path:
     return path
 
 
-def _plain(entry: Any) -> dict[str, Any]:
-    return {**asdict(entry), "pages": [{"name": page, "href": "file/" + quote(page)} for page in entry.pages]}
+def _plain(entry: LabEntry) -> dict[str, Any]:
+    pages = [{"name": page, "href": "file/" + quote(page)} for page in entry.pages]
+    if entry.section == MEASURED:
+        pages.append({"name": "assign columns and import", "href": "import/" + quote(entry.path)})
+    return {**asdict(entry), "pages": pages}

@@ -183,6 +183,24 @@ def test_the_page_answers_whoever_knows_its_address(lab):
             urlopen(address + "file/..%2Fsecret.html")
 
 
+def test_measured_files_open_their_wizard(lab):
+    rows = "".join(
+        f"{0.05 * k:.2f},{depth},{10 + depth}\n" for k, depth in enumerate([0.0] * 20 + [1.0] * 20 + [0.0] * 20)
+    )
+    (lab / "bench").mkdir()
+    (lab / "bench" / "run.csv").write_text("t [s],depth [mm],c0 [pF]\n" + rows)
+    with studio_server(Inventory(lab.resolve()), 0) as address:
+        with urlopen(address + "list") as answer:
+            (entry,) = (each for each in json.load(answer)["entries"] if each["path"] == "bench")
+        with urlopen(address + entry["pages"][0]["href"]) as answer:
+            place = answer.url
+            assert b"bench: import" in answer.read()
+        with urlopen(place + "contents") as answer:
+            assert json.load(answer)["session"] == str(lab.resolve() / "bench-session")
+        with pytest.raises(HTTPError, match="422"):
+            urlopen(address + "import/monday")
+
+
 def test_the_verb_prints_the_list(lab):
     done = tacdata("studio", lab, "--list")
     assert done.returncode == 0 and "Sessions: monday: usable, nothing to remark" in done.stdout

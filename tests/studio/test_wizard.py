@@ -189,6 +189,21 @@ def test_the_session_is_imported_and_checked_and_no_session_is_replaced(wizard, 
     assert "session exists" in refused(wizard, "import", {"file": "mapping.yaml", "session": "session"})[1]
 
 
+def test_a_verdict_is_computed_and_shown_where_one_is_wanted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    noise = np.random.default_rng(0).normal(0, 0.002, (2, len(T)))
+    source = written(tmp_path / "in" / "run.csv", "t_s,depth (mm),a,b", T, DEPTH, C0 + noise[0], C1 + noise[1])
+    with wizard_server(Wizard.of(source, tmp_path / "mapping.yaml", tmp_path / "session"), 0) as address:
+        asked(address, "write", {"choices": asked(address, "contents")["choices"], "file": "mapping.yaml"})
+        asked(address, "import", {"file": "mapping.yaml", "session": "session"})
+        found = asked(address, "judge", {"session": "session"})
+        assert found["text"] == (tmp_path / "session-verdict" / "verdict.txt").read_text()
+        with urlopen(address + found["page"]) as answer:
+            assert answer.read() == (tmp_path / "session-verdict" / "verdict.html").read_bytes()
+        assert "no verdict 3" in refused(address, "verdict/3")[1]
+        assert "session-verdict exists" in refused(address, "judge", {"session": "session"})[1]
+
+
 def test_a_mapping_of_a_person_is_gone_on_with(source, tmp_path):
     document = {
         "version": "1.6",

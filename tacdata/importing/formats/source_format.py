@@ -12,6 +12,7 @@ import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,7 +20,7 @@ from tacdata import registry
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
-from tacdata.importing.text.written_numbers import with_numbers
+from tacdata.importing.text.written_numbers import written_numbers
 
 AUTOMATIC = ReadOptions()
 """Options of a file that is read as it is recognized."""
@@ -96,7 +97,18 @@ def read_table(path: Path, options: ReadOptions = AUTOMATIC) -> SourceTable:
         table: SourceTable = kind.read(path, options)
     if not table.rows:
         raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
-    return with_numbers(table)
+    return _with_numbers(table)
+
+
+def _with_numbers(table: SourceTable) -> SourceTable:
+    """Return a table whose numbers in texts are numbers."""
+    found = written_numbers(table.columns)
+    columns = {name: values for name, (values, _) in found.items()}
+    units = {name: unit for name, (_, unit) in found.items() if unit}
+    notes = [f"{table.path.name}: the cells of {name} hold their units; read in {unit}" for name, unit in units.items()]
+    return replace(
+        table, columns={**table.columns, **columns}, units={**units, **table.units}, notes=(*table.notes, *notes)
+    )
 
 
 def tables_in(path: Path) -> tuple[str, ...]:

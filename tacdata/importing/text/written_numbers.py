@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 
-from tacdata.importing.source_table import SourceTable
 from tacdata.importing.text.layout import MISSING, THOUSANDS
 from tacdata.importing.units import factor, plain, quantity_of
 
@@ -19,23 +17,18 @@ PADDED = re.compile(r"0\d+")
 """A number that is rather a name."""
 
 
-def with_numbers(table: SourceTable) -> SourceTable:
-    """Return a table whose columns of numbers written as texts are numbers [unit of the cells].
+def written_numbers(columns: dict[str, np.ndarray]) -> dict[str, tuple[np.ndarray, str]]:
+    """Return the columns of text that are numbers, and the unit of their cells; "" without one.
 
-    Columns with a text that is none stay as they are, and so do those of few different texts.
+    Columns with a text that is no number are not among them, nor are those of few different texts.
     """
-    columns, units, notes = dict(table.columns), dict(table.units), list(table.notes)
-    for name, values in table.columns.items():
-        if values.dtype != object or values.ndim > 1:
-            continue
-        texts = ["" if value is None else str(value).strip() for value in values.tolist()]
-        if (read := _read(["" if text in MISSING else text for text in texts])) is None:
-            continue
-        columns[name], unit = read
-        if unit:
-            units.setdefault(name, unit)
-            notes.append(f"{table.path.name}: the cells of {name} hold their units; they are read in {unit}")
-    return replace(table, columns=columns, units=units, notes=tuple(notes))
+    found = {}
+    for name, values in columns.items():
+        if values.dtype == object and values.ndim == 1:
+            texts = ["" if value is None else str(value).strip() for value in values.tolist()]
+            if read := _read(["" if text in MISSING else text for text in texts]):
+                found[name] = read
+    return found
 
 
 def _read(texts: list[str]) -> tuple[np.ndarray, str] | None:

@@ -8,9 +8,10 @@ from threading import Lock
 from typing import Any
 
 from fastapi import APIRouter, FastAPI
-from fastapi.responses import HTMLResponse
+from fastapi.responses import FileResponse, HTMLResponse
 from pydantic import BaseModel
 
+from tacdata.errors import UsageError
 from tacdata.pages import live_page
 from tacdata.progress import say
 from tacdata.studio.wizard.choices import Choices
@@ -42,6 +43,12 @@ class ImportRequest(BaseModel):
     session: str
 
 
+class JudgeRequest(BaseModel):
+    """Request of the page for a verdict on the session that it made."""
+
+    session: str
+
+
 def wizard_server(wizard: Wizard, port: int) -> AbstractContextManager[str]:
     """Serve the page of the wizard. See `loopback.page_server`."""
     return loopback.page_server(lambda token: application(wizard, token), port)
@@ -52,6 +59,7 @@ def application(wizard: Wizard, token: str) -> FastAPI:
     api = FastAPI(openapi_url=None)
     routes = APIRouter(prefix=f"/{token}")
     loopback.guard(api, token, HEADERS)
+    pages: dict[str, str] = {}  # session -> page of its verdict
     one_at_a_time = Lock()  # requests run in threads of their own; two must not write one file
 
     @routes.get("/")
@@ -82,6 +90,20 @@ def application(wizard: Wizard, token: str) -> FastAPI:
             answer = wizard.imported(request.file, request.session)
         say(f"{answer['recordings']} recordings in {request.session}")
         return answer
+
+    @routes.post("/judge")
+    def judged(asked: JudgeRequest) -> dict[str, Any]:
+        with one_at_a_time:
+            answer = wizard.judged(asked.session)
+        say(f"{answer['folder']} is written")
+        pages[asked.session] = answer["page"]
+        return {**answer, "page": f"verdict/{len(pages) - 1}"}
+
+    @routes.get("/verdict/{number}")
+    def verdict(number: int) -> FileResponse:
+        if not 0 <= number < len(pages):
+            raise UsageError(f"no verdict {number}", "a verdict of this page", "open it from the page")
+        return FileResponse(list(pages.values())[number], headers={"Content-Security-Policy": SEALED})
 
     api.include_router(routes)
     return api

@@ -6,11 +6,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import yaml
 
 from tacdata import documents
 from tacdata.documents import write_text
-from tacdata.errors import UsageError
+from tacdata.errors import SolveError, UsageError
 from tacdata.importing.expression import with_derived
 from tacdata.importing.mapping import FileEntry, Mapping
 from tacdata.importing.proposing.description import described
@@ -20,6 +21,7 @@ from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.source_table import SourceTable
 from tacdata.pipeline.check import check
 from tacdata.pipeline.import_files import import_files
+from tacdata.pipeline.judge import judge
 from tacdata.studio.entry import command
 from tacdata.studio.wizard.alternatives import alternatives
 from tacdata.studio.wizard.choices import ROLES, UNITS, Choices
@@ -140,8 +142,26 @@ class Wizard:
                 self.command(Path(file), session),
                 command("check", session),
                 command("browse", session, "--web"),
+                command("discrepancy", session, "--out", f"{session}-verdict"),
             ],
         }
+
+    def judged(self, session: str) -> dict[str, Any]:
+        """Find the effect that a response fitted to the session lacks.
+
+        Raises:
+            UsageError, FormatError: As `tacdata.judge`.
+            SolveError: If the search finds no numbers, as for readings without noise.
+        """
+        try:
+            verdict = judge(session, f"{session}-verdict")
+        except (np.linalg.LinAlgError, FloatingPointError) as error:
+            raise SolveError(
+                f"no verdict on {session}: {error}",
+                "measured readings, with their noise",
+                "look at the presses with tacdata browse: are they measured, and do they differ?",
+            ) from error
+        return {"text": verdict.text, "folder": str(verdict.folder), "page": str(verdict.folder / "verdict.html")}
 
 
 def _text(mapping: Mapping) -> str:
