@@ -77,9 +77,10 @@ def test_the_page_shows_each_column_with_its_role_its_grounds_and_its_course(wiz
 def test_choices_left_as_they_were_give_the_proposal_itself(wizard):
     choices = asked(wizard, "contents")["choices"]
     before = asked(wizard, "try", choices)
-    assert "1 recording of 210 rows at 20 Hz, 3 channels" in before["sentence"]
+    assert "3 recordings of 70 rows at 20 Hz, 3 channels" in before["sentence"]
     assert yaml.safe_load(before["text"])["position"] == {"file": "run", "z": {"column": "arm (mm)"}}
-    assert before["cut_above"] == 0.1
+    assert yaml.safe_load(before["text"])["trials"] == {"press_above": 0.1} and before["cut_above"] is None
+    assert asked(wizard, "try", choices | {"trials": {}})["cut_above"] == 0.1
 
 
 def test_a_changed_role_a_rule_and_a_height_change_the_presses_at_once(wizard):

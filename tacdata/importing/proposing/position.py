@@ -120,7 +120,7 @@ def _turned(
         proposed = replace(proposed, trials=TrialRule(gap=motion.pause))
         pause = f"{motion.pauses} pause{'s' * (motion.pauses > 1)} of more than {motion.pause:g} s"
         questions.append(Question(f"{pause}: each is taken for the end of a trial", "trials"))
-    elif "trial" not in kind.roles and motion.strokes > 1:
+    elif "trial" not in kind.roles and motion.strokes > 1 and (is_depth or not motion.at_zero or kind.found.count == 1):
         above = f"{motion.above * _in_mm(kind.table, name, axis):.2g}"
         proposed = replace(proposed, trials=TrialRule(press_above=float(above)))
         stretches = f"each stretch deeper than {above} mm is taken for a trial"

@@ -19,7 +19,6 @@ def test_a_text_that_is_named_xls_is_read(tmp_path):
         ("run.xls", b"\xd0\xcf\x11\xe0" + bytes(600), "save it as .xlsx"),
         ("run.xls", b"PK\x03\x04" + bytes(600), "save it as .xlsx"),
         ("run.h5", b"\x89HDF", "h5py"),
-        ("run.bag", b"#ROSBAG V2.0", "rosbags-convert"),
         ("run.TDMS", b"TDSm", ".csv or .xlsx"),
     ),
 )

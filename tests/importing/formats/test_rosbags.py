@@ -132,7 +132,7 @@ def test_what_is_no_bag_is_said_in_words(tmp_path):
     made = tacdata("example", "first", "-q", folder=tmp_path)
     assert made.returncode == 0
     recording = next((tmp_path / "first").glob("*.mcap"))
-    with pytest.raises(FormatError, match="no bag of ROS 2") as error:
+    with pytest.raises(FormatError, match="no bag of ROS that can be read: it is a recording of tacdata") as error:
         tables_in(recording)
     assert "needs no import" in error.value.remedy
     cut = tmp_path / "cut.db3"

@@ -34,7 +34,7 @@ def test_quiet_rows_of_a_coarse_clock_stay(tmp_path):
 def test_a_table_that_is_pasted_twice_counts_once(tmp_path):
     rows = table(presses=1)
     made, episodes = imported(tmp_path, write(tmp_path, "csv", np.concatenate([rows, rows])))
-    assert len(episodes) == 1 and any("the same, value by value" in note for note in made.notes)
+    assert len(episodes) == 1 and any("100 rows came before, with their time" in note for note in made.notes)
 
 
 def test_recordings_that_differ_in_noise_count_each(tmp_path):

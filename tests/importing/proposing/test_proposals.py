@@ -9,6 +9,7 @@ import scipy.io
 
 from tacdata import documents
 from tacdata.errors import FormatError
+from tacdata.importing.formats.source_format import read_table
 from tacdata.importing.imported_session import import_session
 from tacdata.importing.proposing.description import described
 from tacdata.importing.proposing.proposal import proposed_mapping
@@ -460,5 +461,8 @@ def test_cycles_that_begin_at_once_keep_their_sign(tmp_path):
 def test_a_line_that_broke_off_is_told_by_its_number(tmp_path):
     rows = [f'{{"t_s": {0.02 * k}, "depth_mm": {k % 9}, "r": {k}}}' for k in range(30)]
     (tmp_path / "log.jsonl").write_text("\n".join([*rows, rows[0][:12]]))
-    with pytest.raises(FormatError, match=r"line 31: no JSON"):
+    table = read_table(tmp_path / "log.jsonl")
+    assert table.rows == 30 and table.doubts == ("log.jsonl: 1 line is cut off or no JSON, first line 31: left out",)
+    (tmp_path / "log.jsonl").write_text("\n".join([*rows, *[rows[0][:12]] * 2]))
+    with pytest.raises(FormatError, match=r"2 of 32 lines are no JSON, first line 31"):
         described(tmp_path / "log.jsonl")

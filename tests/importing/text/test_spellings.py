@@ -1,6 +1,7 @@
 """Spellings of strangers' files: units in headers, words for no value, numbers and names in text files."""
 
 import gzip
+import re
 from pathlib import Path
 
 import numpy as np
@@ -180,7 +181,7 @@ def test_words_for_no_value_stand_in_any_row_the_first_too(tmp_path, word):
 
 @pytest.mark.parametrize("word", ["OL", "overflow", "missing", "1'010.5"])
 def test_an_unknown_word_is_named_with_its_column_and_row(tmp_path, word):
-    error = refusal(tmp_path, text().replace("20.0000", word, 1).replace("20.01", word).replace("20.02", word))
+    error = refusal(tmp_path, re.sub(r",20\.0\d+", f",{word}", text()))
     assert f"column cap0, row 1 of the data: {word!r}" in error.given
     assert ("missing in the mapping" in error.remedy) == (word != "1'010.5")
 
