@@ -153,11 +153,10 @@ class _McapLog:
             return encoding, ""
         if encoding not in ("cdr", "ros1") or schema is None:
             return None
-        readers = {"ros2msg": get_types_from_msg, "ros1msg": get_types_from_msg, "ros2idl": get_types_from_idl}
-        if (read := readers.get(schema.encoding)) is None:
+        if schema.encoding not in ("ros1msg", "ros2msg", "ros2idl"):
             return None
-        text = schema.data.decode()
-        self.types.register(read(text, schema.name) if read is get_types_from_msg else read(text))
+        text, is_idl = schema.data.decode(), schema.encoding == "ros2idl"
+        self.types.register(get_types_from_idl(text) if is_idl else get_types_from_msg(text, schema.name))
         package, _, name = schema.name.rpartition("/")
         return encoding, schema.name if package.endswith("/msg") else f"{package}/msg/{name}"
 
