@@ -84,6 +84,10 @@ class Dataset(Displayed):
             raise FormatError(f"{self.root} has no column {key!r}", ", ".join(self.columns), "name one of them")
         return self.columns[key]
 
+    def __fspath__(self) -> str:
+        """Return the folder: functions that take a path take the object, too."""
+        return str(self.root)
+
     def windows(
         self, offsets: Mapping[str, Iterable[int]] | None = None, keys: Sequence[str] | None = None
     ) -> WindowDataset:

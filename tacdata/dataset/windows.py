@@ -109,6 +109,11 @@ class WindowDataset(torch.utils.data.Dataset):
         """Number of frames, each with its window."""
         return len(self.data)
 
+    def __repr__(self) -> str:
+        """Return the number of frames, and the length of each window."""
+        spans = ", ".join(f"{len(frames)} of {key}" for key, frames in self.offsets.items())
+        return f"Windows of {len(self)} frames: {spans}"
+
     def __getitem__(self, index: int | Sequence[int]) -> dict[str, Any]:
         """Return one frame as LeRobotDataset would, or a batch for a sequence of frames.
 

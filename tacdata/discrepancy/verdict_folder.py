@@ -26,6 +26,10 @@ class VerdictFolder(Displayed):
     _kept: Any = field(default=None, compare=False)
     """A temporary folder that is deleted with this object; None if the folder is permanent."""
 
+    def __fspath__(self) -> str:
+        """Return the folder: functions that take a path take the object, too."""
+        return str(self.folder)
+
     @property
     def status(self) -> str:
         """ "named", "ambiguous", "unknown" or "none"."""

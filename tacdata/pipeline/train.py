@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -88,7 +89,7 @@ def train(
         UsageError: If ``out`` exists, there is no dataset, or a setting cannot train.
         FormatError: If the dataset is damaged or of another sensor than ``start``.
     """
-    begun = pretrained(str(start)) if start else None
+    begun = pretrained(os.fspath(start)) if start else None
     settings = recipe(options, begun, simulated is not None)
     folder = Path(out)
     frames = read_frames(dataset)

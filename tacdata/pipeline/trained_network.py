@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from tacdata.display import Displayed
 from tacdata.errors import UsageError
 from tacdata.paths import StrPath
 from tacdata.recording.episode import Episode
+from tacdata.recording.files.reader import read_episode
 from tacdata.sensor import Sensor
 from tacdata.training.inference.checkpoint import Checkpoint
 from tacdata.training.inference.prediction import PredictedMaps
@@ -42,6 +44,10 @@ class TrainedNetwork(Displayed):
         """The checkpoint file."""
         return self.checkpoint.path
 
+    def __fspath__(self) -> str:
+        """Return the checkpoint file: functions that take a path take the object, too."""
+        return str(self.path)
+
     @property
     def training_folder(self) -> Path:
         """The folder of the dataset that it was trained on.
@@ -56,13 +62,15 @@ class TrainedNetwork(Displayed):
             )
         return recorded
 
-    def predict(self, episode: Episode) -> PredictedMaps:
-        """Return the depth map of each reading of an episode.
+    def predict(self, episode: Episode | StrPath) -> PredictedMaps:
+        """Return the depth map of each reading of an episode, or of the recording at a path.
 
         Raises:
+            UsageError: If there is no recording.
             FormatError: If the episode is of another sensor, or cannot be tared.
         """
         trained = self.checkpoint
+        episode = episode if isinstance(episode, Episode) else read_episode(episode)
         trained.check_sensor(episode.sensor, str(episode.path))
         identity = trained.content_hash
         return PredictedMaps(
@@ -108,4 +116,4 @@ def read_network(path: StrPath) -> TrainedNetwork:
         >>> network.predict(td.read_episode("session/episode-000000.mcap")).depth.shape
         (170, 35, 26)
     """
-    return TrainedNetwork(pretrained(str(path)))
+    return TrainedNetwork(pretrained(os.fspath(path)))

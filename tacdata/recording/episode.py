@@ -155,6 +155,10 @@ class Episode(Displayed):
     fingers: tuple[TagStream, ...] = ()
     """Poses of fingertips, one stream for each camera and finger."""
 
+    def __fspath__(self) -> str:
+        """Return the file: functions that take a path take the object, too."""
+        return str(self.path)
+
     @property
     def number(self) -> int:
         """The episode's number in its session."""

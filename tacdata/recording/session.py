@@ -73,6 +73,10 @@ class Session(Displayed):
         """Read the finished recordings one by one, in the order of the plan."""
         return map(read_episode, self.episodes)
 
+    def __fspath__(self) -> str:
+        """Return the folder: functions that take a path take the object, too."""
+        return str(self.folder)
+
     def description(self) -> Iterator[str]:
         """Yield the lines of its description: recordings, sensor, plan."""
         yield f"Session {self.folder}: {len(self)} of {len(self.plan.presses)} presses of plan {self.plan.name!r}"

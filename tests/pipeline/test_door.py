@@ -97,6 +97,22 @@ def test_a_noun_describes_and_draws_itself(name, nouns, tmp_path):
             noun.plot(tmp_path / "picture.png")
 
 
+def test_an_object_serves_as_its_path(nouns, tmp_path):
+    session, network, episode = nouns["session"], nouns["network"], nouns["episode"]
+    assert len(td.pack(session, tmp_path / "packed").dataset) == len(nouns["dataset"])
+    assert td.open(nouns["dataset"]).content_hash == nouns["dataset"].content_hash
+    assert np.array_equal(network.predict(RECORDING).depth, network.predict(episode).depth)
+    assert td.read_network(network).path == network.path
+    assert td.check(session).usable
+
+
+def test_results_describe_themselves_in_a_few_lines(nouns):
+    report, windows = repr(td.check(SESSION)), repr(nouns["dataset"].windows())
+    assert report.splitlines()[0].endswith("2 recordings, usable")
+    assert windows == "Windows of 490 frames: 9 of observation.state"
+    assert len(report.splitlines()) <= 6
+
+
 def test_an_episode_gives_its_arrays(nouns):
     episode, label = nouns["episode"], nouns["label"]
     assert episode.readings.shape == episode.tared.shape == (len(episode.times), 24)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tacdata import schemas
+from tacdata.display import Displayed
 from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 from tacdata.recording.check.clocks import clock_words
@@ -24,8 +26,8 @@ WEAK, FEWEST_PRESSES = 0.2, 4
 """Share of the usual change of the readings below which a press is named [1], of so many presses [count] or more."""
 
 
-@dataclass(frozen=True)
-class Report:
+@dataclass(frozen=True, repr=False)
+class Report(Displayed):
     """Result of a check: figures, findings, usable or not."""
 
     source: Path
@@ -35,6 +37,12 @@ class Report:
     findings: tuple[Finding, ...]
     not_assessed: tuple[str, ...] = ()
     """Questions that the recordings leave open, and why, as sentences."""
+
+    def description(self) -> Iterator[str]:
+        """Yield the lines of its description: verdict, findings."""
+        verdict = "usable" if self.usable else "NOT usable as it is"
+        yield f"Check of {self.source}: {len(self.episodes)} recordings, {verdict}"
+        yield from (line.strip() for line in _grouped(self.findings))
 
     @property
     def usable(self) -> bool:
