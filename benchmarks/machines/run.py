@@ -15,7 +15,7 @@ import yaml
 
 HERE = Path(__file__).resolve().parent
 SETS = {
-    "damper": ("friction_damper", "friction_damper.yaml"),
+    "damper": ("friction_damper", HERE.parents[1] / "tacdata" / "example" / "damper.yaml"),
     "healthy": ("linear_actuator", "actuator_healthy.yaml"),
     "lubrication": ("linear_actuator", "actuator_lubrication.yaml"),
 }

@@ -27,7 +27,8 @@ def test_workflows_have_jobs_with_steps_and_least_rights(path):
     assert workflow["permissions"] == {"contents": "read"}
     for job in workflow["jobs"].values():
         assert "uses" in job or (job["runs-on"] and job["steps"])
-        assert set(job.get("needs", "").split()) <= set(workflow["jobs"])
+        needs = job.get("needs", [])
+        assert {*([needs] if isinstance(needs, str) else needs)} <= set(workflow["jobs"])
         for step in job.get("steps", []):
             assert len({"uses", "run"} & set(step)) == 1
 
