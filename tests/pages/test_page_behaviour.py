@@ -87,6 +87,22 @@ def test_nothing_is_wider_than_the_window(wide):
         assert canvas.bounding_box()["width"] > 150
 
 
+def test_print_leaves_nothing_out_on_a4_and_puts_three_maps_in_a_row(browser, tmp_path):
+    made = HtmlPage(PageHeader("Kind", "It is so.", next=["then `tacdata view here --web`"]))
+    made.add("Maps", *(PixelMap(n, np.arange(6.0).reshape(2, 3), "mm", 0, 5, (0, 3, 0, 2)) for n in "pqr"))
+    names = [f"a quantity with a long name, {k}" for k in range(10)]
+    made.add("Wide", Table(names, [("0.123 ± 0.456",) * 10] * 2), Plot("a", "t", "y", [Series("s", X)], X))
+    (tmp_path / "page.html").write_text(made.text)
+    for page in _opened(browser, (tmp_path / "page.html").as_uri(), 680):  # A4 less 15 mm, 96 dots an inch
+        page.emulate_media(media="print")
+        page.wait_for_timeout(200)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 680
+        assert page.evaluate("document.querySelector('table').getBoundingClientRect().right") <= 680
+        boxes = [box.bounding_box() for box in page.locator("figure.map").all()]
+        assert len(boxes) == 3 and {box["y"] for box in boxes} == {boxes[0]["y"]}
+        assert not page.locator("figcaption .tools:visible, button.copy:visible").count()
+
+
 def test_values_are_read_under_the_pointer_and_in_the_linked_figure(page):
     hover(page, 0, 0.4)
     for k in (0, 1):
