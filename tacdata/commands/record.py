@@ -72,6 +72,7 @@ def run(
         from tacdata.plans import read_plan
         from tacdata.recording.live.detection_process import in_background
         from tacdata.recording.live.interruption import Interruption
+        from tacdata.recording.live.recorder_process import announced
         from tacdata.recording.motion.preflight import Preflight
         from tacdata.recording.recorder import Recorder
         from tacdata.registration.chosen import chosen_registration
@@ -96,7 +97,7 @@ def run(
     else:
         view = nullcontext()
     bar = _Bar()
-    with Interruption() as interruption, view as watch, bar as show, in_background(look) as detect:
+    with announced(out), Interruption() as interruption, view as watch, bar as show, in_background(look) as detect:
         recorder = Recorder(
             bench,
             skin,

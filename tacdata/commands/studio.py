@@ -23,7 +23,7 @@ def run(
 ) -> Result:
     """Show sessions, datasets, networks, verdicts and a recording that runs on one page of this computer.
 
-    It only reads. Its next steps are commands to copy.
+    It reads, and stops a recording on request. Its next steps are commands to copy.
     """
     from tacdata.studio.inventory import Inventory
 

@@ -39,6 +39,8 @@ class LabEntry:
     """Files that a browser shows, from the lab's folder on."""
     running: bool = False
     """Whether it changes at this moment."""
+    can_stop: bool = False
+    """Whether the page can stop it."""
     address: str = ""
     """Address of a page that another program serves."""
     share: float | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
@@ -14,11 +14,14 @@ from urllib.parse import quote
 from fastapi import APIRouter, FastAPI
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
 
-from tacdata.errors import UsageError
+from tacdata.errors import TacdataError, UsageError
 from tacdata.pages import live_page
+from tacdata.recording.live import recorder_process
 from tacdata.studio.entry import PAGES, LabEntry
 from tacdata.studio.inventory import SECTIONS, Inventory
+from tacdata.studio.live_values import LiveValues
 from tacdata.studio.measured import SECTION as MEASURED
+from tacdata.studio.recording_state import recording_state
 from tacdata.studio.wizard.server import wizard_server
 from tacdata.studio.wizard.wizard import Wizard
 from tacdata.viewers.browse import loopback
@@ -48,6 +51,7 @@ def application(inventory: Inventory, token: str, wizards: ExitStack) -> FastAPI
     routes = APIRouter(prefix=f"/{token}")
     loopback.guard(api, token, {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"})
     opened: dict[str, str] = {}  # measured files -> address of their wizard
+    values = LiveValues()
     one_at_a_time = Lock()  # requests run in threads of their own, the list has one memory
 
     @routes.get("/")
@@ -60,6 +64,21 @@ def application(inventory: Inventory, token: str, wizards: ExitStack) -> FastAPI
         with one_at_a_time:
             current = inventory.entries()
         return {"root": str(inventory.root), "sections": SECTIONS, "entries": [_plain(entry) for entry in current]}
+
+    @routes.get("/live/{name:path}")
+    def live(name: str) -> dict[str, Any] | None:
+        with one_at_a_time:
+            current = recording_state(running_session(inventory, name), 1 << 30).current
+            with suppress(TacdataError):  # it has ended meanwhile, or has no content yet
+                return None if current is None else values.of(current)
+        return None
+
+    @routes.post("/stop/{name:path}")
+    def stopped(name: str) -> dict[str, str]:
+        with one_at_a_time:
+            session = running_session(inventory, name)
+        recorder_process.stop(session)
+        return {"said": "stopping: the motion stops, the tip is lifted"}
 
     @routes.get("/file/{name:path}")
     def file(name: str) -> FileResponse:
@@ -90,6 +109,17 @@ def wizard_of(inventory: Inventory, name: str) -> Wizard:
     source = inventory.root / name
     session = inventory.root / f"{source.stem}-session"
     return Wizard.of(source, inventory.root / f"{source.stem}-mapping.yaml", session)
+
+
+def running_session(inventory: Inventory, name: str) -> Path:
+    """Return the folder of a session that is being recorded.
+
+    Raises:
+        UsageError: If no recording of that name runs.
+    """
+    if not any(entry.running and entry.path == name for entry in inventory.entries()):
+        raise UsageError(f"no recording runs in {name!r}", "a session that is being recorded", "take it from the list")
+    return inventory.root / name
 
 
 def shown_file(root: Path, name: str) -> Path:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tacdata import documents
 from tacdata.labels import file_names as label_names
+from tacdata.recording.live.recorder_process import recorder_of
 from tacdata.recording.session import FILE
 from tacdata.studio.entry import LabEntry, command, local_minute, pages_in
 from tacdata.studio.recording_state import RecordingState, recording_state
@@ -37,6 +38,7 @@ def session_entry(root: Path, folder: Path) -> LabEntry:
         _next(name, state, labels, tone),
         pages_in(root, folder),
         state.running,
+        can_stop=state.running and recorder_of(folder) is not None,
         share=state.done / state.wanted if state.wanted else None,
         order=state.newest,
     )

@@ -2,10 +2,13 @@
 
 import json
 import os
+import subprocess
+import sys
 import time
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
+import numpy as np
 import pytest
 from running.chromium import needs_chromium
 from running.in_process import tacdata
@@ -13,7 +16,10 @@ from running.in_process import tacdata
 from tacdata import documents, schemas
 from tacdata.errors import UsageError
 from tacdata.example import copy_session
+from tacdata.recording import read_episode
 from tacdata.recording.files.file_names import partial
+from tacdata.recording.live.machine_state import own_state_directory
+from tacdata.recording.live.recorder_process import FOLDER
 from tacdata.studio import inventory as inventories
 from tacdata.studio.farm import running_at
 from tacdata.studio.inventory import Inventory
@@ -231,6 +237,51 @@ def test_the_page_refreshes_without_losing_its_place(lab, browser):
         assert opened.value.title() == "a verdict"
         context.close()
         assert not faults and all(url.startswith(address) for url in asked)
+
+
+@pytest.fixture
+def recorder(lab):
+    """A process that stands for the recorder of a session whose third press is half written."""
+    whole = (lab / "monday" / "episode-000001.mcap").read_bytes()
+    partial(lab / "evening" / "episode-000002.mcap").write_bytes(whole[: len(whole) // 2])
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(100)", "record"]) as process:
+        file = own_state_directory() / FOLDER / str(process.pid)
+        file.parent.mkdir(parents=True)
+        file.write_text(str(lab / "evening"))
+        (file.parent / "999999999").write_text(str(lab / "evening"))
+        yield process
+        process.kill()
+
+
+@needs_chromium
+def test_a_running_recording_shows_its_taxels_and_tip_and_is_stopped(lab, recorder, browser):
+    episode = read_episode(lab / "monday" / "episode-000001.mcap")
+    with studio_server(Inventory(lab), 0) as address:
+        for wrong in ("live/monday", "live/..%2Flab%2Fevening", "live/none"):
+            with pytest.raises(HTTPError, match="422"):
+                urlopen(address + wrong)
+        now = json.load(urlopen(address + "live/evening"))
+        half = episode.taxels.counts - episode.taxels.counts[:10].mean(axis=0)
+        assert now["columns"] == 6 and np.abs(half - now["change"]).max(axis=1).min() < 1e-9, "readings of one frame"
+        x, y, depth = now["tip"]
+        assert (x, y) == pytest.approx((-2.85, 3.75), abs=0.01) and -4.0 < depth < 0.98
+        assert now["phase"] in ("approach", "press", "hold", "release")
+        page = browser.new_page(viewport={"width": 360, "height": 800})
+        page.goto(address)
+        page.wait_for_selector(".now td")
+        assert page.evaluate("document.documentElement.scrollWidth") == 360
+        cells = page.locator(".now tr").evaluate_all("rows => rows.map(r => [...r.children].map(c => c.textContent))")
+        shown = np.array(cells, dtype=float)[::-1].ravel()
+        assert shown == pytest.approx(now["change"], abs=0.51), "row 0 is the lowest"
+        assert f"tip at x {now['tip'][0]:.2f}" in page.inner_text(".now p")
+        page.on("dialog", lambda dialog: dialog.accept())
+        page.click("button.stop")
+        page.wait_for_selector("button.stop:has-text('stopping')")
+        assert recorder.wait(20) != 0
+        page.wait_for_selector("button.stop", state="detached")
+        with pytest.raises(HTTPError, match="422"):
+            urlopen(Request(address + "stop/evening", method="POST"))
+        page.close()
 
 
 def test_measured_files_have_the_wizard_as_their_next_step_and_exports_of_a_session_are_none(lab):

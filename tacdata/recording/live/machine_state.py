@@ -30,7 +30,13 @@ def state_directory(rig: Rig) -> Path:
     The rig file's ``state_directory`` decides, then ``$TACDATA_STATE``, then the platform's directory for state. Users
     of one machine should share a directory.
     """
-    if directory := rig.document.get("state_directory") or os.environ.get("TACDATA_STATE"):
+    directory = rig.document.get("state_directory")
+    return Path(directory).expanduser() if directory else own_state_directory()
+
+
+def own_state_directory() -> Path:
+    """Return the folder of states where no rig file names one."""
+    if directory := os.environ.get("TACDATA_STATE"):
         return Path(directory).expanduser()
     home = {
         "win32": os.environ.get("LOCALAPPDATA") or "~/AppData/Local",
