@@ -2,7 +2,7 @@
 
 A run of `tacdata demo`, in `demo`, and of `examples/hidden_delay.py`, in `hidden_delay`, are made first if they are
 missing. docs/pictures/code.json keeps the hash of the code that drew each picture; a test compares it with today's.
-Not drawn here: the windows of other programs, the learning curve, and the actuator, whose data are not part of a clone.
+Not drawn here: the actuator, whose data are not part of a clone.
 """
 
 import contextlib

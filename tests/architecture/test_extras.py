@@ -160,6 +160,8 @@ def test_a_first_look_works_without_the_extras(beyond, tmp_path):
         (["discrepancy", "first", "--out", "verdict"], "warp", "fem"),
         (["train", "dataset", "--out", "run"], "torch", "learn"),
         (["view", "first", "--save", "x.rrd"], "rerun", "view"),
+        (["browse", "first", "--web"], "fastapi", "view"),
+        (["studio", "."], "fastapi", "view"),
         (["farm", "up"], "uvicorn", "farm"),
         (["calibrate-camera", "--board", "board.yaml", "--draw", "board.pdf"], "cv2", "camera"),
     ],
@@ -175,6 +177,8 @@ def test_a_verb_says_the_install_line_of_what_it_lacks(arguments, module, extra,
     assert IMPORTED_AS.get(module, module) in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "verdict").exists()
+    row = re.search(rf"^\| `{extra}` \|.*", (ROOT / "README.md").read_text(), re.M)
+    assert arguments[0] not in ("browse", "studio") or f"`{arguments[0]}" in row[0], "README names it with its extra"
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,12 @@
 """A first look: the shipped recording is checked and drawn, and stays small."""
 
 import json
+import re
 
+import numpy as np
 from typer.testing import CliRunner
 
+import tacdata as td
 from tacdata import cli
 from tacdata.errors import Exit
 from tacdata.example.shipped import DEEPEST, SESSION
@@ -25,6 +28,16 @@ def test_it_checks_and_draws_the_shipped_recording(tmp_path):
     assert any("label" in line.lower() for line in found["press"]["found"])
     for name in ("check.png", "press.png"):
         assert (tmp_path / "first" / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_check_and_card_count_the_same_frames_off_the_path(tmp_path):
+    shown = example(tmp_path / "first").stdout
+    td.pack(tmp_path / "first", tmp_path / "data")
+    card = json.loads(CliRunner().invoke(APP, ["card", str(tmp_path / "data"), "--json"]).stdout)
+    lost, outside = map(int, re.search(r"(\d+) lost, (\d+) outside the commanded path", shown).groups())
+    assert (card["frames_after_a_loss"], card["frames_outside_the_path"]) == (lost, outside)
+    invalid = np.count_nonzero(~np.asarray(td.open(tmp_path / "data")["tacdata.valid"]))
+    assert invalid == lost + outside > 0
 
 
 def test_it_says_what_to_do_next_and_overwrites_nothing(tmp_path):

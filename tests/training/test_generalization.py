@@ -13,6 +13,7 @@ from tacdata.training.generalization import generalize
 from tacdata.training.inference import checkpoint
 from tacdata.training.reports.comparison import groups, verdicts
 from tacdata.training.reports.report_page import Scored, page
+from tacdata.training.reports.score_sheet import markdown
 from tacdata.training.settings import TrainingSettings
 
 RECIPE = TrainingSettings(network="direct", arguments={"hidden": 16}, epochs=2, batch_size=64)
@@ -158,6 +159,16 @@ def test_runs_are_reported_by_the_verb(outcomes, tmp_path, monkeypatch):
     scores = json.loads((tmp_path / "runs/direct-episode-0/scores/scores.json").read_text())
     assert next(entry["level"] for entry in scores["uncertainty"]["levels"]) == 0.5
     assert "direct" in run["title"] and run["uncertainty"] == scores["uncertainty"]
+
+
+def test_the_time_of_a_network_is_one_in_report_and_score_sheet(outcomes):
+    first = scored(outcomes)[0]
+    document = {**first.evaluation.document, "inference_ms_per_frame": 2.3456}
+    one = replace(first, evaluation=replace(first.evaluation, document=document))
+    assert "2.35 ms a frame" in markdown(document)
+    words = re.sub(r"<(script|style).*?</\1>", "", page([one]), flags=re.S)
+    times = re.findall(r"\b\d\.\d\d(?= ms a frame)", words)
+    assert times and set(times) == {"2.35"} and re.search(r">\s*2\.35\s*</td>", words)
 
 
 def test_a_report_calls_networks_by_their_names_and_tells_their_recipes_once(outcomes):

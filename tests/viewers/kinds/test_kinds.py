@@ -148,7 +148,7 @@ def verdict(tmp_path):
         "margins": {"relaxation": 3.5, "drift": 7.0},
         "necessity": 9.0,
         "at_bound": [],
-        "experiment": "hold longer",
+        "experiment": "pull it off",
     }
     document = {
         "version": schemas.version("verdict"),
@@ -179,6 +179,17 @@ def test_a_verdict_in_words_and_bars(verdict, tmp_path):
     assert bars["limits"].labels == ("creep", "tilt"), "what is not excited has no bar"
     assert {"/bars/gap", "/bars/limits", "/about"} <= drawn(scene, tmp_path)
     assert scene_at(verdict / "verdict.json").bars[0].labels == scene.bars[0].labels
+
+
+def test_only_these_recordings_are_evidence_and_an_experiment_is_proposed_where_a_rival_is_open(verdict):
+    summary = scene_at(verdict).summary
+    assert "distinguished in these recordings from: relaxation by 3.5, drift by 7.0 standard errors" in summary
+    assert "pull it off" not in summary
+    document = documents.read(verdict / "verdict.json", "verdict")
+    document["effects"][0]["alternatives"] = ["relaxation"]
+    documents.write(verdict / "verdict.json", document, "verdict")
+    summary = scene_at(verdict).summary
+    assert "from: drift by 7.0" in summary and "an experiment that would distinguish them: pull it off" in summary
 
 
 def test_a_verdict_shows_its_readings_beside_the_model(verdict, tmp_path):
