@@ -385,13 +385,14 @@ class Grbl(MotionController):
     def _remember_opening(self, link: GrblLink, state: str, homed: bool) -> None:
         """Keep the identified board, and why its position cannot be trusted."""
         position = link.last.position if link.last is not None else np.full(3, np.nan)
+        was_homed = link.statuses.homed if self._answers.homing else False  # None: a Grbl is locked until it was
         version = self._answers.answers.get("VER", "nothing")
         self._found = {
             "banner": link.welcome or f"none, the board was not reset by opening; $I says {version}",
             "reset_at_opening": "yes" if link.resets else "no",
             "state_at_opening": state,
             "homed_at_opening": "yes" if homed else "no",
-            "homed_before": {True: "yes", False: "no", None: "unknown"}[link.statuses.homed],
+            "homed_before": {True: "yes", False: "no", None: "unknown"}[was_homed],
             # Adding 0.0 turns -0.0 into 0.0, which is printed without a sign.
             "position_at_opening": ",".join(f"{value:.3f}" for value in position + 0.0),
         }

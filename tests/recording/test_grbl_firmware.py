@@ -152,6 +152,7 @@ def session(firmware, folder, presses=1, **changes):
         plan(presses, hold=0.3, rest=0.4),
         folder,
         mount=lambda press: None,
+        ask=lambda question: True,
         devices=RigDevices(cnc, Board(clock, cnc), {}),
         **changes,
     )

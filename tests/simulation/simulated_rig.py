@@ -15,7 +15,7 @@ from tacdata.recording.live.ending import ending
 from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.lost_position import PositionGuard
-from tacdata.recording.live.machine_state import MachineState
+from tacdata.recording.live.machine_state import UNKNOWN, MachineState
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.recorder import Recorder
 from tacdata.registration import RegistrationSettings
@@ -129,6 +129,7 @@ class World:
         """Height of the skin above the registered one [mm]."""
         self.camera = CameraDevice() if camera else None
         self.asked, self.answer, self.said = [], lambda question: False, []
+        self.is_new = True  # who sets a machine up answers where it stands
         self.controller.start()
         self.board.start()
         self.bench.thread(self._watch, "watch").start()
@@ -273,6 +274,9 @@ class World:
         return self.controller.position_at(self.clock.now_ns())
 
     def _asked(self, question):
+        is_new, self.is_new = self.is_new, False
+        if is_new and UNKNOWN in question:
+            return True
         self.asked.append(question)
         return self.answer(question)
 

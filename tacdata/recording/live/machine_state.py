@@ -16,7 +16,7 @@ from tacdata.devices.device import MotionController
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.motion.move_times import report_resolution
 from tacdata.rig import Rig
-from tacdata.wire.serial_port import usb_identity
+from tacdata.wire.serial_port import is_present, usb_identity
 
 SCHEMA = "machine_state"
 FIRMWARE = ("FIRMWARE", "VER", "OPT")
@@ -136,7 +136,9 @@ class MachineState:
         if self._document is None:
             self._identity = self._identify()
             records = [record for record in map(_record, self._directory.glob("*.json")) if self._is_ours(record)]
-            # A change of port leaves several records of one machine; the latest counts.
+            # A change of port leaves several records of one machine; the latest counts. Some boards of one maker share
+            # a serial number, so a port that is there now is another machine's.
+            records = [r for r in records if r["port"] == self._port or not is_present(r["port"])]
             self._document = max(records, key=lambda record: record["number"], default={})
         return self._document
 

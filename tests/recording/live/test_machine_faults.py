@@ -183,7 +183,7 @@ def test_a_power_cycle_in_mid_press_is_no_ground_to_stand_on(virtual, tmp_path):
     virtual.controller.settings.update({"$22": "0", "$20": "0"})
     on_the_skin(virtual, virtual.controller.inject_brown_out)
     with pytest.raises(DeviceError, match="position is lost"):
-        recorder(virtual, out).run(lambda summary: True)
+        recorder(virtual, out, ask=lambda question: True).run(lambda summary: True)
     assert np.allclose(virtual.controller.machine.error, virtual.controller.position_at(virtual.clock.now_ns()))
     with Deepest(virtual) as followed, pytest.raises(DeviceError, match="position is not known"):
         recorder(virtual, out, resume=True).run(lambda summary: True)

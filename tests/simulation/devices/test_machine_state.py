@@ -8,6 +8,7 @@ import pytest
 from simulated_rig import ORIGIN, World
 
 from tacdata.errors import DeviceError, FormatError
+from tacdata.recording.live import machine_state
 
 PRESSING = 7_000_000_000
 """Time at which the tip is in the skin [ns]."""
@@ -48,7 +49,9 @@ def refused(world, **options):
 
 def jog(world, up):
     """Jog straight up by hand [mm], as a pendant does."""
+    world.schedule.run_for(1.0, world.bench)
     machine, now = world.controller.machine, world.clock.now_ns()
+    machine.reset(now)  # a hold may stand
     machine._move(machine.planner.target - machine.error + [0.0, 0.0, up], 5.0, now, "Jog")
     world.schedule.run_for(3.0, world.bench)
 
@@ -178,16 +181,41 @@ def test_the_code_of_a_question_answers_it_and_no_later_one(world):
     assert code not in refused(world, confirmed=code).remedy
 
 
-def test_another_controller_on_the_port_has_a_record_of_its_own(world):
+FORGOTTEN = {
+    "the record was deleted": None,
+    "another controller": ("controller", {"driver": "grbl", "firmware": "another board", "usb": ""}),
+    "another port, without a serial number": ("port", "/dev/ttyUSB7"),
+}
+
+
+@pytest.mark.parametrize("change", FORGOTTEN.values(), ids=FORGOTTEN)
+def test_a_machine_without_homing_that_nobody_remembers_is_asked_about(world, change):
+    """Freed by a jog, it does not report the zero of power-on."""
     broken_in_mid_press(world, world.controller.inject_brown_out)
-    document = state_of(world)
+    jog(world, 1.0)
     path = next((world.folder.parent / "machines").glob("*.json"))
-    document["controller"]["firmware"] = "another board"
-    path.write_text(json.dumps(document))
-    world.home()
+    path.write_text(json.dumps(state_of(world) | dict([change]))) if change else path.unlink()
+    world.folder = world.folder.with_name("session2")
+    assert "there is no record of where the machine was left" in refused(world).given
+
+
+def test_two_boards_of_one_serial_number_have_a_record_each(world, monkeypatch):
+    """Their maker gave all of them the same; while a port is there, its record is that of the board on it."""
+    monkeypatch.setattr(machine_state, "usb_identity", lambda port: "10c4:ea60 0001")
+    present = {"/dev/ttyUSB7"}
+    monkeypatch.setattr(machine_state, "is_present", present.__contains__)
+    world.record()
+    world.reboot()
+    path = next((world.folder.parent / "machines").glob("*.json"))
+    twin = state_of(world) | {"port": "/dev/ttyUSB7", "position": [1.0, 2.0, 3.0], "number": 1000}
+    path.with_name("twin.json").write_text(json.dumps(twin))
     world.folder = world.folder.with_name("session2")
     assert world.record().remaining == ()
     assert world.asked == []
+    world.reboot()
+    present.clear()  # one board, and two ports that it may have had: the later record counts
+    world.folder = world.folder.with_name("session3")
+    assert "the machine was left at (1.000, 2.000, 3.000) mm" in refused(world).given
 
 
 def test_a_damaged_record_is_named_and_nothing_moves(world):
@@ -220,8 +248,8 @@ def test_a_zero_of_power_on_is_asked_about_though_it_was_left_there(tmp_path, se
 @pytest.mark.parametrize("up", [0.0, 3.0])
 def test_another_computer_asks_a_grblhal_that_was_not_homed(tmp_path, up):
     world = World(1, tmp_path / "session", **HAL_UNLOCKED)
+    world.is_new = False
     world.controller.inject_brown_out()
-    world.schedule.run_for(1.0, world.bench)
     jog(world, up)
     assert "the position is not known" in refused(world).given
     world.end()
