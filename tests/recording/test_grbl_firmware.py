@@ -45,9 +45,6 @@ SET_UP = (
     "G53G90G94G21G1X10Y20Z-20F3000",
     "G4P0.01",
 )
-WITHIN = 0.05
-"""What a nominal position may be off a reported one [mm], by what is claimed: 5 mm/s for 10 ms."""
-
 
 REAL = pytest.param("real", marks=pytest.mark.skipif(not COMMAND, reason="TACDATA_GRBL_FIRMWARE names no firmware"))
 
@@ -173,8 +170,6 @@ def test_a_session_whose_nominal_path_agrees_with_the_reports(ready, tmp_path):
         assert near.sum() > 5
         allowed = claimed(recording)[inside]
         assert (np.abs(nominal - reported).max(axis=1) < allowed)[near].all()
-        # What is claimed on a machine that is not too busy is worth something, too.
-        assert np.median(allowed[near]) < WITHIN
 
 
 def test_a_fault_in_mid_press_stops_and_lifts_straight_up(ready, tmp_path):

@@ -1,5 +1,6 @@
 """The simulated world keeps its promises, and the recorder keeps its own in it: some seeds of many."""
 
+import numpy as np
 import pytest
 from schedule import SECOND, Hung, Schedule
 from simulated_host import SimulatedHost
@@ -7,6 +8,11 @@ from simulated_rig import World
 from simulated_run import play
 
 from tacdata.errors import DeviceError
+from tacdata.recording.files.reader import read_recording
+
+CLAIM_NS = 15_000_000
+"""Greatest median uncertainty of a report against the nominal path [ns]: 8 ms of a line's round trip, 7 ms of half a
+query's."""
 
 
 @pytest.fixture
@@ -131,6 +137,19 @@ def test_what_must_hold_of_every_run_holds(seed):
 def test_seeds_that_once_failed(seed, kinds):
     names, found, _ = play(seed, kinds)
     assert not found, f"{names}: {found}"
+
+
+def test_a_computer_that_is_not_late_claims_a_narrow_path(tmp_path):
+    """The claim follows the round trips of queries and lines; only here nothing else delays them."""
+    world = World(3, tmp_path / "session")
+    session = world.record()
+    world.end()
+    for path in session.episodes:
+        recording = read_recording(path)
+        stream, moves = recording.episode.cnc, recording.moves
+        half_ns = np.median(stream.arrival_ns - stream.sample_ns)
+        starts_ns = [move.uncertainty_ns + move.contradiction_ns for move in moves]
+        assert np.median(starts_ns) + half_ns < CLAIM_NS
 
 
 def test_a_disk_without_room_for_the_head_of_a_recording_leaves_no_file_that_nobody_can_read(tmp_path):
