@@ -307,6 +307,7 @@ def play(seed, only=()):
 
 def _play(world, faults, anew=False, unlocks=False, course=""):
     run = Run(world, course=course)
+    world.is_new = False
     faults.end()
     yield from (f"first run: {words}" for words in broken(run, faults))
     if run.hung or (run.error is None and not run.killed):
