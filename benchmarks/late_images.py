@@ -7,7 +7,8 @@ of `KINDS`. Of each kind, one half has cameras that stamp their images, the othe
 The cameras' places are off by their stated spread, the same for a whole recording. So by chance alone about one
 recording in a hundred has many frames outside.
 
-    python benchmarks/late_images.py [--seeds N] [--first N] [--seconds S] [--kind KIND] [--json FILE]
+    python benchmarks/late_images.py [--seeds N] [--first N] [--seconds S] [--kind KIND] [--faults] [--alone]
+        [--json FILE]
 """
 
 from __future__ import annotations
@@ -38,6 +39,15 @@ KINDS = ("late", "late to the end", "late from the start", "bursts", "slow", "lo
 """How images come on a busy host: 0.2 s late for ten seconds, in the middle, to the end, or from before the start; late
 now and then; a camera that skips images for lack of time; lost images; 0.2 s late all the time.
 """
+FAULTS = (
+    *("step", "small step", "frozen", "reordered", "dropped", "batches", "drift", "stall", "half rate", "units"),
+    "rate",
+)
+"""Faults of a camera and its stamps: its clock set by up to 1.5 s or by less than a period; an image repeated under
+fresh stamps; neighbours exchanged; no images for a second; stamps of a whole batch; stamps 0.1 % slow; images held
+back and then all at once, at the beginning or the end; half the rate after a second of silence; stamps in
+microseconds; a rig file with no rate or another one.
+"""
 BEFORE = 5.0
 """Time for which the camera is open before the recording [s]."""
 ACCUSING = ("was moved", "change places", "of the other hand", "contradict", "glued on")
@@ -45,7 +55,15 @@ ACCUSING = ("was moved", "change places", "of the other hand", "contradict", "gl
 
 
 def exposed(kind, seconds, rng):
-    """Return exposures and arrivals of one camera [s after the beginning of the recording], shape (n,) both."""
+    """Return exposures, arrivals and stamps of one camera [s after the beginning of the recording], shape (n,) each."""
+    if kind in FAULTS:
+        return faulty(kind, seconds, rng)
+    times, arrivals = busy(kind, seconds, rng)
+    return times, arrivals, times
+
+
+def busy(kind, seconds, rng):
+    """Return exposures and arrivals of a camera on a busy host, or an idle one."""
     begun = -BEFORE + rng.uniform(0, 1 / RATE)
     times = np.arange(begun, seconds, 1 / RATE)
     late = DELAY + rng.uniform(0, 0.01, len(times))
@@ -72,6 +90,42 @@ def exposed(kind, seconds, rng):
     return times[kept], arrivals[kept] + 0.0005 * np.arange(len(times))[kept] / len(times)
 
 
+def faulty(kind, seconds, rng):
+    """Return exposures, arrivals and stamps of a camera with a fault, on an idle host."""
+    times, arrivals = busy("", seconds, rng)
+    stamps, count = times.copy(), len(times)
+    begin, length = rng.uniform(2.0, seconds - 4.0), rng.uniform(0.5, 1.3)
+    after, inside = times > begin, (times > begin) & (times < begin + length)
+    kept = np.ones(count, bool)
+    if kind == "step":
+        stamps[after] += rng.choice([-1, 1]) * rng.uniform(0.06, 1.5)
+    elif kind == "small step":
+        stamps[after] += rng.choice([-1, 1]) * rng.uniform(0.015, 0.045)
+    elif kind == "frozen":
+        times[inside] = times[after][0]
+    elif kind == "reordered":
+        for k in np.flatnonzero(rng.random(count - 1) < 0.05):
+            times[[k, k + 1]], stamps[[k, k + 1]] = times[[k + 1, k]], stamps[[k + 1, k]]
+    elif kind == "dropped":
+        kept = ~inside
+    elif kind == "batches":
+        last = np.minimum((np.arange(count) // (size := int(rng.integers(2, 6))) + 1) * size, count) - 1
+        arrivals = arrivals[last] + 0.0005 * (np.arange(count) - last + size)
+        stamps = times[last] + 0.0002 * (np.arange(count) - last + size)
+    elif kind == "drift":
+        stamps *= 1 + rng.choice([-1, 1]) * 0.001
+    elif kind == "stall":
+        held = times < length if rng.random() < 0.5 else times > seconds - length - 0.3
+        release = arrivals[held][-1] if held[0] else seconds - 0.3
+        arrivals = np.where(held, np.maximum(arrivals, release), arrivals)
+        arrivals = np.maximum.accumulate(arrivals) + 0.0005 * np.arange(count) / count
+    elif kind == "half rate":
+        kept = ~(after & (times < begin + 1.0)) & ~((times >= begin + 1.0) & (np.arange(count) % 2 == 0))
+    elif kind == "units":
+        stamps *= 0.001
+    return times[kept], arrivals[kept], stamps[kept]
+
+
 def slow(first, seconds, begin, rng):
     """Return exposures and arrivals of a camera that skips exposures when its work takes longer than a period."""
     times, arrivals, now, number = [], [], first, 0
@@ -86,18 +140,18 @@ def slow(first, seconds, begin, rng):
     return np.array(times), np.array(arrivals)
 
 
-def streams(hand, camera, eye, made, stamped, seconds, rng):
+def streams(hand, camera, eye, made, stamped, seconds, rng, rate=RATE):
     """Return one camera's view of all fingers, with the times that the reader of a recording would give."""
-    times, arrivals = made
-    arrival, device = (START + np.rint(values * 1e9).astype(np.int64) for values in (arrivals, times))
-    device = device - START + 7_000_000_000_000 if stamped else np.full(len(times), -1)
+    times, arrivals, marks = made
+    arrival = START + np.rint(arrivals * 1e9).astype(np.int64)
+    device = np.rint(marks * 1e9).astype(np.int64) + 7_000_000_000_000 if stamped else np.full(len(times), -1)
     clock = StreamClock("device_ns" if stamped else "order")
     clock.set_latency(StreamLatency(int(DELAY * 1e9), 2_000_000))
     number = np.arange(len(times))
     for k in number:
         clock.take(int(arrival[k]), int(device[k] if stamped else k))
     rows = (arrivals >= 0) & (arrivals < seconds)
-    own = image_clock(arrival[rows], number[rows], device[rows], clock.model(), RATE)
+    own = image_clock(arrival[rows], number[rows], device[rows], clock.model(), rate)
     counter = device[rows] if stamped else number[rows]
     stamps, sigma = own.sample_times(arrival[rows], counter), own.uncertainties(counter)
     return [
@@ -109,18 +163,20 @@ def seen_by(hand, finger, camera, eye, times, stamps, sigma, rng):
     """Return a finger's poses at true times, under the times that they are given."""
     world, count = np.linalg.inv(eye), len(times)
     poses = np.array([world @ hand.tip(finger, t) for t in times])
+    # One image, repeated, has one pose.
+    copied = np.maximum.accumulate(np.where(np.diff(times, prepend=-np.inf) != 0, np.arange(count), 0))
     across = rng.uniform(0.00005, 0.0002, count)
     spreads = np.stack([np.radians(0.25) * np.ones(count)] * 3 + [across, across, 6 * across], axis=1)
     noise = rng.normal(0, spreads)
     covariance = np.zeros((count, 6, 6))
     covariance[:, range(6), range(6)] = spreads**2
     turns = Rotation.from_rotvec(noise[:, :3]) * Rotation.from_matrix(poses[:, :3, :3])
-    kept, first = rng.random(count) < 0.9, FINGERS["fingers"][finger]["cube"]["ids"]["+x"]
+    kept, first = (rng.random(count) < 0.9)[copied], FINGERS["fingers"][finger]["cube"]["ids"]["+x"]
     stream = TagStream(
         camera,
         stamps,
-        poses[:, :3, 3] + noise[:, 3:],
-        turns.as_quat(),
+        (poses[:, :3, 3] + noise[:, 3:])[copied],
+        turns.as_quat()[copied],
         np.full(count, 0.1),
         np.full(count, 2),
         covariance,
@@ -142,8 +198,8 @@ def felt(hand, finger, seconds, rng):
     return TaxelStream(stamps, stamps, np.arange(len(times)), np.round(counts))
 
 
-def judged(seed, kind, seconds, folder):
-    """Record, track and judge one hand; return its figures."""
+def judged(seed, kind, seconds, folder, alone=False):
+    """Record, track and judge one hand, seen by two cameras or one alone; return its figures."""
     rng = np.random.default_rng([seed, 29])
     hand = draw_hand(seed, ("grasp", "wipe")[seed // 2 % 2])
     rig, eyes = rig_of(seed)
@@ -151,9 +207,12 @@ def judged(seed, kind, seconds, folder):
     path = folder / "episode-000000.mcap"
     path.write_bytes(b"simulated")
     views, off = [], []
-    for k, (camera, eye) in enumerate(eyes.items()):
-        made = exposed(kind if both or k == seed % 2 else "", seconds, rng)
-        found, ratio = streams(hand, camera, eye, made, stamped, seconds, rng)
+    both = both or alone
+    for k, (camera, eye) in enumerate(list(eyes.items())[: 1 if alone else None]):
+        at_fault = both or k == seed % 2
+        made = exposed(kind if at_fault else "", seconds, rng)
+        rate = (None, 1.5 * RATE)[seed // 4 % 2] if at_fault and kind == "rate" else RATE
+        found, ratio = streams(hand, camera, eye, made, stamped, seconds, rng, rate)
         views, off = [*views, *found], [*off, ratio]
     taxels = {finger: felt(hand, finger, seconds, rng) for finger in FINGERS["fingers"]}
     recording = DemoRecording(path, rig, hand.task, taxels, tuple(views), True, ())
@@ -187,14 +246,17 @@ def main():
     parser.add_argument("--seeds", type=int, default=60)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=18.0)
-    parser.add_argument("--kind", choices=KINDS)
+    parser.add_argument("--kind", choices=(*KINDS, *FAULTS))
+    parser.add_argument("--faults", action="store_true", help="faults of cameras and stamps, in place of busy hosts")
+    parser.add_argument("--alone", action="store_true", help="one camera in place of two")
     parser.add_argument("--json", type=Path)
     chosen = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(chosen.first, chosen.first + chosen.seeds):
-            kind = chosen.kind or (KINDS[seed // 2 % len(KINDS)] if seed % 2 else "")
-            rows.append(judged(seed, kind, chosen.seconds, Path(folder)))
+            kind = KINDS[seed // 2 % len(KINDS)] if seed % 2 else ""
+            kind = chosen.kind or (FAULTS[seed % len(FAULTS)] if chosen.faults else kind)
+            rows.append(judged(seed, kind, chosen.seconds, Path(folder), chosen.alone))
             print(line(rows[-1]), flush=True)
             if chosen.json:
                 chosen.json.write_text(json.dumps(rows, indent=1) + "\n")
