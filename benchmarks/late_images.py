@@ -106,6 +106,7 @@ def faulty(kind, seconds, rng):
     elif kind == "reordered":
         for k in np.flatnonzero(rng.random(count - 1) < 0.05):
             times[[k, k + 1]], stamps[[k, k + 1]] = times[[k + 1, k]], stamps[[k + 1, k]]
+            arrivals[k] = arrivals[k + 1] - 0.0002
     elif kind == "dropped":
         kept = ~inside
     elif kind == "batches":
@@ -152,8 +153,7 @@ def streams(hand, camera, eye, made, stamped, seconds, rng, rate=RATE):
         clock.take(int(arrival[k]), int(device[k] if stamped else k))
     rows = (arrivals >= 0) & (arrivals < seconds)
     own = image_clock(arrival[rows], number[rows], device[rows], clock.model(), rate)
-    counter = device[rows] if stamped else number[rows]
-    stamps, sigma = own.sample_times(arrival[rows], counter), own.uncertainties(counter)
+    stamps, sigma = own.sample_times(arrival[rows], number[rows]), own.uncertainties(number[rows])
     return [
         seen_by(hand, finger, camera, eye, times[rows], stamps, sigma, rng) for finger in FINGERS["fingers"]
     ], np.abs((stamps - START) * 1e-9 - times[rows]) / sigma

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
 
 from tacdata.demonstrations.paths.motion_filter import GAP, Smoothed, logarithm
-from tacdata.demonstrations.paths.sightings import Sightings
+from tacdata.demonstrations.paths.sightings import Sightings, repeated
 from tacdata.demonstrations.recording.reader import TIMELY
+from tacdata.recording.episode import TagStream
 from tacdata.tags.cube.pose import CubePose
 from tacdata.tags.fingers import Finger
 from tacdata.tags.mixups import handedness
@@ -171,6 +173,20 @@ def _stands(fingers: dict[str, Finger], paths: dict[str, Smoothed], k: int) -> s
         if np.isfinite(paths[name].position[k]).all()
     }
     return handedness(fingers, cubes)
+
+
+def repeats(views: Iterable[TagStream], begin_ns: int) -> list[str]:
+    """Describe which cameras repeated images."""
+    moments: dict[str, set[int]] = {}
+    for view in views:
+        moments.setdefault(view.camera, set()).update(view.sample_ns[repeated(view)].tolist())
+    return [
+        f"camera {camera} repeated an image {len(times)} times from {(min(times) - begin_ns) * 1e-9:.1f} to "
+        f"{(max(times) - begin_ns) * 1e-9:.1f} s: repeated images do not count; it hung, or its driver fills in for "
+        "lost ones: check its cable and its rate"
+        for camera, times in moments.items()
+        if times
+    ]
 
 
 def contradictions(sightings: Sightings, path: Smoothed, begin_ns: int) -> list[str]:

@@ -60,7 +60,7 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
         stamps = image_times(records, name, clock)
         timing = None
         if isinstance(clock, ImageClock):
-            timing = clock.uncertainties(stamps.device_ns if clock.axis == "device_ns" else stamps.sequence)
+            timing = clock.uncertainties(stamps.sequence)
         views += [_stream(name, finger, stamps.sample_ns, detections, timing) for finger in recording.rig.fingers]
     notes = tuple(note for note in recording.notes if not note.startswith("camera ") or "failed" in note)
     searched = f"all {sum(map(len, sightings.values()))} images"

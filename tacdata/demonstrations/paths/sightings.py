@@ -128,6 +128,17 @@ def sightings_of(
     )
 
 
+def repeated(view: TagStream) -> np.ndarray:
+    """Return which poses of a finger are those of an image before, to the last bit, shape (p,), bool.
+
+    Noise makes every image another one, of resting fingers too. So such an image is no new one, whatever its time.
+    """
+    poses = np.concatenate([view.position, view.quaternion], axis=1)
+    again = np.isfinite(poses).all(axis=1)
+    again[np.unique(poses, axis=0, return_index=True)[1]] = False
+    return again
+
+
 def _error_of(camera: str, rig: DemoRig) -> CameraError | None:
     """Return the error common to all sightings of a camera; None if its file states no uncertainty."""
     world = rig.worlds[camera]
@@ -140,7 +151,7 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     pose = rig.camera_pose(view.camera)
     sightings = np.isfinite(view.position).all(axis=1) & (view.faces > 0)
     # A rotation of no length or no number is no pose: one damaged message must not end the whole path.
-    sightings &= np.abs(np.linalg.norm(view.quaternion, axis=1) - 1) < UNIT
+    sightings &= (np.abs(np.linalg.norm(view.quaternion, axis=1) - 1) < UNIT) & ~repeated(view)
     if pose is None:
         sightings[:] = False
         pose = np.eye(4)

@@ -72,7 +72,14 @@ def track(
     original = sightings
     sightings, bumps = without_bumps(sightings, recording, delays)
     times = begin + np.rint(np.arange(int((end - begin) * 1e-9 * rate) + 1) * (1e9 / rate)).astype(np.int64)
-    remarks = [*delay_notes, *stretch_notes, *bumps, *(f"while recording: {note}" for note in recording.notes)]
+    repeat_notes = path_faults.repeats(recording.views, begin)
+    remarks = [
+        *delay_notes,
+        *stretch_notes,
+        *repeat_notes,
+        *bumps,
+        *(f"while recording: {note}" for note in recording.notes),
+    ]
     remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in sightings.items() if len(s) < FEWEST]
     sightings = {name: series for name, series in sightings.items() if len(series) >= FEWEST}
     if not sightings or len(times) < 2:

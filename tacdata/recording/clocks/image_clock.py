@@ -2,7 +2,7 @@
 
 An image arrives after a latency of at least the camera's minimum. On a busy computer the latency grows, and images are
 lost. With a time stamp of the camera the two are distinguished: the line under arrival against stamp gives every
-exposure.
+exposure. Stamps are believed only where they can be of exposures (`exposure_stamps`).
 
 Numbers given on arrival do not tell a late image from one after a lost one. Against a clock of constant period P, the
 excess E = arrival - P number rises with both and falls only when lateness ends. So the lateness of an image is at
@@ -19,12 +19,17 @@ import numpy as np
 
 from tacdata.recording.clocks.clock_model import ClockModel
 from tacdata.recording.clocks.envelope_fit import CRYSTAL, HIDDEN, TYPICAL, append_to_hull
+from tacdata.recording.clocks.exposure_stamps import ExposureStamps, exposure_stamps
 
 NS = 1e-9
 STEP_NS = 2_000_000_000
 """Change of arrival against stamp that is a step of the camera's clock, and no lateness [ns]."""
 BLOCK_NS = 1_000_000_000
 """Length of a block of images, of which the smallest latency counts [ns]."""
+STRAIGHT_NS, STEEPEST, BLOCKS = 3_000_000, 0.005, 5
+"""A clock that runs wrong by more than a crystal: median distance of the blocks' smallest latencies from their line
+[ns], largest slope of it [ns/ns], and fewest blocks [count].
+"""
 UNSURE_NS = 1_000_000
 """Standard uncertainty that the rate of a camera's clock leaves in the times of a recording [ns]."""
 PERIODS = 0.01
@@ -49,29 +54,26 @@ FAR_NS = 10_000_000_000
 class ImageClock:
     """Times of all images of one camera."""
 
-    axis: str
-    """``device_ns`` or ``order``, as in `ClockModel`."""
-    counter: np.ndarray
-    """Number of each image, or its time stamp [ns], shape (n,), int64, ascending."""
+    number: np.ndarray
+    """Number of each image, shape (n,), int64, ascending."""
     time_ns: np.ndarray
     """Time of exposure of each [ns], shape (n,), int64."""
     uncertainty: np.ndarray
     """Standard uncertainty of each time [s], shape (n,)."""
 
-    def sample_times(self, arrival_ns: np.ndarray, counter: np.ndarray) -> np.ndarray:
+    def sample_times(self, arrival_ns: np.ndarray, number: np.ndarray) -> np.ndarray:
         """Return times of exposure [ns], shape (m,), int64; the arrival [ns] of an image that is not known."""
-        rows, hits = self._rows(counter)
+        rows, hits = self._rows(number)
         return np.where(hits, self.time_ns[rows], arrival_ns)
 
-    def uncertainties(self, counter: np.ndarray) -> np.ndarray:
+    def uncertainties(self, number: np.ndarray) -> np.ndarray:
         """Return standard uncertainties of times [s], shape (m,); the largest for an image that is not known."""
-        rows, hits = self._rows(counter)
+        rows, hits = self._rows(number)
         return np.where(hits, self.uncertainty[rows], self.uncertainty.max())
 
-    def _rows(self, counter: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        numbers = np.asarray(counter, np.int64)
-        rows = np.clip(np.searchsorted(self.counter, numbers), 0, len(self.counter) - 1)
-        return rows, self.counter[rows] == numbers
+    def _rows(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows = np.clip(np.searchsorted(self.number, number), 0, len(self.number) - 1)
+        return rows, self.number[rows] == number
 
 
 def image_clock(
@@ -90,34 +92,42 @@ def image_clock(
         model: The clock that the recorder fitted, which also knows the images before the recording.
         rate: Nominal rate of the camera [Hz]; None if unknown.
     """
-    arrival, sequence, device = (np.asarray(values, np.int64) for values in (arrival_ns, sequence, device_ns))
-    stamped = bool(len(device)) and bool((device >= 0).all()) and bool((np.diff(device) > 0).all())
-    counter = device if stamped else sequence
-    order = np.argsort(counter, kind="stable")
-    arrival, counter = arrival[order], counter[order]
-    if len(arrival) < 3 or (np.diff(counter) <= 0).any():
+    order = np.argsort(np.asarray(sequence, np.int64), kind="stable")
+    arrival, number, device = (np.asarray(values, np.int64)[order] for values in (arrival_ns, sequence, device_ns))
+    if len(arrival) < 3 or (np.diff(number) <= 0).any():
         return None
-    previous = model if model is not None and model.axis == ("device_ns" if stamped else "order") else None
-    lateness, spread = _stamped(arrival, counter, previous) if stamped else _numbered(arrival, counter, previous, rate)
+    stamps = exposure_stamps(arrival, device, rate)
+    previous = model if model is not None and model.axis == ("device_ns" if stamps else "order") else None
+    lateness, spread = (
+        _stamped(arrival, device, stamps, previous) if stamps else _numbered(arrival, number, previous, rate)
+    )
     constant = model.latency if model is not None else None
     time_ns = arrival - np.rint(lateness).astype(np.int64) - (constant.latency_ns if constant else 0)
     sigma = np.hypot(spread, constant.uncertainty_ns if constant else 0) * NS
-    return ImageClock("device_ns" if stamped else "order", counter, time_ns, sigma)
+    return ImageClock(number, time_ns, sigma)
 
 
-def _stamped(arrival: np.ndarray, device: np.ndarray, model: ClockModel | None) -> tuple[np.ndarray, np.ndarray]:
+def _stamped(
+    arrival: np.ndarray, device: np.ndarray, stamps: ExposureStamps, model: ClockModel | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the lateness of images with time stamps, and its standard uncertainty [ns], shape (n,) both."""
+    order, arrival, device = stamps.order, arrival[stamps.order], device[stamps.order]
     excess = (arrival - arrival[0]) - (device - device[0]).astype(float)
-    lateness, spread = np.zeros(len(arrival)), np.zeros(len(arrival))
-    begins = [0, *(np.flatnonzero(np.abs(np.diff(excess)) > STEP_NS) + 1), len(arrival)]
-    for first, end in pairwise(begins):
+    late, unsure = np.zeros(len(arrival)), np.zeros(len(arrival))
+    # A fall of seconds is no lateness, whatever the period.
+    believed = not len(stamps.begins) and bool((np.diff(order) > 0).all())
+    begins = np.union1d(stamps.begins, np.flatnonzero(np.abs(np.diff(excess)) > STEP_NS) + 1)
+    for first, end in pairwise([0, *begins.tolist(), len(arrival)]):
         rows = slice(first, end)
-        slope = _slope(device[rows] - device[first], excess[rows])
+        slope, bend = _slope(device[rows] - device[first], excess[rows])
         above = excess[rows] - slope * (device[rows] - device[first])
-        # The recorder's clock may know images before this recording that were less late.
-        floor = min([float(above.min()), *_earlier(model, arrival[rows], device[rows], above)])
-        lateness[rows] = above - floor
-        spread[rows] = np.hypot(_unsure(arrival[rows], lateness[rows]), UNSURE_NS)
+        # The recorder's clock may know images before this recording that were less late. Its line takes stamps as they
+        # come, so a step or an exchange bends it.
+        known = _earlier(model, arrival[rows], device[rows], above) if believed else []
+        late[rows] = above - min([float(above.min()), *known])
+        unsure[rows] = np.hypot(_unsure(arrival[rows], late[rows]), np.hypot(UNSURE_NS, bend))
+    lateness, spread = np.zeros(len(arrival)), np.zeros(len(arrival))
+    lateness[order], spread[order] = late, np.hypot(unsure, stamps.doubt_ns)
     return lateness, spread
 
 
@@ -132,17 +142,28 @@ def _earlier(model: ClockModel | None, arrival: np.ndarray, device: np.ndarray, 
     return [float(level) for level in levels if abs(level - above.min()) < STEP_NS]
 
 
-def _slope(device: np.ndarray, excess: np.ndarray) -> float:
-    """Return the slope of the line under latencies [ns/ns], as steep as a crystal's drift at most."""
+def _slope(device: np.ndarray, excess: np.ndarray) -> tuple[float, float]:
+    """Return the slope of the line under latencies [ns/ns], and the uncertainty of times that it leaves [ns].
+
+    It is as steep as a crystal's drift at most. A steeper one counts where the smallest latencies lie on it throughout:
+    lateness does not grow along a line. Its excess over a crystal's drift leaves an uncertainty.
+    """
     hull: list[tuple[int, int]] = []
     for point in zip(device.tolist(), np.rint(excess).astype(np.int64).tolist(), strict=True):
         append_to_hull(hull, point)
     if len(hull) < 2:
-        return 0.0
+        return 0.0, 0.0
     # The edge under the middle: at the ends of a recording few latencies bound the line.
     edge = next((k for k in range(1, len(hull) - 1) if hull[k][0] >= device.mean()), len(hull) - 1)
     (x1, y1), (x2, y2) = hull[edge - 1], hull[edge]
-    return float(np.clip((y2 - y1) / (x2 - x1), -CRYSTAL, CRYSTAL))
+    slope = (y2 - y1) / (x2 - x1)
+    if CRYSTAL < abs(slope) < STEEPEST:
+        block = device // BLOCK_NS
+        lowest = [np.flatnonzero(block == k)[excess[block == k].argmin()] for k in np.unique(block)]
+        deviation = np.abs(excess[lowest] - y1 - slope * (device[lowest] - x1))
+        if len(lowest) >= BLOCKS and np.median(deviation) < STRAIGHT_NS:
+            return slope, (abs(slope) - CRYSTAL) * float(device[-1] - device[0]) / 4
+    return float(np.clip(slope, -CRYSTAL, CRYSTAL)), 0.0
 
 
 def _numbered(
@@ -194,19 +215,21 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
         turns = pairs[None, :] / periods[:, None]
         return np.exp(-0.5 * ((turns - np.rint(turns)) / KERNEL) ** 2).mean(axis=1)
 
-    for guess in [usual] if nominal is None else [nominal, usual]:
+    candidates = []
+    # Half of the median: most images of a camera that went on at half its rate are two periods apart.
+    for guess in [usual, usual / 2] if nominal is None else [nominal, usual, usual / 2]:
         width = min(PERIODS, NEAR * guess / max(float(begun[-1]), 1.0) * TURN)
         tried = guess * (1 + np.linspace(-width, width, 201))
         shares = agreeing(tried)
-        best = tried[int(shares.argmax())]
-        # The right-hand side is the mean of the kernel over a whole turn: the agreement of arrivals without a period.
-        if shares.max() < CLEAR * KERNEL * np.sqrt(2 * np.pi):
-            continue
-        for usual_period in [] if nominal is None else [nominal, nominal * NTSC]:
-            if float(agreeing(np.array([usual_period]))[0]) > AS_WELL * shares.max():
-                return usual_period, CRYSTAL_SIGMA
-        return float(best), FITTED_SIGMA
-    return (nominal or usual), FITTED_SIGMA
+        candidates.append((float(tried[int(shares.argmax())]), float(shares.max())))
+    period, share = next(pair for pair in candidates if pair[1] >= AS_WELL * max(share for _, share in candidates))
+    # The right-hand side is the mean of the kernel over a whole turn: the agreement of arrivals without a period.
+    if share < CLEAR * KERNEL * np.sqrt(2 * np.pi):
+        return (nominal or usual), FITTED_SIGMA
+    for usual_period in [] if nominal is None else [nominal, nominal * NTSC]:
+        if float(agreeing(np.array([usual_period]))[0]) > AS_WELL * share:
+            return usual_period, CRYSTAL_SIGMA
+    return period, FITTED_SIGMA
 
 
 def _unsure(arrival: np.ndarray, lateness: np.ndarray) -> float:

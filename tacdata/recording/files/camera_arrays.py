@@ -109,9 +109,7 @@ def _stream(
         np.array([v.ambiguous for v in views], dtype=bool),
         tuple(tuple(v.ids) for v in views),
         finger,
-        clock.uncertainties(device if clock.axis == "device_ns" else sequence)
-        if isinstance(clock, ImageClock)
-        else None,
+        clock.uncertainties(sequence) if isinstance(clock, ImageClock) else None,
     )
 
 
@@ -120,6 +118,8 @@ def _sample(
 ) -> np.ndarray:
     if clock is None:
         return arrival_ns
+    if isinstance(clock, ImageClock):
+        return clock.sample_times(arrival_ns, sequence)
     return clock.sample_times(arrival_ns, device_ns if clock.axis == "device_ns" else sequence)
 
 

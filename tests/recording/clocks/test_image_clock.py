@@ -23,9 +23,8 @@ def errors(times, arrivals, stamped=False, rate=20.0):
         clock.take(int(arrival[k]), int(device[k] if stamped else k))
     rows = arrivals >= 0
     own = image_clock(arrival[rows], number[rows], device[rows], clock.model(), rate)
-    counter = device[rows] if stamped else number[rows]
-    off = (own.sample_times(arrival[rows], counter) - exposed[rows]) * 1e-9
-    return off, own.uncertainties(counter), times[rows]
+    off = (own.sample_times(arrival[rows], number[rows]) - exposed[rows]) * 1e-9
+    return off, own.uncertainties(number[rows]), times[rows]
 
 
 def images(seed, seconds=18.0, rate=20.0):
