@@ -9,9 +9,6 @@ from tacdata.replay.robot.urdf import read_urdf
 PLAIN = '<limit lower="-1" upper="1" effort="1" velocity="0.5"/>'
 
 
-PLAIN = '<limit lower="-1" upper="1" effort="1" velocity="0.5"/>'
-
-
 def joint(name, kind, parent, child, limit=PLAIN, axis="1 0 0", more=""):
     ends = f'<parent link="{parent}"/><child link="{child}"/>'
     return f'<joint name="{name}" type="{kind}">{ends}<axis xyz="{axis}"/>{limit}{more}</joint>'
@@ -98,6 +95,17 @@ def test_one_sentence_names_all_joints_of_a_kind(tmp_path):
 def test_a_speed_of_nought_or_infinity_is_none(tmp_path, speed, known):
     found = read(tmp_path, *pair(limit=limit(-1, 1, speed)))
     assert found.velocity.get("turn") == known and found.velocity["slide"] == 0.5
+
+
+def test_a_prefix_that_is_not_declared_is_passed_over(tmp_path):
+    """As in a published file of an arm: the program that knows the prefix reads it so."""
+    from tacdata.replay.kinematics import Kinematics
+    from tacdata.replay.robot import read_robot
+
+    given = PLAIN.replace("<limit", '<limit drake:acceleration="2.5"')
+    assert read(tmp_path, *pair(limit=given)).velocity["turn"] == 0.5
+    (tmp_path / "robot.yaml").write_text('{version: "1.0", name: r, urdf: robot.urdf, fingers: {index: {link: tip}}}')
+    assert Kinematics(read_robot(tmp_path / "robot.yaml"), ("index",)).joints[0].upper == 1.0
 
 
 def test_a_limit_on_one_side_only_can_be_drawn_from(tmp_path):

@@ -6,6 +6,7 @@ radians; a mimic joint without its leader is free. So the file is checked before
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections import Counter
 from dataclasses import dataclass
@@ -33,6 +34,8 @@ FARTHEST = 10.0
 TURN = 6.3
 """Largest plausible angle of an origin [rad]: a turn; more are degrees."""
 
+PREFIX = re.compile(rb"[\s<]([A-Za-z_][\w.-]*):[A-Za-z_]")
+"""A name with the prefix of a namespace, at the beginning of a tag or an attribute."""
 UNBOUNDED = "the URDF gives no limits of the position, so none were kept"
 
 
@@ -70,7 +73,7 @@ def read_urdf(path: StrPath) -> Urdf:
         raise UsageError(f"no URDF {path}", "a file named relative to the robot file", "correct urdf")
     text = path.read_bytes()
     try:
-        root = ET.fromstring(text)  # in the encoding that its first line names, or UTF-8
+        root = _parsed(text)
     except (ET.ParseError, LookupError, ValueError) as error:
         if b"\0" in text[:4] or not _is_utf8(text) or "encoding" in str(error):
             raise FormatError(
@@ -107,6 +110,19 @@ def read_urdf(path: StrPath) -> Urdf:
     names = tuple(_name(joint) for joint in joints)
     notes = tuple(f"joint {', '.join(which)}: {words}" for words, which in remarks.items())
     return Urdf(ET.tostring(root, encoding="unicode"), tuple(links), names, velocity, notes)
+
+
+def _parsed(text: bytes) -> ET.Element:
+    """Return the root of a file in the encoding that its first line names, or UTF-8; raises as `ET.fromstring`."""
+    try:
+        return ET.fromstring(text)
+    except ET.ParseError as error:
+        if "unbound prefix" not in str(error):
+            raise
+    # Published URDFs have attributes of one program, such as drake:acceleration, whose prefix is not declared.
+    prefixes = {name for name in PREFIX.findall(text) if name != b"xmlns" and b"xmlns:" + name not in text}
+    declared = b"".join(b' xmlns:%s="%s"' % (name, name) for name in sorted(prefixes))
+    return ET.fromstring(text.replace(b"<robot", b"<robot" + declared, 1))
 
 
 def _name(joint: ET.Element) -> str:
