@@ -98,3 +98,17 @@ def test_late_images_do_not_average_out(tmp_path):
     spread = np.concatenate([np.sqrt(t.covariance[:, range(3, 6), range(3, 6)]) for t in tracked.tracks.values()])
     assert 1000 * np.nanmax(np.abs(off)) > 5.0
     assert (np.abs(off) > 3 * spread).any(axis=1).mean() < 0.01
+
+
+def test_an_image_that_is_repeated_under_fresh_stamps_does_not_count(tmp_path):
+    frozen = []
+    for name in NAMES:
+        stream = view(name)
+        rows = slice(61, 70)
+        for values in (stream.position, stream.quaternion):
+            values[rows] = values[60]
+        frozen.append(stream)
+    made = track(recording(tmp_path, views=tuple(frozen)))
+    assert any(words.startswith("camera eye repeated an image 9 times from 2.4 to 2.8 s") for words in made.remarks)
+    assert not any("contradict" in words or "change places" in words for words in made.remarks)
+    assert all(t.outliers == 0 and t.gap[75:81].any() for t in made.tracks.values())

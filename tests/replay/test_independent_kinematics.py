@@ -48,9 +48,15 @@ def numbers(element, name, fallback):
     return np.array((fallback if element is None else element.get(name, fallback)).split(), float)
 
 
+def link_of(joint, end):
+    element = joint.find(end)
+    assert element is not None
+    return element.get("link")
+
+
 def tip_poses(urdf, link, values, base, tip):
     """Poses of a fingertip on a link at joint values by name [rad], shape (n,) each; shape (n, 4, 4)."""
-    parents = {j.find("child").get("link"): j for j in ElementTree.fromstring(urdf).findall("joint")}
+    parents = {link_of(j, "child"): j for j in ElementTree.fromstring(urdf).findall("joint")}
     matrix, at = placed(tip)[None], link
     while at in parents:
         joint = parents[at]
@@ -63,7 +69,7 @@ def tip_poses(urdf, link, values, base, tip):
             turns = Rotation.from_rotvec(values[joint.get("name")][:, None] * axis / np.linalg.norm(axis))
             turn[:, :3, :3], turn[:, 3, 3] = turns.as_matrix(), 1.0
             here = here @ turn
-        matrix, at = here @ matrix, joint.find("parent").get("link")
+        matrix, at = here @ matrix, link_of(joint, "parent")
     return placed(base) @ matrix
 
 

@@ -134,7 +134,7 @@ def repeated(view: TagStream) -> np.ndarray:
     Noise makes every image another one, of resting fingers too. So such an image is no new one, whatever its time.
     """
     poses = np.concatenate([view.position, view.quaternion], axis=1)
-    again = np.isfinite(poses).all(axis=1)
+    again = np.asarray(np.isfinite(poses).all(axis=1))
     again[np.unique(poses, axis=0, return_index=True)[1]] = False
     return again
 

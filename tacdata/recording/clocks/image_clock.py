@@ -36,8 +36,16 @@ PERIODS = 0.01
 """Largest deviation of the period from its first guess [1]."""
 PAIRS, NEAR = 6000, 5
 """Pairs of images from which the period is found [count]; they are at most this part of the recording apart."""
+ALIKE = 0.25
+"""Largest deviation of intervals from their median that count as the usual one [1]."""
 KERNEL = 0.06
 """Scatter of a pair's distance about a multiple of the period [periods]."""
+CHANCE = KERNEL * float(np.sqrt(2 * np.pi))
+"""Share of pairs at multiples of any period, of arrivals without one [1]: the mean of the kernel over a whole turn."""
+ODD = 0.1
+"""Share of pairs an odd number of half periods apart, over those at multiples, at which the period is half as long [1]."""
+WHOLE = 0.1
+"""Largest distance of the usual interval from a multiple of the nominal period [periods]."""
 TURN = 3.0
 """Multiples of the period by which the farthest pair may be off in the search [count]."""
 CLEAR = 1.3
@@ -172,7 +180,10 @@ def _numbered(
     """Return the lateness of images without time stamps, and its standard uncertainty [ns], shape (n,) both."""
     begun = (arrival - arrival[0]).astype(float)
     steps = np.diff(begun) / np.diff(number)
-    period, drift = _period(begun, float(np.median(steps)), 1e9 / rate if rate else None)
+    usual = float(np.median(steps))
+    # Where the rate changed, latencies draw the median to the other rate.
+    usual = float(steps[np.abs(steps - usual) <= ALIKE * usual].mean())
+    period, drift = _period(begun, usual, 1e9 / rate if rate else None)
     excess = begun - period * (number - number[0])
     # Numbers are given on arrival: a lost image raises the excess of all later ones for good, lateness does not. So an
     # image is at least as late as against the later ones, and at most as against the earlier ones.
@@ -202,7 +213,7 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
 
     Args:
         begun: Arrivals [ns], shape (n,).
-        usual: Median interval [ns].
+        usual: Usual interval [ns].
         nominal: Nominal period [ns], or None.
     """
     # A fixed seed: one recording always has the same period.
@@ -211,25 +222,33 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
     second = np.clip(first + rng.integers(4, max(len(begun) // NEAR, 6), PAIRS), 0, len(begun) - 1)
     pairs = begun[second] - begun[first]
 
-    def agreeing(periods: np.ndarray) -> np.ndarray:
-        turns = pairs[None, :] / periods[:, None]
+    def agreeing(periods: np.ndarray, shift: float = 0.0) -> np.ndarray:
+        turns = pairs[None, :] / periods[:, None] + shift
         return np.exp(-0.5 * ((turns - np.rint(turns)) / KERNEL) ** 2).mean(axis=1)
 
-    candidates = []
-    # Half of the median: most images of a camera that went on at half its rate are two periods apart.
-    for guess in [usual, usual / 2] if nominal is None else [nominal, usual, usual / 2]:
+    def fitted(guess: float) -> tuple[float, float]:
         width = min(PERIODS, NEAR * guess / max(float(begun[-1]), 1.0) * TURN)
         tried = guess * (1 + np.linspace(-width, width, 201))
         shares = agreeing(tried)
-        candidates.append((float(tried[int(shares.argmax())]), float(shares.max())))
-    period, share = next(pair for pair in candidates if pair[1] >= AS_WELL * max(share for _, share in candidates))
-    # The right-hand side is the mean of the kernel over a whole turn: the agreement of arrivals without a period.
-    if share < CLEAR * KERNEL * np.sqrt(2 * np.pi):
-        return (nominal or usual), FITTED_SIGMA
-    for usual_period in [] if nominal is None else [nominal, nominal * NTSC]:
-        if float(agreeing(np.array([usual_period]))[0]) > AS_WELL * share:
-            return usual_period, CRYSTAL_SIGMA
-    return period, FITTED_SIGMA
+        return float(tried[int(shares.argmax())]), float(shares.max())
+
+    # Arrivals in batches have a median interval of nearly nothing.
+    found = fitted(max(usual, 0.5 * float(begun[-1]) / (len(begun) - 1)))
+    # Pairs a quarter of a period off are those without a period.
+    odd, stray = (float(agreeing(np.array([found[0]]), shift)[0]) for shift in (0.5, 0.25))
+    if odd - stray > ODD * max(found[1] - stray, CHANCE):
+        found = fitted(found[0] / 2)
+    turns = usual / nominal if nominal else 0.0
+    for period, share in [found] if nominal is None else [fitted(nominal), found]:
+        # A nominal period that does not divide the usual interval must agree as well as that one.
+        divides = abs(turns - max(round(turns), 1)) < WHOLE
+        if share < CLEAR * CHANCE or (period != found[0] and not divides and share < AS_WELL * found[1]):
+            continue
+        for usual_period in [] if nominal is None else [nominal, nominal * NTSC]:
+            if float(agreeing(np.array([usual_period]))[0]) > AS_WELL * share:
+                return usual_period, CRYSTAL_SIGMA
+        return period, FITTED_SIGMA
+    return (nominal or usual), FITTED_SIGMA
 
 
 def _unsure(arrival: np.ndarray, lateness: np.ndarray) -> float:

@@ -12,10 +12,12 @@ DELAY = 0.05
 """Smallest latency, which the clock is told [s]."""
 
 
-def errors(times, arrivals, stamped=False, rate=20.0):
+def errors(times, arrivals, stamped=False, rate=20.0, stamps=None):
     """Errors of the times [s], and their uncertainties [s]; the camera is open five seconds before time 0."""
     arrival, exposed = (START + np.rint(values * 1e9).astype(np.int64) for values in (arrivals, times))
-    device = exposed - START + 10**13 if stamped else np.full(len(times), -1)
+    marks = times if stamps is None else stamps
+    stamped = stamped or stamps is not None
+    device = np.rint(marks * 1e9).astype(np.int64) + 10**13 if stamped else np.full(len(times), -1)
     number = np.arange(len(times))
     clock = StreamClock("device_ns" if stamped else "order")
     clock.set_latency(StreamLatency(int(DELAY * 1e9), 2_000_000))
@@ -74,6 +76,59 @@ def test_a_rate_that_is_not_nominal_is_found(rate):
     times, arrivals = images(3, rate=rate)
     off, sigma, _ = errors(times, np.maximum.accumulate(arrivals + 0.2 * ((times > 4) & (times < 9))), rate=round(rate))
     assert (np.abs(off) < 3 * sigma).mean() > 0.99 and sigma.max() < 0.02
+
+
+STAMPS = {
+    "clock set forward": lambda times: times + 0.33 * (times > 7),
+    "clock set back": lambda times: times - 0.33 * (times > 7),
+    "clock set back by less than a period": lambda times: times - 0.03 * (times > 7),
+    "clock set twice": lambda times: times + 0.02 * (times > 3) - 0.61 * (times > 12),
+    "slow by 0.1 %": lambda times: 1.001 * times,
+    "in microseconds": lambda times: 0.001 * times,
+    "of batches of four": lambda times: (
+        times[np.minimum(np.arange(len(times)) // 4 * 4 + 3, len(times) - 1)] + 0.0002 * (np.arange(len(times)) % 4)
+    ),
+}
+"""Wrong stamps -> stamps of exposures [s]."""
+
+
+@pytest.mark.parametrize("kind", STAMPS)
+@pytest.mark.parametrize("late", [0.0, 0.2])
+def test_stamps_that_are_wrong_do_not_make_times_wrong(kind, late):
+    times, arrivals = images(4)
+    arrivals = np.maximum.accumulate(arrivals + late * ((times > 9) & (times < 11)))
+    off, sigma, _ = errors(times, arrivals, stamps=STAMPS[kind](times))
+    assert (np.abs(off) < 3 * sigma).mean() > 0.98 and np.abs(off[:-5]).max() < 0.012 and np.median(sigma) < 0.01
+
+
+def test_a_clock_set_forward_by_whole_periods_as_nothing_else_changes_leaves_a_doubt():
+    times, arrivals = images(5)
+    off, sigma, when = errors(times, arrivals, stamps=times + 0.2 * (times > 7 - 1e-6))
+    assert (np.abs(off) < 3 * sigma).all() and sigma[when < 6.9].min() > 0.19 and sigma[when > 7.1].max() < 0.01
+
+
+def test_neighbours_that_arrive_in_the_wrong_order_are_put_right_by_their_stamps():
+    times, arrivals = images(6)
+    order = np.arange(len(times))
+    for k in (150, 200, 201, 310):
+        order[[k, k + 1]] = order[[k + 1, k]]
+        arrivals[k] = arrivals[k + 1]
+    off, sigma, _ = errors(times[order], arrivals, stamps=times[order])
+    assert (np.abs(off) < 3 * sigma).all() and np.abs(off).max() < 0.005
+
+
+@pytest.mark.parametrize("rate", [None, 30.0, 10.0])
+def test_a_rate_that_the_rig_file_has_wrong_or_not_costs_nothing(rate):
+    times, arrivals = images(7)
+    off, sigma, _ = errors(times, arrivals, rate=rate)
+    assert (np.abs(off) < 3 * sigma).mean() > 0.99 and sigma.max() < 0.02
+
+
+def test_a_camera_that_goes_on_at_half_its_rate_is_not_late_before():
+    times, arrivals = images(8)
+    kept = (times < 4) | (np.arange(len(times)) % 2 == 0)
+    off, sigma, _ = errors(times[kept], arrivals[kept], rate=None)
+    assert (np.abs(off) < 3 * sigma).mean() > 0.99 and np.abs(off).max() < 0.012
 
 
 def test_too_few_images_have_no_clock():
