@@ -43,7 +43,7 @@ KERNEL = 0.06
 CHANCE = KERNEL * float(np.sqrt(2 * np.pi))
 """Share of pairs at multiples of any period, of arrivals without one [1]: the mean of the kernel over a whole turn."""
 ODD = 0.1
-"""Share of pairs an odd number of half periods apart, over those at multiples, at which the period is half as long [1]."""
+"""Share of pairs an odd number of half periods apart, over those at multiples, from which the period is half [1]."""
 WHOLE = 0.1
 """Largest distance of the usual interval from a multiple of the nominal period [periods]."""
 TURN = 3.0
