@@ -82,12 +82,9 @@ def _bias(ax: Any, study: dict[str, Any]) -> None:
 
 
 def _ways(ax: Any, study: dict[str, Any]) -> None:
-    ways = [name for name in study["rates"] if name in study["bias"]["accepted_to"]]
-    colors = _colors(study)
+    ways, colors = list(study["rates"]), _colors(study)
     for trial in study["trials"]:
         name = trial["strategy"]
-        if name not in ways:
-            continue
         shift = 0.24 * (ways.index(name) / max(len(ways) - 1, 1) - 0.5)
         moves = [k + shift for k in range(len(trial["truths"]))]
         ax.plot(moves, trial["truths"], color=colors[name], lw=0.6, alpha=0.5)
