@@ -1,4 +1,7 @@
-"""Starts Warp without its banner and without its warning that there is no GPU."""
+"""Starts Warp without its banner and without its warning that there is no GPU; the one place that imports it.
+
+A file of kernels imports ``wp`` from here, as Warp's options are taken when a file's first kernel is declared.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,10 @@ import os
 import sys
 import tempfile
 
-import warp as wp  # noqa: TID253 - imported by modules of kernels alone
+import warp as wp  # noqa: TID251
+from warp import Function  # noqa: TID251
+
+__all__ = ["Function", "start", "wp"]
 
 NO_GPU = b"Could not find or load the NVIDIA CUDA driver"
 """Printed by Warp's native library, past Python, at every start on a machine without a GPU."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp  # noqa: TID253 - for kernels; imported with them
+
+from tacdata.warp_runtime import wp  # noqa: TID253 - for kernels; imported with them
 
 LANES = 8
 """As many numbers as a processor's widest registers hold [1]."""

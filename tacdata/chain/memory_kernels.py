@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp  # noqa: TID253 - kernels; imported when a history is run, never with an effect
 
-import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.chain.lanes import Lanes, in_lanes, padded
+from tacdata.warp_runtime import wp  # noqa: TID253 - kernels; imported when a history is run, never with an effect
 
 
 @wp.kernel(module="unique", enable_backward=False)

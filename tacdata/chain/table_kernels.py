@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp  # noqa: TID253 - kernels; imported with a table's values, never with the response's module
 
-import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.chain.lanes import Lanes, in_lanes
+from tacdata.warp_runtime import wp  # noqa: TID253 - kernels; imported with a table's values, never with the response's module
 
 SAVED = 2.0
 """Depths are read from a table of each place where those have fewer nodes than so many times the rows [1]."""

@@ -12,7 +12,8 @@ from tacdata.indenters.indenter import Indenter, warp
 
 if TYPE_CHECKING:
     import trimesh
-    from warp import Function
+
+    from tacdata.warp_runtime import Function
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,8 @@ from tacdata.errors import FormatError
 
 if TYPE_CHECKING:
     import trimesh
-    from warp import Function
+
+    from tacdata.warp_runtime import Function
 
 ROOM, BASE = "tacdata.indenters", "indenter"
 
@@ -169,9 +170,9 @@ class Indenter(ABC):
 
 def warp() -> Any:
     """Import Warp, typed as Any: the bodies of Warp functions are Python in form only."""
-    import warp
+    from tacdata.warp_runtime import wp
 
-    return warp
+    return wp
 
 
 def rounded_hull(corners: np.ndarray, radius: float, height: float) -> trimesh.Trimesh:

@@ -17,7 +17,8 @@ from tacdata.surfaces.solid import TOP, Solid, solid
 
 if TYPE_CHECKING:
     import trimesh
-    from warp import Function
+
+    from tacdata.warp_runtime import Function
 
 SHAPES = Path(__file__).parent / "shapes"
 """Surface files that ship."""

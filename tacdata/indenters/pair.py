@@ -15,7 +15,8 @@ from tacdata.indenters.indenter import BASE, ROOM, Indenter, from_document, warp
 
 if TYPE_CHECKING:
     import trimesh
-    from warp import Function
+
+    from tacdata.warp_runtime import Function
 
 _MEMBERS = ("first", "second")
 
@@ -156,7 +157,7 @@ def _shapes() -> list[str]:
 @cache
 def _on_device(pair: Pair, device: str) -> Any:
     """Return half the distance, both solids' numbers and their parameters; kept, as kernels hold only the address."""
-    import warp as wp
+    from tacdata.warp_runtime import wp
 
     rows = np.zeros((3, 8))
     rows[0, 0] = pair.distance / 2

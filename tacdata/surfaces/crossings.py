@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
-import tacdata.warp_runtime  # noqa: F401 - starts Warp
+from tacdata.warp_runtime import wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
 
 @wp.func

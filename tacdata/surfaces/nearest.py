@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
-import tacdata.warp_runtime  # noqa: F401 - starts Warp
+from tacdata.warp_runtime import wp  # noqa: TID253 - kernels; imported when a surface is asked, never with a plan
 
 
 @wp.kernel(module="unique", enable_backward=False)

@@ -61,7 +61,7 @@ class Solid:
         It leads to eight float64: address of the coefficients, origin x, y, z and spacing [mm], nodes along x, y, z.
         The data live as long as the process: kernels hold only the address.
         """
-        import warp as wp
+        from tacdata.warp_runtime import wp
 
         if device not in self._on_devices:
             grid = self.grid

@@ -4,9 +4,9 @@ import subprocess
 import sys
 
 import pytest
-import warp as wp
 
 from tacdata import warp_runtime
+from tacdata.warp_runtime import wp
 
 FAKE = """
 import os, warp
@@ -25,5 +25,24 @@ def test_start_says_nothing_of_a_missing_card(code, expected):
     assert done.stderr == expected
 
 
-def test_long_loops_of_kernels_are_written_out_for_a_card_alone():
+OPTIONS = """
+import importlib, pkgutil, sys
+import tacdata
+from tacdata import warp_runtime
+for room in ("chain", "skin", "surfaces"):
+    package = importlib.import_module(f"tacdata.{room}")
+    for _, name, _ in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+        if "import wp" in open(importlib.util.find_spec(name).origin).read():
+            importlib.import_module(name)
+wp = warp_runtime.wp
+expected = wp.config.max_unroll if wp.is_cuda_available() else warp_runtime.UNROLLED
+modules = [m for m in wp._src.context.user_modules.values() if not m.name.startswith("warp.")]
+print(len(modules), [m.name for m in modules if m.options["max_unroll"] != expected])
+"""
+
+
+def test_long_loops_of_all_kernels_are_written_out_for_a_card_alone():
     assert (wp.config.max_unroll > warp_runtime.UNROLLED) == wp.is_cuda_available()
+    done = subprocess.run([sys.executable, "-c", OPTIONS], capture_output=True, text=True, check=True)
+    count, others = done.stdout.split(maxsplit=1)
+    assert int(count) > 5 and others.strip() == "[]"

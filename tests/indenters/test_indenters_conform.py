@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-import warp as wp
 
 from tacdata import registry
 from tacdata.errors import FormatError
 from tacdata.indenters import Indenter, from_document
 from tacdata.indenters.indenter import BASE, ROOM
+from tacdata.warp_runtime import wp
 
 NAMES = registry.names(ROOM, BASE)
 Parameters = wp.types.vector(length=8, dtype=wp.float64)

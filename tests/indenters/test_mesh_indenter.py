@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 import trimesh
-import warp as wp
 import yaml
 from test_indenters_conform import Parameters, compiled, distance, gradient
 
@@ -19,6 +18,7 @@ from tacdata.plans import Plan, read_plan
 from tacdata.plans.beside_skin import tip_aside
 from tacdata.sensor import default_sensor
 from tacdata.surfaces import distance_grid
+from tacdata.warp_runtime import wp
 
 
 def tessellated_punch(steps, sections):

@@ -5,11 +5,11 @@ When `tacdata.skin.mesh.build.RECIPE` changes they are no longer found: replace 
 
 import pytest
 import torch
-import warp as wp
 from skin_examples import bumps_sensor, slab_sensor
 
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.skin.model import ModelSettings, SkinModel
+from tacdata.warp_runtime import wp
 
 
 def _settings(**mesh):

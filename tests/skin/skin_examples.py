@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import torch
-import warp as wp
 
 from tacdata.sensor import Material, Sensor, default_sensor
 from tacdata.sensor.sensor import ContactProperties, DepthMap, Skin, Taxels
@@ -20,6 +19,7 @@ from tacdata.skin.mesh.generation.quadratic import quadratic
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.model import ModelSettings
 from tacdata.skin.solve.settings import SolverSettings
+from tacdata.warp_runtime import wp
 
 MATERIAL = Material("neo_hookean", 0.30, 0.47)
 

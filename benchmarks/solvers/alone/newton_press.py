@@ -20,7 +20,8 @@ DENSITY = 1e-9  # of water [t/mm^3]
 def build(press):
     """Return model, solver, two states, contacts and the pipeline that finds them."""
     import newton
-    import warp as wp
+
+    from tacdata.warp_runtime import wp
 
     wp.config.quiet = True
     h = press["spacing"]

@@ -10,9 +10,8 @@ from abc import ABC, abstractmethod
 from functools import cache
 from typing import ClassVar
 
-import warp as wp
-
 from tacdata import registry
+from tacdata.warp_runtime import wp
 
 ROOM, BASE = "tacdata.skin.adhesions", "adhesion_law"
 

@@ -2,9 +2,8 @@
 
 from functools import cache
 
-import warp as wp
-
 from tacdata.skin.adhesions.adhesion_law import AdhesionLaw
+from tacdata.warp_runtime import wp
 
 
 class XuNeedleman(AdhesionLaw):

@@ -2,9 +2,8 @@
 
 from typing import NamedTuple
 
-import warp as wp
-
 from tacdata.skin.constitutive import invariants, kinematics, split
+from tacdata.warp_runtime import wp
 
 
 class Profile(NamedTuple):

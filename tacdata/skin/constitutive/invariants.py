@@ -7,9 +7,8 @@ q = D:D/2 - det D it holds that det(C)/c^3 = 1 - q. So I1bar = 3 (1 - q)^(-1/3),
 from functools import cache
 from types import SimpleNamespace
 
-import warp as wp
-
 from tacdata.skin.constitutive.kinematics import matrix, volume
+from tacdata.warp_runtime import wp
 
 
 @cache

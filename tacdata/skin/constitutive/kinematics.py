@@ -10,7 +10,7 @@ F x D = d(cof F)[D] follows Bonet, Gil and Ortigosa (2015), Comput. Methods Appl
 from functools import cache
 from types import SimpleNamespace
 
-import warp as wp
+from tacdata.warp_runtime import wp
 
 
 def matrix(real: type) -> type:

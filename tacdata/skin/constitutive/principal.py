@@ -2,10 +2,9 @@
 
 from functools import cache
 
-import warp as wp
-
 from tacdata.skin.constitutive import scalars
 from tacdata.skin.constitutive.kinematics import matrix
+from tacdata.warp_runtime import wp
 
 
 @cache

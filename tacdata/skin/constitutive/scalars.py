@@ -2,7 +2,7 @@
 
 from functools import cache
 
-import warp as wp
+from tacdata.warp_runtime import wp
 
 
 @cache

@@ -1,8 +1,7 @@
 """The volumetric-isochoric split: an isochoric law plus kappa/2 (J - 1)^2."""
 
-import warp as wp
-
 from tacdata.skin.constitutive import kinematics
+from tacdata.warp_runtime import wp
 
 
 def with_volumetric(

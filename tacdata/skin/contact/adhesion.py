@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import cache
 
 import torch
-import warp as wp
 
 from tacdata.sensor import Adhesion
 from tacdata.skin.adhesions import load_adhesion_law
@@ -23,6 +22,7 @@ from tacdata.skin.contact.kernels import deformed_point, normal_function, of_mem
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
+from tacdata.warp_runtime import wp
 
 _PER_MM = 1e-3
 """J/m^2 in N/mm [1]."""

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import warp as wp
 
 from tacdata.skin.contact import kernel_data, kernels
 from tacdata.skin.contact.contact_forces import ContactForces, ContactTangent
@@ -30,6 +29,7 @@ from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
 from tacdata.skin.mesh import elements
+from tacdata.warp_runtime import wp
 
 SUBDIVISIONS = 2
 """The quadrature rule is repeated on the sub-triangles of the hats, on which these are linear."""

@@ -1,11 +1,10 @@
 """Data of the contact kernels: surface, members of a batch and history as Warp structs."""
 
-import warp as wp
-
 from tacdata.skin.contact.history import ContactHistory
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.member.warp_arrays import filled
+from tacdata.warp_runtime import wp
 
 Parameters = wp.types.vector(length=8, dtype=wp.float64)
 """Numbers of an indenter's distance function."""

@@ -5,9 +5,8 @@ Indices: f a face, k a point of its quadrature rule, a a node of the face, j a c
 
 from functools import cache
 
-import warp as wp
-
 from tacdata.skin.contact.kernel_data import HistoryData, MemberData, Nodal, Parameters, Six, SurfaceData
+from tacdata.warp_runtime import wp
 
 
 @wp.func

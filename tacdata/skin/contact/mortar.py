@@ -12,10 +12,9 @@ from functools import cache
 import numpy as np
 import scipy.sparse as sp
 import torch
-import warp as wp
 
-import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.skin.member.warp_arrays import REAL, argument
+from tacdata.warp_runtime import wp
 
 
 @cache

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from functools import cache
 
-import warp as wp
-
 from tacdata.skin.contact.kernel_data import MemberData, SurfaceData
 from tacdata.skin.contact.kernels import deformed_point, of_member, parameters_of, rotation_of
+from tacdata.warp_runtime import wp
 
 _SAMPLES = wp.constant(16)
 """Points of a ray where the distance is asked for [count]."""

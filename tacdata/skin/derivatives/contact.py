@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-import warp as wp
 
 from tacdata.skin.contact.contact_forces import ContactForces
 from tacdata.skin.contact.contact_surface import ContactSurface
@@ -22,6 +21,7 @@ from tacdata.skin.member.columns import Columns
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.member.warp_arrays import argument
+from tacdata.warp_runtime import wp
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,6 @@ Indices as in `tacdata.skin.contact.kernels`; the structs of `kernel_data` hold 
 
 from functools import cache
 
-import warp as wp
-
 from tacdata.skin.contact.kernel_data import HistoryData, MemberData, Nodal, Parameters, Six, SurfaceData
 from tacdata.skin.contact.kernels import (
     at_node,
@@ -17,6 +15,7 @@ from tacdata.skin.contact.kernels import (
     rotation_of,
     share_in_contact,
 )
+from tacdata.warp_runtime import wp
 
 
 @wp.func

@@ -6,11 +6,10 @@ Each element reads its nodes once and adds to them once: on a GPU it is these ac
 from functools import cache
 from types import SimpleNamespace
 
-import warp as wp
-
 from tacdata.skin.constitutive import kinematics
 from tacdata.skin.elasticity.element_functions import constant_data, element_data, element_functions
 from tacdata.skin.materials import load_law
+from tacdata.warp_runtime import wp
 
 BEARABLE = 1.0
 """Pressure over Young's modulus beyond which the tangent no longer follows it [1]."""

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import torch
-import warp as wp
 
 from tacdata.skin.elasticity.averaged_kernels import averaged_kernels
 from tacdata.skin.elasticity.element_functions import constant_data
@@ -25,6 +24,7 @@ from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
 from tacdata.skin.mesh import elements
 from tacdata.skin.mesh.skin_mesh import SkinMesh
+from tacdata.warp_runtime import wp
 
 CORRECTIONS = 3
 """Steps of Richardson's iteration; each takes two orders of the element's size off the error of lumping."""

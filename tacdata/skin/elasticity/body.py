@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 import torch
-import warp as wp
 
-import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.skin.elasticity.averaged_volume import AveragedVolume, corner_shapes
 from tacdata.skin.elasticity.element_functions import constant_data, element_data, element_functions
 from tacdata.skin.elasticity.prepared_tangent import PreparedTangent
@@ -20,6 +18,7 @@ from tacdata.skin.materials import load_law
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
 from tacdata.skin.mesh.skin_mesh import SkinMesh
+from tacdata.warp_runtime import wp
 
 
 @cache

@@ -7,9 +7,8 @@ from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
-import warp as wp
-
 from tacdata.skin.constitutive import kinematics
+from tacdata.warp_runtime import wp
 
 
 @cache

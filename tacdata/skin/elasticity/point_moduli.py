@@ -6,12 +6,11 @@ Lanes are members in one vector. A CPU works on them at once.
 from functools import cache
 from types import SimpleNamespace
 
-import warp as wp
-
 from tacdata.skin.constitutive import kinematics
 from tacdata.skin.elasticity.averaged_kernels import BEARABLE
 from tacdata.skin.elasticity.element_functions import constant_data, element_data, element_functions
 from tacdata.skin.materials import load_law
+from tacdata.warp_runtime import wp
 
 LANES = 8
 """Members that are worked on at a time."""

@@ -12,13 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import torch
-import warp as wp
 
 from tacdata.skin.elasticity.averaged_volume import CORRECTIONS, AveragedVolume
 from tacdata.skin.elasticity.element_functions import constant_data
 from tacdata.skin.elasticity.point_moduli import LANES, NUMBERS, moduli_kernel, product_kernels
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.warp_arrays import REAL, argument, filled
+from tacdata.warp_runtime import wp
 
 _MOVED = 0.003
 """Change of an entry of F's cofactor up to which a point keeps its moduli [1]."""

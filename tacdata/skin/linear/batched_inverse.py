@@ -7,10 +7,10 @@ smaller matrices. Only the lower triangle is kept up to date.
 from __future__ import annotations
 
 import torch
-import warp as wp
 
 from tacdata.skin.linear.sweep_kernels import ROWS, invert_in_place, sweep_kernels
 from tacdata.skin.member.warp_arrays import argument
+from tacdata.warp_runtime import wp
 
 _STRIP = 256
 """Columns that are brought up to date by one product: the wider, the more are above the diagonal, for nothing."""

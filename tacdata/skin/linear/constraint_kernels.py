@@ -4,7 +4,7 @@ Indices: j a contact node, b a batch member, s a constraint of it. A constraint 
 M with the components of its direction.
 """
 
-import warp as wp
+from tacdata.warp_runtime import wp
 
 SOFT = wp.constant(wp.float32(1.0e3))
 """Compliance of a slipping node, over the body's at the same node, up to which friction enters [1]: beyond, it is

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import torch
-import warp as wp
 
 from tacdata.skin.contact.contact_forces import ContactTangent
 from tacdata.skin.contact.contact_surface import ContactSurface
 from tacdata.skin.linear import constraint_kernels as kernels
 from tacdata.skin.linear.rest_stiffness import RestSolver
 from tacdata.skin.member.warp_arrays import argument, filled
+from tacdata.warp_runtime import wp
 
 _TURNED, _SOFTENED = 0.02, 0.3
 """Relative change of a direction [1] and of its compliance [1], up to which members keep the constraints that

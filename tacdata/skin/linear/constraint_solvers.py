@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 
 import torch
-import warp as wp
 
 from tacdata.skin.linear.batched_inverse import ROWS, inverse_of
+from tacdata.warp_runtime import wp
 
 Assemble = Callable[[torch.Tensor, torch.Tensor], None]
 """Writes S of some members, by index, shape (g,), into a tensor of shape (g, a, a): its lower triangle."""

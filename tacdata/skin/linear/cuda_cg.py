@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import torch
-import warp as wp
 
 from tacdata.skin.linear import constraint_kernels
 from tacdata.skin.linear import cuda_cg_kernels as kernels
@@ -22,6 +21,7 @@ from tacdata.skin.linear.projected_cg import Stopping
 from tacdata.skin.linear.rest_stiffness import DenseRest
 from tacdata.skin.linear.tangent import Linearization, TangentStiffness
 from tacdata.skin.member.warp_arrays import argument
+from tacdata.warp_runtime import wp
 
 _ROOM = 256.0
 """To which residuals are scaled for half precision: they may grow as much again."""

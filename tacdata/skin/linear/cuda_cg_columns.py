@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import torch
-import warp as wp
 
 from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
 from tacdata.skin.linear.tangent import Linearization
+from tacdata.warp_runtime import wp
 
 _FIELDS = ("x", "r", "p")
 _ALIGNED = 8

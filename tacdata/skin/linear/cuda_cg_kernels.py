@@ -4,7 +4,7 @@ Fields are (3n, batch); ``order`` is the degree of freedom of each row of the re
 A thread does `STRIP` rows of one member, so that its sums go to memory once.
 """
 
-import warp as wp
+from tacdata.warp_runtime import wp
 
 STRIP = wp.constant(32)
 """Rows a thread."""

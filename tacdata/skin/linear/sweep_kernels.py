@@ -11,9 +11,9 @@ from functools import cache
 from types import SimpleNamespace
 
 import torch
-import warp as wp
 
 from tacdata.skin.member.warp_arrays import REAL, argument
+from tacdata.warp_runtime import wp
 
 ROWS = 128
 """Size of the matrices."""

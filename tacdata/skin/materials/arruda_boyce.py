@@ -5,10 +5,9 @@ from functools import cache
 from math import comb
 from typing import Self
 
-import warp as wp
-
 from tacdata.skin.constitutive import first_invariant, kinematics
 from tacdata.skin.materials.law import Law, LawFunctions
+from tacdata.warp_runtime import wp
 
 SERIES = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
 """C1 to C5 of W = mu0 sum_i C_i / N^(i-1) (I1bar^i - 3^i) (Arruda and Boyce 1993, J. Mech. Phys. Solids 41, 389)."""

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Self
 
-import warp as wp
-
 from tacdata.skin.constitutive import first_invariant, kinematics, scalars
 from tacdata.skin.materials.law import Law, LawFunctions
+from tacdata.warp_runtime import wp
 
 LOCKED = 0.98
 """Share of Jm beyond which w' goes on along its tangent [1], so that an iterate beyond the pole is no NaN."""

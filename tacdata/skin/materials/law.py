@@ -13,12 +13,11 @@ from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
-import warp as wp
-
 from tacdata import registry
 from tacdata.errors import FormatError
 from tacdata.sensor import Material
 from tacdata.skin.constitutive import kinematics
+from tacdata.warp_runtime import wp
 
 ROOM, BASE = "tacdata.skin.materials", "law"
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import ClassVar
 
-import warp as wp
-
 from tacdata.skin.constitutive import kinematics, scalars
 from tacdata.skin.materials.law import Law, LawFunctions
+from tacdata.warp_runtime import wp
 
 
 @dataclass(frozen=True)

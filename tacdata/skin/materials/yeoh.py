@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Self
 
-import warp as wp
-
 from tacdata.skin.constitutive import first_invariant, kinematics
 from tacdata.skin.materials.law import Law, LawFunctions
+from tacdata.warp_runtime import wp
 
 
 @dataclass(frozen=True)

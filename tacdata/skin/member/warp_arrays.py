@@ -3,7 +3,8 @@
 from typing import Any
 
 import torch
-import warp as wp
+
+from tacdata.warp_runtime import wp
 
 REAL = {torch.float32: wp.float32, torch.float64: wp.float64}
 """Warp's name of a scalar type."""

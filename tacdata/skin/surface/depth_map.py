@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
-import warp as wp
 
 from tacdata.errors import UsageError
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.surface.depth_map_kernel import NOTHING, highest
 from tacdata.skin.surface.pressed_shape import PressedShape
+from tacdata.warp_runtime import wp
 
 SAMPLINGS = ("point", "area")
 """How a pixel gets its value: at its centre, or as the mean over its square."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import warp as wp
+from tacdata.warp_runtime import wp
 
 NOTHING = wp.constant(-1.0e30)
 """Height of a sample without a triangle [mm]."""

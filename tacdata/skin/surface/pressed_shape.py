@@ -22,10 +22,9 @@ from functools import cache
 
 import numpy as np
 import torch
-import warp as wp
 
-import tacdata.warp_runtime  # noqa: F401 - starts Warp
 from tacdata.indenters import Indenter
+from tacdata.warp_runtime import wp
 
 _Parameters = wp.types.vector(length=8, dtype=wp.float64)
 

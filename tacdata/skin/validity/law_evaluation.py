@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import warp as wp
 
 from tacdata.skin.constitutive import kinematics
 from tacdata.skin.materials.law import Gradient, Law
+from tacdata.warp_runtime import wp
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import warp as wp
 from skin_examples import kuhn_mesh, slab_sensor
 
 from tacdata import registry
@@ -20,6 +19,7 @@ from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.settings import SolverSettings
 from tacdata.skin.validity import fineness
+from tacdata.warp_runtime import wp
 
 LAWS = registry.names(ROOM, BASE)
 

@@ -4,13 +4,13 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
-import warp as wp
 
 from tacdata import registry
 from tacdata.sensor.sensor import Material
 from tacdata.skin.constitutive import kinematics
 from tacdata.skin.materials import load_law
 from tacdata.skin.validity.law_evaluation import evaluate
+from tacdata.warp_runtime import wp
 
 MU = 0.3 / (2 * 1.47)
 STRETCH = np.array([0.5, 0.7, 0.9, 1.1, 1.5, 2.0])

@@ -4,7 +4,6 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
-import warp as wp
 from skin_examples import random_rotation
 
 from tacdata import registry
@@ -13,6 +12,7 @@ from tacdata.sensor.sensor import Material
 from tacdata.skin.materials import load_law
 from tacdata.skin.materials.law import Gradient
 from tacdata.skin.validity.law_evaluation import evaluate
+from tacdata.warp_runtime import wp
 
 LAWS = registry.names("tacdata.skin.materials", "law")
 WITH_PARAMETERS = [n for n in LAWS if asdict(load_law(n))]
