@@ -3,9 +3,10 @@
     python benchmarks/first_label.py [--runs 2]
 
 `tacdata label` labels a copy of the recording that ships, with one worker of one thread. Every run of "cold" starts
-with empty caches of kernels and answers; "warm" uses those that a cold one left. Phases are CPU seconds of the
-processes of one run: the verb itself, the process that finds the model's version, the worker until its first label
-and after it. The last line gives warm over cold.
+with empty caches of kernels and answers. "shipped" does too, but has the kernels that a wheel ships for a kind of
+processor (Linux on x86-64, no GPU). "warm" uses the caches that a cold run left. Phases are CPU seconds
+of the processes of one run: the verb itself, the process that finds the model's version, the worker until its first
+label and after it. The last lines give the ratios to cold, and whether all labels are equal bit by bit.
 """
 
 from __future__ import annotations
@@ -20,7 +21,11 @@ import tempfile
 import time
 from pathlib import Path
 
+import pyarrow.parquet as pq
+
 import tacdata
+from tacdata import warp_runtime
+from tacdata.warp_runtime import wp
 
 SESSION = Path(tacdata.__path__[0]) / "example" / "session"
 PHASES = ("verb", "version", "first label", "other label")
@@ -46,15 +51,16 @@ def processes(root: int) -> dict[int, tuple[str, float]]:
     return found
 
 
-def label(folder: Path, caches: Path) -> dict[str, float]:
+def label(session: Path, caches: Path, kernels: Path) -> dict[str, float]:
     """Label a copy of the session; return CPU seconds by phase."""
-    session = folder / "session"
-    shutil.rmtree(session, ignore_errors=True)
     shutil.copytree(SESSION, session, ignore=shutil.ignore_patterns("labels"))
-    places = {"WARP_CACHE_PATH": str(caches / "warp"), "TACDATA_CACHE": str(caches / "tacdata")}
+    places = {"WARP_CACHE_PATH": caches / "warp", "TACDATA_CACHE": caches / "tacdata", "TACDATA_KERNELS": kernels}
     command = [sys.executable, "-m", "tacdata.cli", "label", str(session), "--workers", "1"]
     run = subprocess.Popen(
-        command, env={**os.environ, "OMP_NUM_THREADS": "1", **places}, stdout=subprocess.DEVNULL, text=True
+        command,
+        env={**os.environ, "OMP_NUM_THREADS": "1", **{name: str(place) for name, place in places.items()}},
+        stdout=subprocess.DEVNULL,
+        text=True,
     )
     spent, first = dict.fromkeys(PHASES, 0.0), None
     while run.poll() is None:
@@ -79,17 +85,39 @@ def label(folder: Path, caches: Path) -> dict[str, float]:
     return spent
 
 
+def ship(place: Path) -> None:
+    """Label once more, for a kind of processor, and keep the kernels as a wheel ships them."""
+    shipped = place / "kernels" / wp.__version__ / warp_runtime.processors()[0]
+    # While its folder is empty, kernels are compiled for it.
+    shipped.mkdir(parents=True)
+    label(place / "building session", place / "building", place / "kernels")
+    shutil.copytree(place / "building" / "warp" / wp.__version__, shipped, dirs_exist_ok=True)
+
+
+def values(session: Path) -> list[bytes]:
+    """Return the numbers of a session's labels, without their provenance."""
+    tables = [pq.read_table(path) for path in sorted((session / "labels").glob("episode-*.parquet"))]
+    return [
+        buffer.to_pybytes() for t in tables for c in t.columns for k in c.chunks for buffer in k.buffers() if buffer
+    ]
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=2)
     arguments = parser.parse_args()
-    figures: dict[str, list[dict[str, float]]] = {"cold": [], "warm": []}
+    figures: dict[str, list[dict[str, float]]] = {"cold": [], "shipped": [], "warm": []}
+    found = []
     with tempfile.TemporaryDirectory() as folder:
         for number in range(arguments.runs):
-            caches = Path(folder) / f"caches {number}"
-            for kind in figures:
-                figures[kind].append(label(Path(folder), caches))
+            place = Path(folder) / str(number)
+            for kind, runs in figures.items():
+                caches = place / ("shipped" if kind == "shipped" else "cold")
+                if kind == "shipped":
+                    ship(place)
+                runs.append(label(place / f"{kind} session", caches, place / "kernels"))
+                found.append(values(place / f"{kind} session"))
     print(f"CPU s, medians of {arguments.runs} runs")
     print("caches  " + "".join(f"{phase:>13}" for phase in (*PHASES, "until first", "total")))
     totals = {}
@@ -97,8 +125,10 @@ def main() -> None:
         phases = [statistics.median(run[phase] for run in runs) for phase in PHASES]
         totals[kind] = (sum(phases[:-1]), sum(phases))
         print(f"{kind:8}" + "".join(f"{value:13.2f}" for value in (*phases, *totals[kind])))
-    until_first, total = (warm / cold for warm, cold in zip(totals["warm"], totals["cold"], strict=True))
-    print(f"warm over cold: {until_first:.2f} until the first label, {total:.2f} in all")
+    for kind in ("shipped", "warm"):
+        until_first, total = (part / cold for part, cold in zip(totals[kind], totals["cold"], strict=True))
+        print(f"{kind} over cold: {until_first:.2f} until the first label, {total:.2f} in all")
+    print("labels: " + ("equal to the last bit" if all(each == found[0] for each in found) else "not equal"))
 
 
 if __name__ == "__main__":

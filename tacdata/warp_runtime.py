@@ -1,13 +1,18 @@
 """Starts Warp without its banner and without its warning that there is no GPU; the one place that imports it.
 
-A file of kernels imports ``wp`` from here, as Warp's options are taken when a file's first kernel is declared.
+A file of kernels imports ``wp`` from here, as Warp's options are taken when a file's first kernel is declared. Compiled
+kernels that a wheel ships are taken into Warp's cache first.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 import tempfile
+import uuid
+from contextlib import suppress
+from pathlib import Path
 
 import warp as wp  # noqa: TID251
 from warp import Function  # noqa: TID251
@@ -24,12 +29,71 @@ as fast and take longer to compile, in Python and in LLVM. On an empty cache, `p
 tests/skin/elasticity/test_skin_elasticity.py` takes 28 s of the processor, and 37 with 6 passes.
 """
 
+KERNELS = "TACDATA_KERNELS"
+"""Variable with the folder of shipped kernels; by default that in this package."""
+_SINCE_2013 = {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}
+PROCESSORS = {
+    "x86-64-v4": _SINCE_2013 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
+    "x86-64-v3": _SINCE_2013,
+}
+"""LLVM's name of a kind of processor -> its features, as Linux names them.
+
+Objects for a kind serve every machine of that kind. Those for Warp's default, the machine's own processor, do not.
+"""
+
 
 def start() -> None:
     """Start Warp; all other output of its native library is passed on."""
     _start_quietly()
-    if not wp.is_cuda_available():
-        wp.config.max_unroll = UNROLLED
+    if wp.is_cuda_available():
+        return
+    wp.config.max_unroll = UNROLLED
+    for processor in processors():
+        shipped = shipped_kernels() / wp.__version__ / processor
+        if shipped.is_dir() and wp.config.cpu_compiler_flags:
+            flags = wp.config.cpu_compiler_flags
+            wp.config.cpu_compiler_flags = flags.replace("-march=native", f"-target-cpu {processor}")
+            copy_to_cache(shipped)
+            break
+
+
+def shipped_kernels() -> Path:
+    """Return the folder of shipped kernels (`tacdata.label_farm.presses.kernels`), which need not exist.
+
+    In it there is a folder for each release of Warp, and in that one for each kind of processor.
+    """
+    return Path(os.environ.get(KERNELS) or Path(__file__).with_name("kernels"))
+
+
+def copy_to_cache(folder: Path) -> None:
+    """Copy compiled modules that Warp's cache lacks into it.
+
+    A module's name has the hash of its source and of Warp's options: one of other source is never looked up.
+    """
+    cache = wp.config.kernel_cache_dir
+    if cache is None:
+        return
+    for module in folder.glob("wp_*"):
+        place = Path(cache) / module.name
+        # A cache that cannot be written costs time alone. Of two processes the first to rename fills the place.
+        with suppress(OSError):
+            if not place.exists():
+                copy = place.with_name(f"{place.name}_{uuid.uuid4().hex}")
+                try:
+                    shutil.copytree(module, copy)
+                    copy.rename(place)
+                finally:
+                    shutil.rmtree(copy, ignore_errors=True)
+
+
+def processors() -> list[str]:
+    """Return those of `PROCESSORS` that this machine is; none but under Linux on x86-64."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return []
+    features = {name for line in lines if line.startswith("flags") for name in line.partition(":")[2].split()}
+    return [name for name, needed in PROCESSORS.items() if features >= needed]
 
 
 def _start_quietly() -> None:

@@ -1,5 +1,7 @@
 """Warp starts without a word about a card that is not there, and says everything else."""
 
+import os
+import shutil
 import subprocess
 import sys
 
@@ -46,3 +48,29 @@ def test_long_loops_of_all_kernels_are_written_out_for_a_card_alone():
     done = subprocess.run([sys.executable, "-c", OPTIONS], capture_output=True, text=True, check=True)
     count, others = done.stdout.split(maxsplit=1)
     assert int(count) > 5 and others.strip() == "[]"
+
+
+LOAD = """
+from tacdata import warp_runtime
+from tacdata.chain.memory_kernels import _filter
+_filter.module.load("cpu", block_dim=1)
+"""
+
+
+def compiled(cache, kernels):
+    """Load a kernel with an empty cache; return the object files there, with the times of their making."""
+    places = {"WARP_CACHE_PATH": str(cache), "TACDATA_KERNELS": str(kernels)}
+    subprocess.run([sys.executable, "-c", LOAD], env={**os.environ, **places}, check=True)
+    return {path.name: path.stat().st_mtime_ns for path in cache.glob("*/wp_*/*.o")}
+
+
+def test_a_shipped_kernel_is_not_compiled(tmp_path):
+    # A machine that is of no such kind, or has a card, compiles for itself both times.
+    kinds = [] if wp.is_cuda_available() else warp_runtime.processors()
+    built = tmp_path / "kernels" / wp.__version__ / next(iter(kinds), "none")
+    (built / "wp_other_0123456").mkdir(parents=True)
+    first = compiled(tmp_path / "first", tmp_path / "kernels")
+    assert len(first) == 1
+    shutil.copytree(tmp_path / "first" / wp.__version__, built, dirs_exist_ok=True)
+    second = compiled(tmp_path / "second", tmp_path / "kernels")
+    assert (second == first) == bool(kinds)
