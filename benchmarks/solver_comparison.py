@@ -124,13 +124,24 @@ def write_case(document: dict, folder: Path) -> Case:
     return read_case(path)
 
 
-def rows_of(name: str, entry: Entry, answer: Answer, against: Reference) -> list[dict]:
+def penetration(case: Case, answer: Answer) -> np.ndarray:
+    """Return how deep a node of the outer face lies inside the sphere at most, in % of each depth, shape (d,)."""
+    flat = np.full(len(answer.places), case.sensor.skin.thickness)
+    nodes = np.column_stack([answer.places, flat]) + answer.displacement
+    centers = np.array([[case.request.x, case.request.y, flat[0] + SPHERE["radius"] - d] for d in answer.depth])
+    inside = SPHERE["radius"] - np.linalg.norm(nodes - centers[:, None], axis=2)
+    return 100 * inside.max(axis=1).clip(0.0) / answer.depth
+
+
+def rows_of(name: str, entry: Entry, case: Case, answer: Answer, against: Reference) -> list[dict]:
     """Return one row for each depth."""
+    deep = penetration(case, answer)
     return [
         {
             "press": name,
             "code": entry.label,
             **asdict(d),
+            "penetration": float(deep[k]),
             "seconds": float(answer.seconds[k]),
             "cpu_seconds": float(answer.cpu_seconds[k]),
             "setup_cpu_seconds": answer.setup_cpu_seconds,
@@ -144,13 +155,15 @@ def rows_of(name: str, entry: Entry, answer: Answer, against: Reference) -> list
 
 
 def speed_and_error(rows: list[dict]) -> list[str]:
-    """Return one table of all codes: CPU time of an equilibrium, and the worst errors but at the first depth."""
-    lines = ["| press | code | CPU s | force % | top % | contact % | protrusion % |", "|---|---|---|---|---|---|---|"]
+    """Return one table of all codes: CPU time of an equilibrium, and the worst figures but at the first depth."""
+    measures = ("residual", "penetration", "force", "top", "contact", "protrusion")
+    titles = ["press", "code", "CPU s", measures[0], *(f"{measure} %" for measure in measures[1:])]
+    lines = [f"| {' | '.join(titles)} |", "|---" * len(titles) + "|"]
     for press, code in dict.fromkeys((r["press"], r["code"]) for r in rows):
         own = [r for r in rows if (r["press"], r["code"]) == (press, code)]
         later = own[1:] or own
         seconds = sorted(r["cpu_seconds"] for r in own)
-        worst = [max(abs(r[name]) for r in later) for name in ("force", "top", "contact", "protrusion")]
+        worst = [max(abs(r[name]) for r in later) for name in measures]
         figures = ["" if np.isnan(value) else f"{value:.2g}" for value in worst]
         lines.append(f"| {press} | {code} | {seconds[0]:.2g} to {seconds[-1]:.2g} | {' | '.join(figures)} |")
     return lines
@@ -240,7 +253,7 @@ def run_press(name: str, depths: list[float], arguments: argparse.Namespace, abs
         except (PeerError, TacdataError) as error:
             absent.append((name, entry.label, str(error)))
             continue
-        rows += rows_of(name, entry, answer, against)
+        rows += rows_of(name, entry, case, answer, against)
         print(f"{name}: {entry.label}: {', '.join(f'{s:.2f}' for s in answer.cpu_seconds)} CPU s", flush=True)
     return rows, what
 
