@@ -14,7 +14,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-import tacdata
 from tacdata import registry
 from tacdata.indenters import Indenter
 from tacdata.label_farm.presses import model
@@ -65,4 +64,6 @@ def _shapes() -> list[Indenter]:
 
 
 if __name__ == "__main__":
-    build(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tacdata.__path__[0]) / "kernels")
+    from tacdata.warp_runtime import shipped_kernels
+
+    build(Path(sys.argv[1]) if len(sys.argv) > 1 else shipped_kernels())

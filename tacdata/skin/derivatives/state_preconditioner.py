@@ -104,16 +104,22 @@ class StatePreconditioner:
         Returns:
             z [mm], shape (3n, c), and the forces [N], shape (s, c), 0 where not active; float32.
         """
-        z, normal = self._rest.apply(residual), torch.zeros_like(gaps)
+        normal = torch.zeros_like(gaps)
         if self._factor is None:
-            return z, normal
-        force = -self._give @ (self._along @ self._rest.rows(z)[self._rows].to(torch.float64))
-        force[self._normal] += self._give[self._normal, self._normal, None] * gaps[self._slots]
-        force = torch.linalg.lu_solve(*self._factor, force)
-        hats = torch.zeros(self._count, residual.shape[1], dtype=torch.float32, device=residual.device)
-        hats[self._rows] = (self._along.T @ force).to(torch.float32)
-        normal[self._slots] = force[self._normal].to(torch.float32)
-        return self._rest.apply(residual + self._rest.spread(hats)), normal
+            return self._rest.apply(residual), normal
+        factor = self._factor
+
+        def forces(moved: torch.Tensor) -> torch.Tensor:
+            """Return the forces on the mortar rows that hold what they move."""
+            force = -self._give @ (self._along @ moved[self._rows].to(torch.float64))
+            force[self._normal] += self._give[self._normal, self._normal, None] * gaps[self._slots]
+            force = torch.linalg.lu_solve(*factor, force)
+            hats = torch.zeros(self._count, residual.shape[1], dtype=torch.float32, device=residual.device)
+            hats[self._rows] = -(self._along.T @ force).to(torch.float32)
+            normal[self._slots] = force[self._normal].to(torch.float32)
+            return hats
+
+        return self._rest.held(residual, forces), normal
 
 
 def _frames(surface: ContactSurface, normal: torch.Tensor) -> torch.Tensor:

@@ -75,20 +75,24 @@ class ConstraintPreconditioner:
         r = residual.reshape(-1, residual.shape[-1])
         which = torch.arange(r.shape[1], device=r.device) if member is None else member
         scale = self.scale[which]
-        # Block elimination: the unconstrained z first, its violation v of the constraints, their forces y, then z with
-        # them.
-        z = self.rest.apply(r) * scale
         y = torch.zeros(len(which), self.rows.most, device=r.device)
-        if any(self.rows.sizes):
-            number, one = which.to(torch.int32), torch.ones_like(scale)
+        if not any(self.rows.sizes):
+            return (self.rest.apply(r) * scale).reshape(residual.shape), y
+        number = which.to(torch.int32)
+
+        def forces(moved: torch.Tensor) -> torch.Tensor:
+            """Return the constraints' forces on all rows, against their violation v by an unconstrained z."""
+            nonlocal y
             v, unit = torch.empty_like(y), torch.ones(self.rows.count, device=r.device)
-            self.rows.launch(kernels.along, tuple(v.shape), self.rest.rows(z), unit, one, number, self.rows.data, v)
+            self.rows.launch(kernels.along, tuple(v.shape), moved, unit, scale, number, self.rows.data, v)
             if gaps is not None:
                 v -= self.rows.wanted(gaps)[which]
             y = self.solver.times(v, which)
-            forces = torch.zeros(self.rows.count, len(which), device=r.device)
-            self.rows.launch(kernels.onto_rows, tuple(y.shape), y, number, self.rows.data, forces, forces)
-            z = self.rest.apply(r - self.rest.spread(forces)) * scale
+            total = torch.zeros(self.rows.count, len(which), device=r.device)
+            self.rows.launch(kernels.onto_rows, tuple(y.shape), y, number, self.rows.data, total, total)
+            return total
+
+        z = self.rest.held(r, forces) * scale
         return z.reshape(residual.shape), y
 
     def forces(self, y: torch.Tensor) -> list[torch.Tensor]:

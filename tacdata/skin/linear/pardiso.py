@@ -22,6 +22,8 @@ _SEQUENTIAL, _INT32 = 1, 0
 _POSITIVE_DEFINITE = 2
 """Kind of matrix: real, symmetric, positive definite; its upper triangle is given."""
 _FACTORIZE, _SOLVE, _RELEASE = 12, 33, -1
+_FORWARD, _BACKWARD = 331, 333
+"""The two halves of a solve."""
 _PARAMETERS = {0: 1, 1: 2, 27: 1, 34: 1}
 """Numbers of iparm from 0: no defaults, nested dissection, single precision, indices from 0. The rest is 0."""
 
@@ -73,10 +75,21 @@ class PardisoFactor:
         Raises:
             SolveError: If memory does not hold so many.
         """
+        return self._solved(_SOLVE, rhs)
+
+    def forward(self, rhs: np.ndarray) -> np.ndarray:
+        """Return L^-1 b, of A = L L^T in an order of PARDISO's own; as `solve`."""
+        return self._solved(_FORWARD, rhs)
+
+    def backward(self, rhs: np.ndarray) -> np.ndarray:
+        """Return L^-T b; as `solve`."""
+        return self._solved(_BACKWARD, rhs)
+
+    def _solved(self, phase: int, rhs: np.ndarray) -> np.ndarray:
         # PARDISO reads right-hand sides one after another in memory.
         columns = np.ascontiguousarray(rhs.T, dtype=np.float32)
         solution = np.empty_like(columns)
-        code = self._call(_SOLVE, columns, solution)
+        code = self._call(phase, columns, solution)
         if code:
             raise SolveError(
                 f"{len(columns)} right-hand sides of {self._memory.size} that PARDISO cannot solve (error {code})",
