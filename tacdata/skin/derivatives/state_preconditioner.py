@@ -119,7 +119,9 @@ class StatePreconditioner:
             normal[self._slots] = force[self._normal].to(torch.float32)
             return hats
 
-        return self._rest.held(residual, forces), normal
+        used = torch.zeros(self._count, residual.shape[1], dtype=torch.bool, device=residual.device)
+        used[self._rows] = True
+        return self._rest.held(residual, used, forces), normal
 
 
 def _frames(surface: ContactSurface, normal: torch.Tensor) -> torch.Tensor:

@@ -1,5 +1,7 @@
 """Kernels of `tacdata.skin.linear.constraint_rows`: constraints of batch members by the mortar rows that they join.
 
+Also those of `cholesky.HalfRows`.
+
 Indices: j a contact node, b a batch member, s a constraint of it. A constraint joins up to three neighbouring rows of
 M with the components of its direction.
 """
@@ -205,3 +207,46 @@ def onto_rows(
                     wp.atomic_add(soft, first + p, b, n[p] * y[b, s])
                 else:
                     wp.atomic_add(hard, first + p, b, n[p] * y[b, s])
+
+
+@wp.struct
+class SparseRows:
+    """Compressed rows, and the mortar row that each belongs to."""
+
+    start: wp.array(dtype=wp.int32)
+    column: wp.array(dtype=wp.int32)
+    value: wp.array(dtype=wp.float32)
+    row: wp.array(dtype=wp.int32)
+
+
+@wp.kernel(enable_backward=False)
+def along_rows(
+    rows: SparseRows,
+    used: wp.array2d(dtype=wp.bool),
+    half: wp.array2d(dtype=wp.float32),
+    result: wp.array2d(dtype=wp.float32),
+):
+    """Products of rows with the vectors of members, where these use them."""
+    k, b = wp.tid()
+    m = rows.row[k]
+    if used[m, b]:
+        total = wp.float32(0.0)
+        for e in range(rows.start[k], rows.start[k + 1]):
+            total += rows.value[e] * half[b, rows.column[e]]
+        result[m, b] = total
+
+
+@wp.kernel(enable_backward=False)
+def less_rows(
+    rows: SparseRows,
+    used: wp.array2d(dtype=wp.bool),
+    factor: wp.array2d(dtype=wp.float32),
+    half: wp.array2d(dtype=wp.float32),
+):
+    """Take multiples of the rows that a member uses off its vector."""
+    b = wp.tid()
+    for k in range(rows.row.shape[0]):
+        m = rows.row[k]
+        if used[m, b]:
+            for e in range(rows.start[k], rows.start[k + 1]):
+                half[b, rows.column[e]] = half[b, rows.column[e]] - factor[m, b] * rows.value[e]

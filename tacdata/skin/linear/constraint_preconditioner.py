@@ -92,7 +92,7 @@ class ConstraintPreconditioner:
             self.rows.launch(kernels.onto_rows, tuple(y.shape), y, number, self.rows.data, total, total)
             return total
 
-        z = self.rest.held(r, forces) * scale
+        z = self.rest.held(r, self.rows.used[:, which], forces) * scale
         return z.reshape(residual.shape), y
 
     def forces(self, y: torch.Tensor) -> list[torch.Tensor]:

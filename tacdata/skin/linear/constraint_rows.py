@@ -71,6 +71,8 @@ class ActiveRows:
         self._held, self._table = _Rows(0, 0, "cpu"), torch.empty(0)
         self.sizes: list[int] = []
         """Number of constraints of each member."""
+        self.used = torch.zeros(base, 0, dtype=torch.bool)
+        """Mortar rows that the constraints of each member join, shape (m, b), bool."""
         self._slots: list[torch.Tensor] = []
         self._active: list[torch.Tensor] = []
 
@@ -112,7 +114,9 @@ class ActiveRows:
         if len(scale) > len(rows.own) or capacity > self.most or rows.own.device != device:
             # Room never shrinks: tensors stay where recorded CUDA graphs expect them.
             self._held = rows = _Rows(max(len(scale), len(rows.own)), max(capacity, self.most), device)
-        self._table = self._rest.table(self._used())
+        every = zip(self._surfaces, self._active, strict=True)
+        self.used = torch.cat([active.repeat_interleave(1 if surface.flat else 3, dim=0) for surface, active in every])
+        self._table = self._rest.table(self.used.any(dim=1))
         new = _Rows(len(scale), self.most, device)
         new.own.copy_(count)
         new.scale.copy_(scale)
@@ -135,14 +139,6 @@ class ActiveRows:
         which = rows.differ(new).nonzero()[:, 0]
         rows.put(which, new)
         return which.tolist()
-
-    def _used(self) -> torch.Tensor:
-        """Return which mortar rows some member's constraints join, shape (m,), bool."""
-        parts = [
-            active.any(dim=1).repeat_interleave(1 if surface.flat else 3)
-            for surface, active in zip(self._surfaces, self._active, strict=True)
-        ]
-        return torch.cat(parts)
 
     def compliance(self, member: torch.Tensor, room: torch.Tensor) -> None:
         """Write the compliance of the constraints of some members [mm/N], its lower triangle.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
@@ -15,7 +14,7 @@ import torch
 from tacdata.errors import SolveError
 from tacdata.sensor import Material
 from tacdata.skin.elasticity.averaged_volume import averaged_stiffness
-from tacdata.skin.linear.cholesky import factor_of
+from tacdata.skin.linear.cholesky import Forces, HalfRows, factor_of
 from tacdata.skin.linear.pardiso import PardisoFactor
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 
@@ -57,10 +56,6 @@ def for_averaged(material: Material) -> Material:
     return replace(material, youngs_modulus=2 * mu * (1 + nu), poisson_ratio=nu)
 
 
-Forces = Callable[[torch.Tensor], torch.Tensor]
-"""Forces on the mortar rows [N] by what they move [mm], both of shape (m, b), float32."""
-
-
 class RestSolver(Protocol):
     """K0^-1 on one device, and the compliance of the rows of M, the mortar projections of all contacts."""
 
@@ -87,12 +82,13 @@ class RestSolver(Protocol):
         """
         ...
 
-    def held(self, residual: torch.Tensor, forces: Forces) -> torch.Tensor:
+    def held(self, residual: torch.Tensor, used: torch.Tensor, forces: Forces) -> torch.Tensor:
         """Return K0^-1 (r - M^T f) of forces f that depend on M K0^-1 r; shapes as of `apply`.
 
         Args:
             residual: r.
-            forces: f, shape (m, b), of M K0^-1 r, likewise; both at rows of the table alone.
+            used: Rows on which f depends and acts, shape (m, b), bool; known to the table.
+            forces: f, shape (m, b), of M K0^-1 r, likewise.
         """
         ...
 
@@ -152,8 +148,6 @@ class SparseRest:
     """
 
     _BLOCK = 64
-    _FEW_ROWS, _FEW_COLUMNS = 1000, 4
-    """Mortar rows and right-hand sides up to which half solves are cheaper than whole ones [1]."""
 
     def __init__(self, stiffness: sp.csr_matrix, unfixed: np.ndarray, rows: sp.csr_matrix, device: str = "cpu") -> None:
         """Factorize; arguments as of `rest_solver`, ``unfixed`` the degrees of freedom that are not held."""
@@ -164,7 +158,7 @@ class SparseRest:
         count = self._mortar.count
         self._table = torch.from_numpy(np.empty((count, count), dtype=np.float32))
         self._known, self._order = torch.zeros(count, dtype=torch.bool), torch.zeros(0, dtype=torch.int64)
-        self._halves = _HalfRows(self._factor) if isinstance(self._factor, PardisoFactor) else None
+        self._halves = HalfRows(self._factor) if isinstance(self._factor, PardisoFactor) else None
 
     def apply(self, residual: torch.Tensor) -> torch.Tensor:
         """Return K0^-1 r, zero where held; shapes (3n, b), float32."""
@@ -197,65 +191,19 @@ class SparseRest:
         unit = torch.zeros(self._mortar.count, len(part), dtype=torch.float32)
         unit[part, torch.arange(len(part))] = 1.0
         loads = self.spread(unit)
-        if len(self._order) > self._FEW_ROWS:
-            self._halves = None
         if self._halves:
-            return torch.from_numpy(self._halves.extended(loads[self._free].numpy()))
+            self._halves.add(part, loads[self._free])
         columns = self.rows(self.apply(loads))
         columns[part] = (columns[part] + columns[part].T) / 2
         return columns[self._order]
 
-    def held(self, residual: torch.Tensor, forces: Forces) -> torch.Tensor:
-        """Return K0^-1 (r - M^T f), as `RestSolver`: by one solve while few rows are known, else by two."""
-        if not self._halves or residual.shape[1] > self._FEW_COLUMNS:
+    def held(self, residual: torch.Tensor, used: torch.Tensor, forces: Forces) -> torch.Tensor:
+        """Return K0^-1 (r - M^T f), as `RestSolver`: by PARDISO one solve, else two."""
+        if not self._halves:
             return _held(self, residual, forces)
-        half, moved = (
-            self._halves.forward(residual[self._free].numpy()),
-            torch.zeros(self._mortar.count, residual.shape[1]),
-        )
-        moved[self._order] = torch.from_numpy(self._halves.rows(half))
         result = torch.zeros(residual.shape, dtype=torch.float32)
-        result[self._free] = torch.from_numpy(self._halves.backward(half, forces(moved)[self._order].numpy()))
+        result[self._free] = self._halves.held(residual[self._free], used, forces)
         return result
-
-
-class _HalfRows:
-    """L^-1 M^T of some mortar rows, for K0 = L L^T: they know of a solve after its first half.
-
-    A row is sparse: 1,800 of 28,600 entries on the default mesh. Products with 300 rows take 0.8 ms, a solve 7.5 ms.
-    """
-
-    _MERGED = 8
-    """Matrices that are joined into one, so that joining costs little."""
-
-    def __init__(self, factor: PardisoFactor) -> None:
-        self._factor, self._parts = factor, list[sp.csr_matrix]()
-
-    def extended(self, loads: np.ndarray) -> np.ndarray:
-        """Add rows of M, as columns, shape (n, p); return M K0^-1 M^T between all rows so far and these."""
-        half = self._factor.forward(loads)
-        self._parts.append(sp.csr_matrix(half.T))
-        if len(self._parts) > self._MERGED:
-            self._parts = [sp.csr_matrix(sp.vstack(self._parts))]
-        return self.rows(half)
-
-    def forward(self, rhs: np.ndarray) -> np.ndarray:
-        """Return L^-1 b."""
-        return self._factor.forward(rhs)
-
-    def rows(self, half: np.ndarray) -> np.ndarray:
-        """Return M K0^-1 b of L^-1 b."""
-        return (
-            np.concatenate([part @ half for part in self._parts])
-            if self._parts
-            else np.zeros((0, half.shape[1]), np.float32)
-        )
-
-    def backward(self, half: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Return K0^-1 (b - M^T f) of L^-1 b and f."""
-        place = np.cumsum([0, *(part.shape[0] for part in self._parts)])
-        loads = (part.T @ forces[i:j] for part, i, j in zip(self._parts, place, place[1:], strict=False))
-        return self._factor.backward(half - sum(loads))
 
 
 class DenseRest:
@@ -353,7 +301,7 @@ class DenseRest:
         """Return M K0^-1 M^T [mm/N], as `RestSolver`: all of it."""
         return self._table
 
-    def held(self, residual: torch.Tensor, forces: Forces) -> torch.Tensor:
+    def held(self, residual: torch.Tensor, used: torch.Tensor, forces: Forces) -> torch.Tensor:
         """Return K0^-1 (r - M^T f), as `RestSolver`."""
         return _held(self, residual, forces)
 

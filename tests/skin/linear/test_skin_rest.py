@@ -97,19 +97,18 @@ def test_compliance_asked_for_in_parts_is_that_of_the_whole(body):
     assert (everything(second, body) - whole).abs().max() < 1e-5 * whole.abs().max()
 
 
-@pytest.mark.parametrize("columns", [1, 9])
-def test_forces_by_halves_of_a_solve_are_those_by_whole_ones(body, columns):
+def test_forces_by_halves_of_a_solve_are_those_by_whole_ones(body):
     first, second = (rest_solver(body.mesh, MATERIAL, body.mesh.bottom, body.rows, "cpu") for _ in range(2))
-    m, r = body.rows.shape[0], body.random(*range(columns))
-    used = torch.arange(m) % 3 != 0
-    for rest, part in ((first, used), (first, torch.arange(m) < 9), (second, used)):
+    m, r = body.rows.shape[0], body.random(0, 1, 2)
+    used = (torch.arange(m)[:, None] + torch.arange(3)) % 4 < 2
+    for rest, part in ((first, torch.arange(m) % 5 < 2), (first, used.any(dim=1)), (second, used.any(dim=1))):
         rest.table(part)
 
     def forces(moved):
-        return torch.where(used[:, None], 0.4 * moved, 0.0)
+        return torch.where(used, 0.4 * moved, 0.0)
 
     second._halves = None
-    halves, whole = first.held(r, forces), second.held(r, forces)
+    halves, whole = first.held(r, used, forces), second.held(r, used, forces)
     assert (halves - whole).norm() < 1e-4 * whole.norm()
     assert (whole - second.apply(r)).norm() > 1e-2 * whole.norm()
 
