@@ -75,8 +75,8 @@ class HalfRows:
         self._column, self._value = torch.zeros(0, dtype=torch.int32), torch.zeros(0)
         self._start, self._row = torch.zeros(1, dtype=torch.int32), torch.zeros(0, dtype=torch.int32)
 
-    def add(self, rows: torch.Tensor, loads: torch.Tensor) -> None:
-        """Add rows of M, by number, shape (p,), and as columns, shape (n, p)."""
+    def add(self, rows: torch.Tensor, loads: torch.Tensor) -> torch.Tensor:
+        """Add rows of M, by number, shape (p,), and as columns, shape (n, p); return K0^-1 of these."""
         half = self._factor.forward(loads.numpy()).T
         first, column = half.nonzero()
         end, value = self._count + len(column), half[first, column]
@@ -89,6 +89,7 @@ class HalfRows:
         ends = self._count + np.cumsum(np.bincount(first, minlength=len(rows)))
         self._start = torch.cat([self._start, torch.from_numpy(ends.astype(np.int32))])
         self._row, self._count = torch.cat([self._row, rows.to(torch.int32)]), end
+        return torch.from_numpy(self._factor.backward(half.T))
 
     def held(self, residual: torch.Tensor, used: torch.Tensor, forces: Forces) -> torch.Tensor:
         """Return K0^-1 (r - M^T f); arguments as of `rest_stiffness.RestSolver.held`, of free degrees of freedom."""

@@ -192,8 +192,11 @@ class SparseRest:
         unit[part, torch.arange(len(part))] = 1.0
         loads = self.spread(unit)
         if self._halves:
-            self._halves.add(part, loads[self._free])
-        columns = self.rows(self.apply(loads))
+            moved = torch.zeros(loads.shape)
+            moved[self._free] = self._halves.add(part, loads[self._free])
+        else:
+            moved = self.apply(loads)
+        columns = self.rows(moved)
         columns[part] = (columns[part] + columns[part].T) / 2
         return columns[self._order]
 
