@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tacdata import catalogue
+from tacdata import catalogue, registry
 from tacdata.commands.command import START, TASKS, Result, members
 from tacdata.progress import say
 
@@ -22,8 +22,8 @@ def run(
     """List indenters, devices, verbs and every other folder of members, with units."""
     if not room:
         folders = [
-            {"name": registry.name, "members": len(catalogue.members(registry.name)), "meaning": registry.meaning}
-            for registry in catalogue.registries().values()
+            {"name": kind.name, "members": len(catalogue.members(kind.name)), "meaning": kind.meaning}
+            for kind in catalogue.registries().values()
         ]
         for folder in folders:
             print(f"{folder['name']:<12} {folder['members']:>3}  {folder['meaning']}")
@@ -36,6 +36,9 @@ def run(
         print(f"{member.name:<16} {member.meaning}")
         for name, meaning in member.parameters:
             print(f"{'':<16}   {name}: {meaning}")
+    kind = catalogue.registries()[room]
+    folder = registry.source(kind.room, kind.base).parent
+    say(f"\nnext: to add one, copy a file of {folder} as a plug-in ({registry.HELP})")
     return Result([{**asdict(member), "parameters": dict(member.parameters)} for member in entries])
 
 
