@@ -59,13 +59,12 @@ def add_folder(folder: StrPath) -> None:
 def _check_folder(folder: Path) -> None:
     """Refuse a plug-in folder that is not there, has no folder of a kind, or one under a name that means another."""
     inside = {each.name for each in folder.iterdir() if each.is_dir()} if folder.is_dir() else set()
-    mistaken = sorted(inside & MISTAKEN.keys())
-    if mistaken or not inside & KINDS:
-        remedy = f"rename {mistaken[0]} to {MISTAKEN[mistaken[0]]}" if mistaken else f"make one; {HELP} explains it"
+    kinds = f"folders named {', '.join(sorted(KINDS))}"
+    for name in sorted(inside & MISTAKEN.keys()):
+        raise UsageError(f"the folder of plug-ins {folder} holds {name}", kinds, f"rename it to {MISTAKEN[name]}")
+    if not inside & KINDS:
         raise UsageError(
-            f"{folder} is no folder of plug-ins" + (f": it holds {mistaken[0]}" if mistaken else ""),
-            f"a folder with folders in it, for example devices/my_board.py: {', '.join(sorted(KINDS))}",
-            remedy,
+            f"{folder} is no folder of plug-ins", kinds, f"make devices/my_board.py in it; {HELP} explains it"
         )
 
 

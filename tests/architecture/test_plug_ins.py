@@ -151,7 +151,7 @@ def test_folders_that_hold_no_plug_ins_are_refused(lab):
     with pytest.raises(UsageError, match="no folder of plug-ins"):
         td.add_plugins(lab / "devices")
     (lab / "indenters").rename(lab / "indenter")
-    with pytest.raises(UsageError, match="rename indenter to indenters"):
+    with pytest.raises(UsageError, match="rename it to indenters"):
         td.add_plugins(lab)
 
 
