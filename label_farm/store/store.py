@@ -66,7 +66,7 @@ class Store:
             raise UsageError(
                 f"cannot make a label store in {self.folder}: {error.strerror}",
                 "a folder that can be written",
-                "name another folder with --store",
+                "name another folder with --store; if the session may not be written, one for labels with --out",
             ) from None
 
     @property

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import RECORD, Result
-from tacdata.errors import Exit
+from tacdata.errors import DeviceError, Exit
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
@@ -30,7 +30,16 @@ def run(
     ] = None,
 ) -> Result:
     """Check every stream for gaps, noise, stuck channels and missing tags; exit 0 if usable, 1 if not."""
-    report = checked(path, out or (path if path.is_dir() else path.parent))
+    import tacdata as td
+
+    try:
+        report = checked(path, out or (path if path.is_dir() else path.parent))
+    except DeviceError as error:
+        if out is not None:
+            raise
+        # The recordings of a drive that may not be written are judged all the same.
+        say(f"the report is not written: {error.given}; --out names another folder")
+        report = td.check(path)
     if path.is_dir() and report.usable:
         if unknown_skin(report):
             say("labels need the skin's size and material: give them under sensor in the mapping, and import again")

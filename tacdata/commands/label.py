@@ -31,6 +31,9 @@ def run(
     store: Annotated[
         Path | None, typer.Option(help="Folder of solved presses, may serve many sessions; else SESSION/labels/store.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for labels of a session that may not be written; gets links to it.")
+    ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Worker processes; else one per core or GPU.")] = None,
     redo: Annotated[
         bool, typer.Option("--redo", help="Replace labels of another model version; retry failed presses.")
@@ -71,6 +74,7 @@ def run(
             session,
             sensor=sensor,
             store=store,
+            out=out,
             workers=workers,
             devices=device or (),
             redo=redo,
@@ -86,7 +90,7 @@ def run(
         )
     if follow and (remaining := len(td.read_session(session).remaining)):
         say(f"{remaining} presses of the plan were not recorded: label again when they are")
-    return _report(summary, file_names.folder(session), session)
+    return _report(summary, file_names.folder(out or session), out or session)
 
 
 class _Bars:

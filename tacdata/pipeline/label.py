@@ -23,7 +23,7 @@ from tacdata.label_farm.workers.pool import Pool
 from tacdata.labels import file_names
 from tacdata.paths import StrPath
 from tacdata.recording.files.reader import read_episode
-from tacdata.recording.session import read_session
+from tacdata.recording.session import linked_session, read_session
 from tacdata.sensor import Sensor, read_sensor
 
 POLL = 0.2
@@ -35,6 +35,7 @@ def label(
     *,
     sensor: Sensor | StrPath | None = None,
     store: StrPath | None = None,
+    out: StrPath | None = None,
     workers: int | None = None,
     devices: Sequence[str] = (),
     redo: bool = False,
@@ -54,6 +55,7 @@ def label(
         session: The session folder; the labels lie in its folder ``labels``.
         sensor: The sensor whose skin is solved, or its file; None takes each recording's own.
         store: Folder of solved presses, which may serve many sessions; None takes ``labels/store``.
+        out: Folder for the labels of a session that may not be written; it gets links to the recordings.
         workers: Worker processes; None takes one a core or GPU.
         devices: Devices of the workers: "cpu", "cuda" for all GPUs, "cuda:0", ...
         redo: Replace labels of another model version, and retry failed presses.
@@ -77,6 +79,9 @@ def label(
     recorded = read_session(folder)
     if not recorded.episodes and not follow:
         raise UsageError(f"{folder} holds no finished recording", "at least one", "record: `tacdata record`")
+    if out is not None:
+        recorded = linked_session(recorded, Path(out))
+        folder = recorded.folder
     workplaces = devices_named(devices)
     limit = Tolerance(least=tolerance) if tolerance else None
     settings = FarmSettings(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -217,6 +218,34 @@ def _is_whole(path: Path, final: Path) -> bool:
         return read_recording(path).episode.complete
     except TacdataError:
         return False
+
+
+def linked_session(session: Session, folder: Path) -> Session:
+    """Make a folder with links to the recordings of a session that may not be written; copies on a drive without links.
+
+    Labels, checks and datasets then lie beside the links. A folder that was made so before is completed.
+
+    Raises:
+        UsageError: If the folder holds recordings of another session.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for original in (*session.episodes, *session.unfinished, session.folder / FILE):
+        place = folder / original.name
+        if place.exists() and (original.name == FILE or place.stat().st_size == original.stat().st_size):
+            continue
+        if place.exists():
+            raise UsageError(
+                f"{place} is not the one of {session.folder}",
+                "a new folder, or one of this session",
+                "name another --out",
+            )
+        try:
+            if original.name == FILE:
+                raise OSError  # the document grows with the folder: a link would lead to the drive
+            place.symlink_to(original.resolve())
+        except OSError:
+            shutil.copyfile(original, place)
+    return read_session(folder)
 
 
 def refresh(session: Session) -> Session:

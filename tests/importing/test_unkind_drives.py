@@ -3,13 +3,18 @@
 import errno
 import gzip
 import os
+import shutil
 
 import pytest
 from sources import mapping, table, write
 
-from tacdata.errors import FormatError, refused_by_system
+from tacdata import documents
+from tacdata.commands import check
+from tacdata.errors import DeviceError, Exit, FormatError, UsageError, refused_by_system
+from tacdata.example import copy_session
 from tacdata.importing.formats import csv
 from tacdata.importing.imported_session import import_session
+from tacdata.recording.session import linked_session, read_session
 
 
 @pytest.mark.parametrize("call", ("chmod", "fsync"))
@@ -49,3 +54,26 @@ def test_a_text_that_grows_beyond_the_memory_is_refused(tmp_path, monkeypatch):
     path.write_bytes(gzip.compress(b"t,depth,c0,c1\n" + b"1.0,1.0,1.0,1.0\n" * 200_000))
     with pytest.raises(FormatError, match="more than 1 MiB of text"):
         import_session(tmp_path, mapping(tmp_path, path), tmp_path / "session")
+
+
+def test_a_session_that_may_not_be_written_is_judged_and_its_labels_lie_elsewhere(tmp_path, monkeypatch, capsys):
+    kept = copy_session(tmp_path / "drive")
+    shutil.rmtree(kept / "labels")
+    real = documents.write
+
+    def refused(path, *rest):
+        if path.is_relative_to(kept):
+            raise DeviceError(f"writing {path} failed", "a folder that may be written", "choose another")
+        real(path, *rest)
+
+    monkeypatch.setattr(documents, "write", refused)
+    assert check.run(kept).ends == Exit.DONE and "--out names another folder" in "".join(capsys.readouterr())
+    before = sorted(kept.iterdir())
+    linked = linked_session(read_session(kept), tmp_path / "mine")
+    assert [path.resolve() for path in linked.episodes] == [path.resolve() for path in read_session(kept).episodes]
+    assert linked.labels == tmp_path / "mine" / "labels" and sorted(kept.iterdir()) == before
+    assert linked_session(read_session(kept), tmp_path / "mine").episodes == linked.episodes
+    linked.episodes[0].unlink()
+    linked.episodes[0].write_bytes(b"another")
+    with pytest.raises(UsageError, match="is not the one of"):
+        linked_session(read_session(kept), tmp_path / "mine")
