@@ -163,7 +163,7 @@ def _listener(bar: Bar) -> Callable[[Progress], None]:
         error = line["validation_contact_rmse_mm"]
         words = "no contact" if error is None else f"contact RMSE {error:.3f} mm"
         bar.print(
-            f"epoch {line['epoch']:3d}  train loss {line['train_loss']:.5f}  "
+            f"epoch {line['epoch']:3d} of {progress.epochs}  train loss {line['train_loss']:.5f}  "
             f"validation loss {line['validation_loss']:.5f}, {words}"
         )
 
