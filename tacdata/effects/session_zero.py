@@ -41,4 +41,5 @@ class SessionLevels(SessionZero):
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         count = int(course.session.max()) + 1
-        return f"{count} sessions: a shift from one to the next explains as much" if count < LEAST else ""
+        few = f"{count} sessions: a shift from one to the next explains as much" if count < LEAST else ""
+        return "a single session" if count < 2 else few
