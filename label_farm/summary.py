@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from tacdata.display import Displayed
 from tacdata.label_farm.labels.margin import Margin
 
 
-@dataclass
-class LabellingSummary:
+@dataclass(repr=False)
+class LabellingSummary(Displayed):
     """Episodes written, current and failed in one run over a session."""
 
     written: list[int] = field(default_factory=list)
@@ -27,3 +29,10 @@ class LabellingSummary:
     """How well each written label with contact is known."""
     remarks: list[str] = field(default_factory=list)
     """Remarks on the models for the user."""
+
+    def description(self) -> Iterator[str]:
+        """Yield the numbers of labels, and the first reason of a failure."""
+        yield f"Labels: {len(self.written)} written, {len(self.current)} current before, {len(self.failed)} failed"
+        for number, reason in list(self.failed.items())[:1]:
+            yield f"episode {number}: {reason.splitlines()[0]}"
+        yield from self.remarks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,14 +10,15 @@ from tacdata import documents, provenance
 from tacdata.dataset import frames
 from tacdata.dataset.format import features, folder, metadata
 from tacdata.dataset.writer import DatasetWriter
+from tacdata.display import Displayed
 from tacdata.errors import FormatError, UsageError
 from tacdata.labels import Label, file_names, read_label, table
 from tacdata.recording.episode import Episode
 from tacdata.sensor import Sensor
 
 
-@dataclass(frozen=True)
-class Packed:
+@dataclass(frozen=True, repr=False)
+class Packed(Displayed):
     """The result of packing."""
 
     root: Path
@@ -28,6 +29,16 @@ class Packed:
     """Frames written."""
     left_out: tuple[tuple[str, str], ...]
     """Recording and the reason why it was left out, in words."""
+
+    def __fspath__(self) -> str:
+        """Return the dataset's folder."""
+        return str(self.root)
+
+    def description(self) -> Iterator[str]:
+        """Yield episodes and frames, and the first recording that was left out."""
+        yield f"Packed: {self.episodes} episodes, {self.frames} frames in {self.root}"
+        for name, reason in self.left_out[:1]:
+            yield f"{len(self.left_out)} recordings left out; the first, {name}: {reason.splitlines()[0]}"
 
 
 def pack(

@@ -15,6 +15,7 @@ import numpy as np
 
 from tacdata import documents, provenance, schemas
 from tacdata.chain.at_rest import ZeroSide, below_zero, zero_side
+from tacdata.display import Displayed
 from tacdata.errors import TacdataError, UsageError
 from tacdata.importing import recording_file
 from tacdata.importing.mapping import Mapping
@@ -29,8 +30,8 @@ from tacdata.recording.files import file_names
 from tacdata.recording.session import FILE
 
 
-@dataclass(frozen=True)
-class Imported:
+@dataclass(frozen=True, repr=False)
+class Imported(Displayed):
     """Result of an import."""
 
     folder: Path
@@ -40,6 +41,18 @@ class Imported:
     """Remarks for a person, as sentences, each once."""
     refused: tuple[str, ...]
     """Trials that could not be imported, and why."""
+
+    def __fspath__(self) -> str:
+        """Return the session's folder."""
+        return str(self.folder)
+
+    def description(self) -> Iterator[str]:
+        """Yield recordings, and the first of the trials that were refused and of the notes."""
+        yield f"Import: {self.recordings} recordings in {self.folder}"
+        if self.refused:
+            yield f"{len(self.refused)} trials refused; the first: {self.refused[0].splitlines()[0]}"
+        if self.notes:
+            yield f"{len(self.notes)} notes; the first: {self.notes[0].splitlines()[0]}"
 
 
 def import_session(

@@ -18,7 +18,7 @@ from tacdata.recording.session import read_session
 from tacdata.sensor import Sensor, read_sensor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PackedSession(Packed):
     """The result of packing a session."""
 

@@ -106,8 +106,11 @@ def test_an_object_serves_as_its_path(nouns, tmp_path):
     assert td.check(session).usable
 
 
-def test_results_describe_themselves_in_a_few_lines(nouns):
+def test_results_describe_themselves_in_a_few_lines(nouns, tmp_path):
     report, windows = repr(td.check(SESSION)), repr(nouns["dataset"].windows())
+    packed = td.pack(SESSION, tmp_path / "dataset")
+    assert repr(packed) == f"Packed: 2 episodes, 490 frames in {packed.root}"
+    assert len(td.read_dataset(packed)) == 490
     assert report.splitlines()[0].endswith("2 recordings, usable")
     assert windows == "Windows of 490 frames: 9 of observation.state"
     assert len(report.splitlines()) <= 6
