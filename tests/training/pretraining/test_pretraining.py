@@ -113,7 +113,7 @@ def test_presses_left_out_make_the_intervals_of_a_fit(known, unit, tmp_path):
 
 def test_a_curve_goes_on_where_it_ended_and_refuses_another(known, unit, many, tmp_path):
     told = []
-    options = {"device": "cpu", "threads": 1, "networks": (), "told": told.append}
+    options = {"device": "cpu", "threads": 1, "networks": (), "report": told.append}
     first = learning_curve(unit, known, tmp_path, (0, 3), (0,), **options)
     learning_curve(unit, known, tmp_path, (0, 3), (0, 1), **options)
     assert len(told) == 4 and len({(point.presses, point.seed) for point in told}) == 4
