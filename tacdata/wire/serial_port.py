@@ -27,11 +27,6 @@ def ports() -> str:
     return ", ".join(names) or "this machine shows none"
 
 
-def is_present(port: str) -> bool:
-    """Return whether this computer lists a port, by its path without links."""
-    return any(os.path.realpath(p.device) == port for p in list_ports.comports())
-
-
 def usb_identity(port: str) -> str:
     """Return vendor, product and serial number of the USB device behind a port; empty without a serial number."""
     device = next((p for p in list_ports.comports() if os.path.realpath(p.device) == port), None)

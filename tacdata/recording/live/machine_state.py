@@ -16,7 +16,7 @@ from tacdata.devices.device import MotionController
 from tacdata.errors import FormatError, UsageError
 from tacdata.recording.motion.move_times import report_resolution
 from tacdata.rig import Rig
-from tacdata.wire.serial_port import is_present, usb_identity
+from tacdata.wire.serial_port import usb_identity
 
 SCHEMA = "machine_state"
 FIRMWARE = ("FIRMWARE", "VER", "OPT")
@@ -48,7 +48,7 @@ def own_state_directory() -> Path:
 class MachineState:
     """The state of one machine: position at rest, whether it moves, and why its position was lost.
 
-    A file is found by port and controller identity, or by the USB serial number alone after a change of port. It is
+    A file is found by controller identity with the port, its name in the rig file, or the USB serial number. It is
     written before a motion, after it, and at the end; a crash leaves the mark of a motion.
 
     Example:
@@ -58,7 +58,7 @@ class MachineState:
     def __init__(self, rig: Rig, cnc: MotionController) -> None:
         """Prepare; nothing is read before the controller is open."""
         self._directory, self._cnc = state_directory(rig), cnc
-        port = str(rig.cnc.get("port", ""))
+        self._name = port = str(rig.cnc.get("port", ""))
         # Two names of one port, such as a link in /dev/serial/by-id, must find one record.
         self._port = os.path.realpath(port) if os.path.exists(port) else port
         self._driver = rig.cnc["driver"]
@@ -136,9 +136,7 @@ class MachineState:
         if self._document is None:
             self._identity = self._identify()
             records = [record for record in map(_record, self._directory.glob("*.json")) if self._is_ours(record)]
-            # A change of port leaves several records of one machine; the latest counts. Some boards of one maker share
-            # a serial number, so a port that is there now is another machine's.
-            records = [r for r in records if r["port"] == self._port or not is_present(r["port"])]
+            # A change of port leaves several records of one machine; the latest counts.
             self._document = max(records, key=lambda record: record["number"], default={})
         return self._document
 
@@ -148,8 +146,13 @@ class MachineState:
         return {"driver": self._driver, "firmware": firmware, "usb": usb_identity(self._port)}
 
     def _is_ours(self, record: dict[str, Any]) -> bool:
-        same_board = bool(record) and record["controller"] == self._identity
-        return same_board and (record["port"] == self._port or bool(record["controller"]["usb"]))
+        if not record or record["controller"] != self._identity:
+            return False
+        if record["port"] == self._port or record.get("name") == self._name:
+            return True
+        # Some makers give all boards one serial number: one that is on the other port now is another machine's.
+        usb = record["controller"]["usb"]
+        return bool(usb) and usb_identity(record["port"]) != usb
 
     def _write(self, **changes: Any) -> None:
         document = {
@@ -158,6 +161,7 @@ class MachineState:
             **changes,
             "version": schemas.version(SCHEMA),
             "port": self._port,
+            "name": self._name,
             "controller": self._identity,
             "number": self._read().get("number", 0) + 1,
             "written": _now(),

@@ -194,26 +194,35 @@ def test_a_machine_without_homing_that_nobody_remembers_is_asked_about(world, ch
     broken_in_mid_press(world, world.controller.inject_brown_out)
     jog(world, 1.0)
     path = next((world.folder.parent / "machines").glob("*.json"))
-    path.write_text(json.dumps(state_of(world) | dict([change]))) if change else path.unlink()
+    path.write_text(json.dumps(state_of(world) | {"name": "another"} | dict([change]))) if change else path.unlink()
     world.folder = world.folder.with_name("session2")
     assert "there is no record of where the machine was left" in refused(world).given
 
 
+def test_a_port_that_was_renamed_is_known_by_its_link(world):
+    """A board without a serial number is on another port after a reboot; its link in /dev/serial/by-id is the same."""
+    broken_in_mid_press(world, world.controller.inject_brown_out)
+    path = next((world.folder.parent / "machines").glob("*.json"))
+    path.write_text(json.dumps(state_of(world) | {"port": "/dev/ttyUSB7"}))
+    world.folder = world.folder.with_name("session2")
+    assert "the controller was reset in mid-stream" in refused(world).given
+
+
 def test_two_boards_of_one_serial_number_have_a_record_each(world, monkeypatch):
     """Their maker gave all of them the same; while a port is there, its record is that of the board on it."""
-    monkeypatch.setattr(machine_state, "usb_identity", lambda port: "10c4:ea60 0001")
-    present = {"/dev/ttyUSB7"}
-    monkeypatch.setattr(machine_state, "is_present", present.__contains__)
+    plugged = {world.cnc_line.path: "10c4:ea60 0001", "/dev/ttyUSB7": "10c4:ea60 0001"}
+    monkeypatch.setattr(machine_state, "usb_identity", lambda port: plugged.get(port, ""))
     world.record()
     world.reboot()
     path = next((world.folder.parent / "machines").glob("*.json"))
-    twin = state_of(world) | {"port": "/dev/ttyUSB7", "position": [1.0, 2.0, 3.0], "number": 1000}
+    twin = {"port": "/dev/ttyUSB7", "name": "/dev/ttyUSB7", "position": [1.0, 2.0, 3.0], "number": 1000}
+    twin = state_of(world) | twin
     path.with_name("twin.json").write_text(json.dumps(twin))
     world.folder = world.folder.with_name("session2")
     assert world.record().remaining == ()
     assert world.asked == []
     world.reboot()
-    present.clear()  # one board, and two ports that it may have had: the later record counts
+    plugged["/dev/ttyUSB7"] = "2341:0043 7"  # another device: one board had both ports, and the later record counts
     world.folder = world.folder.with_name("session3")
     assert "the machine was left at (1.000, 2.000, 3.000) mm" in refused(world).given
 
