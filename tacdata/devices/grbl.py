@@ -13,7 +13,7 @@ from tacdata.errors import DeviceError, UsageError
 from tacdata.wire.grbl import codes
 from tacdata.wire.grbl.lines import OPENED_AGAIN
 from tacdata.wire.grbl.link import GrblLink
-from tacdata.wire.grbl.opening import ANSWER, ask_all, clear, greet, locked, straighten, unblock, unproved
+from tacdata.wire.grbl.opening import ANSWER, ask_all, clear, greet, locked, reset, straighten, unblock, unproved
 from tacdata.wire.grbl.owed import Owed
 from tacdata.wire.grbl.rest import come_to_rest, in_motion, in_words
 from tacdata.wire.grbl.settings import GrblSettings
@@ -301,7 +301,7 @@ class Grbl(MotionController):
                 (x, y, z),
             )
         try:
-            link.soft_reset(ANSWER)
+            reset(link)
             link.rearm()
             link.command("", ANSWER)  # after refusing a line, grblHAL refuses every line until an empty one
             straighten(link)

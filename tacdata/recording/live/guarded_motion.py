@@ -301,8 +301,8 @@ class GuardedMotion:
                 words = f"motion: NOT KNOWN to have stopped ({self._why}){self._last_seen}"
                 return f"{words}; if it moves, press the emergency stop", f"tip:    {tip}"
             if self._rising is not None:
-                up = f"motion: on its way straight up from {_text(self._rest)} to z {self._rising:.2f} mm when it ended"
-                return f"{up}; it stands somewhere on it", f"tip:    {tip}"
+                way = f"straight up from {_text(self._rest)} to z {self._rising:.2f} mm"
+                return f"motion: NOT KNOWN to have stopped on its way {way}", f"tip:    {tip}"
             return f"motion: stopped at {_text(self._rest)} mm", f"tip:    {tip}"
         return (f"motion: at rest at {_text(self._at)} mm" if self._at else "motion: NOT KNOWN to have stopped",)
 

@@ -222,13 +222,14 @@ class GrblLink:
                 if self.statuses.asked_ns is not None or self.statuses.automatic:
                     self._changed.wait(0.05)
 
-    def soft_reset(self, timeout: float) -> None:
-        """Send 0x18 and wait for the welcome; the caller ensures that nothing moves."""
+    def soft_reset(self, timeout: float, late: float = 0.0) -> None:
+        """Send 0x18 at rest and wait for the welcome; another may come for ``late`` [s, real time] after it."""
         with self._changed:
             self._welcome_expected, self._reset_asked, self.welcome = True, True, ""
         self._write(b"\x18")
         try:
             self.wait(lambda: bool(self.welcome), Owed("the welcome after a soft reset", timeout), through_hold=True)
+            self.clock.host.sleep(late)
         finally:  # one that was interrupted is still answered
             self._welcome_expected, self._reset_asked = not (self.polled and self.welcome), not self.welcome
 

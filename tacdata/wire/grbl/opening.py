@@ -22,6 +22,8 @@ ANSWER = 10.0
 ATTEMPTS, SETTLE, LOOK = 3, 0.5, 0.02
 """Questions for the version [count], the pause after one in which late answers come, and its part after which they are
 looked at [s, real time]."""
+RESETS = 4
+"""Attempts to reset a controller within `ANSWER` [count]: one byte may be lost on its way, or its welcome damaged."""
 TALKS = ("Idle", "Alarm")
 """States in which ``$`` commands are answered."""
 DEAF = (1, 2, 17)
@@ -112,7 +114,7 @@ def clear(link: GrblLink) -> str:
     """
     initial = _state(link)
     if initial in OPENED_AGAIN or (initial.startswith("Alarm") and link.alarm in DEAF):
-        link.soft_reset(ANSWER)
+        reset(link)
     state = _state(link)
     if link.pendant:
         raise DeviceError(
@@ -161,7 +163,8 @@ def attune(link: GrblLink) -> None:
                 ) from None
             link.write_off()
             if link.last and link.last.state.startswith("Alarm"):
-                _reset(link)
+                reset(link)
+                _place(link)
         link.clock.host.sleep(SETTLE)
 
 
@@ -192,16 +195,28 @@ def unproved(link: GrblLink, settings: GrblSettings) -> str:
 def unblock(link: GrblLink) -> None:
     """Reset a controller that obeys no line before. Nothing moves."""
     if link.alarm in DEAF:
-        _reset(link)
+        reset(link)
+        _place(link)
 
 
 def _state(link: GrblLink) -> str:
     return link.statuses.unplaced or link.fresh_status(ANSWER).state
 
 
-def _reset(link: GrblLink) -> None:
-    link.soft_reset(ANSWER)
-    _place(link)
+def reset(link: GrblLink) -> None:
+    """Reset a controller at rest: the queue is emptied, and the position kept.
+
+    Raises:
+        DeviceError: On a fault, or if no welcome comes.
+    """
+    for attempt in range(1, RESETS + 1):
+        try:
+            # After a repetition an earlier reset may still come, with a welcome of its own.
+            link.soft_reset(ANSWER / RESETS, 0.0 if attempt == 1 else SETTLE)
+            break
+        except DeviceError:
+            if link.fault or link.pendant or attempt == RESETS:
+                raise
 
 
 def locked(link: GrblLink, settings: GrblSettings) -> DeviceError:

@@ -96,3 +96,61 @@ def test_an_undamaged_lift_is_one_attempt(lifted):
     world, words = lifted(set())
     assert world.position()[2] == pytest.approx(ORIGIN[2] + 3.0, abs=0.01)
     assert "attempt" not in words
+
+
+def lost_reset(world):
+    """Lose the first reset on its way to the controller."""
+    left = [1]
+
+    def change(data):
+        if data == b"\x18" and left:
+            left.clear()
+            return b""
+        return data
+
+    world.cnc_line.to_device.change = change
+
+
+def lost_welcome(world):
+    """Lose the first welcome on its way to the computer."""
+    left = [1]
+
+    def wire(text):
+        if text.startswith("Grbl") and left:
+            left.clear()
+            return None
+        return text
+
+    world.controller.inject_wire(to_host=wire)
+
+
+def late_reset(world):
+    """Hold back what is sent from the reset on, longer than one attempt waits."""
+    way = world.cnc_line.to_device
+
+    def change(data):
+        if data == b"\x18" and not way.held_until:
+            way.held_until = world.schedule.now_ns + 2_700_000_000
+        return data
+
+    way.change = change
+
+
+@pytest.mark.parametrize("fault", [lost_reset, lost_welcome, late_reset])
+def test_a_reset_that_nobody_answers_is_tried_again_before_the_lift(tmp_path, fault):
+    world = World(1, tmp_path / "session")
+    broken = []
+
+    def pull():
+        fault(world)
+        broken.append(world.schedule.now)
+        world.board_line.close()
+
+    world.schedule.at(PRESSING, pull)
+    with pytest.raises(DeviceError, match="taxel board") as raised:
+        world.record()
+    world.end()
+    assert "the indenter was lifted off the skin" in "\n".join(raised.value.__notes__)
+    clear = next(t for t, _, _, z, *_ in world.path if t > broken[0] and z > ORIGIN[2] + 2.9)
+    assert clear - broken[0] < 6.0
+    assert not world.lost
