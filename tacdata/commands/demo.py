@@ -100,8 +100,9 @@ def _accuracy(scores: Path) -> str:
     peak, region, place = (table[name]["median"] for name in ("peak_error", "contact_rmse", "centroid_error"))
     if None in (peak, region, place):
         return "no held-out frame is in contact: the network has no score"
+    count = len(document["split"]["episodes"])
     return (
-        f"on {len(document['split']['episodes'])} presses that the network had not seen, the median frame is right to "
+        f"on {count} press{'es' * (count != 1)} that the network had not seen, the median frame is right to "
         f"{peak:.2f} mm in peak depth, {region:.2f} mm over the contact and {place * pitch:.2f} mm in place"
     )
 
