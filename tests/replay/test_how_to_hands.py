@@ -59,14 +59,16 @@ def test_every_command_is_typed_somewhere():
         assert verb in (ROOT / "tests" / place).read_text(), f"{place} does not type {verb}"
 
 
-def test_the_page_plans_presses_as_wide_as_a_ball():
+def test_the_pages_files_are_what_the_commands_take():
     import yaml
 
+    from tacdata import documents
     from tacdata.plans import Plan
     from tacdata.plans.recipe import write_out
     from tacdata.sensor import default_sensor
 
-    (block,) = blocks(PAGES[0], "yaml")
+    pairs, block = blocks(PAGES[0], "yaml")
+    documents.check(yaml.safe_load(pairs), "hand_eye_pairs", "hands.md")
     plan = Plan.from_document(write_out(yaml.safe_load(block), default_sensor(), "hands.md"), "hands.md")
     assert len(plan.presses) == 28 and {press.indenter_name for press in plan.presses} >= {"ball_35", "plate", "punch"}
 
