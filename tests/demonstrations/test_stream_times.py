@@ -112,3 +112,21 @@ def test_an_image_that_is_repeated_under_fresh_stamps_does_not_count(tmp_path):
     assert any(words.startswith("camera eye repeated an image 9 times from 2.4 to 2.8 s") for words in made.remarks)
     assert not any("contradict" in words or "change places" in words for words in made.remarks)
     assert all(t.outliers == 0 and t.gap[75:81].any() for t in made.tracks.values())
+
+
+def test_neighbours_in_the_wrong_order_are_noticed_by_the_motion(tmp_path):
+    """Without stamps the reader gives their times in the order of arrival."""
+    exchanged, pairs = [], range(20, 200, 12)
+    for name in NAMES:
+        stream, order = view(name), np.arange(212)
+        for k in pairs:
+            order[[k, k + 1]] = order[[k + 1, k]]
+        arrays = {"position": stream.position[order], "quaternion": stream.quaternion[order]}
+        exchanged.append(replace(stream, **arrays))
+    tracked = track(recording(tmp_path, views=tuple(exchanged)))
+    (words,) = [words for words in tracked.remarks if "wrong order" in words]
+    assert 3 <= int(words.split()[0]) <= len(pairs) and "camera eye" in words
+    off = np.concatenate([t.position - truth_at(n, tracked.time_ns)[:, :3, 3] for n, t in tracked.tracks.items()])
+    spread = np.concatenate([np.sqrt(t.covariance[:, range(3, 6), range(3, 6)]) for t in tracked.tracks.values()])
+    assert (np.abs(off) > 3 * spread).any(axis=1).mean() < 0.01
+    assert not any("contradict" in words or "moved" in words for words in tracked.remarks)

@@ -153,7 +153,7 @@ def late_stretches(sightings: Mapping[str, Sightings], begin_ns: int) -> tuple[d
             for first, last, lag in stretches:
                 rows = _by(series, camera) & (series.time_ns >= first) & (series.time_ns < last)
                 timing[rows] = np.maximum(timing[rows], lag)
-            judged[name] = replace(series, timing=timing, covariance=series.covariance + _more(series, timing))
+            judged[name] = replace(series, timing=timing, covariance=series.covariance + added(series, timing))
         ends = (
             (min(span[0] for span in stretches) - begin_ns) * 1e-9,
             (max(span[1] for span in stretches) - begin_ns) * 1e-9,
@@ -250,7 +250,7 @@ def _by(sightings: Sightings, camera: str) -> np.ndarray:
     return np.array([name == camera for name in sightings.camera], bool)
 
 
-def _more(sightings: Sightings, timing: np.ndarray) -> np.ndarray:
+def added(sightings: Sightings, timing: np.ndarray) -> np.ndarray:
     """Return the covariance that larger uncertainties of times add to sightings [m^2], shape (p, 6, 6)."""
     added = np.zeros((len(sightings), 6, 6))
     for camera in dict.fromkeys(sightings.camera):

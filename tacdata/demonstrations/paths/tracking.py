@@ -16,6 +16,7 @@ from tacdata.demonstrations.paths.acquisition import acquire
 from tacdata.demonstrations.paths.background import without_bumps
 from tacdata.demonstrations.paths.camera_bumps import unmoved
 from tacdata.demonstrations.paths.estimator import Estimator, by_finger, identity_of
+from tacdata.demonstrations.paths.image_order import in_order
 from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.motion_filter import GATE, Smoothed
 from tacdata.demonstrations.paths.second_look import why_nothing_is_seen
@@ -68,18 +69,13 @@ def track(
         sightings = {name: sightings_of(name, recording.views, rig, recording.timing) for name in rig.fingers}
     begin, end = recording.span_ns
     # A fault of time looks like a fault of cameras or tags, so it comes first.
+    sightings, order_notes = in_order(sightings)
     sightings, stretch_notes = late_stretches(sightings, begin)
     original = sightings
     sightings, bumps = without_bumps(sightings, recording, delays)
     times = begin + np.rint(np.arange(int((end - begin) * 1e-9 * rate) + 1) * (1e9 / rate)).astype(np.int64)
-    repeat_notes = path_faults.repeats(recording.views, begin)
-    remarks = [
-        *delay_notes,
-        *stretch_notes,
-        *repeat_notes,
-        *bumps,
-        *(f"while recording: {note}" for note in recording.notes),
-    ]
+    time_notes = [*delay_notes, *order_notes, *stretch_notes, *path_faults.repeats(recording.views, begin)]
+    remarks = [*time_notes, *bumps, *(f"while recording: {note}" for note in recording.notes)]
     remarks += [f"{n}: seen in {len(s)} images, too few for a path" for n, s in sightings.items() if len(s) < FEWEST]
     sightings = {name: series for name, series in sightings.items() if len(series) >= FEWEST}
     if not sightings or len(times) < 2:
