@@ -1,4 +1,4 @@
-"""A first-order filter in the readout."""
+"""Low-pass filter of first order in the readout."""
 
 from tacdata.chain.memory import low_pass_between
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter, State, Values

@@ -1,4 +1,4 @@
-"""Readings change only in steps, late both ways."""
+"""Dead band of the readings: they change only in steps, late both ways."""
 
 from tacdata.chain.memory import play
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter, State, Values

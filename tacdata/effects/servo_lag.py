@@ -1,4 +1,4 @@
-"""The guide follows its command late."""
+"""Lag of the drive: the guide follows its command late."""
 
 from tacdata.chain.memory import second_order
 from tacdata.effects.effect import AtRest, Effect, Family, Parameter, State, Values

@@ -1,4 +1,4 @@
-"""Lateral error of registration."""
+"""Offset in x and y: lateral error of registration."""
 
 import numpy as np
 

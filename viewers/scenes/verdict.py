@@ -78,13 +78,9 @@ def _scene(title: str, words: str, bars: tuple[Bars, ...], curves: tuple[Curves,
 
 def _distinguished(effect: dict[str, Any]) -> list[str]:
     """Return the nearest rivals by these recordings' own margins; the experiment only where a rival is open."""
-    margins = sorted(effect.get("margins", {}).items(), key=lambda item: item[1])
     open_to = {*effect["alternatives"], effect["mechanism"]}
-    nearest: dict[str, float] = {}
-    for name, by in margins:
-        if load(name).called not in open_to:
-            nearest.setdefault(load(name).called, by)  # of several forms of a mechanism the nearest
-    excluded = [f"{name} by {by:.1f}" for name, by in nearest.items() if by > 0][:RIVALS]
+    nearest = _smallest(effect.get("margins", {}))
+    excluded = [f"{name} by {by:.1f}" for name, by in nearest.items() if by > 0 and name not in open_to][:RIVALS]
     lines = []
     if excluded:
         lines.append(f"- distinguished in these recordings from: {', '.join(excluded)} standard errors")
@@ -124,10 +120,11 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
     ):
         if items:
             lines += [f"## {heading}", "", *(f"- {item}" for item in items), ""]
-    if verdict["unjudgeable"]:
-        lines += ["Cannot be judged here: " + ", ".join(verdict["unjudgeable"]) + ".", ""]
+    judged = _smallest({name: value for name, value in verdict["limits"].items() if value})
+    if unjudged := [name for name in _smallest(dict.fromkeys(verdict["unjudgeable"], 0.0)) if name not in judged]:
+        lines += [f"Cannot be judged here: {', '.join(sorted(unjudged))}.", ""]
     if picture:
-        lines.append(f"The page with the residuals is {picture}.")
+        lines.append(f"Residuals before and after are drawn in {picture}.")
     return "\n".join(lines)
 
 
@@ -153,7 +150,7 @@ def _margins(verdict: dict[str, Any]) -> list[Bars]:
     charts = []
     for effect in verdict["effects"]:
         if effect["margins"]:
-            rivals = sorted(effect["margins"].items(), key=lambda pair: pair[1])
+            rivals = _smallest(effect["margins"]).items()
             title = f"{effect['mechanism']}: by how many standard errors better than"
             charts.append(
                 Bars(
@@ -169,8 +166,14 @@ def _margins(verdict: dict[str, Any]) -> list[Bars]:
 
 def _limits(verdict: dict[str, Any]) -> list[Bars]:
     """Return how small an effect would have been seen, those that these recordings excite."""
-    limits = sorted(((n, v) for n, v in verdict["limits"].items() if v), key=lambda pair: pair[1])
-    if not limits:
-        return []
-    title = "Would be found half the time at this part of its usual size"
-    return [Bars("limits", title, tuple(n for n, _ in limits), np.array([v for _, v in limits], float), 1.0, True)]
+    limits = _smallest({name: value for name, value in verdict["limits"].items() if value})
+    title = "Least size found [usual size]"
+    return [Bars("limits", title, (*limits,), np.array([*limits.values()], float), 1.0, True)] if limits else []
+
+
+def _smallest(values: dict[str, float]) -> dict[str, float]:
+    """Return the smallest value of each mechanism, smallest first, by the names of `tacdata list effects`."""
+    found: dict[str, float] = {}
+    for name, value in sorted(values.items(), key=lambda pair: pair[1]):
+        found.setdefault(load(name).called, value)
+    return found

@@ -158,8 +158,8 @@ def verdict(tmp_path):
         "gate": {"gap": True, "p": 0.001, "p_generic": 0.001, "noise": [1.0], "memory": 0.0},
         "left": {"share": 0.01, "t": 0.3, "before": 8.0, "after": 1.1, "floor": 1.0},
         "located": ["phase: hold"],
-        "unjudgeable": {"tilt": "one place"},
-        "limits": {"creep": 0.02, "drift": None, "tilt": 4.0},
+        "unjudgeable": {"rotation": "one place", "relaxation_let_go": "loads", "power_creep_let_go": "loads"},
+        "limits": {"creep": 0.02, "relaxation": 0.03, "power_creep": 0.01, "drift": None, "tilt": 4.0},
         "untested": [],
         "data": {},
         "remarks": ["one indenter"],
@@ -176,7 +176,9 @@ def test_a_verdict_in_words_and_bars(verdict, tmp_path):
     bars = {b.name: b for b in scene.bars}
     assert bars["gap"].values.tolist() == [8.0, 1.1, 1.0]
     assert bars["margins/creep"].labels == ("relaxation", "drift")
-    assert bars["limits"].labels == ("creep", "tilt"), "what is not excited has no bar"
+    assert bars["limits"].labels == ("relaxation", "creep", "tilt"), "what is not excited has no bar"
+    assert bars["limits"].values.tolist() == [0.01, 0.02, 4.0], "of several forms of a mechanism the smallest"
+    assert "Cannot be judged here: rotation." in scene.summary, "by the names of tacdata list effects"
     assert {"/bars/gap", "/bars/limits", "/about"} <= drawn(scene, tmp_path)
     assert scene_at(verdict / "verdict.json").bars[0].labels == scene.bars[0].labels
 
