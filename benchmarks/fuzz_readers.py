@@ -3,7 +3,7 @@
 A reader must return, or raise one of our own errors, within 10 s and 1 GiB. Anything else is a fault, and is listed
 with its seed. A process that ends by a signal is one as well, at its end too. Tables are also imported whole.
 
-    python benchmarks/fuzz_readers.py [--tries N] [--only NAME ...] [--json FILE]
+    python benchmarks/fuzz_readers.py [--tries N] [--first SEED] [--only NAME ...] [--json FILE]
 """
 
 from __future__ import annotations
@@ -281,6 +281,7 @@ def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tries", type=int, default=10_000)
+    parser.add_argument("--first", type=int, default=0, help="first seed, to share readers among processes")
     parser.add_argument("--only", nargs="*", default=[])
     parser.add_argument("--json", type=Path)
     chosen = parser.parse_args()
@@ -301,7 +302,7 @@ def main() -> None:
             read(whole)
             counts: Counter[str] = Counter()
             faults: dict[str, int] = {}
-            for seed in range(chosen.tries):
+            for seed in range(chosen.first, chosen.first + chosen.tries):
                 rng = np.random.default_rng(seed)
                 # A name of its own: readers may cache contents by name.
                 path = folder / f"damaged_{seed}{ending}"
