@@ -1,7 +1,8 @@
-"""Closed loop by touch: fingertips press until the live estimate of depth equals the recorded one.
+"""Closed loop by touch: fingertips press until the live estimate of depth, or the live reading, is the recorded one.
 
 The controller knows the stiffness of robot and skin of the undisturbed scene, not of the drawn one. Its estimate is
-late and wrong as measured of a network (docs/how_to/hands.md): too shallow by a constant, with scatter.
+late and wrong as measured of a network (docs/how_to/hands.md): too shallow by a constant, with scatter. A reading is
+off by the gain of its unit instead.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ LATENCY = 0.13
 """Latency of a live estimate [s]: four frames of a centred window of nine at 30 Hz (paper, Exp. 3)."""
 SHALLOW, SCATTER = 0.23, 0.04
 """Largest constant error towards 0, and standard deviation of the scatter of a predicted depth [mm]."""
+UNLIKE = 0.2
+"""Largest relative deviation of a unit's gain from the usual one [1]."""
 BANDWIDTH = 3.0
 """Rate at which the error of depth is corrected [1/s]; with `LATENCY` the phase margin is 68 degrees."""
 RELEASE = 10.0
@@ -39,13 +42,16 @@ class DepthFeedback:
     """Displacement of a target per depth of the skin, 1 + skin / robot, of the undisturbed scene [1]."""
     seed: int
     """Decides the errors of the live estimate."""
+    raw: bool = False
+    """Whether readings are fed back in place of depth; the goal is then a reading over the usual gain [m]."""
 
     def __post_init__(self) -> None:
         """Draw the errors of the estimate."""
         # Random numbers of its own: the same seed draws the same scene with and without feedback.
         self._rng = np.random.default_rng([self.seed, 31])
         count = self.goal.shape[1]
-        self._shallow = self._rng.uniform(0, SHALLOW, count) / 1000
+        self._shallow = 0.0 if self.raw else self._rng.uniform(0, SHALLOW, count) / 1000
+        self._gain = self._rng.uniform(1 - UNLIKE, 1 + UNLIKE, count) if self.raw else 1.0
         self._correction = np.zeros(count)
         self._waiting: deque[tuple[float, np.ndarray]] = deque()
         self._estimate = np.zeros(count)
@@ -59,7 +65,9 @@ class DepthFeedback:
             step: Time since the last call [s].
         """
         noise = self._rng.normal(0, SCATTER / 1000, len(depth)) * (depth > 0)
-        self._waiting.append((moment + LATENCY, np.clip(depth - self._shallow * (depth > 0) + noise, 0, None)))
+        self._waiting.append(
+            (moment + LATENCY, np.clip(self._gain * depth - self._shallow * (depth > 0) + noise, 0, None))
+        )
         while self._waiting and self._waiting[0][0] <= moment:
             self._estimate = self._waiting.popleft()[1]
         row = min(int(np.searchsorted(self.seconds, moment)), len(self.seconds) - 1)

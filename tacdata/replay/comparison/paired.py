@@ -29,7 +29,7 @@ class PairedDifference:
         """Interval of the difference, 95 % [1]: Wilson's for the share of the first among the scenes that differ."""
         differing = self.first + self.second
         if not differing:
-            reach = 3.0 / self.of  # the rule of three: none of n differed
+            reach = min(3.0 / self.of, 1.0)  # the rule of three: none of n differed
             return -reach, reach
         low, high = binomtest(self.first, differing).proportion_ci(method="wilson")
         return (2 * low - 1) * differing / self.of, (2 * high - 1) * differing / self.of

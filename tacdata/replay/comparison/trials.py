@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 
 from tacdata import provenance, schemas
 from tacdata.demonstrations.demonstration import Demonstration
-from tacdata.replay.comparison.arms import CONTROLS, DEPTH, DIRECT, control_arms
+from tacdata.replay.comparison.arms import CONTROLS, DEPTH, DIRECT, TAXELS, control_arms
 from tacdata.replay.comparison.challenges import CHALLENGES, changed
 from tacdata.replay.comparison.depth_feedback import DepthFeedback
 from tacdata.replay.comparison.gain_search import FoundGain, GripDemand, GripSearch
@@ -21,8 +21,8 @@ from tacdata.replay.outcome import ReplayOutcome, normals, object_centre, replay
 from tacdata.replay.scene import SPREADS, ReplayScene, drawn
 from tacdata.replay.targets import FingertipTargets, targets_of
 
-CHOSEN, CLOSED = "chosen", "closed loop"
-"""Kinds of replay with a gain that was searched for, and with depth fed back while the robot presses."""
+CHOSEN, CLOSED, CLOSED_RAW = "chosen", "closed loop", "closed loop, raw"
+"""Kinds of replay with a gain that was searched for, and with depth or readings fed back while the robot presses."""
 PUBLISHED = {"grasp": (0.0, 0.9167), "wipe": (0.0, 0.90)}
 """Shares of direct and of compensated replays that succeeded in the paper, by task [1] (Exp. 2)."""
 ALIKE = 0.1
@@ -60,14 +60,17 @@ class Trials:
 
     def one(self, kind: str, scene: ReplayScene, seed: int = 0) -> ReplayOutcome:
         """Return the outcome of one trial, of a kind of replay, in a scene; the seed draws a controller's errors."""
-        if kind != CLOSED:
+        if kind not in (CLOSED, CLOSED_RAW):
             return replay_targets(self.paths[kind], scene, self._centre)
-        path = self.paths[DEPTH]
+        path = self.paths[DEPTH if kind == CLOSED else TAXELS]
         goal = np.clip(np.nan_to_num(path.depth), 0, None) / 1000
+        if kind == CLOSED_RAW and (level := self._readings()) is not None:
+            # One gain for all units: what a reading says without a network of its own.
+            goal = np.clip(np.nan_to_num(level), 0, None) * (goal.sum() / max(float(np.nansum(level)), 1e-9))
         seconds = (path.time_ns - path.time_ns[0]) * 1e-9
         # Of the undisturbed scene: the controller does not know the drawn one.
         softness = 1 + self._scene.skin / self._scene.stiffness
-        controller = DepthFeedback(goal, seconds, normals(path), softness, seed)
+        controller = DepthFeedback(goal, seconds, normals(path), softness, seed, kind == CLOSED_RAW)
         return replay_targets(path, scene, self._centre, controller.shift)
 
     def held_in(
@@ -215,7 +218,8 @@ def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[
 
 def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
     """Return the outcomes of each arm and of the closed loop in each of `CHALLENGES`, as plain data."""
-    kinds = [*(kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)), CLOSED]
+    kinds = [kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)]
+    kinds += [CLOSED_RAW, CLOSED] if TAXELS in kinds else [CLOSED]
     return [
         _row({"challenge": name}, [recording.held_in(scene, kinds, seeds, name) for recording in tried], CLOSED)
         for name in CHALLENGES
@@ -224,9 +228,8 @@ def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[
 
 def _row(named: dict[str, Any], each: Sequence[dict[str, list[bool]]], judged: str = DEPTH) -> dict[str, Any]:
     outcomes = {kind: [hit for results in each for hit in results[kind]] for kind in each[0]}
-    rivals = {
-        kind: outcomes[kind] for kind in outcomes if kind in (CONTROLS if judged == DEPTH else (*CONTROLS, DEPTH))
-    }
+    against = CONTROLS if judged == DEPTH else (*CONTROLS, DEPTH, CLOSED_RAW)
+    rivals = {kind: outcomes[kind] for kind in outcomes if kind in against}
     return {
         **named,
         "rates": {kind: rate(values) for kind, values in outcomes.items()},
