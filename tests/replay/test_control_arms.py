@@ -6,7 +6,7 @@ from test_scene import grasp
 
 from tacdata.replay.comparison.arms import CLOSE, CLOSING, CONSTANT, TAXELS, control_arms
 from tacdata.replay.comparison.challenges import CHALLENGES, changed
-from tacdata.replay.comparison.depth_feedback import BANDWIDTH, DepthFeedback
+from tacdata.replay.comparison.depth_feedback import BANDWIDTH, UNLIKE, DepthFeedback
 from tacdata.replay.comparison.paired import paired, worth
 from tacdata.replay.comparison.trials import like_published, rate
 from tacdata.replay.grasp import LEAST_DEPTH
@@ -78,6 +78,19 @@ def test_feedback_presses_as_deep_as_the_person_did():
     assert found[int(4.0 / step)] == pytest.approx(0.0012, abs=0.0001) and found[: int(0.5 / step)].max() == 0
     assert found.max() < 0.0016 and found[-1] < 1e-4
     assert BANDWIDTH * 0.13 < 0.5  # rad of phase that the latency takes
+
+
+def test_feedback_of_readings_is_off_by_the_gain_of_the_unit():
+    """Pressed until a unit reads as the usual one would, the skin is as deep as that unit's gain is small."""
+    seconds, softness = np.arange(0, 4, 0.05), 11.0
+    goal = np.where(seconds > 0.5, 0.001, 0.0)[:, None]
+    controller = DepthFeedback(goal, seconds, np.tile([0.0, 0.0, 1.0], (len(seconds), 1, 1)), softness, 1, raw=True)
+    assert abs(controller._gain - 1.0).max() < UNLIKE
+    controller._gain[:] = 0.8
+    depth, step = np.zeros(1), 0.005
+    for moment in np.arange(0, 4, step):
+        depth = np.maximum(controller.shift(float(moment), depth, step)[:, 2] / softness, 0.0)
+    assert depth[0] == pytest.approx(0.001 / 0.8, abs=0.0001)
 
 
 @pytest.mark.parametrize("name", CHALLENGES)
