@@ -77,7 +77,7 @@ def train(
         start: A pretrained network to start from, or "shipped".
         simulated: A dataset of `simulate` whose frames are mixed in.
         device: "auto", "cpu", "cuda" or "cuda:N".
-        threads: CPU threads; None takes one a core, at most 4.
+        threads: CPU threads; None takes one a core, at most 4, or one thread with ``start``.
         compiled: Let torch compile the network; for cards.
         leave_out: Groups of shapes that are left out in turn, for intervals that hold on unseen shapes.
         tensorboard: Write metrics for TensorBoard too.

@@ -50,6 +50,8 @@ MANY = 24
 """Presses beyond which one network is fitted [count]: four cost more, and gained little on rig 20 with 30."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 """Shares of the way from the pretrained weights that are tried [1]: above 1 as the pull holds each network back."""
+THREADS = 1
+"""CPU threads where none are asked for: with two on a busy computer a step took four times the processor's time."""
 JUDGED = 40
 """Frames of a press left out that judge a share, evenly taken [count]."""
 
@@ -80,7 +82,7 @@ def fit(
         pretrained: The network to start from.
         device: As of `train`.
         resume: Go on with the run in ``out``.
-        threads: As of `train`.
+        threads: CPU threads; `THREADS` by default. Others may change last bits.
         listener: As of `train`; epochs are counted over all networks.
         compiled: As of `train`.
         simulated: As of `train`.
@@ -96,6 +98,7 @@ def fit(
     presses = tuple(sorted({*division.train, *division.validation}))
     if len(presses) < 2:
         raise UsageError(f"a fit to {len(presses)} press", "two presses or more", "record more")
+    threads = threads or THREADS
     if len(presses) > MANY and shape_groups is None:
         resume = resume and (out / checkpoint.LAST).is_file()
         return train(
