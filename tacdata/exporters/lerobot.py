@@ -23,6 +23,9 @@ META = Path("meta/tacdata_targets.json")
 ACTION, STATE = "action", "observation.state"
 DEPTH, FELT, GAP = "tacdata.predicted_contact_depth", "tacdata.felt", "tacdata.gap"
 TIME = "tacdata.time_ns"
+TACTILE, VALID = "observation.tactile.", "tacdata.valid."
+EXACT = "tacdata.exact"
+"""Position, quaternion, seen [m] and depth [mm] of each finger, float64: `action` has no more than seven digits."""
 
 
 class Lerobot(Exporter):
@@ -32,7 +35,8 @@ class Lerobot(Exporter):
 
     - ``action``: fingertip targets, x y z [m] and qx qy qz qw per finger;
     - ``observation.state``: fingertips as seen, in the same form;
-    - ``observation.tactile.FINGER``: readings [counts];
+    - ``observation.tactile.FINGER``: readings [counts]; ``info`` has the place of each channel on the skin [mm];
+    - ``tacdata.valid.FINGER``: whether each channel has a reading; 0 stands where it has none;
     - ``observation.predicted_depth.FINGER``: a network's estimate as a float32 depth image, metres in the file and
       millimetres in lerobot; the feature's ``info`` holds the checkpoint's hash;
     - ``tacdata.predicted_novelty.FINGER``: above 1 the readings are unlike all training readings.
@@ -78,7 +82,7 @@ class Lerobot(Exporter):
         return [] if info["fps"] == rate else [note]
 
     def read(self, directory: Path) -> list[FingertipTargets]:
-        """Return the targets of a dataset, to float32."""
+        """Return the targets of a dataset, to the last bit."""
         info = folder.read_info(Path(directory))
         try:
             entries = json.loads((Path(directory) / META).read_text())
@@ -110,6 +114,9 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
         FELT: np.isfinite(targets.depth),
         GAP: targets.gap,
         TIME: targets.time_ns,
+        EXACT: np.concatenate(
+            [targets.position, targets.quaternion, targets.seen, np.nan_to_num(targets.depth)[..., None]], -1
+        ).reshape(count, -1),
     }
     if len(targets.fingers) == 1:  # LeRobot stores a vector of length one as a number
         columns = {key: values[:, 0] if values.shape[1:] == (1,) else values for key, values in columns.items()}
@@ -117,7 +124,8 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
         () if demonstration is None else ((name, demonstration.tracks[name]) for name in targets.fingers)
     ):
         if track.signals is not None:
-            columns[f"observation.tactile.{name}"] = np.nan_to_num(track.signals[targets.rows])
+            columns[f"{TACTILE}{name}"] = np.nan_to_num(track.signals[targets.rows])
+            columns[f"{VALID}{name}"] = np.isfinite(track.signals[targets.rows])
         if track.depth is not None:
             maps = np.nan_to_num(track.depth[targets.rows]).astype(np.float32)
             columns[f"observation.predicted_depth.{name}"] = maps / tiff.MM_PER_METRE
@@ -140,8 +148,15 @@ def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict
         elif values.ndim == 3:
             dtype, shape, names = "image", [*shape, 1], ["height", "width", "channels"]
             info = {"is_depth_map": True, "depth_unit": "m", "unit": "m"}
+        elif key == EXACT:
+            parts = (*AXES, *TURNS, *(f"seen_{axis}" for axis in AXES), "depth")
+            names, info = [f"{n}.{part}" for n in targets.fingers for part in parts], {"unit": "m, 1, m, mm"}
+        elif key.startswith(TACTILE) and targets.source:
+            name = key.removeprefix(TACTILE)
+            places = targets.source.sensors[name].taxels.centers
+            info = {"unit": "counts", "frame": f"skin of {name}", "place_mm": places.tolist()}
         elif key != TIME:
-            info = {"unit": "1" if "novelty" in key else "counts"}
+            info = {"unit": "1"}
         if "predicted" in key:
             info |= {"prediction": True, "checkpoint": (targets.network or {}).get("hash", "")}  # ty: ignore[unsupported-operator]
         features[key] = {"dtype": dtype, "shape": shape, "names": names, "info": info}
@@ -163,7 +178,7 @@ def _table(record: dict[str, np.ndarray], features: dict[str, Any]) -> pa.Table:
 
 def _read(directory: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> FingertipTargets:
     documents.check(header, "fingertip_targets", str(directory / META))
-    keys = [ACTION, STATE, DEPTH, FELT, GAP, TIME]
+    keys = [EXACT, FELT, GAP, TIME]
     table = folder.read_parquet(directory / folder.data_path(row.data_file), keys)
     fingers, count = tuple(header["fingers"]), table.num_rows
 
@@ -172,16 +187,16 @@ def _read(directory: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> Fi
         flat = values.flatten() if pa.types.is_nested(values.type) else values
         return flat.to_numpy(zero_copy_only=False).reshape(count, len(fingers), *shape)
 
-    action, state = column(ACTION, 7).astype(float), column(STATE, 7).astype(float)
-    depth = np.where(column(FELT), column(DEPTH).astype(float), np.nan)
+    exact = column(EXACT, 11)
+    depth = np.where(column(FELT), exact[..., 10], np.nan)
     named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
     return FingertipTargets(
         **{name: header[name] for name in named},
         fingers=fingers,
         time_ns=table[TIME].to_numpy(),
-        position=action[..., :3],
-        quaternion=action[..., 3:],
-        seen=state[..., :3],
+        position=exact[..., :3],
+        quaternion=exact[..., 3:7],
+        seen=exact[..., 7:10],
         depth=depth,
         gap=column(GAP),
         remarks=tuple(header["remarks"]),

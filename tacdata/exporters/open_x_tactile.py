@@ -97,7 +97,10 @@ def _store(store: Path, listed: list[FingertipTargets], recordings: Path | None)
     headers = [targets.header(columns) for targets in listed]
     for header in headers:
         documents.check(header, "fingertip_targets", str(store))
-    documents.write_text(store / OWN / ".zattrs", json.dumps({"episodes": headers}, indent=1))
+    taxels, valid = _channels(listed)
+    for name, values in valid.items():
+        _array(store / OWN / f"valid_{name}", values)
+    documents.write_text(store / OWN / ".zattrs", json.dumps({"episodes": headers, "taxels": taxels}, indent=1))
     pictures = [_pictures(targets, recordings) for targets in listed]
     if not all(pictures):
         return [f"{store.name} has no RGB stream, as a recording stores no images: FTP-1's loader wants one"]
@@ -109,6 +112,21 @@ def _store(store: Path, listed: list[FingertipTargets], recordings: Path | None)
         lambda begin, end: np.stack([_picture(data) for data in frames[begin:end]]),
     )
     return []
+
+
+def _channels(listed: list[FingertipTargets]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Return unit, frame and places of each finger's channels, and whether each has a reading, (rows, taxels)."""
+    first = listed[0].source
+    if first is None:
+        return {}, {}
+    felt = [name for name in listed[0].fingers if first.tracks[name].signals is not None]
+    places = {name: first.sensors[name].taxels.centers.tolist() for name in felt}
+    taxels = {name: {"unit": "counts", "frame": f"skin of {name}", "place_mm": places[name]} for name in felt}
+    parts = {name: [(t.source.tracks[name].signals, t.rows) for t in listed if t.source] for name in felt}
+    return taxels, {
+        name: np.concatenate([np.isfinite(values[rows]) for values, rows in some if values is not None])
+        for name, some in parts.items()
+    }
 
 
 def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
