@@ -20,6 +20,15 @@ COLUMNS, ROWS = 3, 3
 DEPTH_BORDERS = (0.3, 0.6, 0.9, 1.2)
 """Borders of the depths by which presses are counted [mm]."""
 PICTURE = "coverage.png"
+HUB = "README.md"
+"""Name of the card in a dataset's folder, where the hub looks for it."""
+HUB_HEAD = """---
+task_categories: [robotics]
+tags: [LeRobot, tactile, tacdata]
+configs: [{config_name: default, data_files: data/*/*.parquet}]
+---
+"""
+"""Head of a card for the hub: its search, and its viewer of the data files."""
 
 
 @dataclass(frozen=True)

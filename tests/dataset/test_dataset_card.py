@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import press_example as example
 import pytest
+import yaml
 
+from tacdata.commands.card import run
 from tacdata.dataset import LostProvenanceWarning, card, coverage_picture, pack, read_dataset
 from tacdata.dataset.format import metadata
+from tacdata.errors import UsageError
 from tacdata.sensor import default_sensor
 
 
@@ -106,3 +109,15 @@ def test_the_card_as_data_agrees_with_its_words(tmp_path):
     assert f"- {data['frames_after_a_loss']} of 60 frames follow a lost frame" in words
     assert f"- {data['frames_outside_the_path']} of 60 frames are outside the commanded path" in words
     assert data["columns"]["observation.depth"]["unit"] == "mm"
+
+
+def test_a_card_for_the_hub_is_written_once_and_the_upload_named(tmp_path, capsys):
+    root = packed(tmp_path / "d", [example.episode(0)])
+    run(root, push="me/presses")
+    assert f"hf upload me/presses {root} . --repo-type dataset" in capsys.readouterr().out
+    text = (root / "README.md").read_text()
+    head = yaml.safe_load(text.split("---")[1])
+    assert "LeRobot" in head["tags"] and head["configs"][0]["data_files"] == "data/*/*.parquet"
+    assert "# Data card: d" in text
+    with pytest.raises(UsageError, match=r"README\.md exists"):
+        run(root, push="me/presses")
