@@ -113,9 +113,10 @@ class _Run:
         Added by hand, it costs a pass over the weights; in the loss it cost as much as the network itself.
         """
         if self.origin:
-            weights = list(self.network.parameters())
-            apart = torch._foreach_sub(weights, self.origin)
-            torch._foreach_add_([weight.grad for weight in weights], apart, alpha=2.0 * self.pull)
+            with torch.no_grad():
+                for weight, start in zip(self.network.parameters(), self.origin, strict=True):
+                    if weight.grad is not None:
+                        weight.grad.add_(weight - start, alpha=2.0 * self.pull)
 
 
 def train(
