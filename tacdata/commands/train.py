@@ -44,7 +44,9 @@ def run(
         float | None, typer.Option(help="Share of the frames out of contact an epoch takes; default 1.")
     ] = None,
     device: Annotated[str, typer.Option(help="auto, cpu, cuda or cuda:N.")] = "auto",
-    threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most; one with --from.")
+    ] = None,
     batch_size: Annotated[int | None, typer.Option(min=1, help="Frames a step; default 32.")] = None,
     learning_rate: Annotated[float | None, typer.Option(help="AdamW's step size; default 0.001.")] = None,
     schedule: Annotated[str | None, typer.Option(help="Course of the learning rate: constant or cosine.")] = None,
