@@ -22,6 +22,7 @@ QUICK = (
     "log_time_of_conversion",
     "names_of_rows",
     "numbers_as_texts",
+    "old_values",
     "packed_store",
     "pointer_of_lfs",
     "pose_of_ros",

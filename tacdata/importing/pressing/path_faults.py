@@ -24,6 +24,8 @@ class PathPolicy:
     """Smallest jump of a dropout [path's range]."""
     faster: float = 5.0
     """Smallest ratio of its steps to those of the path elsewhere [1]."""
+    onward: float = 1.5
+    """Largest way of the machine during a dropout [its usual way]."""
     unanswered: float = 2.0
     """The same of a jump to which no reading answers, for speeds [1]."""
     rare: float = 0.02
@@ -159,7 +161,9 @@ def _excursions(
         back = float(np.linalg.norm(path[end] - path[first]))
         constant = bool((path[begin:end] == path[begin]).all())
         jump = min(steps[first], steps[second])
-        if back <= jump / policy.faster and (end - begin <= policy.longest or constant):
+        # During a dropout the machine moves on.
+        onward = policy.onward * usual * (end - first)
+        if back <= max(jump / policy.faster, onward) and (end - begin <= policy.longest or constant):
             excursions.append((begin, end))
     return excursions
 
