@@ -14,7 +14,7 @@ LIVED = 3.0
 SEEN_LIVING = 3.0
 """Time in which a camera of ten images a second shows that its images differ [s]."""
 SILENT = 3.0
-"""Time after which a silent camera is a fault [s]."""
+"""Time after which a silent camera or controller is a fault [s]."""
 OVERRIDDEN = 6.0
 """Time within which a report must have stated a foreign override [s]: one in 20 states overrides, of 8 a second."""
 COURSE = 19.0
@@ -107,7 +107,8 @@ class Faults:
         if not found:
             return None
         first = min(found)[0]
-        for begin, end in sorted(self.world.computer.stalls):
+        starved = [(begin, end) for _, begin, end in self.world.computer.starved]  # who would see it does not run
+        for begin, end in sorted([*self.world.computer.stalls, *starved]):
             if begin - SECOND // 2 <= first < end:
                 first = end
         for begin, end in sorted(self.world.computer.disk.slow):
@@ -266,11 +267,13 @@ def board_unplugged(faults):
 
 def controller_unplugged(faults):
     faults.deaf = True
+    faults.must_end(2.0)
     faults.world.cnc_line.close()
 
 
 def controller_mute(faults):
     faults.deaf = True
+    faults.must_end(SILENT + 1.5)
     faults.world.controller.inject_wire(to_host=lambda text: None)
 
 

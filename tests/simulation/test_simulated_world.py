@@ -132,6 +132,7 @@ def test_what_must_hold_of_every_run_holds(seed):
         (15940, ()),  # a brown-out at the very end: the judge had not seen it yet
         (18322, ()),  # an alarm that hears no line before a reset: 30 s in silence at opening
         (1339, ()),  # a lift that was interrupted moved on after the end: "it stands somewhere on it"
+        (1593, ()),  # a board pulled out while its reader did not run: no fault of the recorder
         (5582, ()),  # a board that freezes twice shows another reading once: no fault of the recorder
     ],
 )
