@@ -81,7 +81,6 @@ def _unpacked(folder: Path, archive: str, address: str) -> Path:
 def _fetched(folder: Path, file: str, known: str | None, address: str) -> Path:
     """Return a file of the folder, fetched if it is missing."""
     import pooch
-    import requests
 
     path = folder / file
     if path.exists() and known and pooch.file_hash(str(path)) != known.removeprefix("sha256:"):
@@ -91,8 +90,11 @@ def _fetched(folder: Path, file: str, known: str | None, address: str) -> Path:
     pooch.get_logger().setLevel("ERROR")
     try:
         pooch.retrieve(address, known, fname=file, path=folder)
-    except requests.RequestException as error:
-        reason = f"status {error.response.status_code}" if error.response is not None else type(error).__name__
+    except OSError as error:
+        if not hasattr(error, "response"):  # of the disk, not of requests
+            raise
+        status = getattr(error.response, "status_code", None)
+        reason = f"status {status}" if status else type(error).__name__
         raise DeviceError(
             f"{address} does not answer: {reason}",
             "an address that this computer reaches",
