@@ -1,10 +1,11 @@
-"""Error of the deepest pixel: ridge regression, the fitted network without and with its maxima corrected.
+"""Errors of ridge regression, calibration alone, the fitted network without and with its maxima corrected.
 
     tacdata simulate benchmarks/learning_curve/rig_presses.yaml --solved SOLVED --presses 420 --seed 11
     python benchmarks/learning_curve/peaks.py SOLVED --out OUT --rig 40 [--presses 3,8,30,96]
 
 Rigs and shapes as in `run.py`. A fifth of the presses inside is held out; the others are drawn from in one order.
 Medians over every fourth frame in contact of the presses held out, over every sixth of unseen shapes and of the edge.
+Of the corrected network also the share of errors inside its intervals.
 """
 
 from __future__ import annotations
@@ -15,10 +16,13 @@ from pathlib import Path
 
 import numpy as np
 import run
+from unseen_intervals import coverage
 
+from tacdata.training.frames.channel_calibration import calibrate
 from tacdata.training.frames.frames import EpisodeSpan, Frames
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference.predictor import predict
+from tacdata.training.metrics import conformal_intervals
 from tacdata.training.metrics.depth_maps import score_frames, summarize
 from tacdata.training.networks.network import Network
 from tacdata.training.pretraining.cross_fit import fit
@@ -65,11 +69,8 @@ def main() -> None:
     rest = [span.number for span in frames.episodes if span not in unseen and span not in edge]
     order = np.random.default_rng([given.rig, STREAM]).permutation(rest).tolist()
     held, pool = set(order[: len(order) // 5]), order[len(order) // 5 :]
-    places = {
-        "held out": frames_of([span for span in frames.episodes if span.number in held], 4),
-        "unseen shapes": frames_of(unseen, 6),
-        "edge": frames_of(edge, 6),
-    }
+    spans = {"held out": list(frames.spans(tuple(held))), "unseen shapes": unseen, "edge": edge}
+    places = {place: frames_of(some, 4 if place == "held out" else 6) for place, some in spans.items()}
     for count in map(int, given.presses.split(",")):
         numbers, validated = pool[:count], share(count, VALIDATION_SHARE)
         train_on, validation = (tuple(sorted(part)) for part in (numbers[validated:], numbers[:validated]))
@@ -77,17 +78,21 @@ def main() -> None:
         every = Split("episode", given.rig, tuple(sorted(numbers)), (), division.test)
         settings, out = recipe({"seed": given.rig}, start), given.out / f"rig-{given.rig}-{count}"
         fitted = fit(frames, settings, out, start, "cpu", out.is_dir(), 1, split=division)
-        network = fitted.network
-        print(count, "presses, cross-fit", fitted.document["cross_fit"], flush=True)
+        network, alone, unit = fitted.network, pretrained(given.start).network, calibrate(frames, every.train)
+        alone.set_calibration(unit.gain, unit.exponent, unit.mixing)
+        intervals = conformal_intervals.read(out, fitted.content_hash)
+        print(count, "presses, cross-fit", fitted.document.get("cross_fit"), flush=True)
         for place, chosen in places.items():
             label = np.clip(frames.depth[chosen], 0.0, frames.sensor.map.depth_max)
             maps, peak = {"ridge": baselines.predictions(frames, every, chosen)["linear"]}, network.peak
             maps["network"] = maps_of(network, frames, chosen)
             network.peak = None
             maps["network, not corrected"] = maps_of(network, frames, chosen)
-            network.peak = peak
+            network.peak, maps["calibration alone"] = peak, maps_of(alone, frames, chosen)
             for name, predicted in maps.items():
                 found.append({"presses": count, "on": place, "predictor": name, **row(predicted, label)})
+                if intervals and name == "network":
+                    found[-1] |= coverage(intervals, network, frames, tuple(span.number for span in spans[place]))
                 print(found[-1], flush=True)
     (given.out / "peaks.json").write_text(json.dumps(found, indent=1) + "\n")
 
