@@ -41,8 +41,6 @@ SURE_GAIN = 5.0
 """Another family is there, too, if it lowers half the held-out sum of squares by so much [1]..."""
 SURE_SHARE = 0.03
 """...and explains this share of the answer's own part: its laws may be off by less [1]."""
-FAR_MORE = 2.0
-"""A family explains far more of the residual than another if so many times as much [1]."""
 SHARE_LEFT = 0.05
 """Leftovers: largest share of the explainable that an answer may leave [1]."""
 MODEL = {Family.CONTACT: Family.KINEMATICS}
@@ -73,21 +71,6 @@ def another_form(finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
     if family_lack is None or family_lack.size < ANOTHER_FORM * max(finding.bought, 0.0):
         return False
     return family_lack.t >= SURE_T or (family_lack.gain >= CLEAR_GAIN and family_lack.t >= CLEAR_T)
-
-
-def fills(findings: Findings, finding: FoundEffect, lacking: Mapping[Family, Lack]) -> bool:
-    """Return whether an answer's residual is another law of an effect's family: at that level hardly anything is left.
-
-    The family explains nearly all of it, and far more than any other does: models of families overlap.
-    """
-    family_lack = of_family(finding, lacking)
-    if family_lack is None or family_lack.t < SURE_T:
-        return False
-    best_of_others = max((rival.gain for rival in lacking.values() if rival is not family_lack), default=0.0)
-    remainder = findings.left.gain - family_lack.gain
-    return family_lack.gain >= FAR_MORE * best_of_others and remainder < SHARE_LEFT * (
-        findings.left.gain + max(findings.explained, 0.0)
-    )
 
 
 def with_families(findings: Findings, lacking: Mapping[Family, Lack]) -> Findings:

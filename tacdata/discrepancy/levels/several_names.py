@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from tacdata.discrepancy.levels.lack_of_fit import CLEAR_GAIN, CLEAR_T, Lack, surely_elsewhere
 from tacdata.discrepancy.levels.margins import Level
@@ -53,15 +53,6 @@ def beside_open(findings: Findings, answer: list[FoundEffect], levels: list[Leve
     )
     large = [remainder < SHARE_LEFT_ALONE * (remainder + max(f.bought, 0.0)) for f in answer]
     return [level if clear else None for level, clear in zip(levels, large, strict=True)]
-
-
-def traded(answer: Sequence[FoundEffect], levels: Sequence[Level | None]) -> list[bool]:
-    """Return of each effect whether it was found by calibration while an unnamed one may replace it.
-
-    The two are collinear: each may compensate a false part of the other.
-    """
-    nameless = {f.placed.effect.called for f, level in zip(answer, levels, strict=True) if level is None}
-    return [f.corrected_p is None and bool(nameless & set(f.rivals)) for f in answer]
 
 
 def _left(findings: Findings) -> float:

@@ -9,13 +9,12 @@ from enum import Enum, auto
 from tacdata.discrepancy.alarms.alarm import Alarm
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.identifiability import lookalikes
-from tacdata.discrepancy.levels.lack_of_fit import SHARE_LEFT, Lack, another_form, elsewhere, fills
+from tacdata.discrepancy.levels.lack_of_fit import SHARE_LEFT, Lack, another_form, elsewhere
 from tacdata.discrepancy.levels.margins import BesideRemainder, Level
-from tacdata.discrepancy.levels.several_names import LEFT_T, SHARE_LEFT_ALONE, beside_open, lent, stands_in, traded
+from tacdata.discrepancy.levels.several_names import LEFT_T, SHARE_LEFT_ALONE, beside_open, stands_in
 from tacdata.discrepancy.search.elimination import LARGEST_P
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gate import GATE
-from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.shortlist import RIVAL_Z
 from tacdata.discrepancy.verdict.calibration import calibration_error, compliance_of_specimens, gains_beyond_calibration
 from tacdata.discrepancy.verdict.confidence import confidence, features
@@ -29,8 +28,6 @@ SAME_SIZE = 0.1
 """Constancy: largest spread of size over conditions at which a mechanism is named despite a remainder [1]..."""
 ALIKE_SIZE = 0.2
 """...and largest spread for a family. Wrong effects spread by more, except collinear ones [1]."""
-FAR_SIZE = 0.25
-"""...or this spread, if no rival is within `SETTLED_Z` and the sealed gap surely closes [1]."""
 SURELY_CLOSED = 0.5
 """Sealed episodes: the gap surely closes if the 90 % interval of the share that is closed begins above this [1]."""
 SETTLED_Z = 5.0
@@ -146,11 +143,6 @@ def decide(
         levels = [beside_much(findings, f, evidence_of.get(f.placed.effect.name), gap) for f in answer]
         if first is None or levels[first] is None:
             levels = [None for _ in answer]
-        if not any(levels) and first is not None and fills(findings, answer[first], lacking):
-            # The remainder is another law of the same family. At the level of families nothing is left unexplained,
-            # so the rivals that only the remainder admits are dropped.
-            answer[first] = answer_of(replace(findings, left=Leftovers(0.0, 0.0)))[first]
-            levels[first] = finest(answer[first]) and Level.FAMILY
         if any(levels):
             status, reason = INCOMPLETE, Reason.INCOMPLETE
         elif first is not None and stands(
@@ -176,10 +168,6 @@ def decide(
     levels = [Level.FAMILY if doubt else level for doubt, level in zip(doubtful_forms, levels, strict=True)]
     if status in ("named", INCOMPLETE) and (any(doubtful_forms) or elsewhere(findings, lacking)):
         status, reason = INCOMPLETE, Reason.INCOMPLETE
-    if any(trades := traded(answer, levels)):
-        levels = [None if trade else level for trade, level in zip(trades, levels, strict=True)]
-        if status in ("named", INCOMPLETE):
-            status, reason = (INCOMPLETE, Reason.INCOMPLETE) if any(levels) else ("ambiguous", Reason.RIVALS)
     if status in ("named", INCOMPLETE) and refuted(gap):
         status, reason = "unknown", Reason.SEALED
     if status in ("named", INCOMPLETE) and not borne_out(gap):
@@ -260,9 +248,7 @@ def stands(findings: Findings, finding: FoundEffect, evidence: BesideRemainder |
     if evidence is None or not evidence.spreads or not _needed(finding) or _unphysical(finding):
         return False
     closes = gap is not None and gap.interval[0] >= SURELY_CLOSED and bool(len(gap.names))
-    far = closes and all(by >= SETTLED_Z for by in finding.margins.values())
-    largest_spread = FAR_SIZE if far else ALIKE_SIZE
-    return (closes or finding.bought >= findings.left.gain) and max(evidence.spreads.values()) <= largest_spread
+    return (closes or finding.bought >= findings.left.gain) and max(evidence.spreads.values()) <= ALIKE_SIZE
 
 
 def beside_much(
@@ -279,7 +265,7 @@ def beside_much(
     if level is None or evidence is None or not stands(findings, finding, evidence, gap):
         return None
     same = max(evidence.spreads.values()) <= SAME_SIZE
-    fine = level is not Level.FAMILY and same and not _untried_kin(findings, finding)
+    fine = level is not Level.FAMILY and same
     return Level.MECHANISM if fine else Level.FAMILY
 
 
@@ -287,22 +273,6 @@ def _unphysical(finding: FoundEffect) -> bool:
     """Return whether an amplitude is at its bound; a shape at its bound only means that the form is another one."""
     shapes = {p.name for p in finding.placed.effect.shapes}
     return bool(set(finding.at_bound) - shapes)
-
-
-def _untried_kin(findings: Findings, finding: FoundEffect) -> set[str]:
-    """Return mechanisms of its group with the same behaviour at rest that were no rivals in the J test.
-
-    They differ only in their exact form, and a remainder can hide that difference.
-    """
-    effect, tried = finding.placed.effect, {load(name).called for name in finding.margins}
-    candidates = {c.effect.called: c.effect for c in findings.given.candidates}
-    kin = {
-        mechanism
-        for mechanism, e in candidates.items()
-        if effect.at_rest is not None
-        and (e.family, e.group, e.at_rest) == (effect.family, effect.group, effect.at_rest)
-    }
-    return kin - tried - {effect.called}
 
 
 def _needed(finding: FoundEffect) -> bool:
@@ -344,8 +314,6 @@ def answer_of(findings: Findings) -> list[FoundEffect]:
         # An unphysical size is no argument against a rival that these presses cannot distinguish.
         unphysical = tuple(name for name in f.unphysical if name in rivals and name not in alike)
         effects.append(replace(f, rivals=tuple(rivals), unphysical=unphysical))
-    # An effect at its bound that explains no more than the model error of another is no evidence of a second effect.
-    effects = [f for f in effects if not (f.at_bound and lent(findings, f))]
     return [*(f for f in effects if not calibration_error(f)), *gains_beyond_calibration(findings)]
 
 

@@ -11,7 +11,6 @@ from pressing import course
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.levels.lack_of_fit import Lack, another_form, lack, lack_of_fit, with_families
 from tacdata.discrepancy.levels.margins import Level
-from tacdata.discrepancy.levels.several_names import traded
 from tacdata.discrepancy.model.fitted_response import FittedResponse
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.noise.null_model import null_model
@@ -19,7 +18,7 @@ from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.search.gauss_newton import refine
 from tacdata.discrepancy.search.leftovers import Leftovers
 from tacdata.discrepancy.search.problem import prepare
-from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason, answer_of, decide
+from tacdata.discrepancy.verdict.decide import INCOMPLETE, Decided, Decision, Reason, decide
 from tacdata.discrepancy.verdict.reasons import reason_in_words
 from tacdata.effects import Family, Placed, load
 
@@ -112,36 +111,6 @@ def test_what_another_family_surely_explains_makes_a_verdict_incomplete(lacking,
     assert ("something of friction and play shows, too, in loading against unloading" in words) is there, words
 
 
-@pytest.mark.parametrize(
-    ("own", "other", "named"),
-    [
-        (Lack(2500.0, 3.0, 2900.0), 1200.0, True),
-        (Lack(2500.0, 1.9, 2900.0), 1200.0, False),
-        (Lack(2500.0, 3.0, 2900.0), 1300.0, False),
-        (Lack(1000.0, 3.0, 1100.0), 0.0, False),
-    ],
-)
-def test_what_another_law_of_its_family_fills_leaves_the_family(own, other, named):
-    """Steps lost and found beside a frame that grows: neither law is right, and both are kinematics.
-
-    A rival that is worse by less than what is left may be a turn of the law away. Beside the whole family it is not.
-    """
-    found = findings()
-    mine = replace(
-        found.effects[0],
-        placed=Placed(load("lost_steps"), {}),
-        bought=4900.0,
-        margins={"gain_drift": 2.9},
-        losses={"gain_drift": 1000.0},
-    )
-    found = replace(found, effects=(mine,), explained=4900.0, left=Leftovers(1500.0, 2.4))
-    lacking = {Family.KINEMATICS: own, Family.RESPONSE_CURVE: Lack(other, 1.7, other)}
-    decision = decide(found, DataChecks(44), lacking=lacking)
-    told = decision.status, decision.effects[0].status, decision.effects[0].level
-    assert told == ((INCOMPLETE, "named", Level.FAMILY) if named else ("unknown", "suspected", None))
-    assert decision.effects[0].finding.rivals == (() if named else ("gain_drift",))
-
-
 @pytest.mark.parametrize("t", [3.0, 1.0])
 def test_where_no_name_holds_what_shows_of_another_family_is_told(t):
     """A sensor that rocks has no name, but depths go with the side that is pressed: that is where to look."""
@@ -207,25 +176,6 @@ def test_a_second_name_explains_more_than_a_family_without_a_name(family, own, l
     assert decision.effects[0].level is Level.FORM, "beside the first it is little"
     assert decision.effects[1].level is (Level.FORM if level else None)
     assert decision.status == ("named" if level else INCOMPLETE)
-
-
-@pytest.mark.parametrize("beside", ["thickness", "tilt"])
-def test_a_gain_that_calibration_shows_beside_its_own_rival_is_no_name(beside):
-    """The two trade: the skin is thicker, and the gain takes back what that is too much."""
-    one = findings().effects[0]
-    weak = replace(one, placed=Placed(load(beside), {}))
-    gain = replace(one, placed=Placed(load("gain"), {}), rivals=("modulus", "thickness"), corrected_p=None)
-    assert traded([one, weak, gain], [Level.FORM, None, Level.FAMILY]) == [False, False, beside == "thickness"]
-    assert not any(traded([one, weak, gain], [Level.FORM, Level.FORM, Level.FAMILY])), "both are there"
-
-
-@pytest.mark.parametrize(("bound", "told"), [((), 2), (("tau",), 1)])
-def test_what_is_within_anothers_form_and_ends_there_is_not_told(bound, told):
-    """A law of a material that is off by a tenth leaves a hundredth: as a suspect it would say that more is missing."""
-    found = findings()
-    small = replace(found.effects[0], placed=Placed(load("creep"), {}), bought=0.5, at_bound=bound)
-    answer = answer_of(replace(found, effects=(*found.effects, small)))
-    assert [f.bought for f in answer] == [100.0, 0.5][:told]
 
 
 def decided(family, lacking):
