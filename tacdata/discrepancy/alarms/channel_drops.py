@@ -26,7 +26,7 @@ CALM = 0.3
 NORMAL = 0.385
 """Size that this share of normal numbers stays below, over their standard deviation [1]."""
 SEVERAL = 4
-"""Presses that are far off, at least: set on synthetic presses, seeds 1000 to 1019 and 1100 to 1139."""
+"""Presses that are far off the same way, at least: set on synthetic presses, seeds 1000 to 1019 and 1100 to 1139."""
 RARE = 200
 """Beforehand, a press of a channel is far off for other reasons, as a spike, once in so many, known as by one such."""
 MOST_NAMED = 3
@@ -85,6 +85,8 @@ def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
     # Where most presses of a place have dropped, the others seem to be the odd ones: the usual way is that of most.
     way = 1.0 if np.sum(np.sign(channel_deviation[presses])) > 0 else -1.0
     presses = presses[np.sign(channel_deviation[presses]) == way]
+    if len(presses) < SEVERAL:
+        return None
     return test.at, presses, float(np.expm1(np.median(channel_deviation[presses])))
 
 

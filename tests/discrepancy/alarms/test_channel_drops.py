@@ -78,6 +78,15 @@ def test_single_jumps_of_many_channels_are_of_no_channel():
     assert drops(logs) is None
 
 
+def test_far_presses_of_either_way_are_no_drop():
+    """A noisy channel is off both ways; a loose contact is off one way."""
+    logs = logs_of(3)
+    logs[[4, 14, 24, 34, 40, 44], 2] += [0.4, -0.4, 0.4, -0.4, 0.4, -0.4]
+    assert drops(logs) is None
+    logs[[4, 14, 24, 34, 40, 44], 2] = -0.4
+    assert drops(logs) is not None
+
+
 def test_the_rate_of_the_harness_is_that_of_its_statistics_together():
     """Of 400 sets of 20 pure noises none, or hardly one, is beyond a rate of 1 in 1,000."""
     rng = np.random.default_rng(3)
