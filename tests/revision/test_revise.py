@@ -47,7 +47,7 @@ def test_the_new_model_carries_its_evidence(right):
 def test_the_card_stands_alone_and_says_what_it_rests_on(right):
     page = (right.folder / "card.html").read_text()
     assert "model after" in page and not re.search(r"(src|href)=['\"]https?:", page)
-    for told in ("Readings come late", "named", right.document["verdict"], "What would refute it", "90 % interval"):
+    for told in ("latency", "named", right.document["verdict"], "What would refute it", "90 % interval"):
         assert told in page
     rows = list(csv.DictReader((right.folder / "gap.csv").read_text().splitlines()))
     assert float(rows[0]["after"]) == pytest.approx(right.document["gap"]["sealed"]["after"], rel=1e-4)

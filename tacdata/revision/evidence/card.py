@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tacdata.discrepancy.heading import sizes
+from tacdata.discrepancy.heading import sentence, sizes
 from tacdata.discrepancy.verdict.sealed import WIDEST
+from tacdata.effects import load
 from tacdata.pages import Band, HtmlPage, Items, PageHeader, Paragraph, Plot, Series, Slider, Table, Tiles
 from tacdata.revision.evidence.curves import EpisodeCurves
 from tacdata.revision.evidence.table import in_words
@@ -51,9 +52,7 @@ def card(revision: dict[str, Any], verdict: dict[str, Any], shown: Sequence[Epis
 
 def _header(revision: dict[str, Any], verdict: dict[str, Any]) -> PageHeader:
     status, plan = verdict["status"], revision["next"]["plan"]
-    title = " and ".join(e["title"] for e in verdict["effects"]) or "No effect"
-    if status == "unknown" and verdict["effects"]:
-        title = f"Suspected, not named: {title}"
+    title, further = sentence(verdict["why"])
     heading, stamp = verdict.get("heading", {}), revision["provenance"]
     return PageHeader(
         "Evidence card",
@@ -63,7 +62,7 @@ def _header(revision: dict[str, Any], verdict: dict[str, Any]) -> PageHeader:
         version=stamp["code_version"],
         status=status,
         tone="good" if status == "named" else "",
-        lines=[*sizes(verdict), verdict["why"]],
+        lines=[*sizes(verdict), *([further] if further else [])],
         next=[f"record what is missing: `tacdata record --plan {plan}`"] if plan else (),
     )
 
@@ -115,11 +114,13 @@ def _parameters(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
         for name, p in e["parameters"].items():
             value = p["value"]
             if isinstance(value, list):
-                size, spread = f"{min(value):.3g} to {max(value):.3g} over the channels", _number(p["error"], 2)
+                ends = dict.fromkeys(f"{end:.3g}" for end in (min(value), max(value)))
+                size = " to ".join(ends) + " over the channels" * (len(ends) > 1)
+                spread = _number(p["error"], 2)
             else:
                 size = f"{value:.4g}"
                 spread = "{:.4g} to {:.4g}".format(*p["interval"]) if "interval" in p else _number(p["error"], 2)
-            rows.append((e["effect"], name, size, spread, p["unit"]))
+            rows.append((load(e["effect"]).spoken, name, size, spread, p["unit"]))
     _table(page, "Size of the effects", ("effect", "parameter", "value", "90 % interval", "unit"), rows)
 
 
@@ -128,8 +129,13 @@ def _rivals(page: HtmlPage, answer: list[dict[str, Any]]) -> None:
     for e in answer:
         for name, margin in sorted(e["margins"].items(), key=lambda item: item[1])[:6]:
             verdict = "could stand in its place" if name in e["alternatives"] or margin < 2.33 else "ruled out"
-            rows.append((f"{name} instead of {e['effect']}", f"{margin:.1f}", verdict))
-    listed = [f"{', '.join(e['alternatives'])} for {e['mechanism']}" for e in answer if e["alternatives"]]
+            pair = f"{load(name).spoken} instead of {load(e['effect']).spoken}"
+            rows.append((pair, f"{margin:.1f}", verdict))
+    listed = [
+        f"{', '.join(load(name).spoken for name in e['alternatives'])} for {load(e['mechanism']).spoken}"
+        for e in answer
+        if e["alternatives"]
+    ]
     heads = ("rival", "worse by, in standard errors over episodes", "")
     words = Paragraph(f"Not separable by these recordings: {'; '.join(listed)}.") if listed else None
     page.add("What else it could be", Table(heads, rows) if rows else None, words)
