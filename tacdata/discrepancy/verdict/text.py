@@ -78,7 +78,7 @@ def _folded(verdict: dict[str, Any]) -> list[str]:
     weak = [k for k, v in verdict["limits"].items() if (v is None or v > WEAK_LIMIT) and k not in judged]
     counts = [
         (len(set(verdict["unjudgeable"]) - judged), "effects that cannot be judged here"),
-        (len(weak), "that would be seen only at more than three times their usual size"),
+        (len(weak), "that show only beyond three times their usual size"),
         (len(verdict["untested"]), "that are known and not modelled"),
         (len(verdict.get("limitations", ())), "limitations of the recordings"),
     ]

@@ -82,8 +82,8 @@ def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
     """Nor are other forms of it, or what may stand in for it; what is judged is not called unjudgeable either."""
     limits = {"power_creep": None, "relaxation": 9.0, "bouc_wen": 9.0, "drift": 9.0, "tilt": 1.0}
     told = in_text(document(effects=[effect("power_creep", ("hysteresis",))], limits=limits))
-    assert "1 that would be seen only at more than three times their usual size" in line(told, "folded away")
-    assert "would be seen" not in in_text(document(effects=[effect("softening")], limits={"softening": None}))
+    assert "1 that show only beyond three times their usual size" in line(told, "folded away")
+    assert "that show only" not in in_text(document(effects=[effect("softening")], limits={"softening": None}))
     judged = in_text(document(effects=[effect("carriage_compliance")]))
     assert line(judged, "folded away") == "folded away in verdict.html: 1 effects that cannot be judged here"
 
