@@ -144,13 +144,13 @@ def _print_rows(rows: list[dict[str, Any]], first: str, task: str) -> None:
     """Print the outcomes of each arm, a row for each stiffness or challenge, and the benefit of depth there."""
     from tacdata.replay.comparison.trials import PUBLISHED, like_published
 
-    kinds = list(rows[0]["rates"])
-    print("\n" + "  ".join([f"{first:<24}", *(f"{kind:>11}" for kind in kinds)]))
+    widths = {kind: max(len(kind), 11) for kind in rows[0]["rates"]}
+    print("\n" + "  ".join([f"{first:<24}", *(f"{kind:>{width}}" for kind, width in widths.items())]))
     for row in rows:
         name = f"{row[first]:g} N/m" if first == "stiffness" else row[first]
         mark = " *" if first == "stiffness" and like_published(row, task) else ""
-        cells = (f"{rate['held']:>4} of {rate['of']:<4}" for rate in row["rates"].values())
-        print("  ".join([f"{name + mark:<24}", *(f"{cell:>11}" for cell in cells)]))
+        cells = (f"{rate['held']:>4} of {rate['of']:<4}".rjust(widths[kind]) for kind, rate in row["rates"].items())
+        print("  ".join([f"{name + mark:<24}", *cells]))
     for row in rows:
         print(f"{row[first]:g} N/m: {row['worth']}" if first == "stiffness" else f"{row[first]}: {row['worth']}")
     if first == "stiffness":

@@ -4,8 +4,13 @@ import time
 
 import numpy as np
 import pytest
+from demo_examples import rig
 
 from tacdata.clock import Clock
+from tacdata.demonstrations.recording import recorder
+from tacdata.demonstrations.recording.reader import read_demo
+from tacdata.demonstrations.recording.recorder import DemoRecorder
+from tacdata.demonstrations.recording.session import open_demo_session
 from tacdata.demonstrations.recording.streams import DemoStreams
 from tacdata.devices.device import Camera, ImageFrame, StreamCounts, TaxelBoard, TaxelFrame
 from tacdata.errors import DeviceError
@@ -142,6 +147,26 @@ def test_a_camera_that_repeats_one_image_is_lost(monkeypatch):
         until(lambda: streams.lost_cameras)
     assert streams.lost_cameras == {"camera left": "camera left repeats one image: it hangs"}
     assert said[0].startswith("camera left: the same image again and again for 1.5 s")
+
+
+def test_a_lost_camera_ends_the_recording_as_interrupted(tmp_path, monkeypatch):
+    monkeypatch.setattr(DemoStreams, "silence", 1.5)
+    eyes = []
+
+    def made(entry, kind, clock):
+        if kind is Camera:
+            eyes.append(Eye(clock))
+        return eyes[-1] if kind is Camera else Board(clock)
+
+    monkeypatch.setattr(recorder, "create", made)
+    bench = rig(boards=("thumb",))
+    session = open_demo_session(tmp_path / "demos", bench, "grasp", resume=False)
+    with DemoRecorder(session, bench) as opened, pytest.raises(DeviceError, match="camera eye repeats one image: it"):
+        eyes[0].frozen = True
+        opened.record(lambda: False, seconds=30.0)
+    assert not opened.session.episodes
+    (kept,) = opened.session.unfinished
+    assert not read_demo(kept).complete
 
 
 IMPOSSIBLE = [(9001.0, "no channel has changed for"), (65535.0, "have read 65535 counts")]
