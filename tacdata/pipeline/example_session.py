@@ -9,7 +9,7 @@ from tacdata.paths import StrPath
 from tacdata.recording.session import Session, read_session
 
 
-def example_session(out: StrPath = "example") -> Session:
+def example_session(folder: StrPath = "example") -> Session:
     """Copy the shipped session, two labelled presses, to a new folder and open it.
 
     Raises:
@@ -21,4 +21,4 @@ def example_session(out: StrPath = "example") -> Session:
         >>> len(td.example_session("a first look"))
         2
     """
-    return read_session(copy_session(Path(out)))
+    return read_session(copy_session(Path(folder)))
