@@ -20,6 +20,8 @@ LEAST_SIZE, MOST_SIZE = 0.1, 10.0
 """Bounds of the estimated size of pose errors [standard deviations of their prior]."""
 TOGETHER = 4
 """Successive episodes that share a mean where places are not visited again."""
+LEAST_SCALE = 1e-5
+"""Least noise of a stream [its largest rise]: readings without noise carry rounding, which is no evidence."""
 ODD_Z = 6.0
 """An episode is odd if its errors exceed the estimated spread by so many standard deviations [1]."""
 
@@ -57,7 +59,8 @@ class EpisodeErrors:
         """Return the noise besides errors of pose, shape (m, streams, kinds)."""
         course, relative = self.course, readings.relative_scale(self.residual, self.rise, self.course)
         residual = readings.beside_depth(self.residual, course)
-        estimate = readings.first_guess(residual, course, relative)
+        least = LEAST_SCALE * np.abs(self.rise).max(axis=0)
+        estimate = _at_least(readings.first_guess(residual, course, relative), least)
         columns = np.concatenate([residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
         for _ in range(2):
@@ -67,7 +70,7 @@ class EpisodeErrors:
             whitener = Whitener(course, still, self.context, self.features, errors / estimate.scale[None, :, None])
             bare = whitener.whitened(standardized[:, :, None])[:, :, 0]
             bare[~np.isfinite(residual)] = np.nan
-            estimate = readings.refined(bare * estimate.scale, course, estimate)
+            estimate = _at_least(readings.refined(bare * estimate.scale, course, estimate), least)
         remainder = residual - self.rich @ best.astype(np.float32)
         kinds = levels(course, self.context, self.features is not None)
         process = offset_process(remainder, course, estimate.scale, estimate.memory, kinds)
@@ -160,6 +163,11 @@ def levels(course: Course, context: np.ndarray, fitted: bool) -> list[np.ndarray
     place = np.zeros(course.episodes, dtype=np.int64)
     place[course.episode] = context
     return [course.session, place] if fitted else [course.session]
+
+
+def _at_least(noise: Noise, least: np.ndarray) -> Noise:
+    """Return noise with a scale of each stream that is no smaller than a bound, shape (streams,)."""
+    return replace(noise, scale=np.maximum(noise.scale, least))
 
 
 def _freedom(episodes: np.ndarray, groups: list[np.ndarray]) -> int:
