@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import webbrowser
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -127,11 +128,13 @@ def follow(path: Path, web: bool) -> None:
         FormatError: If it is no recording of a press.
         DeviceError: If the viewer does not start.
     """
+    from tacdata.recording.live.interruption import Interruption
     from tacdata.viewers.live.fed_viewer import fed_viewer
     from tacdata.viewers.rerun.window import has_display
 
     try:
-        with suppress(KeyboardInterrupt), fed_viewer(web) as viewer:
+        # Rerun's finalizers would swallow a Ctrl-C, and the viewer would stay.
+        with suppress(KeyboardInterrupt), fed_viewer(web) as viewer, Interruption() as ctrl_c, ctrl_c.kept():
             if web:
                 print(f"open {viewer.address}", flush=True)
                 if has_display():
@@ -140,10 +143,11 @@ def follow(path: Path, web: bool) -> None:
             remains = set(file_names.unfinished(path.parent))  # remains of crashes are not waited for
             visited, following = remains, path
             while viewer.process.poll() is None:
+                ctrl_c.check()
                 if following is None:
                     time.sleep(PAUSE)
                 else:
-                    _follow_one(following, viewer)
+                    _follow_one(following, viewer, ctrl_c.check)
                     visited.add(following)
                 following = next((p for p in file_names.unfinished(path.parent) if _is_next(p, visited)), None)
     except TimeoutError as error:
@@ -155,8 +159,8 @@ def _is_next(path: Path, visited: set[Path]) -> bool:
     return is_growing(path) and path not in visited
 
 
-def _follow_one(path: Path, viewer: FedViewer) -> None:
-    """Draw one recording until it ends or the viewer is closed."""
+def _follow_one(path: Path, viewer: FedViewer, check: Callable[[], None]) -> None:
+    """Draw one recording until it ends, the viewer is closed, or a check raises."""
     import rerun as rr
 
     from tacdata.viewers.rerun.backend import APPLICATION
@@ -170,6 +174,7 @@ def _follow_one(path: Path, viewer: FedViewer) -> None:
     is_noted = False
     try:
         while not follower.finished and viewer.process.poll() is None:
+            check()
             begun = time.monotonic()
             if not (follower.step() or follower.frames or is_noted):
                 print(f"{path.name}: waiting for the first readings", flush=True)

@@ -1,10 +1,14 @@
 """A recording that is being written: every row is drawn once, however the file grows, and its end is seen."""
 
+import contextlib
+import itertools
 import os
 import signal
 import subprocess
 import sys
+import time
 from collections import Counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +20,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.recording.files import chunked_file
 from tacdata.recording.files.growing_file import GrowingFile
 from tacdata.recording.files.reader import read_recording, recording_of
+from tacdata.viewers.live import fed_viewer, following
 from tacdata.viewers.live.following import Follower, is_growing, meant
 
 
@@ -97,6 +102,27 @@ def test_what_is_no_recording_is_refused_in_words(tmp_path):
     assert meant(tmp_path) == tmp_path
     assert is_growing(tmp_path / "episode-000000.partial.mcap")
     assert not is_growing(tmp_path / "episode-000000.mcap")
+
+
+class Dying:
+    """An object of Rerun's kind, whose finalizer swallows what is raised in it."""
+
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0)  # a handler runs between two instructions
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent as a signal")
+def test_a_ctrl_c_within_a_finalizer_ends_the_viewer(tmp_path, monkeypatch):
+    turns = itertools.count()
+    viewer = SimpleNamespace(process=SimpleNamespace(poll=lambda: None if next(turns) < 20 else 0), address="")
+    monkeypatch.setattr(fed_viewer, "fed_viewer", lambda web: contextlib.nullcontext(viewer))
+    monkeypatch.setattr(following, "_follow_one", lambda *arguments: Dying() and None)
+    monkeypatch.setattr(following, "PAUSE", 0.0)
+    handler = signal.getsignal(signal.SIGINT)
+    following.follow(tmp_path / "episode-000003.partial.mcap", web=False)
+    assert next(turns) <= 3
+    assert signal.getsignal(signal.SIGINT) is handler
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent as a signal")
