@@ -175,8 +175,9 @@ MISTYPED: Any = typer.BadParameter.__mro__[1]
 
 def closest(name: str, names: Iterable[str]) -> str:
     """Return the question whether the most similar of some names was meant; an empty text if none is similar."""
-    close = difflib.get_close_matches(name, list(names), n=1)
-    return f"did you mean {close[0]}? " if close else ""
+    words = {option.lstrip("-"): option for option in names}  # dashes would make all options similar
+    close = difflib.get_close_matches(name.lstrip("-"), words, n=1)
+    return f"did you mean {words[close[0]]}? " if close else ""
 
 
 def missing_path(error: TacdataError, arguments: Sequence[str]) -> str:

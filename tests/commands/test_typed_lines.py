@@ -8,6 +8,7 @@ LINES = {
     "check a b c": ("tacdata check with b c, which it has no place for", "tacdata check [OPTIONS]", "leave it out"),
     "check --nope a": ("tacdata check with --nope", "--help, --json, --out, --quiet", "tacdata check --help"),
     "check --jsn a": ("tacdata check with --jsn", "--help, --json", "did you mean --json? tacdata check --help"),
+    "example --out x": ("tacdata example with --out", "--quiet", "next:    tacdata example --help explains each"),
     "chek a": ("tacdata has no verb 'chek'", "register, plan, record, check", "did you mean check? tacdata --help"),
     "farm statu": ("tacdata farm has no verb 'statu'", "status", "did you mean status? tacdata farm --help"),
     "farm nope": ("tacdata farm has no verb 'nope'", "up, send, submit", "tacdata farm --help explains each"),
