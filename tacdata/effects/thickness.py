@@ -1,7 +1,7 @@
 """The skin is thicker or thinner than its model.
 
 Finite elements give the true change 1 mm deep (24 protrusions, held at the sides). Of the part that a common gain
-leaves unexplained, the spread of the load below explains 89 % (-0.78 e, not -e; `benchmarks/thickness_spread.py`).
+leaves unexplained, the spread of the load below explains 89 % (-0.78 e, not -e; `benchmarks/README.md`).
 """
 
 from dataclasses import replace

@@ -29,7 +29,7 @@ LEFT_OUT = 3
 """Presses left out of a table, to measure its error."""
 
 LEAST_ERROR = 0.007
-"""Least error of a table: root mean square, over the loads' (`benchmarks/fem_bases`) [1]."""
+"""Least error of a table: root mean square, over the loads' (`benchmarks/settled_studies.md`) [1]."""
 
 Progress = Callable[[int, int, float], None]
 """Called with the presses done, their total, and about how many seconds are left."""

@@ -1,4 +1,4 @@
-"""Retraining: packed presses are those that a dataset holds, a choice loses nothing, and all shapes can be pressed."""
+"""Retraining: packed presses are those that a dataset holds, and all shapes of the plan can be pressed."""
 
 import importlib.util
 import os
@@ -17,6 +17,7 @@ from tacdata.label_farm.simulated.simulation import Simulation
 from tacdata.label_farm.simulated.solving import solve_batch
 from tacdata.sensor import default_sensor
 from tacdata.training.frames.data import read_frames
+from tacdata.training.pretraining.recipe import recipe
 from tacdata.training.pretraining.shipped import pretrained
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "label_farm"))
@@ -99,14 +100,9 @@ def test_of_frames_that_are_alike_few_are_learned_from(solved, tmp_path):
     assert all(some <= 4 for _, some in held)
 
 
-def test_a_run_from_a_network_keeps_its_layers_and_takes_smaller_steps():
-    variants = module("variants")
-    start = pretrained("shipped")
-    for name in variants.VARIANTS:
-        fresh, onward = variants.settings(name, 4, 256), variants.settings(name, 4, 256, start)
-        assert onward.learning_rate < fresh.learning_rate
-        assert onward.arguments == start.network.arguments
-        assert (onward.gain_jitter, onward.pull) == (fresh.gain_jitter, 0.0)
+def test_the_recipe_is_that_of_the_network_that_ships():
+    settings = recipe({**retrain.RECIPE, **retrain.VARIED, "batch_size": 2048, "epochs": 1}, None)
+    assert settings.document == pretrained("shipped").document["settings"]
 
 
 def test_the_plan_presses_each_of_its_shapes():
@@ -117,27 +113,3 @@ def test_the_plan_presses_each_of_its_shapes():
     for shape in plan.shapes:
         # Sizes that find no place are drawn again, so wide shapes come up less often than their weight says.
         assert drawn[shape.name] > 0.3 * 600 * shape.weight / weights, shape.name
-
-
-def scores(centroid, overlap, pairs, ridge):
-    rig = {
-        "held out": {"centroid": centroid, "iou_deep": overlap},
-        "contacts": {kind: {"all_found": pairs} for kind in ("balls_4mm", "unlike_4mm")},
-    }
-    return {"rig 20": rig, "rig 21": rig, "worn": {"aligned_iou": ridge}}
-
-
-def test_a_network_that_loses_on_single_presses_is_not_chosen():
-    found = {
-        "shipped": scores(0.40, 0.80, 0.86, 0.74),
-        "loses": scores(0.60, 0.80, 0.99, 0.90),
-        "gains": scores(0.41, 0.80, 0.95, 0.80),
-        "unfinished": {"worn": {"aligned_iou": 0.99}},
-    }
-    assert retrain.chosen(found) == "gains"
-
-
-def test_nothing_is_chosen_before_all_scores_are_there():
-    found = {"shipped": scores(0.40, 0.80, 0.86, 0.74), "unfinished": {"worn": {"aligned_iou": 0.99}}}
-    with pytest.raises(SystemExit, match="call score again"):
-        retrain.chosen(found)

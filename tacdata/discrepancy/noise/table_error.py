@@ -13,7 +13,7 @@ from tacdata.chain import Course
 MODES = 16
 """Cosine series: the shortest wave is an eighth of the deepest press [1]."""
 COMMON = 0.25
-"""Share of the error common to all presses (`benchmarks/fem_bases`) [1]."""
+"""Share of the error common to all presses (`benchmarks/settled_studies.md`) [1]."""
 REPEATED = 2.0
 """By how much more it counts: presses of one place do not average it [1]."""
 
