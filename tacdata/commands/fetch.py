@@ -19,7 +19,7 @@ def run(
     name: Annotated[str, typer.Argument(metavar="[NAME]", help="Name of a set; without it, all are listed.")] = "",
     out: Annotated[Path | None, typer.Option(help="Folder for its files; default: the set's name.")] = None,
     mirror: Annotated[
-        str, typer.Option(envvar="TACDATA_MIRROR", help="Address with the folder NAME/, in place of the origin.")
+        str, typer.Option(envvar="TACDATA_MIRROR", help="Address, or folder here, that holds the folder NAME/.")
     ] = "",
 ) -> Result:
     """Fetch a set of recordings by name from its authors or a release, and compare it with its hashes."""

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import shutil
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import yaml
 
@@ -29,7 +33,7 @@ def fetch(name: str, folder: Path, mirror: str = "") -> Path:
     Args:
         name: Name of the set.
         folder: Folder for its files; made if there is none.
-        mirror: Address with a folder of the set's name, in place of the origin.
+        mirror: Address or local folder with a folder of the set's name, in place of the origin.
 
     Returns:
         The folder of its recordings.
@@ -42,7 +46,27 @@ def fetch(name: str, folder: Path, mirror: str = "") -> Path:
     sets = published_sets()
     if name not in sets:
         raise UsageError(f"no set {name}", ", ".join(sets), "tacdata fetch lists them")
-    record = sets[name]
+    if mirror and "://" not in mirror:
+        mirror = Path(mirror).resolve().as_uri()
+    with _nothing_left(folder):
+        return _all_of(name, sets[name], folder, mirror)
+
+
+@contextmanager
+def _nothing_left(folder: Path) -> Iterator[None]:
+    """Remove the folders that a failed fetch made and left empty."""
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    try:
+        yield
+    except Exception:
+        with suppress(OSError):  # one that is not empty stays, and so do those above it
+            for each in made:
+                each.rmdir()
+        raise
+
+
+def _all_of(name: str, record: dict[str, Any], folder: Path, mirror: str) -> Path:
+    """Fetch all files of a set, and write its mapping and its source beside them; return the folder of recordings."""
     if archive := record.get("archive"):
         return _unpacked(folder, archive, f"{mirror.rstrip('/')}/{name}" if mirror else _release())
     files = record["files"]
@@ -89,8 +113,12 @@ def _fetched(folder: Path, file: str, known: str | None, address: str) -> Path:
         )
     pooch.get_logger().setLevel("ERROR")
     try:
-        pooch.retrieve(address, known, fname=file, path=folder)
+        pooch.retrieve(address, known, fname=file, path=folder, downloader=_copy if _is_local(address) else None)
     except OSError as error:
+        if _is_local(address) and isinstance(error, FileNotFoundError):
+            raise UsageError(
+                f"no file {error.filename}", "a folder NAME/ with the set's files", "correct --mirror"
+            ) from None
         if not hasattr(error, "response"):  # of the disk, not of requests
             raise
         status = getattr(error.response, "status_code", None)
@@ -102,12 +130,23 @@ def _fetched(folder: Path, file: str, known: str | None, address: str) -> Path:
         ) from None
     except ValueError as error:
         if known is None or known.removeprefix("sha256:") not in str(error):
-            raise UsageError(f"{address} is no address", "http://HOST/FOLDER", "correct --mirror") from None
+            raise UsageError(
+                f"{address} is no address", "http://HOST/FOLDER, or a folder here", "correct --mirror"
+            ) from None
         raise FormatError(
             f"{address} has another hash than {known}", "the file that was published", "try again, or another mirror"
         ) from None
     path.chmod(0o644)  # pooch gives it to its owner alone
     return path
+
+
+def _is_local(address: str) -> bool:
+    return address.startswith("file:")
+
+
+def _copy(address: str, target: str, _: Any) -> None:
+    """Copy a file of this computer; pooch's own ways go over a network."""
+    shutil.copyfile(url2pathname(urlsplit(address).path), target)
 
 
 def _release() -> str:

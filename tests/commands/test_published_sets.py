@@ -85,7 +85,17 @@ def test_another_hash_is_refused_and_leaves_nothing(mirror, tmp_path, name):
     (folder / name).write_bytes(b"changed")
     done = tacdata("fetch", name.split("/")[0], "--mirror", address, "--out", "new", folder=tmp_path)
     assert done.returncode == Exit.FORMAT and "has another hash" in done.stderr
-    assert not list((tmp_path / "new").iterdir())
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("name", ["machine", "presses"])
+def test_a_folder_here_is_a_mirror_by_its_path_or_its_address(mirror, tmp_path, name):
+    folder = mirror[1]
+    for number, spelled in enumerate((str(folder), folder.as_uri())):
+        done = tacdata("fetch", name, "--mirror", spelled, "--out", f"new{number}", folder=tmp_path)
+        assert done.returncode == Exit.DONE, done.stderr
+        assert list((tmp_path / f"new{number}").rglob("run.json" if name == "machine" else "session.json"))
+    assert not mirror[2]  # nothing goes over the network
 
 
 def test_a_file_of_the_person_stays(mirror, tmp_path):
@@ -101,12 +111,15 @@ def test_a_file_of_the_person_stays(mirror, tmp_path):
     [
         (("machin",), Exit.USAGE, "allowed: machine, presses"),
         (("machine", "--mirror", "{}/nowhere"), Exit.DEVICE, "status 404"),
-        (("machine", "--mirror", "nowhere"), Exit.USAGE, "is no address"),
+        (("machine", "--mirror", "nowhere"), Exit.USAGE, "nowhere/machine/run.json"),
+        (("machine", "--mirror", "file:///nowhere"), Exit.USAGE, "no file /nowhere/machine/run.json"),
+        (("machine", "--mirror", "gopher://nowhere"), Exit.USAGE, "is no address"),
     ],
 )
 def test_what_cannot_be_fetched_is_answered_in_words(mirror, tmp_path, words, code, told):
     done = tacdata("fetch", *(word.format(mirror[0]) for word in words), folder=tmp_path)
     assert done.returncode == code and told in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "machine").exists()
 
 
 def test_a_verb_alone_lists_the_sets_with_licence_and_each_record_is_complete():
