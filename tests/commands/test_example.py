@@ -4,6 +4,7 @@ import json
 import re
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 import tacdata as td
@@ -54,3 +55,14 @@ def test_the_shipped_recording_is_small_and_names_no_place_of_its_maker():
     assert len(read_session(SESSION).episodes) == 2
     assert len(list((SESSION / "labels").glob("episode-*.parquet"))) == 2
     assert not [path for path in files if b"/root/" in path.read_bytes() or b"/home/" in path.read_bytes()]
+
+
+@pytest.mark.long(
+    "tacdata/skin", "tacdata/indenters", "label_farm", reason="models change often; their labels are renewed at times"
+)
+def test_the_shipped_labels_are_of_todays_model(tmp_path):
+    """`sh .dev/example` renews them."""
+    example(tmp_path / "first")
+    labelled = CliRunner().invoke(APP, ["label", str(tmp_path / "first")])
+    assert labelled.exit_code == Exit.DONE, labelled.exception
+    assert "labels written: 0 (0 without contact), already there: 2" in labelled.stdout
