@@ -144,9 +144,9 @@ def _is_local(address: str) -> bool:
     return address.startswith("file:")
 
 
-def _copy(address: str, target: str, _: Any) -> None:
-    """Copy a file of this computer; pooch's own ways go over a network."""
-    shutil.copyfile(url2pathname(urlsplit(address).path), target)
+def _copy(fname: str, action: Any, pooch: Any, *, check_only: bool | None = None) -> None:
+    """Copy a file of this computer, as a downloader of pooch: its own ones go over a network."""
+    shutil.copyfile(url2pathname(urlsplit(fname).path), action)
 
 
 def _release() -> str:
