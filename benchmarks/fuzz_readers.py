@@ -87,6 +87,16 @@ def examples(folder: Path) -> dict[str, tuple[bytes, str, Callable[[Path], objec
         book.active.append([float(v) for v in row])
     book.save(folder / "a.xlsx")
     found["xlsx"] = (folder / "a.xlsx").read_bytes(), ".xlsx", table
+    import h5py
+    from nptdms import ChannelObject, TdmsWriter
+
+    with h5py.File(folder / "a.h5", "w") as file:
+        for name, values in columns.items():
+            file.create_dataset(f"run/{name}", data=values, chunks=(50,), compression="gzip").attrs["units"] = "pF"
+    found["h5"] = (folder / "a.h5").read_bytes(), ".h5", table
+    with TdmsWriter(folder / "a.tdms") as file:
+        file.write_segment([ChannelObject("run", name, values) for name, values in columns.items()])
+    found["tdms"] = (folder / "a.tdms").read_bytes(), ".tdms", table
     plan = {
         "version": "1.0",
         "name": "p",

@@ -14,6 +14,7 @@ from tacdata.errors import PackageError
 IMPORTED_AS = {
     "cv2": "opencv-contrib-python-headless",
     "markdown_it": "markdown-it-py",
+    "nptdms": "npTDMS",
     "rerun": "rerun-sdk",
     "warp": "warp-lang",
 }

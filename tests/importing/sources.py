@@ -56,10 +56,21 @@ def write(folder: Path, form: str, rows: np.ndarray, names=NAMES) -> Path:
         group = zarr.open_group(str(path), mode="w")
         for name, values in columns.items():
             group.create_array(name, data=values, chunks=(20,))
+    elif form == "h5":
+        import h5py
+
+        with h5py.File(path, "w") as file:
+            for name, values in columns.items():
+                file[name] = values
+    elif form == "tdms":
+        from nptdms import ChannelObject, TdmsWriter
+
+        with TdmsWriter(path) as file:
+            file.write_segment([ChannelObject("run", name, values) for name, values in columns.items()])
     return path
 
 
-FORMS = ("csv", "xlsx", "parquet", "npz", "mat", "jsonl", "json", "zarr")
+FORMS = ("csv", "xlsx", "parquet", "npz", "mat", "jsonl", "json", "zarr", "h5", "tdms")
 
 
 def mapping(folder: Path, path: Path, **changes) -> Path:

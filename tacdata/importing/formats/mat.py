@@ -1,4 +1,4 @@
-"""MATLAB files up to version 7: variables, structures and arrays of structures."""
+"""MATLAB files: variables, structures and arrays of structures; those of version 7.3 are read as HDF5."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
+from tacdata.importing.formats.hdf5 import Hdf5
 from tacdata.importing.formats.npz import rows_of
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
 from tacdata.importing.mapping import ReadOptions
@@ -31,7 +32,7 @@ class Mat(SourceFormat):
         try:
             loaded = _loaded(path)
         except NotImplementedError:
-            return ("",)  # `read` raises the error with the remedy
+            return Hdf5().tables(path)
         names = [name for name in loaded if not name.startswith("__")]
         are_trials = all(isinstance(loaded[name], dict) or (np.ndim(loaded[name]) in (2, 3)) for name in names)
         alike = len({re.sub(r"\d+", "#", name) for name in names}) == 1
@@ -42,11 +43,7 @@ class Mat(SourceFormat):
         try:
             loaded = _loaded(path)
         except NotImplementedError:
-            raise FormatError(
-                f"{path} is a MATLAB 7.3 file (HDF5)",
-                "a MATLAB file of version 7 or older",
-                "in MATLAB: save('new.mat', ..., '-v7')",
-            ) from None
+            return Hdf5().read(path, options)
         variables = {name: value for name, value in loaded.items() if not name.startswith("__")}
         if any(type(value).__name__ == "MatlabOpaque" for value in loaded.values()) and not _readable(variables):
             raise FormatError(

@@ -29,6 +29,7 @@ LONGEST = 300
 """Letters of a library's words that an error repeats."""
 LARGEST, DENSEST = 256 * 1024 * 1024, 100
 """Bytes that a file may become when it is read [byte], and how often its own size it may become beyond them [1]."""
+OLD_OFFICE = b"\xd0\xcf\x11\xe0"
 MAGIC = {
     b"\x1f\x8b": "gzip (.gz)",
     b"PK\x03\x04": "a zip archive (such as .zip, .npz or .xlsx)",
@@ -42,7 +43,7 @@ MAGIC = {
     b"\x89PNG": "a PNG image",
     b"\xff\xd8": "a JPEG image",
     b"%PDF": "PDF",
-    b"\xd0\xcf\x11\xe0": "an old Office file (.xls)",
+    OLD_OFFICE: "an old Office file (.xls)",
     b"BZh": "bzip2",
     b"\xfd7zXZ": "xz",
     b"\x28\xb5\x2f\xfd": "zstd",
@@ -50,11 +51,7 @@ MAGIC = {
 """First bytes of files and the kind of file that begins so."""
 
 CONVERSIONS = {
-    ".xls": "open it in Excel or LibreOffice and save it as .xlsx",
     ".ods": "open it in LibreOffice and save it as .xlsx",
-    ".h5": "in Python: h5py.File(name)[dataset][:], then numpy.savez(new_name, ...)",
-    ".hdf5": "in Python: h5py.File(name)[dataset][:], then numpy.savez(new_name, ...)",
-    ".tdms": "in LabVIEW or Excel: export it as .csv or .xlsx",
     **dict.fromkeys((".zip", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz", ".zst"), "unpack it, and import the folder"),
     ".sqlite": "in Python: pandas.read_sql(...).to_parquet(new_name)",
     ".pkl": "in Python: pandas.read_pickle(name).to_parquet(new_name)",
@@ -234,7 +231,11 @@ def _by_ending(path: Path) -> str:
             kind = _markup(path)
         if not kind:
             return "csv"  # instruments write tabs and give the file this ending
-        raise UsageError(f"{path} is {kind}", "an Excel workbook (.xlsx)", CONVERSIONS[ending])
+        if kind == MAGIC[b"PK\x03\x04"]:
+            return "xlsx"
+        if kind != MAGIC[OLD_OFFICE]:
+            words = "open it in Excel or LibreOffice and save it as .xlsx"
+            raise UsageError(f"{path} is {kind}", "an Excel workbook (.xls, .xlsx)", words)
     if ending in CONVERSIONS:
         raise UsageError(f"{path}: {ending} is not read", ", ".join(sorted(endings)), CONVERSIONS[ending])
     if not matches:

@@ -1,4 +1,4 @@
-"""Excel workbooks: one sheet as a table, its cells as Excel last computed them."""
+"""Excel workbooks (.xlsx): one sheet as a table, its cells as Excel last computed them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import csv
 import io
 import re
 import zipfile
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, time
@@ -36,6 +37,16 @@ HEAD = 60
 """Rows of a sheet that tell whether it holds numbers."""
 
 
+@dataclass(frozen=True)
+class Marks:
+    """Properties of a sheet other than the values of its cells."""
+
+    merged: tuple[tuple[int, int, int, int], ...] = ()
+    """First and last row and column of each merged range, from 0."""
+    hidden: frozenset[int] = frozenset()
+    """Rows that a filter or a person hides, from 0."""
+
+
 class Xlsx(SourceFormat):
     """The sheet that ``table`` names, else the first with numbers; headers and units as in a text file."""
 
@@ -43,15 +54,11 @@ class Xlsx(SourceFormat):
 
     def tables(self, path: Path) -> tuple[str, ...]:
         """Return the sheets whose first rows hold numbers, if there are several; see the base."""
-        from openpyxl import load_workbook
-
-        refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
-        book, titles = load_workbook(path, read_only=True, data_only=True), []
+        book, titles = self.opened(path), []
         try:
             for sheet in [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]:
-                sheet.reset_dimensions()
                 with suppress(FormatError):
-                    table_of(path, _as_text(sheet, _Marks(), [], HEAD), TABS, [])
+                    table_of(path, _as_text(sheet, Marks(), [], HEAD), TABS, [])
                     titles.append(sheet.title)
         finally:
             book.close()
@@ -59,34 +66,59 @@ class Xlsx(SourceFormat):
 
     def read(self, path: Path, options: ReadOptions) -> SourceTable:
         """Read a sheet; dates come as ISO 8601. See the base."""
-        from openpyxl import load_workbook
-
-        refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
-        book = load_workbook(path, read_only=True, data_only=True)
+        book = self.opened(path)
         try:
             if (sheet_name := options.table) and sheet_name not in book.sheetnames:
                 allowed = ", ".join(book.sheetnames)
                 raise FormatError(f"{path}: no sheet {sheet_name}", allowed, "correct table in the mapping")
-            table, read, remainder = _first_table(path, book, options)
+            table, read, remainder = _first_table(path, book, options, self.marks)
         finally:
             book.close()
         notes = [
             *table.notes,
             *([f"{path.name}: sheet {read} is read, not {', '.join(remainder)}"] if remainder else []),
         ]
-        if any(values.dtype != object and not np.isfinite(values).any() for values in table.columns.values()):
+        if zipped_size(path) and any(
+            values.dtype != object and not np.isfinite(values).any() for values in table.columns.values()
+        ):
             notes += _never_computed(path, read)
         return replace(table, notes=tuple(notes))
 
+    def opened(self, path: Path) -> Any:
+        """Return a file's workbook, whose sheets give their rows."""
+        from openpyxl import load_workbook
 
-def _first_table(path: Path, book: Any, options: ReadOptions) -> tuple[SourceTable, str, list[str]]:
+        refuse_growth(path, zipped_size(path), LARGEST_SHEETS)
+        # As bytes: openpyxl refuses a workbook of today by the ending .xls.
+        book = load_workbook(io.BytesIO(path.read_bytes()), read_only=True, data_only=True)
+        for sheet in book.worksheets:
+            sheet.reset_dimensions()  # programs other than Excel write wrong ones, by which rows would be cut off
+        return book
+
+    def marks(self, path: Path, sheet: Any) -> Marks:
+        """Return the merged ranges and the hidden rows of a sheet."""
+        name = str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
+        with zipfile.ZipFile(path) as archive:
+            if name not in archive.namelist() or archive.getinfo(name).file_size > MOST_MARKED:
+                return Marks()
+            text = archive.read(name)
+        merged = []
+        for match in MERGED.finditer(text):
+            left, top, right, bottom = (group.decode() for group in match.groups())
+            merged.append((int(top) - 1, int(bottom) - 1, _column_number(left), _column_number(right)))
+        rows = (NUMBERED.search(match[0]) for match in HIDDEN.finditer(text))
+        return Marks(tuple(merged), frozenset(int(match[1]) - 1 for match in rows if match))
+
+
+def _first_table(
+    path: Path, book: Any, options: ReadOptions, marks: Callable[[Path, Any], Marks]
+) -> tuple[SourceTable, str, list[str]]:
     """Return the sheet that is meant, else the first with rows of numbers; its name, and those of other full sheets."""
     sheet_name, refused, sheets, notes = options.table, None, {}, {}
     visible = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
     for sheet in [book[sheet_name]] if sheet_name else visible or book.worksheets:
-        sheet.reset_dimensions()  # programs other than Excel write wrong ones, by which rows would be cut off
         notes[sheet.title] = []
-        if text := _as_text(sheet, _marks(path, sheet), notes[sheet.title]):
+        if text := _as_text(sheet, marks(path, sheet), notes[sheet.title]):
             sheets[sheet.title] = text
     hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != sheet_name]
     for name, data, decimal in [(name, data, decimal) for decimal in ".," for name, data in sheets.items()]:
@@ -111,31 +143,6 @@ def _first_table(path: Path, book: Any, options: ReadOptions) -> tuple[SourceTab
     )
 
 
-@dataclass(frozen=True)
-class _Marks:
-    """Properties of a sheet other than the values of its cells."""
-
-    merged: tuple[tuple[int, int, int, int], ...] = ()
-    """First and last row and column of each merged range, from 0."""
-    hidden: frozenset[int] = frozenset()
-    """Rows that a filter or a person hides, from 0."""
-
-
-def _marks(path: Path, sheet: Any) -> _Marks:
-    """Return the merged ranges and the hidden rows of a sheet."""
-    name = str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
-    with zipfile.ZipFile(path) as archive:
-        if name not in archive.namelist() or archive.getinfo(name).file_size > MOST_MARKED:
-            return _Marks()
-        text = archive.read(name)
-    merged = []
-    for match in MERGED.finditer(text):
-        left, top, right, bottom = (group.decode() for group in match.groups())
-        merged.append((int(top) - 1, int(bottom) - 1, _column_number(left), _column_number(right)))
-    rows = (NUMBERED.search(match[0]) for match in HIDDEN.finditer(text))
-    return _Marks(tuple(merged), frozenset(int(match[1]) - 1 for match in rows if match))
-
-
 def _units_of_formats(sheet: Any) -> list[str]:
     """Return the unit that the number format of each column shows behind its numbers, as 0.0" um" does; "" for none."""
     units: list[str] = []
@@ -156,7 +163,7 @@ def _column_number(letters: str) -> int:
     return number - 1
 
 
-def _as_text(sheet: Any, marks: _Marks, notes: list[str], limit: int | None = None) -> bytes:
+def _as_text(sheet: Any, marks: Marks, notes: list[str], limit: int | None = None) -> bytes:
     """Return a sheet's rows as text with tabs between cells; empty if no cell is full.
 
     A merged cell fills its range. Hidden rows are left out and counted in ``notes``.
@@ -184,7 +191,7 @@ def _never_computed(path: Path, sheet: str) -> list[str]:
     from openpyxl import load_workbook
 
     # Without data_only the cells are the formulas themselves.
-    book = load_workbook(path, read_only=True)
+    book = load_workbook(io.BytesIO(path.read_bytes()), read_only=True)
     try:
         book[sheet].reset_dimensions()
         cells = [cell for row in book[sheet].iter_rows(values_only=True) for cell in row]

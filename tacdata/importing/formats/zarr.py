@@ -57,7 +57,7 @@ class Zarr(SourceFormat):
             if array.nchunks > array.nchunks_initialized:
                 values, words = _without_lost(array, folder, values)
                 notes.append(f"{path.name}: {name}: {words}")
-            values, unit = _by_attributes(values, dict(array.attrs))
+            values, unit = by_attributes(values, dict(array.attrs))
             units |= {name.removeprefix("data/"): unit} if unit else {}
             arrays[name] = np.char.strip(values) if values.dtype.kind == "U" else values
         ends = arrays.pop(ENDS, None)
@@ -70,18 +70,19 @@ class Zarr(SourceFormat):
         return replace(table, units={**units, **table.units}, notes=(*notes, *table.notes))
 
 
-def _by_attributes(values: np.ndarray, attributes: dict[str, Any]) -> tuple[np.ndarray, str]:
+def by_attributes(values: np.ndarray, attributes: dict[str, Any]) -> tuple[np.ndarray, str]:
     """Return an array's values by its attributes, and its unit: fill value, scale and offset as netCDF has them.
 
     "milliseconds since 2026-01-31" is the unit milliseconds.
     """
     unit = str(attributes.get("units") or attributes.get("unit") or "").partition(" since ")[0]
-    if values.dtype.kind not in "iuf" or not {"_FillValue", "scale_factor", "add_offset"} & set(attributes):
+    named = {"_FillValue", "missing_value", "scale_factor", "add_offset"} & set(attributes)
+    if values.dtype.kind not in "iuf" or not named:
         return values, unit
     result = values.astype(float)
-    fill = attributes.get("_FillValue")
-    if isinstance(fill, (int, float)):
-        result[values == fill] = np.nan
+    for fill in (attributes.get("_FillValue"), attributes.get("missing_value")):
+        if isinstance(fill, (int, float)):
+            result[values == fill] = np.nan
     return result * float(attributes.get("scale_factor", 1.0)) + float(attributes.get("add_offset", 0.0)), unit
 
 

@@ -77,7 +77,7 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
     if not kinds:
         raise UsageError(
             f"no file in {source} can be read as columns ({', '.join(refused) or 'it is empty'})",
-            "CSV, Excel, JSON, NPZ, Parquet or MATLAB files, or bags of ROS 2",
+            "CSV, Excel, JSON, NPZ, Parquet, MATLAB, HDF5 or TDMS files, or bags of ROS 2",
             next(iter(remedies)) if len(remedies) == 1 else "check the path, or convert the files",
         )
     kinds = _of_same_columns(_split_logs(source, kinds, paths))

@@ -14,13 +14,7 @@ def test_a_text_that_is_named_xls_is_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "data", "remedy"),
-    (
-        ("run.xls", b"\xd0\xcf\x11\xe0" + bytes(600), "save it as .xlsx"),
-        ("run.xls", b"PK\x03\x04" + bytes(600), "save it as .xlsx"),
-        ("run.h5", b"\x89HDF", "h5py"),
-        ("run.TDMS", b"TDSm", ".csv or .xlsx"),
-    ),
+    ("name", "data", "remedy"), (("run.ODS", b"PK\x03\x04", "save it as .xlsx"), ("run.pkl", b"\x80\x04", "to_parquet"))
 )
 def test_the_way_to_a_file_that_is_read_is_named(tmp_path, name, data, remedy):
     (tmp_path / name).write_bytes(data)
