@@ -44,6 +44,7 @@ class Board:
         """
         documents.check(document, "calibration_board", origin)
         board = cls(**{key: value for key, value in document.items() if key != "version"})
+        # Smaller markers are not read from a distance; larger ones touch the squares' corners, whose places are needed.
         if not 0.3 * board.square < board.marker < 0.9 * board.square:
             fault = f"{origin}: a marker of {board.marker:g} mm in a square of {board.square:g} mm"
             raise FormatError(fault, "30 to 90 % of the square", "measure both on the print")

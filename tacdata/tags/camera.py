@@ -61,6 +61,7 @@ class PinholeCamera:
                 "calibrate the camera",
             )
         distortion = np.array(document.get("distortion", ()), float)
+        # The lengths that OpenCV knows; of another one it would take some coefficients for others.
         if len(distortion) not in (0, 4, 5, 8, 12, 14):
             fault = f"{origin}: {len(distortion)} distortion coefficients"
             raise FormatError(fault, "4, 5, 8, 12 or 14", "calibrate the camera")
@@ -116,6 +117,7 @@ class PinholeCamera:
 
         left, top = np.clip(np.floor(low), 0, [self.width - 1, self.height - 1]).astype(int)
         right, bottom = np.clip(np.ceil(high), [left + 1, top + 1], [self.width, self.height]).astype(int)
+        # A window moves the optical centre, and nothing else.
         matrix = self.matrix - np.array([[0, 0, left], [0, 0, top], [0, 0, 0]])
         if not self.distortion.any():
             return grey[top:bottom, left:right], matrix

@@ -87,6 +87,7 @@ def exchanged(earlier: dict[str, CubePose], later: dict[str, CubePose]) -> tuple
             np.linalg.norm(later[name].position - earlier[partner].position),
             np.linalg.norm(later[partner].position - earlier[name].position),
         )
+        # Each must be near the other's place: one finger alone may have moved there.
         if max(jumps) < NEARER * distance:
             remarks.append(
                 f"{name} and {partner} have changed places between two images: their tags' numbers are swapped"

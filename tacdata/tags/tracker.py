@@ -53,11 +53,13 @@ class FingerTracker:
         """
         grey = to_grey(image)
         self.camera.check(grey)
+        # Only fingers of the image before have a place near which it is worth looking.
         fresh = {name for name, age in self._ages.items() if age == 0}
         # Every few images all is searched: a finger that comes in is near no previous one.
         tags = [] if not fresh or self._since >= self._every else self._near(grey, fresh)
         unread = {name for name in fresh if not self._has_tag(name, tags)}
         self._since += 1
+        # A finger is missing where it was: it may have moved far between two images.
         if not tags or unread:
             tags, self._since = detect_tags(grey, whole=False), 0
         view = view_of(grey, tags, self.camera, self.fingers, self._hints)

@@ -48,6 +48,7 @@ class ImageStream:
         except (http.client.HTTPException, ValueError) as error:
             raise OSError(str(error)) from error
         self._boundary = b"--" + str(self._answer.headers.get_param("boundary") or "").strip('"-').encode()
+        # Whether images have time stamps is seen only in the first one.
         first = self._next() if self._answer.headers.get_content_type() == MULTIPART else None
         if first is None:
             self.close()

@@ -61,6 +61,7 @@ def open_port(port: str, baud: int, device: str, timeout: float, dtr: bool | Non
         # Ports on a network know no lock.
         if "://" not in port:
             line.exclusive = True
+        # Set before the port is opened: afterwards the reset has happened.
         if dtr is not None:
             line.dtr = dtr
         line.open()
@@ -105,6 +106,8 @@ def write_all(line: serial.SerialBase, data: bytes) -> None:
     if not isinstance(handle, int) or termios is None:
         line.write(data)
         return
+    # pyserial's own timeout counts anew after each part; a controller that takes one byte at a time would hold the
+    # caller.
     patience = Patience(WRITE, floor=WRITE)
     while data:
         try:
@@ -121,6 +124,7 @@ def _keep_dtr(line: serial.SerialBase) -> None:
         return
     try:
         attributes = termios.tcgetattr(handle)
+        # With HUPCL the system drops DTR when the port is closed, which resets many boards and loses the position.
         attributes[2] &= ~termios.HUPCL
         termios.tcsetattr(handle, termios.TCSANOW, attributes)
     except (termios.error, OSError):

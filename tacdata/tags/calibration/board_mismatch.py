@@ -115,6 +115,7 @@ def _other_sizes(evidence: _Seen, board: Board) -> Iterator[tuple[str, Board]]:
         return
     for columns in range(_FEWEST, 2 * markers // _FEWEST + 1):
         for rows in range(_FEWEST, 2 * markers // _FEWEST + 1):
+            # The first square is black or white by the drawing, so an odd board has half a marker more or less.
             if columns * rows // 2 == markers or (columns * rows + 1) // 2 == markers:
                 for is_legacy in (board.legacy, not board.legacy):
                     yield "", replace(board, columns=columns, rows=rows, legacy=is_legacy)

@@ -133,8 +133,11 @@ def calibrate(views: list[BoardView], board: Board, size: tuple[int, int], model
             "take views with the board in every part of the image, and larger in it",
         )
     first = MODELS[0] if model == "auto" else model
+    # With the simplest lens first: a richer one bends itself to single wrong corners.
     views, left_out = _without_strays(views, _fit(views, board, size, first))
     members, dropped = _fitting(views, board, size, first, len(views))
+    # Chosen on the views that fit, by views held out: more coefficients always fit better those that they are fitted
+    # to.
     choice = _choose_model(members, board, size) if model == "auto" else model
     members, more = _fitting(members, board, size, choice, len(views) - len(dropped))
     fit, held_out = _fit(members, board, size, choice), _held_out(members, board, size, choice)
@@ -164,6 +167,7 @@ def _fitting(
     members, dropped = list(views), []
     while True:
         rms = _fit(members, board, size, model).rms
+        # Most views are wrong together: dropping single ones cannot help.
         if np.median(rms) > BAD:
             raise FormatError(
                 f"the corners' reprojection error is {np.median(rms):.1f} px",
@@ -218,6 +222,7 @@ def _judged(
     fit: _Fit, members: list[BoardView], dropped: list[UsedView], size: tuple[int, int], model: str, held_out: float
 ) -> Calibration:
     """Return the calibration, or refuse it."""
+    # The largest angle between two boards.
     tilt = float(np.degrees(np.arccos(np.clip((fit.normals @ fit.normals.T).min(), -1, 1))))
     share = coverage_of(members, size)
     unsure = float((fit.spread[:2] / np.diag(fit.matrix)[:2]).max())

@@ -59,6 +59,7 @@ class ViewPicker:
             return False
         self.with_board += 1
         if self.still:
+            # Thresholds are shares of the width, so that they hold for any resolution.
             unit = size[0] / 1000
             # A board in motion is blurred, and a rolling shutter shears it.
             if previous is None or view.moved(previous) > STILL * unit:

@@ -81,6 +81,7 @@ def align(
         patches = _patches(pose, cube, matrix, grey, COARSE if step == 0 else FINE)
         used = [p for f, p in patches.items() if f in faces or p.likeness > ENTIRE]
         detected = [p for f, p in patches.items() if f in faces]
+        # Coarse in the first step, as the corners can be off by a pixel; fine drawings have a narrow basin.
         solution = _step(used, pose, matrix, cube, None if step == 0 else pose.residual) if steps else None
         pose = Alignment(
             pose.rotation,
@@ -95,11 +96,13 @@ def align(
         pose = Alignment(
             _rotation(solution.move[:3]) @ pose.rotation,
             pose.translation + solution.move[3:6],
+            # Blur adds in variances. Below 0.2 px the drawing's own grid is coarser; above 3 px no tag is readable.
             float(np.sqrt(np.clip(pose.blur**2 + solution.move[6], 0.2**2, 3.0**2))),
             pose.likeness,
             _residual(detected, solution.move),
             solution.covariance,
         )
+        # The first step is coarse: its smallness proves nothing.
         if step > 0 and solution.pixels < SETTLED:
             break
     return replace(pose, covariance=pose.covariance + _grain(pose, faces, cube, matrix))
@@ -111,6 +114,7 @@ def _grain(pose: Alignment, faces: set[str], cube: Cube, matrix: np.ndarray) -> 
     slopes = np.empty((2, 6, len(arms)))
     for row, (x, y) in zip(slopes, ((-1.0, 0.0), (0.0, -1.0)), strict=True):
         ones = np.ones(len(arms))
+        # Unit slopes along x and y: columns are the motion of the corners in pixels.
         slopes_of(x * ones, y * ones, arms.T, pose.translation, matrix, row)
     rows = slopes.transpose(0, 2, 1).reshape(-1, 6)
     return GRAIN**2 * np.linalg.pinv(rows.T @ rows, rcond=1e-12)

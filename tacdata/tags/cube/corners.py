@@ -96,6 +96,7 @@ def _solved(start: Tag, tags: list[Tag], cube: Cube, camera: PinholeCamera) -> I
     import cv2
 
     points, pixels = _pairs([start], cube)
+    # A planar square has two poses of nearly equal error (Schweighofer and Pinz 2006); this method gives both.
     method = cv2.SOLVEPNP_IPPE
     try:
         _, rotations, translations, _ = cv2.solvePnPGeneric(points, pixels, camera.matrix, None, flags=method)
@@ -113,6 +114,7 @@ def _settle(
     """Refine a pose (rotation vector [rad] and translation [m]) on its inlier tags; None if there are none."""
     import cv2
 
+    # From one tag the others are predicted badly. Loosely first, then with all tags found.
     for limit in (LOOSE, TIGHT):
         group = _fitting(rotation, translation, tags, cube, camera, limit)
         if not group:
@@ -144,6 +146,7 @@ def _fitting(
     inliers: dict[int, tuple[float, Tag]] = {}
     for tag in tags:
         outward = square @ AXES[cube.faces[tag.id]][:, 2]
+        # Behind the camera, or a face seen from within the cube.
         if place[2] <= 0 or outward @ (place + outward * cube.side / 2000) >= 0:
             continue
         error = _error(square, place, tag, cube, camera)

@@ -39,6 +39,7 @@ class FacePatch:
     def __post_init__(self) -> None:
         base = self.columns[7:]
         moments, right = base @ base.T, base @ self.image
+        # Least squares of black and white in closed form: two unknowns a face.
         slack = moments[0, 0] * moments[1, 1] - moments[0, 1] ** 2
         deviation = right[1] * moments[0, 0] - right[0] * moments[0, 1]
         spread = float(self.image @ self.image) * moments[0, 0] - right[0] ** 2
@@ -78,6 +79,7 @@ def draw_face(
 
     axes, half = rotation @ AXES[face], cube.tag / 2000
     centre = translation + axes[:, 2] * cube.side / 2000
+    # At a grazing angle a cell is less than a pixel wide, and the drawing depends on its sampling.
     if -axes[:, 2] @ centre < GRAZING * np.sqrt(centre @ centre) or centre[2] <= 1e-3:
         return None
     outline = centre + cube.side / 2000 * _SQUARE @ axes[:, :2].T
@@ -95,6 +97,7 @@ def draw_face(
     plane[:2] -= np.array([[left], [top]]) * plane[2]
     to_plane = np.linalg.inv(plane)
     width = 2 * half * matrix[0, 0] / centre[2]
+    # The drawing has more pixels than the image where cells are small, or edges between pixels would jump.
     fine = int(np.clip(np.ceil(8 * CELL * detail / width), 1, FINEST))
     model = _drawn(cube.ids[face], to_plane, (int(right - left), int(bottom - top)), blur, fine)
     u, v = np.arange(2.0, right - left - 2), np.arange(2.0, bottom - top - 2)[:, None]

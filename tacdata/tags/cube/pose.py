@@ -92,6 +92,7 @@ def detect_cube(
     grey, camera, geometry = to_grey(image), PinholeCamera.from_document(intrinsics), Cube.from_document(cube)
     camera.check(grey)
     near = None if hint is None else surroundings(hint, geometry, camera)
+    # Near the previous pose first; a cube that has moved away is searched for in the whole image.
     for within in (near, None) if near else (None,):
         pose = solve_cube(grey, detect_tags(grey, whole=False, within=within), geometry, camera, hint)
         if pose is not None:

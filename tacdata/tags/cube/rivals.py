@@ -90,12 +90,14 @@ def best_rival(
         if not starts:
             return None
         start = None if previous is None else _continuing(starts, previous)
+        # A pose that continues the image before needs no rival, as long as it explains this image as well.
         if previous is not None and start is not None:
             rival = PoseHypothesis(start, grey, cube, camera)
             if not rival.false and rival.alignment.residual < CLEARLY * previous.residual:
                 return rival, None
         rivals = [PoseHypothesis(candidate, grey, cube, camera) for candidate in starts]
         first = rivals[0]
+        # One face, and all candidates agree: seen head-on, the mirrored minimum was too near to be found by corners.
         turns = [angle_between(first.alignment.rotation, r.alignment.rotation) for r in rivals]
         if len(first.seen) == 1 and max(turns) < APART:
             rivals = [first, PoseHypothesis(_mirrored(first, cube), grey, cube, camera)]

@@ -112,6 +112,8 @@ def _read_one(grey: np.ndarray, suspect: Suspect, tags: list[Tag]) -> None:
     scale = 1.0
     while suspect.size * scale >= LARGE:
         scale /= 2
+    # The library needs some pixels a cell. Tiny tags are read enlarged first, large ones reduced, as its time grows
+    # with pixels.
     scales = (2.0, scale) if suspect.size < TINY else (scale, 2.0) if suspect.size < SMALL else (scale,)
     box = suspect.box(ROOM * suspect.size + 3, width, height)
     readings = next((readings for each in scales if (readings := _read(grey, box, each))), [])

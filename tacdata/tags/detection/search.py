@@ -69,6 +69,7 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
     half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     if min(half.shape) < WINDOW:
         return [Suspect((0, 0), (grey.shape[1], grey.shape[0]))]
+    # A threshold below the noise would turn grain into thousands of blobs.
     darker = float(np.clip(4 * noise(half), *DARKER))
     kind = cv2.ADAPTIVE_THRESH_MEAN_C
     dark = cv2.adaptiveThreshold(half, 1, kind, cv2.THRESH_BINARY_INV, WINDOW, darker)

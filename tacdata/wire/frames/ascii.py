@@ -40,10 +40,12 @@ class AsciiLines:
             self.offset += end + 1
             if (fields := self._line(line)) is not None:
                 frames.append((fields, self.offset))
+        # No line of this format is as long: the baud rate is wrong, or line ends were lost.
         if len(self.buffer) > self.longest:
             self.counts.garbage_bytes += len(self.buffer)
             self.offset += len(self.buffer)
             self.buffer.clear()
+            # Without sync or checksum the end of a cut line looks like a whole one, so the next line is dropped.
             self.unproven = not self.layout.sync and self.layout.checksum == "none"
         return frames
 

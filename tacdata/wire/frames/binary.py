@@ -20,6 +20,7 @@ def widen(values: np.ndarray, kind: str, endianness: str) -> np.ndarray:
     low, middle, high = (parts[:, i] for i in ((0, 1, 2) if endianness == "little" else (2, 1, 0)))
     integer = low + (middle << 8) + (high << 16)
     if kind == "int24":
+        # Two's complement in 24 bits.
         integer = np.where(integer >= 1 << 23, integer - (1 << 24), integer)
     return integer.astype(np.float64)
 
@@ -58,6 +59,8 @@ class BinaryFrames:
     def push(self, data: bytes) -> list[tuple[Fields, int]]:
         """Take bytes; return each complete frame's fields and the offset of its end in the stream [bytes]."""
         layout, frames = self.layout, []
+        # Sync bytes can occur in readings. Without a checksum, only the next frame's sync proves that this one was cut
+        # rightly.
         proof = len(layout.sync) if layout.checksum == "none" else 0
         self.buffer += data
         while True:

@@ -52,6 +52,7 @@ def _reflect(value: int, width: int) -> int:
 def _table(crc: Crc) -> tuple[int, ...]:
     top, mask = 1 << (crc.width - 1), (1 << crc.width) - 1
     entries = []
+    # One look-up a byte in place of eight shifts.
     for byte in range(256):
         register = (_reflect(byte, 8) if crc.reflected else byte) << (crc.width - 8)
         for _ in range(8):

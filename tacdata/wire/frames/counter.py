@@ -27,10 +27,13 @@ class CounterTrack:
         """Return the unwrapped counter of the next frame, or None if that frame was there before."""
         if self.raw < 0:
             return self._begin(raw, raw, arrival_ns)
+        # Modulo, so that a counter that wraps counts on.
         step = (raw - self.raw) % self.modulus
         if step == 0 or self.modulus - step <= min(REPEAT_WINDOW, self.modulus // 4):
             self.counts.repeated += 1
             return None
+        # Losses are bounded by the time that has passed: more frames than the rate allows cannot have been sent. The 5
+        # % are for boards whose clock is off.
         room = (arrival_ns - self.first_ns) * 1e-9 * self.rate * 1.05 + self.margin
         implausible = step > self.margin and self.value + step - self.first_value > room
         if step > self.modulus // 2 or implausible:

@@ -45,6 +45,7 @@ class Decoder:
     def feed(self, data: bytes, arrival_ns: int) -> list[TaxelFrame]:
         """Take bytes received at ``arrival_ns`` [ns]; return the frames that they complete."""
         self._received += len(data)
+        # A frame may end in the middle of a read. Its time is that of the read which brought its last byte.
         self._arrivals.append((self._received, arrival_ns))
         frames = []
         for fields, end in self._frames.push(data):
@@ -53,6 +54,7 @@ class Decoder:
             counter = -1
             if self._counter:
                 value = self._counter.advance(int(fields["counter"][0]), arrival)
+                # A frame sent twice is one sample. Kept twice, it would count as two independent readings.
                 if value is None:
                     continue
                 counter = value

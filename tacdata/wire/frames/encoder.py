@@ -64,6 +64,7 @@ class Encoder:
         layout, texts = self.layout, []
         for name in layout.order:
             if layout.type_of(name).startswith("float"):
+                # Digits that give the same number back when read: 9 for single precision, 17 for double.
                 digits = 9 if layout.type_of(name) == "float32" else 17
                 texts += [f"{float(v):.{digits}g}" for v in values[name]]
             else:

@@ -25,6 +25,8 @@ def packed(framing: str, frame: bytes) -> bytes:
 def _cobs(frame: bytes) -> bytes:
     result, parts = bytearray(), frame.split(b"\0")
     for number, part in enumerate(parts):
+        # A code byte of 255 stands for 254 bytes without a zero after them; a frame that ends there needs no further
+        # block.
         while len(part) >= 254:
             result += b"\xff" + part[:254]
             part = part[254:]
@@ -58,6 +60,7 @@ def _from_cobs(packet: bytes) -> bytes | None:
             return None
         result += packet[at + 1 : at + code]
         at += code
+        # A block of 254 bytes replaces no zero, and the last zero of a frame is not sent.
         if code < 255 and at < len(packet):
             result.append(0)
     return bytes(result)
@@ -89,6 +92,7 @@ class PacketFrames:
             frame = unpacked(layout.framing, packet)
             if self._good(frame) and frame is not None:
                 frames.append((fields(layout, frame), self.offset))
+            # Before the first marker the packet may have begun before the port was opened: that is garbage, not damage.
             elif self.begun and len(packet) <= self.longest:
                 self.counts.corrupt += 1
             else:

@@ -47,6 +47,8 @@ def refusal(line: str, answer: str) -> DeviceError | None:
             f"the line {line!r} was dropped by a reset", accepted, "send it again when the machine is idle"
         )
     why = codes.error_in_words(int(code[1])) if code[1] else answer
+    # Lines of motion are made here and are well formed. So a syntax error of the controller means that bytes were
+    # changed.
     damaged = code[1] and int(code[1]) in codes.DAMAGED_LINE
     return DeviceError(
         f"the controller refused {what}: {why}",
@@ -60,6 +62,7 @@ def refusal(line: str, answer: str) -> DeviceError | None:
 
 def changed_on_its_way(sent: str, echo: str) -> DeviceError | None:
     """Return the fault of a line of motion that was sent back; None if it arrived as it was sent."""
+    # Controllers differ in how they echo settings; only motion can hurt. Spaces and case carry no meaning in G-code.
     if sent.startswith("$") or "".join(echo.split()).upper() == sent.upper():
         return None
     return DeviceError(

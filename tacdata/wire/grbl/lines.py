@@ -66,6 +66,7 @@ def parse_status(line: str) -> StatusReport | None:
     """
     if not (line.startswith("<") and line.endswith(">")):
         return None
+    # The last "<": a report may follow the remains of one that was cut off.
     state, *fields = line[line.rfind("<") + 1 : -1].split("|")
     values: dict[str, list[float]] = {}
     texts: dict[str, str] = {}
@@ -76,10 +77,12 @@ def parse_status(line: str) -> StatusReport | None:
                 values[name] = [float(number) for number in text.split(",")]
             except ValueError:
                 return None
+            # float() reads "nan" and "inf", which damaged digits can spell; no machine is there.
             if not np.all(np.isfinite(values[name])):
                 return None
         else:
             texts[name] = text
+    # Which of the two is sent depends on $10; a controller sends one of them.
     kind = "MPos" if "MPos" in values else "WPos"
     position, offset = values.get(kind, []), values.get("WCO")
     if not re.fullmatch(r"[A-Za-z]+(:\d+)?", state) or len(position) < 3 or (offset and len(offset) < 3):

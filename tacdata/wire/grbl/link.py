@@ -162,12 +162,14 @@ class GrblLink:
         entry = SentLine(line)
         with self._turn:
             room = Owed("room in the controller's receive buffer", limit, motion)
+            # Counted here, as Grbl drops bytes without a word when its receive buffer is full.
             self.wait(lambda: self._room() >= len(data), room)
             with self._changed:
                 # Before the line is written: its answer may come at once.
                 self._unanswered.append(entry)
             sent_ns = self._commanded_ns = self.clock.now_ns()
             self._write(data)
+        # Replies to a query are expected; lines that come in answer to a move explain why it was not carried out.
         heard = () if line.startswith("$") else entry.pushed
         self.wait(lambda: entry.answer is not None, Owed(f"an answer to {line!r}", limit, motion, heard, True))
         answered_ns = self.clock.now_ns()
@@ -210,6 +212,7 @@ class GrblLink:
         Raises:
             DeviceError: On a fault, or when the time is over.
         """
+        # A report on its way may be older than the call, and would show the machine before the event.
         begun, watch = self.clock.now_ns(), Owed("a status report", timeout).watch(self.clock)
         while True:
             self.ask()
@@ -320,6 +323,7 @@ class GrblLink:
                     self._take(line, arrival_ns)
             if len(buffer) > LINE_BYTES:  # noise may hold no end of a line
                 self.silence.unread = bytes(buffer[:LINE_BYTES]).decode("ascii", "replace")
+            # Noise without a line end must not fill the memory during a night.
             del buffer[: max(0, len(buffer) - 4096)]
 
     def _take(self, line: str, arrival_ns: int) -> None:
@@ -384,13 +388,16 @@ class GrblLink:
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
         self.silence.restart()
+        # grblHAL states the pendant only when it changes.
         self.pendant = self.pendant if report.pendant is None else report.pendant
         again = self.last is not None and self.last.state == report.state
         place = self.last.position if again and self.last else None
+        # The number comes with the alarm's own line or as a substate. A later report without it must not erase it.
         number = report.state.partition(":")[2]
         self.alarm = None if report.state[:5] != "Alarm" else int(number) if number else self.alarm
         self.statuses.take(report, arrival_ns)
         if self.polled and not self._welcome_expected:
+            # Two reports of one place: a machine that brakes still moves.
             still = bool(place is not None and self.last and (place == self.last.position).all())
             wrong, for_good = what_is_wrong(report, self._held, self.homing, again, still)
             if wrong and for_good:

@@ -91,6 +91,7 @@ def straighten(link: GrblLink) -> tuple[str, ...]:
     bent = settings.bent_by
     for word in dict.fromkeys(UNDONE_BY[change][0] for change in bent):
         link.command(word, ANSWER)
+    # Read again: whether the controller obeyed is seen only in its state.
     settings = GrblSettings.read(link, ANSWER, STATE) if bent else settings
     link.statuses.place(settings.work_offset)
     if residue := settings.bent_by:
@@ -113,6 +114,7 @@ def clear(link: GrblLink) -> str:
         DeviceError: If the machine is moving, or in another state that only a person should end.
     """
     initial = _state(link)
+    # Only at rest: a reset while motors run loses steps, and with them the position.
     if initial in OPENED_AGAIN or (initial.startswith("Alarm") and link.alarm in DEAF):
         reset(link)
     state = _state(link)
@@ -153,6 +155,8 @@ def attune(link: GrblLink) -> None:
         except DeviceError as error:
             if link.fault:
                 raise
+            # An answer of an earlier conversation is consumed by each attempt. A line without any answer is another
+            # fault.
             unanswered += isinstance(error, OwesAnswer)
             # Each attempt without an answer costs its whole patience, so two of them are enough.
             if ATTEMPTS in (attempt, unanswered + 1):
@@ -185,8 +189,10 @@ def unproved(link: GrblLink, settings: GrblSettings) -> str:
     homed = link.statuses.homed
     if homed or (settings.homing and homed is None):  # a Grbl with homing is locked until it is homed
         return ""
+    # Opening a port can pull DTR, which resets many boards: machine zero is then where the tip happened to be.
     if link.resets:
         return "the controller was reset when its port was opened, so it counts from where it stands now"
+    # A machine that was moved since is hardly at exactly zero on all axes.
     if link.last is not None and not np.any(link.last.position):
         return "the controller reports exactly (0, 0, 0), as when it is switched on, and it was not homed"
     return ""

@@ -51,6 +51,8 @@ class Watch:
 
     def ending(self, last: CncStatus | None, late: float = 0.0) -> DeviceError | None:
         """Return why the wait must end, or None; ``late`` is this computer's lateness in reading [s, real time]."""
+        # The clock for a lost answer runs only while the machine is idle: a long move owes its answer for as long as it
+        # lasts.
         if last is None or last.state != "Idle" or last.sent_ns < self._due_ns or not self._owed.idle_ends_it:
             self._idle.restart()
         elif self._idle.over(late):

@@ -37,6 +37,7 @@ def come_to_rest(link: GrblLink) -> CncStatus:
     """
     clock = link.clock
     end = clock.now_ns() + round(COMING_TO_REST * 1e9)
+    # A machine that says it moves and stays in one place is stalled or locked: waiting longer ends nothing.
     standing = Patience(STANDING, clock.rate, STANDING / 2, host=clock.host)
     place = np.full(3, np.nan)
     while True:
@@ -56,6 +57,7 @@ def come_to_rest(link: GrblLink) -> CncStatus:
                 "look at it, then reset it and find its zero again",
             )
         if state in MOVING:
+            # Sent at each look, as one byte can be lost; a second hold changes nothing.
             link.realtime(b"!")
         if clock.now_ns() > end:
             raise DeviceError(

@@ -99,6 +99,7 @@ class GrblSettings:
         """Work coordinate offset [report units], shape (3,): the active G54 to G59.3, G92 and the tool's length."""
         active = re.search(r"G5\d(?:\.\d)?", self.answers.get("GC", ""))
         try:
+            # Grbl starts in G54.
             parts = [self._triple(active[0] if active else "G54"), self._triple("G92")]
             tool = [float(value) for value in self.answers.get("TLO", "0").split(",")]
         except (KeyError, ValueError):
@@ -130,6 +131,8 @@ class GrblSettings:
         if not self.number("$20") or not np.all(length > 0):
             return None
         built_so = "Z" in self.answers.get("OPT", "").partition(",")[0]
+        # A homed axis of Grbl runs from 0 to the negative of its travel, whatever side its switch is on. Built with "Z"
+        # (origin forced) zero is at the switch. grblHAL has a bit for it.
         at_switch = bool(int(self.number("$22")) & 8) if self.is_hal else built_so
         upwards = np.array([bool(int(self.number("$23")) >> axis & 1) for axis in range(3)]) & at_switch
         return np.where(upwards, 0.0, -length), np.where(upwards, length, 0.0)

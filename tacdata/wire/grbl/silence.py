@@ -28,6 +28,7 @@ class Silence:
         self._port, self._is_emulated = port, clock.rate > 1.0
         self.seconds = EMULATED if self._is_emulated else SILENCE
         """Time without an answer that is a fault [s]."""
+        # Gaps of two polls are normal; only time beyond them counts.
         step = max(0.25, 2.0 / (poll_rate * clock.rate))
         self._patience = Patience(self.seconds, clock.rate, self.seconds, step, clock.host)
         self._reader = Lateness(2 * READ, clock.host)
@@ -63,6 +64,7 @@ class Silence:
         if not self._patience.over(delay):
             return None
         controller, busy = f"the controller on {self._port.port}", while_late(delay)
+        # The answers are there: this computer is late, and the position is still known.
         if bytes_waiting(self._port):
             cause = f"{controller} has answered, and nothing was read for {self.seconds:g} s{busy}"
             remedy = "end other programs on this computer, then start again"

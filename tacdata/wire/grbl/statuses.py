@@ -85,6 +85,8 @@ class Statuses:
 
     def take(self, report: StatusReport, arrival_ns: int) -> CncStatus | None:
         """Take a report; return it in mm, or None if its position cannot be known yet."""
+        # Reports carry no name; they are answered in the order of the queries. The bracket from query to arrival holds
+        # the time of the position.
         sent_ns = self._queries.popleft() if self._queries else None
         self._answered_at, self._answered = self._clock.host.monotonic(), True
         self.homed = self.homed if report.homed is None else report.homed
@@ -94,6 +96,7 @@ class Statuses:
         self.unplaced = report.state if report.is_work and self.offset is None else ""
         if self.unplaced:
             return None  # a work position without its offset is no machine position
+        # Nobody asked for this report. It can be as old as the one before it, and not older.
         if sent_ns is None or self.automatic:
             sent_ns = (self.last.arrival_ns if self.last else arrival_ns) - REPORT_LAG_NS
         position = report.position + self.offset if report.is_work and self.offset is not None else report.position

@@ -77,6 +77,7 @@ def what_is_wrong(
     ours = (state == "Hold" and (is_held or (substate == "1" and not still))) or (state == "Home" and homing)
     if state in UNASKED and not ours:
         return UNASKED[state], state in LOST
+    # Once may be a damaged letter; a second time it is the firmware's own word.
     if state not in KNOWN and again:
         return (
             f"the controller reports the state {report.state!r}, which is not known here",
