@@ -82,6 +82,7 @@ def onset(height: np.ndarray, answer: np.ndarray, power: float | None = None) ->
     if fit is None:
         return None
     place, width, best = fit
+    # The power law holds near first contact alone. A second fit there shows how much the far part pulled.
     foot = height >= place - FOOT
     near = _fit(height[foot], answer[foot], powers) if foot.sum() >= 8 and answer[foot][-1] > CLEAR else None
     # Contact is anywhere within a step of the approach: the standard deviation of a uniform distribution.
@@ -121,6 +122,7 @@ def _fit(height: np.ndarray, answer: np.ndarray, powers: np.ndarray) -> tuple[fl
     misfit = _misfits(height, answer, trial, powers)
     profile = misfit.min(axis=1)
     best = int(np.argmin(profile))
+    # The best height is at the top of the search: contact began before the first reading.
     if best >= GRID - 2:
         return None
     # Noise as the residuals show it, never less than that of the idle readings.

@@ -164,6 +164,7 @@ class Recorder:
     def _open_and_record(
         self, session: Session | None, numbers: tuple[int, ...], confirm: Callable[[Preflight], bool]
     ) -> Session:
+        # Before the ports are opened, as opening may home: with a tip in the skin, that moves sideways.
         self._guard.before_homing(session is not None)
         with self._guard.opened(self.devices) as devices:
             cnc = devices.cnc
@@ -215,8 +216,10 @@ class Recorder:
     ) -> None:
         self._wait_for_streams(streams)
         streams.set_latencies(self._latencies)
+        # First of all straight up: nobody knows how the tip was left.
         position = self._rise(streams)
         homed = self.devices.cnc.settings().get("homed_at_opening") == "yes"
+        # A homed machine has just found its zero; others prove it by a slow touch before anything goes deep.
         if self._prove and (self.resume or not homed):
             position = self._touch_first(self._prove, self._tap or self.plan.presses[numbers[0]], position, streams)
         if self._tap is not None:
@@ -229,6 +232,8 @@ class Recorder:
             changed = press.mounting != judged
             position = self._record(press, position, streams, limits)
             session = refresh(session)
+            # At first and after each change of the tool: a wrong height shows in the first press, before the plan's
+            # deepest one.
             if (changed or done <= JUDGED) and not self._bad_readings:
                 require_contact(file_names.finished(self.out)[press.index])
             judged = press.mounting
@@ -333,12 +338,14 @@ class Recorder:
         course = course or steps(press, self.plan.motion, self.rig.registration_for(press.indenter_name))
         cameras, fingers = tuple(self.devices.cameras), tuple((self.rig.fingers or {}).get("fingers", ()))
         writer = EpisodeWriter(path, self._header(press, limits), self.rig.clock, cameras, fingers)
+        # Before the first move, so that the rest without contact is in the file.
         streams.record_into(writer)
         try:
             position = self._motion.drive(course, position, streams, writer)
         except BaseException as error:
             reason = error.given if isinstance(error, TacdataError) else "stopped by Ctrl-C"
             try:
+                # The tip first, the file afterwards: writing can wait, skin relaxes and tears.
                 lifted = self._motion.lift(self._height, self.plan.motion.approach_speed)
                 writer.note(f"broken off: {reason}; {lifted}", "error")
             finally:

@@ -205,6 +205,7 @@ def resume_session(folder: Path, plan: Plan, sensor: Sensor, rig: dict[str, Any]
                 f"the same {what}; one session holds one of each",
                 "use the files it was begun with, or start a new session",
             )
+    # A crash between the last byte and the renaming leaves a whole recording under its partial name.
     for path in folder.glob(f"*{file_names.PARTIAL}"):
         final = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
         path.rename(final if _is_whole(path, final) else file_names.next_interrupted(final))

@@ -30,12 +30,14 @@ def reading_lag(figures: RecordingFigures) -> float | None:
     Taken where answer and depth cross half of their greatest value, going in and coming out. A curved answer moves
     both crossings in opposite ways, so the mean is the delay. The skin's own delay remains: its creep and hysteresis.
     """
+    # At half of the answer the curve is steepest, so noise moves the crossing least.
     felt, episode = _felt(figures, 0.5), figures.recording.episode
     if felt is None:
         return None
     # Above the skin nothing answers, so heights above it are not compared.
     depth = np.maximum(episode.tip_at(episode.taxels.sample_ns)[:, 2], 0.0)
     gone = _crossings(depth, float(depth.max()), 0.5, episode.taxels.sample_ns)
+    # The mean of the way in and out: friction and relaxation delay one and advance the other.
     return None if gone is None else float(np.mean(felt - gone) / 1e6)
 
 
@@ -92,6 +94,7 @@ def other_place(figures: RecordingFigures, tolerance: float) -> str:
     press = episode.press
     if not episode.complete or not figures.recording.moves or press.depth < CONTACT:
         return ""
+    # The deepest point. On the way there the guide is at other places by plan.
     went = episode.tip[int(np.argmax(episode.tip[:, 2]))]
     nominal = np.array([press.x, press.y, press.deepest])
     if np.abs(went - nominal).max() <= tolerance:
@@ -131,11 +134,13 @@ def stood_still(figures: RecordingFigures, rate: float) -> float:
     arrival = recording.episode.cnc.arrival_ns
     if len(arrival) < 2:
         return 0.0
+    # Between two reports a standstill cannot be seen, so only more than the usual interval counts.
     usual = float(np.median(np.diff(arrival))) + UNKNOWN_MS * 1e6 * rate
     # An interrupted recording ends within its last move, which did not run to its end.
     moves = recording.moves if recording.episode.complete else recording.moves[:-1]
     for move, following in zip(moves, [*recording.moves[1:], None], strict=False):
         later = _ended_by(recording, move, following) - move.end_ns
+        # Only there does a standstill falsify a depth that a label is computed for.
         inside = move.command.phase in ("press", "release") and move.profile.length
         if inside and usual < later < np.inf and not _host_was_late(recording, move, later):
             standstill = max(standstill, later / 1e6)

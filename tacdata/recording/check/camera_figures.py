@@ -17,6 +17,7 @@ def camera_figures(recording: Recording, name: str) -> dict[str, Any]:
     times, taxels = recording.cameras[name], recording.episode.taxels.arrival_ns
     tags = next((tag for tag in recording.episode.tags if tag.camera == name), None)
     rate = recording.episode.rig.get("cameras", {}).get(name, {}).get("rate")
+    # A camera that begins late or ends early has a gap at the edge of the press.
     within = (int(taxels[0]), int(taxels[-1])) if len(taxels) else (0, 0)
     spans = np.diff(times.arrival_ns)
     counts = recording.counts.get(f"camera {name}", {})

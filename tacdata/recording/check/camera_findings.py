@@ -34,6 +34,7 @@ def camera_warnings(entries: dict[str, Any], values: dict[str, Any], rate_of_clo
             continue
         texts = [*_still(figures, rate_of_clock), *_losses(figures, rate_of_clock), *figures["notes"]]
         if figures["clock"] and figures["missed"] is not None:
+            # Its drift is not judged: the nominal rate of a camera is a request, not a promise of its crystal.
             texts += clock_warnings({**figures["clock"], "drift": None}, rate_of_clock)
         if "cube" in entry:
             texts += _view("tag", figures, figures["images"])

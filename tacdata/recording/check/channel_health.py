@@ -61,6 +61,7 @@ def idle_noise(episode: Episode) -> np.ndarray:
         return np.full(episode.taxels.counts.shape[1], np.nan)
     changes = np.diff(idle, axis=0)
     spread, quartiles = changes.std(axis=0), np.percentile(changes, [25, 75], axis=0)
+    # A Gaussian's quartiles are 1.349 standard deviations apart. Quartiles ignore single spikes.
     middle = (quartiles[1] - quartiles[0]) / 1.349
     # Quantised readings have quartiles of whole counts; the plain standard deviation is right for them.
     return np.where(spread > 3 * np.maximum(middle, 1.0), middle, spread) / np.sqrt(2)
@@ -100,6 +101,7 @@ def frozen_channels(counts: np.ndarray, noise: np.ndarray, limits: tuple[float, 
     stuck, saturated = [], []
     constant = (counts == counts[:1]).all(axis=0) if len(counts) else np.ones(counts.shape[1], bool)
     moving = noise[~constant]
+    # A board whose channels are all quiet to the count shows constant values in health.
     live = bool(len(moving)) and not np.isnan(moving).all() and np.nanmedian(moving) > LIVE
     for channel in range(counts.shape[1]):
         values = counts[:, channel]
@@ -180,6 +182,7 @@ def _together(change: np.ndarray, response: np.ndarray, noise: np.ndarray) -> tu
         noise: Noise of these channels [counts], shape (m,).
     """
     ratio, precision = change / response, np.abs(response) / noise
+    # No channel weighs more than the others together, as the jump of one must not count as common to all.
     weight = np.minimum(precision, (precision.sum() - precision) / 2)
     order = np.argsort(ratio, axis=1)
     middle = (np.cumsum(weight[order], axis=1) < weight.sum() / 2).sum(axis=1)[:, None]
@@ -249,6 +252,7 @@ def held_by_chance(counts: np.ndarray, idle: np.ndarray, frames: int) -> float:
     """
     change = np.diff(idle, axis=0)
     change = change[:, change.any(axis=0)]
+    # A board slower than its recording repeats frames by design.
     repeats = np.mean((counts[1:] == counts[:-1]).all(axis=1))
     if len(change) < RUN or change.shape[1] < 2 or repeats > SLOWER:
         return np.inf
@@ -271,6 +275,7 @@ def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, 
     for place, channel in sudden:
         if not LASTS <= place + 1 <= len(counts) - LASTS:
             continue
+        # A spike returns; a jump stays. Medians on both sides keep the two apart.
         baseline = np.median(counts[place + 1 - LASTS : place + 1, channel])
         size = float(np.median(counts[place + 1 : place + 1 + LASTS, channel]) - baseline)
         if abs(size) > 0.6 * threshold[channel]:

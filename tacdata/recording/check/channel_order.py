@@ -102,6 +102,7 @@ def fit_answers(sample: Answers, place: np.ndarray | None = None) -> AnswerFit:
     response, squared = sample.response, sample.distance[:, place] ** 2
     gain, pattern, amplitude = np.ones(response.shape[1]), np.zeros_like(response), np.zeros(len(response))
     weight = np.ones_like(response)
+    # Alternating least squares: shapes with given gains, then gains with given shapes, with outliers weighted down.
     for _ in range(ROUNDS):
         for name in np.unique(sample.indenters):
             rows = sample.indenters == name
@@ -134,6 +135,8 @@ def misplaced(sample: Answers) -> dict[int, int]:
     """Return the channels that answer like another taxel, with that taxel; {} with too few presses."""
     if len(sample.response) < PRESSES:
         return {}
+    # A plug that is turned permutes all channels at once. Such orders are tried as a whole, since most channels are
+    # then wrong.
     score = max((likelihood(sample, fit_answers(sample, place).pattern) for place in orders(sample.taxels)), key=_best)
     # A wrong channel spoils the fit that the others are compared with. So channels that fit elsewhere are moved there,
     # and all are tested again.
@@ -179,6 +182,8 @@ def likelihood(sample: Answers, pattern: np.ndarray) -> np.ndarray:
     response, count = sample.response, len(sample.response)
     scale = np.maximum(np.abs(pattern).max(axis=1, keepdims=True), 1e-12)  # deep presses must not outweigh all others
     a, b = response / scale, pattern / scale
+    # Without a floor, channels that answer to nothing fit everywhere without a misfit. 2 % is the error of the pattern
+    # itself.
     floor = count * (np.median(sample.noise / np.median(scale)) ** 2 + 0.02**2)
     power = (a**2).sum(axis=0)[:, None]
     # A gain is positive: answers of the opposite sign explain nothing.
@@ -191,6 +196,7 @@ def gain_steps(sample: Answers) -> dict[int, tuple[int, float]]:
     if len(sample.response) < STEP_PRESSES:
         return {}
     pattern = fit_answers(sample).pattern
+    # Far from a press, noise decides the ratio.
     near = _near(sample, pattern)
     ratio = np.full(pattern.shape, np.nan)
     # A gain is a factor; in logarithms its step is additive.
@@ -230,6 +236,7 @@ def _common(sample: Answers, ratio: np.ndarray) -> np.ndarray:
             use = np.isfinite(ratio) & rows[:, None]
             if use.sum() < 12:
                 continue
+            # A cubic in distance stands for how an indenter's answer deviates from the Gaussian.
             terms = np.stack([np.ones_like(distance), distance, distance**2, distance**3], axis=-1)
             target = (ratio - offsets)[use]
             weight = np.ones(len(target))
@@ -268,6 +275,7 @@ def _step(values: np.ndarray, usual: np.ndarray) -> tuple[int, float] | None:
     (n,).
     """
     best: tuple[float, int, float] | None = None
+    # Each side needs some presses, or one odd press is a step.
     for at in range(SIDE, len(values) - SIDE + 1):
         head, tail = values[:at], values[at:]
         change = float(np.median(tail) - np.median(head))

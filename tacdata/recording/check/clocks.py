@@ -66,6 +66,7 @@ def clock_warnings(clock: dict[str, Any] | None, rate_of_clock: float) -> list[s
         return []
     remarks = []
     drift = clock["drift"]
+    # Only what two standard deviations leave: a short recording knows its rate badly.
     if drift is not None and abs(drift) - 2 * clock["drift_uncertainty"] > DRIFT_PPM:
         remarks.append(
             f"its clock is {drift:+.0f} ppm off its nominal rate (known to {clock['drift_uncertainty']:.0f} ppm): "

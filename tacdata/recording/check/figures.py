@@ -119,6 +119,7 @@ def _cnc(recording: Recording) -> dict[str, Any]:
     stream = recording.episode.cnc
     # A move that was interrupted did not run to its end, so its profile cannot be compared.
     moves = recording.moves if recording.episode.complete else recording.moves[:-1]
+    # Depth matters while the skin is loaded. Elsewhere an uncertain start of a move costs nothing.
     loaded = [move for move in moves if move.command.phase in ("press", "release")]
     slack = [(move.uncertainty_ns + move.contradiction_ns) * 1e-9 * move.profile.peak for move in loaded]
     return {

@@ -119,6 +119,7 @@ def _taxels(figures: RecordingFigures) -> list[Judgement]:
         bad = share > LOST_SHARE or values["longest_gap"] > GAP_MS
         text = f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {values['longest_gap']:.0f} ms"
         judgements.append((UNUSABLE if bad else WARNING, "taxels", text))
+    # A counter that goes up by one across a gap: the board itself paused.
     elif values["longest_gap"] > max(GAP_MS, 2.5 * period):
         judgements.append((UNUSABLE, "taxels", f"a gap of {values['longest_gap']:.0f} ms without a sample"))
     if values["rate"] and abs(values["rate"] / values["nominal_rate"] - 1) > RATE_SHARE:

@@ -60,6 +60,8 @@ def first_contact(figures: RecordingFigures) -> FirstContact | None:
     if not len(inside):
         return None
     counts = episode.taxels.counts
+    # In and out: a delay between the streams shifts one of them deeper and the other shallower, so their mean is free
+    # of it.
     ways = [
         _one_way(depth[: inside[0] + 1], counts[: inside[0] + 1], noise),
         _one_way(depth[inside[-1] :][::-1], counts[inside[-1] :][::-1], noise),
@@ -74,6 +76,7 @@ def first_contact(figures: RecordingFigures) -> FirstContact | None:
 
 def _one_way(depth: np.ndarray, counts: np.ndarray, noise: np.ndarray) -> FirstContact | None:
     """Fit first contact to readings in the order of growing depth."""
+    # Where the tip rests, the skin relaxes: such readings are no function of depth.
     moving = np.concatenate([np.diff(depth) > 1e-4, [True]])
     depth, counts = depth[moving], counts[moving]
     if len(depth) < FEW:
@@ -81,6 +84,7 @@ def _one_way(depth: np.ndarray, counts: np.ndarray, noise: np.ndarray) -> FirstC
     answer = combined(counts, noise)
     beyond = np.flatnonzero(answer > LOW * answer[-3:].mean())
     last = max(int(beyond[0]) + 1 if len(beyond) else len(answer), FEW)
+    # Three standard deviations of the noise of rest.
     begin = np.flatnonzero(answer[:last] < 3.0)
     first = max(int(begin[-1]) - ABOVE, 0) if len(begin) else 0
     fitted = onset(-depth[first:last], answer[first:last])
@@ -110,6 +114,7 @@ def drift_words(contacts: list[tuple[int, FirstContact]]) -> str:
         return ""
     number = np.array([k for k, _ in contacts], float)
     depth = np.array([contact.depth for _, contact in contacts])
+    # The median of all pairs' slopes: single wrong contacts do not turn it.
     slope, intercept, low, high = theilslopes(depth, number, CONFIDENCE)
     total = slope * np.ptp(number)
     # A tool that slipped once is a step, and is reported as such: its line through all presses is no drift.

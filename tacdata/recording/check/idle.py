@@ -29,6 +29,7 @@ def idle_rows(episode: Episode) -> np.ndarray:
     begins, ends = edges[::2], edges[1::2]
     rows = np.zeros(len(time_ns), dtype=bool)
     if len(begins):
+        # A recording usually begins at rest. Later stretches above the skin may still recover from a press.
         first = begins[0] == 0 and ends[0] >= FEWEST
         longest = 0 if first else int(np.argmax(ends - begins))
         rows[begins[longest] : ends[longest]] = True

@@ -148,6 +148,7 @@ def _motion(recording: Recording) -> list[Doubt]:
     elif len(episode.tip_ns) > 1:
         seconds = np.diff(episode.tip_ns) * 1e-9
         way = np.linalg.norm(np.diff(episode.tip, axis=0), axis=1)
+        # The 99th percentile, as one jump between two strokes is no speed.
         usual = float(np.percentile(way[seconds > 0] / seconds[seconds > 0], 99)) if (seconds > 0).any() else 0.0
         if usual > SPEED:
             text = f"the position moves at {usual:.3g} mm/s: its times or its lengths are in another unit"
@@ -181,6 +182,7 @@ def answer(figures: RecordingFigures) -> float | None:
     channels = np.isfinite(noise) & np.isfinite(counts[inside]).any(axis=0) & np.isfinite(counts[away]).any(axis=0)
     if not channels.any():
         return None
+    # Medians of many readings: noise of single ones would count as an answer.
     change = np.abs(np.nanmedian(counts[inside][:, channels], axis=0) - np.nanmedian(counts[away][:, channels], axis=0))
     return float((change / np.maximum(noise[channels], _quantum(counts[:, channels]))).max())
 

@@ -141,6 +141,7 @@ def _weak(entries: list[RecordingFigures]) -> list[Finding]:
         return []
     depths = np.array([entry.recording.episode.press.depth for entry in pressed])
     quantiles = [np.nanquantile(entry.recording.episode.taxels.counts, [0.02, 0.98], axis=0) for entry in pressed]
+    # All channels together: which of them answers depends on the place.
     spans = np.array([float(np.linalg.norm(np.nan_to_num(high - low))) for low, high in quantiles])
     usual = float(np.median(spans))
     weak = np.flatnonzero((spans < WEAK * usual) & (depths > 0.8 * np.median(depths)))

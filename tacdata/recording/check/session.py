@@ -154,6 +154,7 @@ def _not_felt(entries: list[RecordingFigures]) -> list[Finding]:
     ]
     usual = [felt for _, press, felt in responses if felt >= PLAIN * ANSWER]
     felt_from = min((press.depth for _, press, felt in responses if felt >= PLAIN * ANSWER), default=np.inf)
+    # Where most presses are not felt, the sensor is the cause, and that has its own finding.
     if 2 * len(usual) < len(responses):
         return []
     return [
@@ -211,6 +212,7 @@ def _louder(entries: list[RecordingFigures]) -> list[Finding]:
     levels = [(entry, float(np.median(values))) for entry, values in zip(entries, noise, strict=True) if values]
     if len(levels) < FEWEST:
         return []
+    # The quiet quarter as the reference: if half of the recordings are loud, the median is loud, too.
     quiet = max(float(np.percentile([value for _, value in levels], 25)), 0.5)
     return [
         Finding(
@@ -246,6 +248,7 @@ def _offsets(entries: list[RecordingFigures], sample: Answers) -> list[str]:
     change = np.diff(idle, axis=0)
     rows = np.isfinite(change).any(axis=1)
     shared = np.zeros(len(change))
+    # Warmth and supply move all channels together; that is no fault of one.
     shared[rows] = np.nanmedian(change[rows], axis=1)
     excess = np.nan_to_num(change - shared[:, None])
     limit = np.maximum(OFFSET * sample.noise, OFFSET_SHARE * np.abs(sample.response).max(axis=0))

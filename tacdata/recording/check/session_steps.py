@@ -108,6 +108,7 @@ def strength_step(entries: list[RecordingFigures], sample: Answers) -> StepSearc
     rows = np.flatnonzero(amplitude > 0)
     if len(rows) < 2:
         return StepSearch(None, np.inf)
+    # Answers grow by a power of depth, which is a line in logarithms; the square allows for saturation.
     depth = np.log([presses[k].depth for k in rows])
     explained = np.column_stack([_explained([presses[k] for k in rows]), depth, depth**2])
     return _back(find_step(explained, np.log(amplitude[rows])[:, None], STRONGER), rows)

@@ -97,6 +97,7 @@ class _Stretch:
     def add(self, point: Point) -> None:
         if not self.frames:
             self.origin = point
+        # Blocks let the fit forget: a crystal drifts with temperature over hours.
         if not self.blocks or point[1] - self.blocks[-1].begin_ns > BLOCK_NS:
             self._begin_block(point)
         self.blocks[-1].add(point, self.origin)
@@ -147,6 +148,7 @@ class _Stretch:
         estimate = self._free_line()
         if estimate is None or self.nominal_ns is None:
             return estimate
+        # A short recording bounds the slope worse than a crystal's tolerance does.
         slope = min(max(estimate[2], self.nominal_ns * (1 - CRYSTAL)), self.nominal_ns * (1 + CRYSTAL))
         deviation = abs(slope - estimate[2])
         if deviation == 0 or deviation > self.nominal_ns * 2 * self.uncertainty_ns() / self.span_ns:
@@ -158,6 +160,8 @@ class _Stretch:
         hull = self.hull
         if len(hull) < 2:
             return None
+        # The hull's edge below the mean of the counters is the line that minimizes the sum of latencies (a linear
+        # programme).
         mean = self.origin[0] + self._total / self._count
         edge = next((i for i in range(1, len(hull) - 1) if hull[i][0] >= mean), len(hull) - 1)
         (x1, y1), (x2, y2) = hull[edge - 1], hull[edge]
@@ -236,8 +240,10 @@ class EnvelopeFit:
         if counter < 0:
             return
         stretch, last = self._stretch, self._late[-1] if self._late else self._stretch.last
+        # A repeated counter carries no time.
         if counter == last[0]:
             return
+        # A device that was reset begins a line of its own, without a common origin.
         if counter < last[0]:
             self._begin([(counter, arrival_ns)])
             return

@@ -52,6 +52,7 @@ def exposure_stamps(arrival_ns: np.ndarray, device_ns: np.ndarray, rate: float |
     stamps, arrivals = np.diff(device_ns[order]).astype(float), np.diff(arrival_ns[order]).astype(float)
     usual = float(np.median(stamps))
     between = (arrival_ns[-1] - arrival_ns[0]) / (len(arrival_ns) - 1)
+    # Stamps given when a batch is fetched come in bunches, much closer than exposures can be.
     shortest = BUNCHED * min([between, *([1e9 / rate] if rate else [])])
     if not SAME_UNIT[0] < usual / max(float(np.median(arrivals)), 1.0) < SAME_UNIT[1]:
         # Batches also have a median interval of nearly nothing: both, then, are not of exposures.

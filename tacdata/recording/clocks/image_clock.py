@@ -132,6 +132,7 @@ def _stamped(
         # The recorder's clock may know images before this recording that were less late. Its line takes stamps as they
         # come, so a step or an exchange bends it.
         known = _earlier(model, arrival[rows], device[rows], above) if believed else []
+        # The least late image of a stretch counts as on time: nothing is known of a delay that all images share.
         late[rows] = above - min([float(above.min()), *known])
         unsure[rows] = np.hypot(_unsure(arrival[rows], late[rows]), np.hypot(UNSURE_NS, bend))
     lateness, spread = np.zeros(len(arrival)), np.zeros(len(arrival))
@@ -220,6 +221,7 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
     rng = np.random.default_rng(0)
     first = rng.integers(0, len(begun), PAIRS)
     second = np.clip(first + rng.integers(4, max(len(begun) // NEAR, 6), PAIRS), 0, len(begun) - 1)
+    # Differences of random pairs: lateness of single images spreads the turns, and leaves their maximum at the period.
     pairs = begun[second] - begun[first]
 
     def agreeing(periods: np.ndarray, shift: float = 0.0) -> np.ndarray:

@@ -36,6 +36,7 @@ class StreamClock:
         """
         if counter >= 0:
             self._fit.add(arrival_ns, counter)
+            # A fit costs more than an arrival, and the line changes slowly.
             if self.frames % REFIT == 0 or self._line is None:
                 self._line = self._fit.line()
                 if self.axis == "order":  # only numbers given on arrival may not fit a line
@@ -61,6 +62,7 @@ class StreamClock:
         self._was_steady = self._steady
         line = self._fit.line()
         if latency is not None and line is not None:
+            # A latency measured against a line that is later found lower has to follow it, or sample times would jump.
             counter = max(self._fit.last_counter - round(TAP_MIDDLE_NS / line[2]), line[0])
             self._measured = latency, counter, _at(line, counter)
 

@@ -89,6 +89,7 @@ def _stream(
     position, quaternion = np.full((len(views), 3), np.nan), np.full((len(views), 4), np.nan)
     covariance = np.full((len(views), 6, 6), np.nan)
     for row, view in enumerate(views):
+        # A message's sequence has 32 bits in MCAP.
         pose = poses.get(view.sequence & 0xFFFFFFFF)
         if pose is not None:
             p, q = pose.position, pose.orientation

@@ -32,6 +32,7 @@ class ChunkedFile:
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
+            # Exclusive creation, by the system: two recorders cannot take one file.
             self._stream = host.create(path)
         except FileExistsError:
             raise UsageError(

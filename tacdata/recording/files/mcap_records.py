@@ -122,6 +122,7 @@ def take(
         entries = [_parsed(*block.record(k)) for k in block.others()]
         named = {entry.id: entry.topic for entry in entries if isinstance(entry, Channel)}
         cameras = {} if images else _cameras(records, named)
+        # Before anything of the chunk is taken: a chunk counts as a whole or not at all.
         heads, data = block.messages(cameras)
     except Exception as error:  # a record's own fields may be damaged in any way
         records.damage.append(f"a damaged chunk is left out ({type(error).__name__})")
@@ -309,6 +310,7 @@ def _skip_to_chunk(stream: IO[bytes], at: int, size: int, damage: list[str]) -> 
         head = stream.read(HEAD)
         length = int.from_bytes(head[1:], "little")
         try:
+            # Its checksum decides whether these bytes are a chunk.
             breakup_chunk(Chunk.read(ReadDataStream(BytesIO(stream.read(length)))), validate_crc=True)
         except Exception:  # most candidates are no chunks
             continue

@@ -113,6 +113,7 @@ def _recording(records: Records) -> Recording:
     sensor = Sensor.from_document(_attachment(records, "sensor.json"), f"{records.path}: sensor.json")
     rig, controller = _attachment(records, "rig.json"), _attachment(records, "controller.json")
     end = records.metadata.get("episode", {})
+    # A file is never complete by its own word alone: damage can lie in what it does not know of.
     complete = bool(json.loads(end.get("complete", "false"))) and not records.damage
     # The path is computed, not measured: commands say where, reports and acknowledgements say when.
     statuses = _statuses(records)
@@ -225,6 +226,7 @@ def _fitted(records: Records, frames: TaxelFrames, stream: str, rate: float) -> 
     else:
         arrival, sequence, device = image_stamps(records, stream.removeprefix("camera "))
         on_device = len(device) > 0 and bool((device >= 0).all())
+        # An image without a stamp has only the number that it was given on arrival.
         model = fit(arrival, device if on_device else sequence, "device_ns" if on_device else "order", rate)
     return model.with_latency(StreamLatency.from_document(latency)) if model and latency else model
 

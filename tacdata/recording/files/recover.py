@@ -74,6 +74,7 @@ def recover(path: Path, target: Path | None = None) -> Recovered:
             _Copy(Writer(stream, compression=CompressionType.ZSTD), result).run(path)
         if not result.messages:
             raise _nothing(path, result)
+        # Before success is reported: a disk may have kept less than it was given.
         _read_back(result)
     except OSError as error:
         target.unlink(missing_ok=True)

@@ -178,6 +178,8 @@ class EpisodeWriter:
         data = message.SerializeToString()
         with self._lock:
             self._taken += len(data)
+            # A disk that is too slow would fill the memory until the system kills the recorder, and with it the last
+            # second.
             waiting = self._taken - self._written
         if self._failure is None and waiting > WAITING:
             self._failure = OSError(f"the disk is slower than the streams: {waiting / 1e6:.0f} MB wait to be written")
@@ -276,8 +278,10 @@ class EpisodeWriter:
         Raises:
             DeviceError: If the disk refused something; the message names the file that holds the data so far.
         """
+        # Behind all that waits: the thread writes everything before it ends.
         self._queue.put(None)
         self._thread.join()
+        # Only a complete recording gets the name of an episode.
         target = self.path if complete and self._failure is None else file_names.next_interrupted(self.path)
         try:
             if self._failure is not None:

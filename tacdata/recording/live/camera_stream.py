@@ -57,9 +57,11 @@ class CameraStream:
             DeviceError: If the image is not a valid picture.
         """
         if sink:
+            # A camera's own JPEG is kept as it is: compressing again costs time and detail.
             jpeg = frame.jpeg or self._jpeg(frame)
             sink.image(self.name, frame.arrival_ns, sample_ns, frame.sequence, jpeg, frame.device_ns)
         self.collect(0.0)
+        # One search at a time. Images that come meanwhile are stored without a pose.
         if self._detect is not None and self._search is None and (sink or not self._asked):
             search = self._detect(frame.image, self._intrinsics, self._fingers or self._cube, self._last)
             self._search, self._asked = (search, frame, sample_ns, sink), True
@@ -72,8 +74,10 @@ class CameraStream:
         before, self._image = self._image, (frame.jpeg, frame.image)
         if before is None:
             return True
+        # Equal bytes: two exposures of a live camera differ by noise.
         same = frame.jpeg == before[0] if frame.jpeg else np.array_equal(frame.image, before[1])
         self._changes += not same
+        # A camera in the dark or with a static test picture never differed, so repeats prove nothing.
         self.is_frozen = bool(same) and self._changes >= LIVED
         return not self.is_frozen
 

@@ -207,6 +207,7 @@ class DeviceStreams(ABC):
                 for frame in frames:
                     counter = frame.device_ns if clock.axis == "device_ns" else frame.counter
                     sample_ns = clock.take(frame.arrival_ns, counter)
+                    # Frames that waited in a buffer since the press before belong to that one.
                     if self._sink and frame.arrival_ns >= self._sink.begun_ns:
                         self._sink.taxels(frame, sample_ns, name)
                 if self._feed and frames:

@@ -97,6 +97,7 @@ class GuardedMotion:
         if self._state:
             self._state.moving()
         failure, host = list[BaseException](), self._clock.host
+        # Motion has a thread of its own, so that this one watches the streams while a move blocks.
         work = self._clock.host.thread(self._carry_out, "motion", (path, start, writer, failure))
         self._allowed.stand(start, self._clock.now_ns())
         self._at = None
@@ -105,6 +106,7 @@ class GuardedMotion:
             looked = host.monotonic()
             while work.is_alive():
                 work.join(WATCH)
+                # A suspended computer wakes up in mid-move, with reports that are old.
                 looked = _look_again(looked, host.monotonic())
                 self._interruption.check()
                 if streams.fault:
@@ -155,11 +157,14 @@ class GuardedMotion:
         """Empty the controller's queue, and take its position, or why that is unknown."""
         self._rest = None
         try:
+            # A feed hold alone keeps the queue: the next command would first run what was stopped.
             self._rest = self._cnc.abandon()
         except TacdataError as error:
             self._why, self._still = error.given, isinstance(error, StandsStill)
             self._stands = error.at if isinstance(error, StandsStill) else None
         else:
+            # A place that cannot be reached in the time since is a damaged report, or a controller that lost its count.
+            # A lift from there could go anywhere.
             if why := self._allowed.out_of_reach(self._rest, self._clock.now_ns()):
                 self._rest, self._why, self._still = None, why, True
                 self._cnc.lose_position(why)
@@ -192,6 +197,7 @@ class GuardedMotion:
                     times = done.sent_ns, done.acknowledged_ns
                     ends = np.array(origin, float), np.array(position, float)
                     writer.motion(Command(phase, *ends, step.speed, step.seconds, *times, done.line))
+            # An acknowledged line is only queued.
             self._cnc.wait_idle(MARGIN)
             self._allowed.rested(self._clock.now_ns())
         except BaseException as error:  # handed to the watching thread, which raises it
@@ -213,6 +219,7 @@ class GuardedMotion:
         if self._rest is None:
             return f"the indenter was not lifted ({self._why}){self._advice}"
         begun = self._rest[2]
+        # A damaged line ends a lift, not the need for it. Each attempt begins from rest.
         for attempt in range(1, LIFTS + 1):
             try:
                 reached = self._rise_to(height, speed)
@@ -234,6 +241,7 @@ class GuardedMotion:
         the way, so the end is compared with the wanted height.
         """
         x, y, z = start = self._rest or (np.nan, np.nan, np.inf)
+        # Never downwards: a lift that goes down would press.
         if z >= height:
             return start
         self._rising, speed = height, min(speed, LIFT_SPEED)
@@ -242,6 +250,7 @@ class GuardedMotion:
         self._cnc.rise((x, y, height), speed)
         self._cnc.wait_idle(MARGIN + (height - z) / speed)
         reached = self._cnc.reported or (x, y, height)
+        # An answer says that a line was read, not that the digits arrived whole.
         if self._allowed.is_short((x, y, height), reached):
             raise DeviceError(
                 f"the lift ended at {_text(reached)} mm, not at {_text((x, y, height))} mm",

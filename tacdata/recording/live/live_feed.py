@@ -38,6 +38,7 @@ class LiveFeed:
 
     def _offer(self, kind: str, stream: str, arrival_ns: int, value: Any) -> None:
         instant = time.monotonic()
+        # Samples are dropped, not queued: a slow viewer must cost the recorder nothing.
         if self._watch is None or instant - self._shown.get(stream, 0.0) < 1 / RATE[kind]:
             return
         self._shown[stream] = instant

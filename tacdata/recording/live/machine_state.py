@@ -148,6 +148,7 @@ class MachineState:
     def _is_ours(self, record: dict[str, Any]) -> bool:
         if not record or record["controller"] != self._identity:
             return False
+        # Ports are renumbered when boards are plugged in again, so either name may be the constant one.
         if record["port"] == self._port or record.get("name") == self._name:
             return True
         # Some makers give all boards one serial number: one that is on the other port now is another machine's.

@@ -79,6 +79,8 @@ class ReadingHealth:
             return ""
         if len(counts) > 1 and (np.all(counts <= self._limits[0]) or np.all(counts >= self._limits[1])):
             return f"all {len(counts)} channels have read {counts[0]:g} counts, their limit, for {lasted:.1f} s"
+        # A coarse board repeats frames at rest by rounding. Only a repetition far longer than any before is a frozen
+        # one.
         if self._changes >= CHANGES and self._same >= RARE * max(self._longest, 1):
             return f"no channel has changed for {lasted:.1f} s: the board repeats one frame"
         return ""
@@ -100,6 +102,7 @@ class ReadingHealth:
         if self._first_rate is None:
             self._first_rate = min(rate, self._rate) if self._rate else rate
         self._low = self._low + 1 if rate < SLOW * self._first_rate else 0
+        # Once may be a busy moment of this computer.
         if self._low < 2:
             return ""
         return f"frames come at {rate:.3g} Hz, no longer at {self._first_rate:.3g} Hz"

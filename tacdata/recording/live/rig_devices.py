@@ -29,6 +29,7 @@ class RigDevices:
             UsageError: If controller and board are on one port.
         """
         ports = rig.cnc.get("port"), rig.board.get("port")
+        # By the real path: links in /dev/serial/by-id name the same port.
         if ports[0] and ports[1] and os.path.realpath(ports[0]) == os.path.realpath(ports[1]):
             same = ports[0] if ports[0] == ports[1] else f"{ports[0]} and {ports[1]}, which are one"
             raise UsageError(

@@ -155,6 +155,7 @@ class RigStreams(DeviceStreams):
         for frame in frames:
             words = self._health.take(frame.arrival_ns, frame.counts)
             if words and self._on_bad_readings:
+                # Afresh: the same frozen frame must not be reported at every arrival.
                 self._health = self._health_of()
                 if frame.arrival_ns < self._quiet_until_ns:
                     continue

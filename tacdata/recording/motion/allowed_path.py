@@ -118,6 +118,7 @@ class AllowedPath:
     def off(self, status: CncStatus) -> DeviceError | None:
         """Return the fault of a reported position, or None."""
         with self._lock:
+            # An answer may belong to the query before, so the earlier of the two bounds the report's age.
             asked_ns, self._asked_ns = min(self._asked_ns, status.sent_ns), status.sent_ns
             sent = [leg for leg in self._legs if leg.sent_ns <= status.arrival_ns] or self._legs[:1]
         if not sent or asked_ns < self._since_ns:
@@ -128,6 +129,7 @@ class AllowedPath:
         nearest, distance, laggard = None, np.inf, None
         for leg in legs:
             deviation, is_ahead = self._distance(leg, asked_ns, status)
+            # One move that explains the report is enough: the guide may be in any of those sent.
             if deviation <= self._tolerance and not is_ahead:
                 if not self._is_behind(leg, asked_ns, status):
                     self._seen = status
@@ -201,6 +203,7 @@ class AllowedPath:
             return float(np.linalg.norm(position - profile.target)), False
         progress = min(max(float(profile.progress(position[None])[0]), 0.0), profile.length)
         on = profile.start + progress / profile.length * (profile.target - profile.start)
+        # The earliest start is when the line was sent; a controller may also be a little faster than its settings.
         since = EARLY[0] * (status.arrival_ns - leg.sent_ns) * 1e-9 + EARLY[1]
         is_ahead = progress > float(profile.distance(np.array([since]))[0]) + self._tolerance
         return float(np.linalg.norm(position - on)), is_ahead

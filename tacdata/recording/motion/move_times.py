@@ -150,6 +150,8 @@ def _anchor_move(
     if profile.length:
         lower_bounds, upper_bounds = _report_bounds(profile, command, following, statuses, resolution)
         earliest, latest = earliest + lower_bounds, latest + upper_bounds
+    # Every bound is hard, so their intersection is, too. An empty one means that reports contradict the profile; half
+    # of the conflict is then the uncertainty.
     low, high = max(earliest), min(latest)
     if low > high:
         return AnchoredMove(command, profile, (low + high) // 2, (low - high) // 2, low - high)
@@ -167,6 +169,7 @@ def _report_bounds(
     sent, arrival = statuses.sent_ns[mask], statuses.stream.arrival_ns[mask]
     progress = profile.progress(statuses.stream.position[mask])
     direction = np.abs(profile.target - profile.start) / profile.length
+    # A report is rounded, and Grbl plans in segments, whose corners cut the ramps by this much.
     margin = float(direction @ resolution) + profile.acceleration * min(SEGMENT**2 / 8, profile.ramp**2 / 2)
     # A report at rest before the move bounds no latest start, and one at its end no earliest start.
     has_begun, unfinished = progress > margin, progress < profile.length - margin

@@ -38,6 +38,7 @@ def plan_time(plan: Plan, limits: AxisLimits = USUAL_LIMITS) -> PlanTime:
     seconds, position, place = [], None, Registration((0.0, 0.0, 0.0), 0.0)
     for press in plan.presses:
         path = steps(press, plan.motion, place)
+        # Where the guide will be at the start is not known yet.
         start: Position = position or path[0].target or (0.0, 0.0, 0.0)
         needed, position = duration(path, start, limits)
         seconds.append(needed + SECONDS_PER_PRESS)

@@ -54,10 +54,13 @@ def steps(press: Press, motion: MotionSettings, registration: Registration) -> t
     pause = motion.rest if press.rest is None else press.rest
     x, y = (c + motion.run_up * step for c, step in zip((press.x, press.y), SIDES[press.approach_from], strict=True))
     path = [Step("", registration.to_machine(x, y, -motion.clearance), motion.travel_speed)]
+    # A pause is answered when it ends, so it dates the end of the move before it. Without one, queued moves would have
+    # no times.
     path += [Step("rest", seconds=max(pause, SYNC))]
     if press.approach_from:
         path += [Step("approach", above, motion.travel_speed), Step("approach", seconds=SYNC)]
     path += [Step("approach", standoff, motion.approach_speed), Step("approach", seconds=SYNC)]
+    # Deeper first: the last way to the target is then out of the skin, and friction acts the other way.
     if press.overshoot:
         beyond = registration.to_machine(press.x, press.y, press.deepest)
         path += [Step("press", beyond, press.speed), Step("press", seconds=SYNC)]

@@ -53,6 +53,7 @@ def steps(tap: Press, plan: Plan, registration: Registration) -> tuple[Step, ...
     )
     path = [Step("", above, motion.travel_speed), Step("rest", seconds=max(motion.rest, 1.0))]
     for number, speed in enumerate(TOUCHES):
+        # Pauses of different lengths: with equal ones a delay of one period would match as well.
         path += [Step("rest", seconds=APART[0] + APART[1] * (number % 5))]
         if speed == SLOW:
             path += [Step("approach", near, motion.approach_speed), Step("approach", seconds=SYNC)]

@@ -148,6 +148,7 @@ def _signal(sample_ns: np.ndarray, counts: np.ndarray, moves: list[AnchoredMove]
         mask = (sample_ns > move.end_ns) & (sample_ns < move.end_ns + round(RANGE[1] * 1e9))
         if mask.any():
             answers.append(counts[mask].max(axis=0, initial=-np.inf) - baseline)
+    # Matched filter: channels count by answer over variance.
     weight = np.median(answers, axis=0) / noise**2 if answers else np.zeros(counts.shape[1])
     weight = np.where(bad | (weight < 0), 0.0, weight)
     scale = max(float(np.sqrt(np.sum((weight * noise) ** 2))), 1e-12)
@@ -180,6 +181,8 @@ def _loading(touch: _Touch, delay: float) -> np.ndarray:
 def _match(slow: list[_Touch], quick: list[_Touch], origin: float, delay: float) -> float:
     """Return the latency [s] at which quick touches follow the slow ones' curve."""
     for _ in range(6):
+        # Slow touches give the signal over depth, as a delay costs them little depth. Quick ones follow the same curve
+        # when shifted rightly.
         curve = _curve(slow, origin, delay)
         inside = [_loading(touch, delay) for touch in quick]
         times = [_Touch(t.move, t.time[i], t.signal[i]) for t, i in zip(quick, inside, strict=True)]
@@ -190,6 +193,7 @@ def _match(slow: list[_Touch], quick: list[_Touch], origin: float, delay: float)
             return values[1] * curve(depth) - signal
 
         scale = 0.05 * np.abs(signal).max() + 3.0
+        # A free factor: at ten times the speed the skin is stiffer.
         fitted = least_squares(residual, [delay, 1.0], loss="soft_l1", f_scale=scale, x_scale=[1e-3, 0.1])
         change, delay = abs(float(fitted.x[0]) - delay), float(fitted.x[0])
         if change < 2e-5:
@@ -215,6 +219,7 @@ def _curve(slow: list[_Touch], origin: float, delay: float) -> Callable[[np.ndar
     slope = float(spline.derivative()(deepest))
 
     def curve(at: np.ndarray) -> np.ndarray:
+        # Quick touches may go deeper than slow ones by the delay; the curve goes on straight.
         beyond = np.maximum(at - deepest, 0.0) * slope
         return np.where(at < low, 0.0, spline(np.clip(at, low, deepest)) + beyond)
 
