@@ -101,6 +101,7 @@ class SkinModel:
     def identity(self) -> dict[str, str]:
         """Everything that decides a result: hashes of sensor, mesh and code, and the settings."""
         estimated = self.settings.error_estimate
+        # The companion decides the stated error, and starts of loading: another one gives other bits.
         coarse = {"companion": self.companion.mesh.content_hash} if estimated and self.companion else {}
         return {
             "sensor": self.sensor.content_hash,
@@ -217,6 +218,7 @@ class SkinModel:
         """
         rows: dict[int, list[Equilibrium]] = {number: [] for number in range(len(requests))}
         began = time.perf_counter()
+        # Before the fine mesh, whose loading starts from its states.
         companions = coarse or self._coarsely(requests, capacity, keep=False)
         for number, _, state in self.states_many(requests, capacity, coarse=companions):
             if isinstance(state, SolveError):

@@ -145,6 +145,7 @@ class AdhesiveSurface(ContactSurface):
         self._law = adhesion.law
         self._adhesion = filled(
             AdhesionData,
+            # Work of adhesion is the area under the curve of traction over gap, so its height is work over range.
             strength=adhesion.work * _PER_MM / adhesion.range,
             length=adhesion.range,
             reach=load_adhesion_law(adhesion.law).reach,

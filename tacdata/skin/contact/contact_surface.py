@@ -71,6 +71,8 @@ class ContactSurface:
         self.faces, self.distances, self.device = faces, dict(distances), str(nodes.device)
         self.rough, self.activation, self.flat = frictional, activation, flat
         self.weights, self.shapes = face_quadrature(nodes, faces, SUBDIVISIONS)
+        # Linear hats carry the multipliers of quadratic faces: with quadratic ones, pressures at corners have no
+        # positive weight.
         at_points = elements.triangle_hats(elements.triangle_quadrature(SUBDIVISIONS)[0])
         self.mortar = Mortar(
             faces.cpu().numpy(),
@@ -123,6 +125,7 @@ class ContactSurface:
     def by_shape(self, conditions: Conditions) -> Iterator[tuple[wp.Function, torch.Tensor]]:
         """Yield each shape's distance function and its members, by index, shape (k,), int32."""
         everyone = torch.arange(len(conditions.shape), dtype=torch.int32, device=conditions.shape.device)
+        # A kernel is compiled for one shape, so a batch of mixed indenters is launched shape by shape.
         if len(self.distances) == 1:
             yield self.only, everyone
             return
@@ -169,6 +172,8 @@ class ContactSurface:
         count, b = self.count, u.shape[2]
         members = kernel_data.member_data(conditions, pose)
         pressed, place = list(self.by_shape(conditions)), self._mean_place(u, conditions)
+        # The active set of a semismooth Newton method: a node is active where pressure less activation times gap is
+        # positive.
         gap = self._gaps(u, place, pose, members, pressed)
         c = self.activation * conditions.modulus
         # The shift by ``near`` adds close nodes at the start of a load step, while their pressures are unknown (0019).
@@ -176,6 +181,7 @@ class ContactSurface:
         pressure = torch.where(active, multiplier, 0.0)
         nodal, normal = torch.zeros_like(total), self._zeros(u, 3)
         points = (0, 0) if self.flat else tuple(self.weights.shape)
+        # Normals turn as the face moves. Above a plane they do not, and the term is left out.
         turn = torch.zeros(*points, 6, b, dtype=torch.float32, device=u.device)
         for distance, chosen in pressed:
             wp.launch(

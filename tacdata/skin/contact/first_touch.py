@@ -43,6 +43,7 @@ def rise(indenter: Indenter, turn: np.ndarray) -> float:
         turn: Rotation to the sensor's frame, shape (3, 3).
     """
     lateral, up = turn[2, :2], turn[2, 2]
+    # An upright shape has its origin at its lowest point by definition.
     if not np.abs(lateral).max() > 1e-12:
         return 0.0
     half, center, best = indenter.extent, np.zeros(2), 0.0
@@ -92,6 +93,7 @@ def reach(sensor: Sensor, request: PressRequest) -> tuple[float, float]:
         for k, (c, h) in enumerate(((request.x, skin.size_x), (request.y, skin.size_y)))
     ]
     height = float(skin.outer_height(request.x, request.y))
+    # Depth counts from first touch, which for a leaning shape is not at its origin.
     bottom = height + rise(request.indenter, turn) - deepest
     within = bottom + place[2] <= skin.outer_height(*heights)
     if not within.any():

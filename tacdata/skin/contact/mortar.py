@@ -91,8 +91,11 @@ class Mortar:
         matrix = sp.csr_matrix(sp.coo_matrix((local.ravel(), (rows, columns)), shape=(len(self.nodes), nodes)))
         self.area = np.asarray(matrix.sum(axis=1), dtype=np.float64).ravel()
         """Area of each hat, undeformed [mm^2], shape (s,)."""
+        # Means, not values at nodes: a gap at a mid-side node alone would let corners pass into the shape.
         self.mean = sp.csr_matrix(sp.diags_array(1 / self.area) @ matrix)
         """Mean over each hat of a field on the mesh's nodes [1], shape (s, n)."""
+        # The transpose spreads forces so that their work equals that of the means: the tangent stays symmetric without
+        # friction.
         back = sp.csr_matrix(self.mean.T)[self.nodes]
         self._down = _Rows(self.mean, np.arange(len(self.nodes)), device)
         self._up = _Rows(back, self.nodes, device)

@@ -59,6 +59,7 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
         abs(place) + half - size / 2
         for place, half, size in zip((request.x, request.y), (half_x, half_y), (skin.size_x, skin.size_y), strict=True)
     ]
+    # Beyond a bonded rim the shape would press the frame, which the model does not have.
     if "sides" in sensor.contact.bonded and max(excess) > 0 and max(request.depths) > 0:
         raise SolveError(
             f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm, {max(request.depths):g} mm deep, reaches "

@@ -47,6 +47,7 @@ class Bonding:
         self._nodes, place = np.unique(faces, return_inverse=True)
         place, count = place.reshape(faces.shape), len(self._nodes)
         rows, columns = np.repeat(place, 6, axis=1).ravel(), np.tile(place, (1, 6)).ravel()
+        # Reactions at nodes are integrals over hats; the mass matrix turns them into tractions.
         mass = sp.csc_matrix(sp.coo_matrix((local.ravel(), (rows, columns)), shape=(count, count)))
         self._solve = splu(mass).solve if count else None
 

@@ -106,6 +106,7 @@ def contact_change(
     # A thicker slab lifts everything above z = 0.
     displacement[:, 2] += wp.to_torch(surface.data.nodes)[:, 2:].clamp_min(0.0) * change.conditions.thickness[:c]
     forces = point.now
+    # The status of nodes is held fixed. At a state where a node just opens the derivative is one-sided.
     active = forces.tangent.active
     pressure = torch.where(active[:, :c], pressure, 0.0)
     members, d_members = member_data(conditions, point.pose), member_data(change.conditions, change.pose)

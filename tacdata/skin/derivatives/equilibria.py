@@ -180,6 +180,7 @@ class PathDerivatives:
         pressures = [torch.zeros_like(contact.pressure) for contact in forces]
         if not self._history:
             self.du = torch.zeros_like(point.at.u)
+            # Before first touch nothing has slipped, so no parameter has changed any history.
             self._history = tuple(history.zeros() for history in point.at.histories)
         else:
             turns = [pose.turn for pose in full_tangent.poses]
@@ -244,6 +245,7 @@ class PathDerivatives:
             for forces, change in zip(point.now, self.changes, strict=True)
         ]
         guess = point.joined(self.du * unfixed, guesses)
+        # All parameters at once: their solutions share most of their directions (decision 0015).
         solution = KrylovSpace(product, precondition).solve(rhs, guess, self._tolerance, weight=self._weight)
         du, pressures = point.parted(solution.x)
         self.du, self.products = du + slack, self.products + solution.products
@@ -276,6 +278,7 @@ class PathDerivatives:
             )
             for e in (step, -step)
         ]
+        # Differences in place of a derivative by each law's numbers: a new law needs no further code.
         upper, lower = (self._newton.body.internal_force(u, end)[0] for end in ends)
         change[:, :, moves] = (upper - lower) / (2 * step)
         return change

@@ -177,6 +177,7 @@ def _difference(numbers: Callable[[float], tuple[float, ...]], value: float, ste
         try:
             ends.append((sign, np.array(numbers(value + sign * step))))
         except FormatError:
+            # At the end of the range the value itself serves, and the difference is one-sided.
             ends.append((0.0, np.array(numbers(value))))
     (high, upper), (low, lower) = ends
     # Neither way is allowed: the law's error is raised again, as it says why.

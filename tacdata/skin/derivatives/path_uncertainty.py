@@ -136,6 +136,8 @@ def _first_order(
     found_by = sensitivities(model, request, list(spreads), _TOLERANCE, passages, list(spreads.values()))
     for depth, state, sensitivity in found_by:
         steep = _STEEPER * max(_slope(model, state.displacement), 0.5)
+        # Where the map changes by more than the geometry allows, a contact is about to jump: no first order holds
+        # there.
         limits = {"x": steep, "y": steep, "z": _STEEPER, "thickness": _STEEPER}
         for name, limit in limits.items():
             if name not in spreads or depth <= 0:
@@ -169,6 +171,7 @@ def _sampled(model: SkinModel, request: PressRequest, spreads: dict[str, float])
 
 def _along(depth: np.ndarray, spread: _Found) -> dict[str, np.ndarray]:
     """Return the standard deviations at all states [mm or N], between those of loading linearly in depth, 0 at 0."""
+    # Unloading states take the deviations of loading at the same depth: they differ by friction alone.
     known_at = np.array([0.0, *(at for at, _ in spread)])
     upper = np.clip(np.searchsorted(known_at, depth - 1e-9), 1, len(known_at) - 1)
     share = np.clip((depth - known_at[upper - 1]) / (known_at[upper] - known_at[upper - 1]), 0.0, 1.0)

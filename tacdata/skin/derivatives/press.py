@@ -164,6 +164,7 @@ class _Reader:
         rise = self._nodes[:, 2].clamp_min(0.0)
         moves = du.clone()
         moves[:, 2] += rise[:, None] * thickness
+        # The map has kinks between triangles. A step of the skin's own scale averages over them.
         step = _MAP_STEP / moves.abs().amax(dim=(0, 1)).clamp_min(1e-30)
         base = torch.as_tensor(state.displacement, device=du.device)[:, :, None]
         maps = self._raster.depth(torch.cat([base + step * moves, base - step * moves], dim=2))

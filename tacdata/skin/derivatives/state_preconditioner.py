@@ -79,6 +79,7 @@ class StatePreconditioner:
     ) -> tuple[torch.Tensor, torch.Tensor]:
         used = torch.zeros(self._count, dtype=torch.bool, device=self._rows.device)
         used[self._rows] = True
+        # Rows of the table are shared by all presses on the mesh.
         compliance = self._rest.table(used)[self._rows[:, None], self._rows].to(torch.float64)
         # Q^T C Q; C is symmetric, so that the sparse factor can stay on the left.
         projected = self._along @ (self._along @ compliance).T

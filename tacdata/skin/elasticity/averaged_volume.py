@@ -75,6 +75,7 @@ class AveragedVolume:
         tets = tets.reshape(-1, 4)
         # Two matrices, as only the slab's volume scales with a member's thickness; the kernel adds them.
         mass = [corner_mass(tets, weights * part[:, None], self.corners) for part in (~slab, slab)]
+        # Absolute values, so that entries that cancel in the sum keep their place.
         pattern = sp.csr_matrix(sum(abs(m) for m in mass) + sp.identity(self.corners, format="csr") * 0)
         pattern.sort_indices()
         values = [_on_pattern(m, pattern) for m in mass]

@@ -163,6 +163,8 @@ class Elasticity:
 
     def _launch(self, name: str, fields: tuple[torch.Tensor, ...], conditions: Conditions, *out: torch.Tensor) -> None:
         real = REAL[fields[0].dtype]
+        # Forces are computed in double precision, products with the tangent in single: Newton's method corrects their
+        # rounding.
         material = conditions.to(fields[0].dtype)
         constants = filled(
             constant_data(real), law=material.law, modulus=material.modulus, thickness=material.thickness

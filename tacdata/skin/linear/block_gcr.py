@@ -116,6 +116,8 @@ class KrylovSpace:
             start = self._count
             # Directions of earlier blocks come first: they cost no product with the matrix.
             if start:
+                # The stored products are orthonormal, so a projection gives the best part of the solution in their
+                # span.
                 share = self._w[:start] @ remainder
                 solution += self._z[:start].T @ share
                 remainder = remainder - self._w[:start].T @ share
@@ -144,6 +146,7 @@ class KrylovSpace:
                 w = w - self._w[: self._count].T @ share
                 # Each operation on w is repeated on z, so that w = A z holds.
                 z = z - self._z[: self._count].T @ share
+            # By eigenvalues, not by Gram and Schmidt: new directions of one block may be nearly the same.
             squares, turn = torch.linalg.eigh((w.T @ w).to(torch.float64))
             independent = squares > (_INDEPENDENT * longest) ** 2
             mix = (turn[:, independent] / squares[independent].sqrt()).to(torch.float32)
@@ -152,6 +155,7 @@ class KrylovSpace:
 
     def _append(self, z: torch.Tensor, w: torch.Tensor) -> None:
         more = len(w)
+        # A full space is begun again rather than thinned: what it gave is in the solution already.
         if not len(self._w) or self._count + more > self._most:
             self._z = torch.empty(self._most, w.shape[1], dtype=torch.float32, device=w.device)
             self._w, self._count = torch.empty_like(self._z), 0

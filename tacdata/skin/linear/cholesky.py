@@ -77,6 +77,8 @@ class HalfRows:
 
     def add(self, rows: torch.Tensor, loads: torch.Tensor) -> torch.Tensor:
         """Add rows of M, by number, shape (p,), and as columns, shape (n, p); return K0^-1 of these."""
+        # A row of M has few entries, and so has its forward substitution: it is kept sparse, and a later product costs
+        # half a solve.
         half = self._factor.forward(loads.numpy()).T
         first, column = half.nonzero()
         end, value = self._count + len(column), half[first, column]

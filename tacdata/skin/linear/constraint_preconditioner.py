@@ -86,6 +86,7 @@ class ConstraintPreconditioner:
             v, unit = torch.empty_like(y), torch.ones(self.rows.count, device=r.device)
             self.rows.launch(kernels.along, tuple(v.shape), moved, unit, scale, number, self.rows.data, v)
             if gaps is not None:
+                # The first application solves for the gaps to close; later ones keep closed ones closed.
                 v -= self.rows.wanted(gaps)[which]
             y = self.solver.times(v, which)
             total = torch.zeros(self.rows.count, len(which), device=r.device)

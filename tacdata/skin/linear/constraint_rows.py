@@ -43,6 +43,7 @@ class _Rows:
     def differ(self, new: _Rows) -> torch.Tensor:
         """Return which of the first members have other constraints in ``new``, shape (b,), bool."""
         count = len(new.own)
+        # A factor is made again only if constraints changed by more than a preconditioner notices.
         rotated = (self.direction[:count] - new.direction).abs().amax(dim=(1, 2)) > _TURNED
         give = self.give[:count]
         limit = _SOFTENED * torch.maximum(give[:, :, :1], new.give[:, :, :1])

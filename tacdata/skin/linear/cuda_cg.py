@@ -65,6 +65,7 @@ class CudaConjugateGradients:
         """
         answer = torch.zeros(r.shape[0] * 3, r.shape[2], device=r.device)
         forces = torch.zeros(r.shape[2], self._preconditioner.rows.most, device=r.device)
+        # Few widths, as each has a recorded graph of its own and its own tensors.
         self._step = max(self._step, _COLUMNS * -(-len(mask) // (_COLUMNS * _WIDTHS)))
         count, iteration = int(mask.sum()), 0
         if not count:
@@ -72,6 +73,7 @@ class CudaConjugateGradients:
         active = self._begin(at, r, gaps, mask, count, stopping.tolerance)
         for iteration in range(1, stopping.limit + 1):
             active.run(self._iterate)
+            # The only figure that the host waits for in an iteration.
             remaining = int(active.going.sum())
             if stopping.enough(iteration, remaining, count):
                 break
@@ -113,6 +115,7 @@ class CudaConjugateGradients:
         solver = self._rest
         active.size.zero_()
         self._sum(kernels.reach, active, residual, solver.order, solver.scale, active.size)
+        # Half precision ends at 65,504, and loses digits below 6e-5: each column is scaled to use its range.
         active.size.copy_(_ROOM / active.size.clamp_min(1e-30))
         torch.div(active.softness, active.size, out=active.factor)
         self._launch(

@@ -38,6 +38,7 @@ def runtime() -> Any | None:
         # ValueError: the package contains no such library, or more than one.
         return None
     library.MKL_Set_Interface_Layer(_INT32)
+    # One thread: the farm runs one worker a core, and torch brings its own OpenMP.
     library.MKL_Set_Threading_Layer(_SEQUENTIAL)
     return library
 

@@ -69,6 +69,7 @@ def projected_conjugate_gradients(
     at, r = at.take(member), rhs.index_select(2, member)
     x, y = preconditioner.apply(r, gaps, member)
     q = product(at, x)
+    # The energy of the first projected step is the scale of what is to be solved.
     goal, r = _dot(x, q).clamp_min(0.0) * stopping.tolerance**2, r - q
     z, y = preconditioner.apply(r, None, member)
     p, rho = z, _dot(r, z)
@@ -77,6 +78,7 @@ def projected_conjugate_gradients(
         remaining = int(going.sum())
         if remaining < len(member):
             answer[:, :, member], forces[member] = x, y
+            # Members that are done leave the batch, so that the others' products get cheaper.
             at, (member, x, r, p, y, rho, goal) = _chosen(at, going, (member, x, r, p, y.T, rho, goal))
             y = y.T
         if stopping.enough(iteration, remaining, count):

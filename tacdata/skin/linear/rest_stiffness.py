@@ -244,7 +244,10 @@ class DenseRest:
         place = torch.as_tensor(np.stack([reduced.row, reduced.col]), dtype=torch.int64, device=device)
         inverse = torch.zeros(reduced.shape, dtype=torch.float64, device=device)
         inverse[place[0], place[1]] = torch.as_tensor(reduced.data, device=device)
+        # A dense inverse on a GPU: a product with it is one call at full speed, where sparse solves are sequences of
+        # small ones.
         inverse = torch.cholesky_inverse(torch.linalg.cholesky(inverse))
+        # A unit diagonal uses the range of half precision evenly.
         scale = inverse.diagonal().sqrt()
         inverse /= scale[:, None]
         inverse /= scale

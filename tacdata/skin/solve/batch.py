@@ -85,6 +85,7 @@ class Batch:
         self._newton, device = newton, idle.law.device
         u = torch.zeros(nodes, 3, capacity, dtype=torch.float64, device=device)
         eye = torch.eye(3, dtype=torch.float64, device=device)[:, :, None].repeat(1, 1, capacity)
+        # Idle columns stay in the batch with an indenter far away: sizes of tensors then need not change.
         heights = (_AWAY, floor)[: len(newton.surfaces)]
         places = (torch.tensor([0.0, 0.0, height], dtype=torch.float64, device=device) for height in heights)
         poses = tuple(Pose(place[:, None].repeat(1, capacity), eye.clone()) for place in places)
@@ -209,6 +210,7 @@ class Batch:
         if not found:
             return
         paths = {column: self._press(column).path for column in found}
+        # Where the direction turns, the rate of change is of the other branch and predicts nothing.
         reversed_ = [(path.attempt - path.depth) * path.direction < 0 for path in paths.values()]
         steps = self._values({column: path.attempt - path.depth for column, path in paths.items()})
         straight = self._values({column: not back for column, back in zip(found, reversed_, strict=True)}) > 0
@@ -306,6 +308,7 @@ class Batch:
         guess, near = self._starts.guess(which, depth, attempt, coarse)
         columns = which.nonzero()[:, 0]
         proposed = guess.take(columns)
+        # An extrapolated start may fold an element. Then the last equilibrium is a safer start.
         wild = self._newton.body.internal_force(proposed.u, self._at.conditions.take(columns))[1] < _WILD
         proposed = self._starts.accepted.take(columns).where(wild, proposed)
         near[columns] = torch.where(wild, TOUCHING, near[columns])

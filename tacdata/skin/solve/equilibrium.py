@@ -82,6 +82,7 @@ class StateReader:
         pairs = np.unique(np.stack([faces.ravel(), taxel]), axis=1)
         # Protrusions share no node: each contact node belongs to one of them.
         self._taxel = torch.as_tensor(pairs[1], device=device).long()
+        # The closure of a taxel is the mean motion of its rim, where the protrusion meets the slab.
         node, taxel = pairs[:, np.abs(mesh.nodes[pairs[0], 2]) < 1e-9]
         share = 1 / np.maximum(np.bincount(taxel, minlength=taxels), 1)[taxel]
         self._rim = torch.zeros(taxels, len(mesh.nodes), dtype=torch.float64)

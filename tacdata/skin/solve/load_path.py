@@ -120,6 +120,7 @@ class LoadPath:
             # `_propose` limits each direction by its own bound.
             self._step = max(self.longest, self.lift)
         else:
+            # After a step that had to be halved, back to longer ones by doubling.
             self._step = min(2 * self._step, max(self.longest, self.lift))
         return reached
 

@@ -51,6 +51,7 @@ class LoadingStates:
         flat = torch.cat(
             [field.reshape(size, -1) for field, size in zip((single.u, *single.multipliers), self._sizes, strict=True)]
         )
+        # Single precision serves for a start and halves the memory of a batch.
         self._values[row, :, column] = flat.T.to(torch.float32)
         self._count[column] += 1
 

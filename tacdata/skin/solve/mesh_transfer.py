@@ -86,6 +86,7 @@ def _located(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.nd
     )
     for element in near.T:
         coordinates = np.einsum("pi,pik->pk", points - first[element], inverse[element])
+        # Points of the finer mesh can lie outside of the coarser one by a chord: they take the nearest place in it.
         inside = np.clip(np.concatenate([1 - coordinates.sum(axis=1, keepdims=True), coordinates], axis=1), 0.0, None)
         inside /= inside.sum(axis=1, keepdims=True)
         away = np.linalg.norm(np.einsum("pk,pki->pi", inside, corners[element]) - points, axis=1)

@@ -75,6 +75,7 @@ class MeshedSkin:
             raise SolveError(
                 "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
             )
+        # Far from incompressible, quadratic elements do not lock, and averages cost time.
         near = sensor.material.poisson_ratio >= settings.averaged_from
         self.averaged = near and load_law(sensor.material.law).splits_volume
         """Whether volume changes are averaged at the corners."""

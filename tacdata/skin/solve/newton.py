@@ -145,6 +145,7 @@ class Newton:
         # Right-hand sides of about norm 1, as the GPU's solver rounds to half precision; x is scaled back below.
         r = torch.where(mask, residual.force / size, 0.0).to(_WORK)
         gaps = [torch.where(mask & own.tangent.active, -own.gap / size, 0.0) for own in residual.contacts]
+        # Single precision for the products: a step is solved to a tenth only.
         linearization = self.tangent.at(at.u.to(_WORK), at.conditions, contacts, None if self._cuda else mask)
         stopping = Stopping(self.settings.forcing, self.settings.cg_limit, _STRAGGLERS, _LONG)
         if self._cuda:

@@ -73,6 +73,7 @@ class Starts:
         """
         guess, near = self.accepted.plus(self._rate, attempt - depth), torch.full_like(depth, TOUCHING)
         beyond = attempt >= self._loading.deepest
+        # On the way up, states of the way down at the same depth are nearer than any extrapolation.
         if not bool((beyond | ~which).all()):
             back = self._loading.back(self.accepted, depth, attempt, leaves=not self._sticky)
             guess, near = guess.where(beyond, back), torch.where(beyond | self._sticky, near, 0.0)

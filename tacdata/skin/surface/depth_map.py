@@ -48,6 +48,7 @@ class DepthRaster:
         self._device, self._parts = device, 1 if sampling == "point" else _GAUSS
         self._share = torch.ones(1, dtype=torch.float64, device=device)
         if sampling == "area":
+            # An area mean by Gauss's rule within each pixel.
             points, weights = np.polynomial.legendre.leggauss(_GAUSS)
             x, y = (_spread(axis, points) for axis in (x, y))
             self._share = torch.as_tensor(weights / 2, device=device)

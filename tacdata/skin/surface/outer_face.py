@@ -32,6 +32,7 @@ class OuterFace:
         self._inverse = np.linalg.inv(np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1))
         self._bent = bool(np.abs(self._plan[:, 3:] - _middles(corners)).max(initial=0.0) > 1e-9)
         self._low, self._high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        # Cells a few triangles wide: few candidates a point, few cells a triangle.
         self._cell = 2.0 * float(np.sqrt(np.prod(self._high - self._low) / len(corners)))
         self._count = np.ceil((self._high - self._low) / self._cell).astype(int)
         self._bins = self._sort(corners)

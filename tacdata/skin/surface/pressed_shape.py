@@ -62,6 +62,7 @@ def touching_share(traction: np.ndarray, slots: np.ndarray) -> np.ndarray:
         return size
     # The mean over the contact force: nodes that barely touch do not change it.
     share = np.minimum(size / (RIM_PRESSURE * (size**2).sum() / size.sum()), 1.0)
+    # A mid-side node between two touching corners touches as well, though its hat may carry little force.
     smallest = np.ones_like(share)
     for a, b in _SIDES:
         np.minimum.at(smallest, slots[:, a], share[slots[:, b]])

@@ -79,6 +79,7 @@ def press_coarsely(
     for index, depth, state in model.states_many(loadings, capacity, observe=recorder):
         number = numbers[index]
         if isinstance(state, SolveError):
+            # Deeper states then have no estimate of their own; the deepest one found is continued in proportion.
             remarks[number] = f"the coarser mesh gave up: {state.given}"
             continue
         passed = recorder.take(index)

@@ -101,6 +101,7 @@ def estimate(
     """
     depths, ratio = fine.depth, max(ratio, _LEAST_RATIO)
     rows = [int(np.flatnonzero(np.abs(depths - depth) < 1e-9)[0]) for depth in coarse.depth]
+    # Nothing to compare with: the whole result is stated as its error.
     if not len(rows) or coarse.depth.max() <= 0:
         force = np.linalg.norm(fine.force, axis=1)
         doubt = np.broadcast_to(depths[:, None, None], fine.surface.shape).copy()
@@ -113,6 +114,7 @@ def estimate(
     pixels = np.stack(np.meshgrid(sensor.map.x, sensor.map.y, indexing="ij"), axis=-1).reshape(-1, 2)
     taxels = sensor.taxels.centers
     pitch = max(sensor.taxels.pitch_x, sensor.taxels.pitch_y)
+    # Averaged over the footprint, as two meshes agree at single pixels by chance.
     surface = _local(coarse.surface - fine.surface[rows], pixels, _STEEP * reach)
     # With at least one neighbour: on a single taxel two meshes may agree by chance.
     taxel = _local(coarse.taxel_force - fine.taxel_force[rows], taxels, max(_STEEP * reach, pitch))
@@ -145,6 +147,7 @@ def _along(coarse: Figures, force: np.ndarray) -> np.ndarray:
     square = (np.linalg.norm(coarse.force - force, axis=1) / np.maximum(size, 1e-12)) ** 2
     # States without force have no share: as zeros they would lower their neighbours' error.
     touched = (size > 0).astype(float)
+    # Neighbouring depths share their mesh error; a difference at one of them alone may cross zero.
     kernel = np.array([1.0, 2.0, 1.0])
     total = np.convolve(touched, kernel)[1:-1]
     return size * np.sqrt(np.convolve(square * touched, kernel)[1:-1] / np.maximum(total, 1e-12))

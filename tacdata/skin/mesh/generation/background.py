@@ -46,6 +46,7 @@ def edge_length(skin: Skin, settings: MeshSettings, points: np.ndarray, below: n
         away = np.maximum(from_middle - radius, 0)
         if hole:
             away = np.maximum(away, hole[0] - from_middle)
+        # Edges grow slowly away from the focus: neighbours of very different size are slivers.
         size = np.minimum(size, fine + 0.5 * np.hypot(away, np.maximum(below, 0)))
     return size
 

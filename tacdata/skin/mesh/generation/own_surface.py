@@ -106,6 +106,7 @@ def _on_surface(target: _Target, vertices: np.ndarray, tets: np.ndarray, reach: 
     Those within ``reach`` [mm] of a sharp edge go to it: the nearest face alone would round the edge off.
     """
     surface = np.unique(boundary(tets))
+    # Creases first: a vertex near one belongs on it, or the mesh rounds the edge off.
     place, sharp = target.creases.snapped(vertices[surface], reach)
     place[~sharp] = target.nearest.places(vertices[surface[~sharp]]).point
     places = vertices.copy()

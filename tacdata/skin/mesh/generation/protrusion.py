@@ -83,6 +83,7 @@ class Protrusion:
             count = max(round(2 * np.pi * self.sphere * np.sin(np.radians(polar)) / edge), 6)
             # Every other ring is turned by half a vertex, so that triangles between rings are nearly equilateral.
             rings.append((float(polar), count, 0.5 * (len(rings) % 2)))
+            # Contact with the board begins at the tip, so edges are shortest there.
             edge *= _GROWTH
         return tuple(rings)
 

@@ -87,6 +87,7 @@ def _on_protrusions(sensor: Sensor, p: np.ndarray) -> tuple[np.ndarray, np.ndarr
     bump = (p[:, 2] < SNAP / 2) & (away < _SNAP_SPHERE * shape.radius)
     bump &= (p[:, 2] < -SNAP / 2) | (away < SNAP)
     rim = bump & (p[:, 2] > -SNAP / 2)
+    # On the rim both the plane and the sphere hold, so such a vertex has one place along the circle.
     foot = local[rim, :2] * (shape.radius / np.linalg.norm(local[rim, :2], axis=1, keepdims=True))
     p[rim] = np.column_stack([centers[nearest[rim]] + foot, np.zeros(rim.sum())])
     on = bump & ~rim
