@@ -64,7 +64,9 @@ def emulate_board(path_pipe, seconds: float) -> None:
 
 
 class Guide:
-    """Stands in for the motion controller: status reports at 10 Hz."""
+    """Motion controller in memory: status reports at 10 Hz, none of them damaged."""
+
+    damaged_reports = 0
 
     def __init__(self, clock: Clock) -> None:
         self.clock, self._next = clock, clock.now_ns()
