@@ -67,6 +67,7 @@ def complete(
     run, identity = best.path.parent, checkpoint.load(best.path).content_hash
     maps, labels, rows = [], [], []
     for part in parts:
+        # A part fitted to other presses needs a correction from these alone, or its errors would be too small.
         same_presses = part.learned == learned
         _set(part.network, peak if same_presses else fit_peaks(part.network, frames, part.learned, prior))
         windows = Windows(frames, part.network.offsets, part.network.get_buffer("mean").device)

@@ -50,6 +50,7 @@ def on_grid(stream: TaxelStream, values: np.ndarray, times_ns: np.ndarray) -> np
     lower = np.maximum(upper - 1, 0)
     is_nearer = times_ns - stream.sample_ns[lower] < stream.sample_ns[upper] - times_ns
     nearest = np.where(is_nearer, lower, upper)
+    # A reading farther away is of another moment: a gap of the board must stay a gap.
     near = np.abs(stream.sample_ns[nearest] - times_ns) <= 1.5e9 * _period(stream)
     result[near] = values[nearest[near]]
     return result
@@ -91,6 +92,7 @@ def unknown(name: str, signals: np.ndarray, novelty: np.ndarray) -> list[str]:
         novelty: Novelty of the readings [1], shape (n,).
     """
     mask = np.isfinite(novelty) & np.isfinite(signals).all(axis=1)
+    # Only clear touch is judged: near zero every reading lies close to those of training.
     strongest = np.max(signals[mask], axis=1, initial=0.0)
     touching = novelty[mask][strongest > FELT * np.max(strongest, initial=0.0)]
     strange = touching > 1.0

@@ -159,6 +159,7 @@ def calibrate(frames: Frames, episodes: tuple[int, ...]) -> ChannelCalibration:
     exponent_error = 1.0
     if groups > 1:
         group = np.arange(len(presses)) % groups
+        # Jackknife over groups of presses: frames of one press share their errors.
         left_out = np.array([_fitted([part[..., group != k, :] for part in sums])[2] for k in range(groups)])
         exponent_error = _jackknifed(left_out)
     return ChannelCalibration(gain, exponent, error, exponent_error, len(presses), variance, variance_error, mixing)
@@ -216,6 +217,7 @@ def _spread(presses: list[tuple[np.ndarray, np.ndarray]], taxels: Taxels, expone
     if len(presses) == 1:  # its place errs as much as a skin differs
         return 0.0, FARTHEST
     for _ in range(_TURNS):
+        # Gains and spreading in turn: either is linear with the other given.
         gain, _ = _gains(_gathered(presses, taxels, variance), exponent)
         mixing = spreading(taxels, variance)
         for k, (counts, force) in enumerate(presses):
@@ -304,11 +306,13 @@ def _shrunk(square: np.ndarray, product: np.ndarray) -> tuple[np.ndarray, np.nda
     count = np.divide(weight, concentration, out=np.zeros_like(weight), where=concentration > 0)
     precision = count / within if within > 0 else np.where(count > 0, 1e300, 0.0)
     sampling = np.divide(1.0, precision, out=np.zeros_like(weight), where=precision > 0)
+    # Moments of a random-effects model: scatter of the channels less what sampling alone explains.
     excess = (weight * ((gain - mean) ** 2 - sampling)).sum() / weight.sum()
     between = max(float(excess), 0.0) if several else 0.0
     reliability = between * precision / (1.0 + between * precision)
     # The statement of the error allows a spread that few presses cannot tell.
     error = np.sqrt(1.0 / (1.0 / max(between, (SPREAD * mean) ** 2) + precision))
+    # Channels that few presses touched are drawn towards the mean gain.
     return mean + reliability * (gain - mean), error
 
 

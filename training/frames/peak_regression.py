@@ -84,7 +84,9 @@ def fit_peaks(
         depth = network.respond(signals)
         columns, largest = peak_features(depth, signals, network)
         features.append(columns.double().cpu().numpy())
+        # In logarithms, as a maximum errs by a share of itself.
         targets.append(np.log(peak / (largest.double().cpu().numpy() * top)))
+        # Each press counts the same, and deep frames by their depth: an error there is larger in millimetres.
         weights.append(peak / np.sqrt(len(peak)))
     if len(features) < FEWEST:
         return parent

@@ -34,6 +34,7 @@ class Variation:
         if self.mirror:
             signals, label = self._mirrored(signals, label)
         if self.spread:
+            # Of either sign: a unit's skin may spread loads less than the model does.
             variance = self.spread * torch.randn(len(signals), 1, 1, device=signals.device)
             signals = ((signals @ self.modes) * (variance * self.values).exp()) @ self.modes.T
         if self.exponent:
@@ -53,6 +54,7 @@ class Variation:
         # Mirrored after standardizing, so that a channel's gain does not travel to the channel opposite. Forces are
         # without gains.
         standard = signals if self.calibrated else (signals - self.mean) / self.sd
+        # The sensor is symmetric about both axes, so mirrored presses are presses that it could have felt.
         way = torch.randint(4, (len(signals),), device=signals.device)
         order = torch.stack(self.orders)[way]
         mirrored = standard.gather(2, order[:, None, :].expand(-1, signals.shape[1], -1))

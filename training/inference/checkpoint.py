@@ -108,6 +108,7 @@ def save(path: Path, network: Network, optimizer: torch.optim.Optimizer | None, 
     tensors = {f"network.{k}": v.detach().cpu().contiguous() for k, v in network.state_dict().items()}
     if optimizer is not None:
         for index, values in optimizer.state_dict()["state"].items():
+            # The optimizer's moments, too: without them a resumed run takes other steps.
             tensors |= {f"optimizer.{index}.{k}": v.detach().cpu().contiguous() for k, v in values.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

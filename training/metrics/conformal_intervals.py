@@ -145,6 +145,7 @@ def calibrate(
     total = np.sum(sums, axis=0)
     deviation, quotients = _filled(*total), []
     for depth, label, part in zip(maps, labels, parts, strict=True):
+        # Each press is judged by deviations of the others: by its own, intervals would be too narrow.
         remaining = ConformalIntervals(_filled(*(total - sums[part])), (), checkpoint, source, area)
         mask = _interesting(depth, label)
         quotients.append(np.abs(depth - label)[mask] / remaining.sigma(depth, pitch)[mask])
@@ -234,6 +235,7 @@ def _filled(square: np.ndarray, count: np.ndarray) -> np.ndarray:
     if not len(occupied):
         rows[:] = square.sum() / max(count.sum(), 1)
     for k in np.flatnonzero(~enough) if len(occupied) else ():
+        # Depths that no press reached take the deviation of the nearest depth.
         rows[k] = rows[occupied[np.argmin(np.abs(occupied - k))]]
     mean_square = square / np.maximum(count, 1)
     return np.sqrt(np.where(count >= LEAST, mean_square, np.broadcast_to(rows, count.shape))).clip(FLOOR)

@@ -119,6 +119,7 @@ def predicted_centroids(depth: np.ndarray) -> np.ndarray:
     connected(owner >= 0, np.ones((3, 3)), output=region)
     for number in range(1, int(region.max()) + 1):
         inside = region == number
+        # In a round region two nearby tops are one contact with noise; in a long one they may be two.
         if elongation(depth, inside) < LONG:
             owner[inside] = owner.max() + 1 + high[inside]
     return _centroids(depth, owner)
@@ -167,6 +168,8 @@ def hills(
     owner = np.full((rows + 2) * (columns + 2), -1)
     padded = np.pad(depth, 1).reshape(-1)
     order = np.flatnonzero(padded > threshold)
+    # Flooding from the deepest pixel outwards: each pixel joins a hill, and where two hills meet their prominence is
+    # known.
     order = order[np.argsort(-padded[order], kind="stable")]
     width = columns + 2
     around = (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)

@@ -83,6 +83,7 @@ def gathered(
     for learned, left_out in parts:
         pressed = left_out[frames.depth[left_out].max(axis=(1, 2)) > CONTACT_THRESHOLD]
         representatives = _representatives(frames, learned, mirror)
+        # Square roots, as noise and gains scatter in proportion: without them deep presses alone would decide.
         distances.append(_nearest(_root(frames.taxels[pressed]), _root(representatives)))
     distance = np.concatenate(distances) if distances else np.empty(0)
     if len(distance) < FEWEST or not len(representatives):

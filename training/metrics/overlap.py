@@ -28,6 +28,7 @@ def aligned_iou(depth: np.ndarray, reference: np.ndarray, threshold: float = REG
     shift = (
         centroid(reference[None], threshold, weighted=False)[0] - centroid(depth[None], threshold, weighted=False)[0]
     )
+    # By fractions of a pixel: half a pixel matters in a small region.
     shifted = ndimage.shift(depth.astype(np.float64), shift, order=1, mode="constant", cval=0.0) > threshold
     union = (shifted | theirs).sum()
     return float((shifted & theirs).sum() / union) if union else None

@@ -48,6 +48,7 @@ def score_press(
         threshold: Depth above which a pixel belongs to the region [mm].
     """
     region = reference > threshold
+    # A region cut by the map's edge has its centroid elsewhere than its contact.
     border = np.concatenate([region[0], region[-1], region[:, 0], region[:, -1]])
     at_centre = bilinear(depth, tip[0], tip[1], grid)
     position = None

@@ -92,6 +92,7 @@ class Network(nn.Module, ABC):
             return depth
         mean, scale, weight = (values.to(depth.device) for values in self.peak)
         features, largest = peak_features(depth, signals, self)
+        # Beyond the presses of the fit a straight line is no guide; it is held at its end.
         standard = ((features - mean) / scale).clamp(-_BEYOND, _BEYOND)
         ratio = (weight[0] + standard @ weight[1:]).clamp(-FARTHEST, FARTHEST).exp()
         ratio = torch.where(largest > SHALLOW, ratio, torch.ones_like(ratio))
@@ -134,6 +135,7 @@ def peak_features(depth: torch.Tensor, signals: torch.Tensor, network: Network) 
     half = (depth > 0.5 * largest[:, None, None]).float().sum(dim=(1, 2)) + 1.0
     deep, load = largest.log(), total.log()
     concentration = (newest.topk(4, dim=1).values.sum(dim=1) / total).clamp(min=1e-3).log()
+    # Loading or unloading: a relaxing skin has two depths for one reading.
     change = (total / oldest).log().clamp(-2.0, 2.0)
     products = [deep**2, load**2, deep * load, concentration * deep, concentration * load]
     return torch.stack([deep, load, area.log(), half.log(), change, concentration, *products], dim=1), largest

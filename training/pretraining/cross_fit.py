@@ -99,6 +99,7 @@ def fit(
     if len(presses) < 2:
         raise UsageError(f"a fit to {len(presses)} press", "two presses or more", "record more")
     threads = threads or THREADS
+    # Enough presses for validation ones of their own.
     if len(presses) > MANY and shape_groups is None:
         resume = resume and (out / checkpoint.LAST).is_file()
         return train(
@@ -139,15 +140,18 @@ def fit(
         )
     with reproducible(threads):
         losses = _losses(members, pretrained, frames, settings)
+        # How far the weights move is decided by presses that no member learned from; not at all is one of the choices.
         share = SHARES[chosen(losses)]
         division = replace(division, train=presses, validation=())
         document = _document(members, division, losses, share)
         ends = [member.network for member in members]
+        # Members that began at one point can be averaged by their weights: one network a frame in place of several.
         network = between(pretrained.network, ends, share, copy.deepcopy(ends[0]))
         if settings.calibrate:
             fitted = calibrate(frames, division.train)
             network.set_calibration(fitted.gain, fitted.exponent, fitted.mixing)
             document["calibration"] = fitted.document
+        # Intervals come from members and the presses that they never saw.
         held_out = [
             HeldOut(between(pretrained.network, [end], share, end), member.split.train, member.split.validation)
             for end, member in zip(ends, members, strict=True)

@@ -132,6 +132,7 @@ def learning_curve(
             for start in (*(("pretrained",) if pretrained else ()), *networks):
                 if (start, count, seed) in done or (count == 0 and start != "pretrained"):
                     continue
+                # Nested: the first n of one order, so that a larger number adds presses and replaces none.
                 numbers = np.random.default_rng(seed).permutation(pool)[:count].tolist()
                 network = pretrained.network if pretrained else None
                 if count:

@@ -26,6 +26,7 @@ def predictions(frames: Frames, split: Split, indices: np.ndarray) -> dict[str, 
     offset = signals.mean(axis=0)
     signals -= offset
     covariance = signals.T @ signals / len(learned)
+    # In proportion to the readings' power, so that the unit of the readings does not matter.
     ridge = RIDGE * np.trace(covariance) / len(covariance) + 1e-12
     mean, cross = _moments(frames, learned, signals)
     slope = np.linalg.solve(covariance + ridge * np.eye(len(covariance)), cross / len(learned))

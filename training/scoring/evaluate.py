@@ -125,6 +125,7 @@ def evaluate(
                 )
             )
             listener(count, len(spans))
+    # On one CPU core, as on a robot's computer.
     pace = milliseconds_per_frame(network.to("cpu"), Windows(frames, network.offsets))
     episodes, part, identity = tuple(results), "test" if same_dataset else "other dataset", trained.content_hash
     document = {

@@ -68,6 +68,7 @@ def divide(frames: Frames, name: str, seed: int) -> Split:
     test = rule.held_out(frames.episodes, frames.sensor, generator)
     training = [e.number for e in frames.episodes if e.number not in test]
     count = share(len(frames.episodes), VALIDATION_SHARE)
+    # Whole episodes: neighbouring frames are nearly the same, and would leak between the parts.
     validation = set(generator.permutation(training)[:count].tolist()) if len(training) > 1 else set()
     train = tuple(n for n in training if n not in validation)
     split = Split(name, seed, train, tuple(sorted(validation)), tuple(sorted(test)))

@@ -58,6 +58,7 @@ def hand_eye(camera: str, frame: str, grippers: np.ndarray, cubes: np.ndarray) -
     left_out = np.flatnonzero(~inliers)
     if len(left_out):
         remarks.append(f"pairs {', '.join(map(str, left_out))} contradict the others and were left out")
+    # Over their weights the residuals were fitted; in radians and metres they are judged.
     raw = _residuals(base, mount, grippers[inliers], cubes[inliers]).reshape(-1, 6) * np.repeat(WEIGHTS[::-1], 3)
     turn, place = (float(np.sqrt((raw[:, part] ** 2).sum(axis=1).mean())) for part in (slice(0, 3), slice(3, 6)))
     if place > 0.02 or turn > 0.1:
@@ -89,6 +90,7 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
     inverse = np.array([np.linalg.inv(pose) for pose in poses])
     mean = np.eye(4)
     rotations = Rotation.from_matrix(inverse[:, :3, :3])
+    # The board is at rest, so the poses of all images are one pose with noise.
     mean[:3, :3], mean[:3, 3] = rotations.mean().as_matrix(), inverse[:, :3, 3].mean(axis=0)
     turns = (rotations * Rotation.from_matrix(mean[:3, :3]).inv()).magnitude()  # ty: ignore[missing-union-attribute]
     distance = max(float(np.linalg.norm(mean[:3, 3])), 0.1)
@@ -121,6 +123,7 @@ def board_world(camera: str, frame: str, poses: Sequence[np.ndarray], rms: float
 def _check_turns(grippers: np.ndarray) -> None:
     from scipy.spatial.transform import Rotation
 
+    # With turns about one axis alone, the place along that axis is not determined (Tsai and Lenz 1989).
     turns = (Rotation.from_matrix(grippers[1:, :3, :3]) * Rotation.from_matrix(grippers[0, :3, :3]).inv()).as_rotvec()  # ty: ignore[missing-union-attribute]
     about = np.linalg.svd(turns, compute_uv=False)
     if len(about) < 2 or np.abs(turns).max() < LEAST_TURN or about[1] < LEAST_TURN:

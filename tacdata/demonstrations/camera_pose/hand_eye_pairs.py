@@ -44,4 +44,5 @@ def _cube(pair: dict[str, Any], document: dict[str, Any], folder: Path, origin: 
     if not file.is_file():
         raise UsageError(f"{origin}: no image {file}", "an image file", "correct its name")
     pose = detect_cube(read_grey(file), document["intrinsics"], document["tag_cube"])
+    # A mirrored pose would pull the fit; one pair less costs little.
     return None if pose is None or pose.ambiguous else pose.matrix

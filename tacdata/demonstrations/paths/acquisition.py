@@ -47,10 +47,12 @@ def acquire(sightings: Sightings, times_ns: np.ndarray, wander: ProcessNoise) ->
         run = next((r for r in _runs(best.accepted) if r[0] not in refused), None)
         if run is None:
             break
+        # Each run is tried once, or one that brings nothing would be tried for ever.
         refused.add(run[0])
         if not _agree(sightings, run, wander):
             continue
         tries = [([*resumptions, run[0]], wrong)]
+        # Perhaps the wrong ones are those that the filter accepted after a gap, and the rejected ones are right.
         suspects = _first_after_gap(sightings, np.flatnonzero(best.accepted[: run[0]]))
         if suspects:
             tries.append((resumptions, [*wrong, *suspects]))

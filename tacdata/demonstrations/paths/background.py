@@ -188,6 +188,7 @@ def _shift(start: np.ndarray, end: np.ndarray, coverage: float, shape: tuple[int
     displacement = np.linalg.norm(end - start, axis=1) < STILL
     if displacement.mean() >= MOST_OF_THEM and _cells(start[displacement], shape) >= coverage:
         return 0.0
+    # Shift, turn and scale: all that a small motion of a camera does to a distant background.
     transform, inside = cv2.estimateAffinePartial2D(start, end, ransacReprojThreshold=1.0)
     together = inside.ravel() > 0
     if transform is None or together.mean() < MOST_OF_THEM or _cells(start[together], shape) < coverage:
@@ -204,6 +205,7 @@ def _bumps(camera: str, looks: list[_Look], scale: float, begin_ns: int) -> list
             runs[-1].append(look)
         else:
             runs.append([look])
+    # A single image may be covered by a hand or an arm.
     runs = [run for run in runs if len(run) > 1]
     bumps = []
     for previous_run, run, next_run in zip(runs, runs[1:], [*runs[2:], None], strict=False):

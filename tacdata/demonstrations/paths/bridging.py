@@ -38,6 +38,7 @@ def unseen_noise(sightings: Sightings, wander: ProcessNoise) -> ProcessNoise:
         return wander
     times = np.arange(sightings.time_ns[0], sightings.time_ns[-1], round(STEP / NS), dtype=np.int64)
     path = smooth(sightings, times, wander)
+    # Only stretches that were seen can show how wrong a bridge over them would have been.
     hidden = np.array(~np.isfinite(path.position).all(axis=1), bool)
     for k in np.flatnonzero(breaks > GAP / NS):
         hidden[(times > sightings.time_ns[k]) & (times < sightings.time_ns[k + 1])] = True
@@ -54,6 +55,7 @@ def _densities(path: Smoothed, hidden: np.ndarray, longest: float) -> tuple[floa
         if len(begins) < FEWEST:
             continue
         deviation, rotation_error = _errors(path, begins, rows)
+        # The variance of white acceleration grows with the third power of the time between the ends.
         factor = MIDDLE / (rows * STEP) ** 3 / SPREADS**2
         largest = max(largest[0], factor * deviation**2), max(largest[1], factor * rotation_error**2)
     return largest

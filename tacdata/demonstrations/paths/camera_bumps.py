@@ -115,6 +115,7 @@ def split(sightings: Mapping[str, Sightings], bumps: Sequence[Bump]) -> dict[str
         name = f"{bump.camera} (moved, {number + 1})"
         for finger, series in divided.items():
             moment = (series.time_ns >= bump.begin_ns) & (series.time_ns < bump.sure_ns)
+            # During the bump itself the camera is in no place that could be named.
             series = series.where(~(moment & _of(series, bump.camera)))
             divided[finger] = series
             rows = _of(series, bump.camera) & (series.time_ns >= bump.sure_ns)
@@ -245,6 +246,7 @@ def _which(
     scores: dict[tuple[str, int], float] = {}
     without: dict[str, float] = {}
     for name, opposite in (cameras, cameras[::-1]):
+        # The process noise by the other camera alone: that of both would contain the bump.
         noise = {finger: _noise(series, opposite) for finger, series in near.items()}
         times = np.unique(
             np.concatenate([series.time_ns[[camera == name for camera in series.camera]] for series in near.values()])
@@ -253,6 +255,7 @@ def _which(
         # Before the bump, too, the camera's place may be a little off: only the change counts.
         always = Bump(name, 0, 0, None, 0.0, "")
         without[name] = _likelihood(split(near, (always,)), noise)
+        # The step of the distance is known to a few images; the likelihood decides between these.
         for at in times[max(middle - CANDIDATES, 0) : middle + CANDIDATES + 1]:
             bump = Bump(name, int(at), int(at), None, 0.0, "")
             scores[name, int(at)] = _likelihood(split(near, (replace(always, end_ns=int(at)), bump)), noise)

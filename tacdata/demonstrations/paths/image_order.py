@@ -43,6 +43,7 @@ def in_order(sightings: Mapping[str, Sightings]) -> tuple[dict[str, Sightings], 
     wrong = [
         pair
         for pair, (arrived, exchanged) in squares.items()
+        # Both a difference and a ratio: at rest either order is smooth, and in fast motion either is rough.
         if arrived - exchanged > CLEARLY and arrived > ROUGHER * exchanged
     ]
     if not wrong:
@@ -84,6 +85,7 @@ def _squares(series: Sightings, rows: np.ndarray) -> list[tuple[int, int, np.nda
 
     def roughness(order: list[int]) -> np.ndarray:
         path = places[quadruples[:, order]]
+        # Second differences: a motion of constant speed has none, whatever its speed.
         second = path[:, :-2] - 2 * path[:, 1:-1] + path[:, 2:]
         return (np.einsum("nij,nkj->nki", whitening[quadruples[:, 1]], second) ** 2).sum(axis=(1, 2))
 

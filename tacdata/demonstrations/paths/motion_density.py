@@ -37,6 +37,7 @@ def _stretches(sightings: Sightings) -> list[Sightings]:
     if len(sightings) <= BLOCKS * BLOCK:
         return [sightings]
     stretches = []
+    # The likelihood of a long recording costs seconds for each density; some stretches choose the same one.
     for begin in np.linspace(0, len(sightings) - BLOCK, BLOCKS).astype(int):
         mask = np.zeros(len(sightings), bool)
         mask[begin : begin + BLOCK] = True

@@ -143,6 +143,7 @@ def smooth(
     state, covariance, instant = _first(sightings, first)
     unseen = _over_gaps(sightings, moments)
     for k in order:
+        # Where a track is resumed the finger may have gone anywhere since; over gaps, as far as elsewhere in that time.
         freely = MANOEUVRE if int(which[k]) in again else (wander.unseen or wander) if unseen[k] else wander
         expected, spread, step = _predicted(state, covariance, float(moments[k] - instant) * NS, freely)
         state, covariance, instant = expected, spread, moments[k]
@@ -218,6 +219,7 @@ def _predicted(
     step[:3, :3] = turn
     step[:3, 6:9] = step[3:6, 9:MOTION] = dt * _EYE
     of_rates, mixed, of_places = _noise_parts(len(covariance), wander.turning, wander.velocity)
+    # Integrated white acceleration: the covariances of velocity, of both together, and of position.
     noise = dt * of_rates + dt**2 / 2 * mixed + dt**3 / 3 * of_places
     place = state.position + state.velocity * dt
     expected = _State(turn @ state.rotation, place, state.turning, state.velocity, state.cameras)
@@ -243,6 +245,7 @@ def _updated(
     )
     if sightings.cameras:
         seen_as = _observed(expected, sightings, n)
+        # The cameras' errors are states: a constant error of a camera's place does not average out over its images.
         surprise = surprise - seen_as[:, MOTION:] @ expected.cameras
         cross = spread @ seen_as.T
         total = seen_as @ cross + sightings.covariance[n]

@@ -65,6 +65,7 @@ def wrong_tags(sightings: Sightings, path: Smoothed, times_ns: np.ndarray) -> tu
         if len(ids) == 1 and np.isfinite(path_rotation).all():
             turns.setdefault(ids[0], []).append(path_rotation.T @ sightings.rotation[k])
     means = {tag: _mean(rotations) for tag, rotations in turns.items() if len(rotations) >= LEAST}
+    # Tags that agree with each other form groups. The largest group is right, and a tie cannot be decided.
     groups = [[b for b in means if _angle(means[a], means[b]) < TURNED] for a in means]
     if not groups:
         return {}, ()

@@ -62,6 +62,7 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
         if isinstance(clock, ImageClock):
             timing = clock.uncertainties(stamps.sequence)
         views += [_stream(name, finger, stamps.sample_ns, detections, timing) for finger in recording.rig.fingers]
+    # Remarks of the search while recording are replaced by those of this one; failures of devices stay.
     notes = tuple(note for note in recording.notes if not note.startswith("camera ") or "failed" in note)
     searched = f"all {sum(map(len, sightings.values()))} images"
     return replace(recording, views=tuple(views), notes=(*notes, *dict.fromkeys(remarks)), searched=searched)

@@ -107,6 +107,7 @@ def sightings_of(
             np.zeros(0),
         )
     time_ns = np.concatenate([part.time_ns for part in parts])
+    # Stable: of equal times the order of the cameras is the same at each run.
     order = np.argsort(time_ns, kind="stable")
     cameras = [camera for part in parts for camera in part.camera]
     ids = [entry for part in parts for entry in part.ids]
@@ -162,6 +163,7 @@ def _of_camera(view: TagStream, rig: DemoRig, timing: float) -> Sightings:
     rotation = np.kron(np.eye(2), turn)
     covariance = rotation @ np.where(np.isfinite(covariance), covariance, np.nan) @ rotation.T
     lost = ~np.isfinite(covariance).all(axis=(1, 2))
+    # A sighting without a stated error still counts, as one that errs widely.
     covariance[lost] = _diagonal(*UNKNOWN)
     # A matrix with a negative variance is of a damaged message.
     covariance[np.linalg.eigvalsh(covariance)[:, 0] < -ROUNDING] = _diagonal(*UNKNOWN)
@@ -203,6 +205,7 @@ def displaced(time_ns: np.ndarray, position: np.ndarray, at_ns: np.ndarray, sigm
     def place(moments: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(moments, seconds, position[:, k]) for k in range(3)], axis=1)
 
+    # Within one and two standard deviations of time the finger may have reversed, so both sides are asked.
     reach = np.minimum(sigma, LONGEST)
     away = np.stack([(place(at + s * reach) - place(at)) / abs(s) for s in (-2.0, -1.0, 1.0, 2.0)])
     squares = (away**2).sum(axis=2)

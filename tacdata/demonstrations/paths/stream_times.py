@@ -107,6 +107,7 @@ def in_step(
         # Of three cameras, a pair with one that is moved already would move it twice.
         if lag is None or reference in delays or partner in delays:
             continue
+        # The later one is moved: no image can be earlier than its exposure.
         slow, fast = (partner, reference) if lag > 0 else (reference, partner)
         delays[slow] = abs(lag)
         words.append(
@@ -188,6 +189,8 @@ def carried_through(path: Smoothed, sightings: Sightings, times_ns: np.ndarray) 
         a, b = max(k - 1, 0), min(k + 1, last)
         turn = path.rotation[b] @ path.rotation[a].T
         turning = logarithm(turn) / (seconds[b] - seconds[a]) if np.isfinite(turn).all() and b > a else np.zeros(3)
+        # By the path's velocity or by the sightings' own motion, whichever is larger: smoothing flattens a quick
+        # stroke.
         smoothed = np.outer(path.velocity[k], path.velocity[k]) * sigma[k] ** 2
         covariance[k, :3, :3] += np.outer(turning, turning) * sigma[k] ** 2
         covariance[k, 3:, 3:] += max(smoothed, displacement[k], key=lambda matrix: float(np.trace(matrix)))
@@ -298,6 +301,7 @@ def _lag(
     coarse = np.array([_difference(pairs, float(lag), fewest) for lag in lags])
     fine = lags[int(coarse.argmin())] + FINE
     scores = np.array([_difference(pairs, float(lag), fewest) for lag in fine])
+    # A lag has to explain the motion far better than none, or noise would choose one each time.
     best, without = float(fine[int(scores.argmin())]), _difference(pairs, 0.0, fewest)
     if not np.isfinite(scores.min()) or abs(best) < SHORTEST or without < BETTER * scores.min():
         return None

@@ -88,6 +88,7 @@ def track(
         sightings[name], paths[name], settings[name], words = _path(series, times)
         remarks += words
         remarks += path_faults.contradictions(sightings[name], paths[name], begin)
+        # After the smoothing: as an error of each sighting, a common error of time would average out.
         paths[name] = carried_through(paths[name], sightings[name], times)
         # The sentence about a bump explains already why its moment is left out.
         doubted = np.setdiff1d(original[name].time_ns, series.time_ns)

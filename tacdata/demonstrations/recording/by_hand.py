@@ -54,6 +54,7 @@ def record_by_hand(rig: Path, folder: Path, task: str, seconds: float | None, co
                 return recorder.session
         # After Ctrl-C, too, a person reads what is on the disk.
         except BaseException as error:
+            # An empty folder would refuse the same command a second time.
             _forget_if_empty(folder, resume)
             error.add_note(_ending(folder))
             raise

@@ -119,6 +119,7 @@ class DemoRecorder:
             while not ended() and (seconds is None or self.rig.clock.now_ns() - begun < seconds * 1e9):
                 if writer.failure is not None:
                     break  # closing reports the failed writes
+                # A take without one of its cameras is not worth its time: it ends, with the part before kept.
                 if lost := self._streams.lost_cameras:
                     reason = "; ".join(lost.values())
                     seconds_kept = (self.rig.clock.now_ns() - begun) * 1e-9

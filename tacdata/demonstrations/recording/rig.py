@@ -137,6 +137,7 @@ def _agree(document: dict[str, Any], fingers: dict[str, Finger], worlds: dict[st
             "one frame for all cameras",
             "calibrate all cameras against the same robot or board",
         )
+    # One camera can be the world itself; two without poses have no common frame.
     lost = sorted(set(document["cameras"]) - set(worlds))
     if lost and (worlds or len(lost) > 1):
         raise FormatError(
