@@ -62,6 +62,7 @@ def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
             [1], shape (presses, channels); NaN where it is not known.
     """
     finite = np.isfinite(logs)
+    # A press that few channels feel has no median to compare a channel with.
     finite &= finite.sum(axis=1, keepdims=True) >= FEWEST_CHANNELS
     finite &= finite.sum(axis=0) >= FEWEST_PRESSES
     if np.count_nonzero(finite.any(axis=0)) < FEWEST_CHANNELS:
@@ -77,6 +78,7 @@ def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
     far = finite & (shares > 1)
     count, presses_of_channel = far.sum(axis=0), finite.sum(axis=0)
     drops_of_others, watched = far.sum() - count, finite.sum() - presses_of_channel
+    # How often others drop is itself uncertain: a beta-binomial tail, with the others' drops as its prior.
     tails = betabinom.sf(count - 1, presses_of_channel, 1 + drops_of_others, RARE + watched - drops_of_others)
     test = rarest(np.where((count >= SEVERAL) & (count <= MOST * presses_of_channel), tails, 1.0))
     if not test.alarms:

@@ -72,12 +72,14 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Best | None:
             # All histories share the flips: the distribution of the largest statistic keeps their correlation.
             signs = flips(len(score), DRAWS + 1, seed)[1:]
         total = information.sum(axis=0)
+        # A press that alone determines a column follows it whatever the cause.
         leverage = information / np.maximum(total, 1e-30)
         counts = (leverage.max(axis=0) < MOST_LEVERAGE) & (total > STIRRED * total.max(initial=0.0))
         if counts.sum() < FEWEST_CHANNELS:
             continue
         score, total, leverage = score[:, counts], total[counts], leverage[:, counts]
         weight = score.sum(axis=0) / total
+        # Residual scores: flips of the raw ones would contain the effect that is looked for.
         scores = (score - information[:, counts] * weight) / (1 - leverage) / np.sqrt(total)
         null = np.square(signs @ scores).sum(axis=1) * _scatter(scores)
         observed = float(np.sum(score.sum(axis=0) ** 2 / total))
@@ -113,6 +115,7 @@ def _columns(cleaned: Cleaned) -> Iterator[tuple[str, str, str, np.ndarray]]:
     course, rise = cleaned.problem.setting.course, cleaned.rise
     reduced, read = course.reduced, course.read
     step = np.maximum(reduced.step, 1e-9)[:, None]
+    # Readings that are late by t differ by t times their rate, to first order.
     rate = np.where(reduced.first[:, None], 0.0, np.diff(rise, axis=0, prepend=rise[:1]) / step)
     span = max(float(np.ptp(course.time)), 1e-9)
     covariates = [("", np.ones(len(read))), ("the time", 2 * (reduced.time - reduced.time.mean()) / span)]

@@ -50,6 +50,7 @@ def motor_lines(cleaned: Cleaned) -> list[Alarm]:
     if motion is None or standstill is None:
         return []
     best = rarest(motion.tails)
+    # The line must be absent at rest, in neighbouring bins too: a rate that differs a little moves it by one.
     near = np.abs(motion.frequency - motion.frequency[best.at]) < BESIDE
     if not best.alarms or standstill.tails[near].min() * np.count_nonzero(standstill.counted) < STANDS:
         return []
@@ -111,6 +112,7 @@ class _Lines:
         total = self.power.sum(axis=0)
         band = (self.frequency / BESIDE).astype(int)
         level = np.array([np.median(total[band == k]) for k in range(band.max() + 1)])
+        # Noise has a slope over frequency. A line is judged by the level around it.
         middle = np.interp(self.frequency / BESIDE, np.arange(len(level)) + 0.5, level)
         ratio = total / np.maximum(middle, 1e-12)
         low, high = np.quantile(ratio[self.counted], [0.25, 0.75])
@@ -167,6 +169,7 @@ def _periodogram(cleaned: Cleaned, rows: np.ndarray) -> _Lines | None:
         size = np.maximum(np.bincount(press), 1)
         values = cleaned.residual[indices]
         mean = np.stack([np.bincount(press, each) for each in values.T], axis=1) / size[:, None]
+        # One spike has power at each frequency.
         values = np.clip(values - mean[press], -OUTLIER, OUTLIER)
         at = np.round((course.time[indices] - course.time[indices[0]]) * FINER / interval).astype(int)
         grid = np.zeros((values.shape[1], bins), dtype=np.float32)

@@ -119,12 +119,14 @@ def stretch(depth: np.ndarray, place: np.ndarray, seed: int = 0) -> tuple[int, i
         return None
     begin, end, long, contrast = begin[mask], end[mask], long[mask], inside[:, mask] / np.sqrt(power[mask])
     remainder = depth - basis @ (basis.T @ depth)
+    # Permutations: without a stretch the presses of a place are exchangeable.
     rng = np.random.default_rng([seed, 31])
     drawn = np.stack([remainder, *(rng.permutation(remainder) for _ in range(DRAWS))])
     drawn -= (drawn @ basis) @ basis.T
     by = drawn @ contrast
     residual_power = np.maximum(np.square(drawn).sum(axis=1, keepdims=True) - np.square(by), 1e-12)
     z = np.abs(by) / np.sqrt(residual_power / freedom)
+    # Short stretches are many, so the largest of them is large by chance.
     fair = z - np.sqrt(2 * np.log(count / np.minimum(long, count - long)))
     test = highest(fair)
     best = test.at
@@ -187,6 +189,7 @@ def reasoned(course: Course, episodes: np.ndarray, lower: np.ndarray) -> bool:
         # Kinds of one press each would determine any group.
         if not 1 < len(kinds) <= len(episodes) // 2:
             continue
+        # A division that follows place, tool, depth, rate or session has an ordinary cause.
         table = np.array([[np.sum((feature == k) & lower), np.sum((feature == k) & ~lower)] for k in kinds])
         if chi2_contingency(table)[1] < REASON:
             return True

@@ -79,6 +79,7 @@ def _over_others(products: np.ndarray, power: np.ndarray, deepest: np.ndarray, p
         neighbours = np.flatnonzero((place == place[k]) & (np.arange(len(products)) != k))
         if len(neighbours) < FEWEST_EACH - 1:
             continue
+        # Over depths that both presses reach: a channel's gain may depend on depth.
         shared = np.arange(products.shape[1]) <= np.minimum(deepest[k], deepest[neighbours])[:, None]
         weight = np.minimum(power[k], power[neighbours]) * shared[:, :, None]
         weighted, weighted_neighbours = (weight * gains[k]).sum(axis=1), (weight * gains[neighbours]).sum(axis=1)

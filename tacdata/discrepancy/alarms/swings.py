@@ -106,8 +106,10 @@ def strongest(cleaned: Cleaned, seed: int = 0) -> Swing | None:
             signs[at] = rng.integers(0, 2, (DRAWS + 1, len(part))) * 2.0 - 1.0
             # Row 0 is the data as it is.
             signs[at][0] = 1.0
+        # Random signs of whole channels keep each channel's spectrum, and destroy its agreement with the others.
         energy += by * (np.square(signs[at] @ part.real) + np.square(signs[at] @ part.imag))
     energy[1:] *= 1 + _shared_in_air(cleaned)
+    # Energy of the sum of all channels less the sum of their energies: only what they have in common remains.
     beyond = np.square(np.abs(parts.sum(axis=1))) - diagonal
     size = 4 * beyond.sum(axis=0) / np.maximum(np.square(power).sum(axis=0), 1e-30)
     explained = (2 * beyond / np.maximum(power, 1e-30)).sum(axis=0)
@@ -157,6 +159,7 @@ def _projected(cleaned: Cleaned, rows: np.ndarray) -> tuple[np.ndarray, np.ndarr
         return None
     interval = max(float(np.median(np.diff(time))), 1e-9)
     phase = WAVES * float(np.median(rate[rows][moving])) * interval / stroke
+    # A wave that is sampled at about its own period looks like a constant.
     resolved = (WAVES * way[-1] >= FEWEST_WAVES) & ((phase < 0.5) | (np.abs(phase - np.round(phase)) >= ALIAS))
     # Near the Nyquist frequency, half a wave a row, a frequency has its alias next to it.
     in_time = (HERTZ * time[-1] >= FEWEST_WAVES) & (HERTZ * interval <= 0.45)

@@ -59,6 +59,7 @@ def spread(gram: np.ndarray, parts: int) -> float:
     root = np.sqrt(np.diag(information))  # parts of very different size: solved at one scale
     scaled = information / np.outer(root, root) + 1e-9 * np.eye(len(index))
     inverse = np.linalg.inv(scaled) / np.outer(root, root)
+    # The refined coefficient is 1 in all parts, so what is left is each part's deviation from it.
     deviation = inverse @ total[index, 0]
     scores = gram[:, index, 0] - np.einsum("eij,j->ei", gram[:, index][:, :, index], deviation)
     # Sandwich variance with episodes as clusters: it does not rely on the noise model.

@@ -142,6 +142,7 @@ def lack(gram: np.ndarray, folds: np.ndarray) -> Lack:
         return Lack(0.0, 0.0, 0.0)
     best = Lack(0.0, 0.0, _size(total_gram))
     mean = float(np.trace(total_gram[1:, 1:])) / (len(total_gram) - 1)
+    # A saturated model fits anything. Only what it predicts in episodes left out counts, at the best shrinkage.
     for strength in STRENGTHS:
         each = np.zeros(len(folds))
         for fold in np.unique(folds):

@@ -54,6 +54,7 @@ def _size(information: np.ndarray, score: np.ndarray, square: float, values: flo
     explained = np.square(projection) / power
     noise = max((square - float(explained.sum())) / max(values - len(power), 1.0), 1.0)
     best, best_size = 0.0, 0.0
+    # By a grid: the likelihood of a variance may have its maximum at zero, where gradients mislead.
     for root in SIZES:
         grown = root**2 * power / power[-1]
         fit = 0.5 * float(np.sum(explained * grown / (1 + grown))) / noise - 0.5 * float(np.log1p(grown).sum())

@@ -68,6 +68,7 @@ def response_curve(course: Course) -> ResponseCurve | None:
     best = min((residuals for _, _, residuals in tried), key=np.sum)
     law, numbers, residuals = min(
         (trial for trial in tried if not _worse(trial[2], best)),
+        # Of laws that predict equally well the one with fewer numbers.
         key=lambda trial: (len(trial[0].shapes) > 1, trial[2].sum()),
     )
     if float(residuals.sum()) > FOLLOWS * power:
@@ -147,6 +148,7 @@ def _held_out(law: ContactLaw, places: list[_Place]) -> tuple[ContactLaw, np.nda
         for fold in np.unique(place.folds[place.folds >= 0]):
             mask = place.folds == fold
             power = np.square(columns[~mask]).sum(axis=0)[:, None]
+            # A gain for each channel has a closed form, so that only touch and shape need a grid.
             factor = columns[~mask].T @ place.change[~mask] / np.maximum(power, 1e-300)
             at = np.argmax(np.square(factor) * power, axis=0)
             missed = place.change[mask] - columns[mask][:, at] * factor[at, channels]

@@ -75,6 +75,7 @@ def series_compliance(course: Course) -> SeriesCompliance | None:
         return None
     of = np.array([p.specimen for p in presses])
     stiff = [float(np.median([p.stiffness for p in presses if p.specimen == s])) for s in members]
+    # Equally stiff specimens bend the frame equally: compliance then looks like the law itself.
     if max(stiff) < STIFFER * min(stiff):
         return None
     products = np.array([[p.products(n) for n in POWERS] for p in presses])  # presses, powers, 3
@@ -187,6 +188,7 @@ def _presses(course: Course) -> list[_Press]:
         rise = rise * np.sign(rise[np.argmax(np.abs(rise))])
         down = np.arange(len(indices)) <= int(np.argmax(depth))
         loaded = down & (rise >= max(BEGINS * rise.max(), NOISE * float(air.std())))
+        # Bins of equal load, so that a slow press does not count more than a quick one.
         step = np.minimum((rise[loaded] / max(float(rise.max()), 1e-300) * BINS).astype(int), BINS - 1)
         count = np.bincount(step, minlength=BINS)
         if np.count_nonzero(count) < BINS // 2:

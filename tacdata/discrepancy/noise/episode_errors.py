@@ -63,6 +63,7 @@ class EpisodeErrors:
         estimate = _at_least(readings.first_guess(residual, course, relative), least)
         columns = np.concatenate([residual[:, :, None], self.rich], axis=2)
         best = np.zeros(self.rich.shape[2])
+        # Noise and the over-rich fit depend on each other; a second turn changes little afterwards.
         for _ in range(2):
             best = self._best(columns, Whitener(course, estimate, self.context, self.features, errors))
             standardized = (residual - self.rich @ best.astype(np.float32)) / estimate.scale

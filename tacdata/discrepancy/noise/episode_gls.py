@@ -211,6 +211,8 @@ class _Errors:
         columns = self._own[:, :, : self._kinds]
         if gain_error is not None:
             power = np.square(gain_error).sum(axis=(1, 2)).astype(np.float64)
+            # A gain common to all streams is an error of pose or load and has its own column. Gains of streams are
+            # deviations from it.
             self._mean = power / max(float(power.sum()), 1e-12)
             gains = gain_error * (np.eye(streams) - self._mean)[:, None, :].astype(np.float32)
             columns = np.concatenate([columns, gains], axis=2)

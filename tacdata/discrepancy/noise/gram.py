@@ -59,6 +59,7 @@ def episode_grams(
         inner: Their own Gram matrices, shape (episodes, more, more).
     """
     width, more = columns.shape[2], 0 if extra is None else extra.shape[2]
+    # One matrix an episode: all later fits, folds and flips of signs work on these and not on rows.
     gram, rows = np.zeros((course.episodes, width + more, width + more)), np.zeros(course.episodes)
     edges = np.searchsorted(course.episode, np.arange(course.episodes + 1))
     for number, (begin, end) in enumerate(pairwise(edges)):

@@ -206,6 +206,8 @@ def null_model(setting: Setting) -> NullModel:
     extra, ridge = nuisance_columns(setting, setting.given)
     rich = generic(course, response, list(setting.given))
     residual = streams.measured(course) - streams.predicted(predicted)
+    # Noise is estimated from the residual of a fit that is richer than any effect: else a missing effect would be taken
+    # for noise.
     candidates = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
     candidates = candidates.astype(np.float32)
     rise = streams.rise(predicted, response).astype(np.float32)

@@ -41,6 +41,7 @@ def modes(rate: float, course: Course, memory: float) -> np.ndarray | None:
     present = count > 1
     length = np.where(present, end - begin, 1.0)
     number = np.arange(1, MOST_MODES + 1)
+    # Karhunen and Loeve: a Brownian motion over an episode as cosines, with variances that fall as 1 / k^2.
     variance = 2 * rate * length[:, None] / (np.pi * number) ** 2
     # Information on a cosine, whose mean square is 1/2. Slow AR(1) noise is larger than its innovations by 1 / (1 -
     # m)^2.
@@ -80,6 +81,7 @@ def walk_rate(residual: np.ndarray, course: Course, scale: np.ndarray, memory: f
         t0, t1 = course.time[start], course.time[end]
         # Means over stretches of a Brownian motion: a third of each stretch counts.
         interval = float(t1[0] - t0[-1] + (np.ptp(t0) + np.ptp(t1)) / 3)
+        # From the rest before to the rest after a press: the offset alone, as nothing presses at either.
         steps.append((streams[end].mean(axis=0) - streams[start].mean(axis=0)) / np.sqrt(interval))
         errors.append((1 / len(start) + 1 / len(end)) / ((1 - memory) ** 2 * interval))
         of.append(place[episode])

@@ -111,6 +111,7 @@ def refined(leftover: np.ndarray, course: Course, previous: Noise) -> Noise:
     # Rows on both sides of a gap in time would make the correlation of successive rows too small.
     pairs = ~course.first & (course.step < 1.5 * previous.step)
     later, earlier = leftover[pairs], leftover[np.flatnonzero(pairs) - 1]
+    # Streams of different units: each counts by its own variance.
     weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-24)
     products = float(np.nansum(later * earlier * weight))
     squares = float(np.nansum(np.where(np.isfinite(later * earlier), 0.5 * (later**2 + earlier**2) * weight, 0.0)))
@@ -174,6 +175,7 @@ def spread_of(gaps: np.ndarray, errors: np.ndarray) -> float:
     floor = float(np.partition(errors, min(EQUAL_WEIGHTS, len(errors)) - 1)[min(EQUAL_WEIGHTS, len(errors)) - 1])
 
     def beyond(power: float) -> bool:
+        # The median of chi-squared variables, not the mean: a single odd episode must not set the spread.
         ratio = square / np.maximum(2 * power + errors, 1e-30)
         weight = 1 / np.square(2 * power + np.maximum(errors, floor) + 1e-30)
         return float(weight[ratio > MEDIAN_CHI2].sum()) > 0.5 * float(weight.sum())

@@ -76,6 +76,7 @@ def components(runs: Sequence[JointScores], groups: Sequence[np.ndarray], lower:
         )
         log, previous = optimum.x, weights
         posterior = [_posterior(run, mean, counts, log) for run, mean, counts in zip(*arguments, strict=True)]
+        # Odd episodes count less, as in a distribution with long tails; they would enlarge the error of all others.
         weights = [_weights(errors, spread, log) for errors, spread in posterior]
         if max(np.abs(new - old).max() for new, old in zip(weights, previous, strict=True)) <= SETTLED:
             break
@@ -138,6 +139,7 @@ def _unlikely(
     log: np.ndarray, runs: Sequence[JointScores], shared: list[np.ndarray], weights: list[np.ndarray]
 ) -> float:
     """Return the negative logarithm of how likely sizes are, given as logarithms."""
+    # A prior of one on the sizes: with few episodes the likelihood alone would end at zero.
     cost = 0.5 * float(np.sum(np.square(log / SURE)))
     for run, mean, counts in zip(runs, shared, weights, strict=True):
         # det(1 + L'IL) instead of det(I): the information I is zero along directions that the response absorbs.

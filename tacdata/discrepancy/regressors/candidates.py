@@ -111,6 +111,7 @@ def build(
             full, low, high = _columns(effect, shapes, course, chain, placed, streams, baseline)
             sizes = [full]
             for share in shares:
+                # Effects with a threshold, such as play, are not linear in their size: a small one has another column.
                 small, _, _ = _columns(effect, shapes, course, chain, placed, streams, baseline, share)
                 if not _unlike(sizes[-1], small):
                     shares = shares[: shares.index(share)]  # A threshold is one at all times and lengths, or at none.

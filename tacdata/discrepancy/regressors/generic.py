@@ -23,6 +23,7 @@ def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndar
     slope = depth_slope(course, response, placed)
     level = np.zeros_like(rise)
     level[:, : course.channels] = np.abs(rise[:, : course.channels]).max()
+    # Clock histories are left to `slow`: offsets and drift would make this test fire at any session.
     path_histories = np.delete(histories(course), CLOCK_HISTORIES, axis=1)[streams.rows]
     parts = [rise[:, :, None] * path_histories[:, None, :], slope[:, :, None] * path_histories[:, None, :] * 0.1]
     parts.append(level[:, :, None] * path_histories[:, None, ::2])

@@ -53,6 +53,7 @@ def model_errors(
         chain = Chain(course, response, background)
         bare = streams.predicted(chain.prediction)
         contribution = streams.predicted(chain.again([*background, member])) - bare
+        # An equation errs by a share of its effect, along anything that the effect may depend on.
         columns += [member.effect.form_error * contribution * by for by in modulations(course, streams, contribution)]
         size = float(np.linalg.norm(contribution))
         for variant in variants(member, course.channels):

@@ -172,6 +172,7 @@ def _memory(ways: _Ways) -> list[np.ndarray]:
     """Readings that follow by any time, harder or later in the session; a skin that differs once it was pressed."""
     columns: list[np.ndarray] = []
     for tau in TIME_CONSTANTS:
+        # Linear memory that fades is close to a sum of exponentials.
         difference = low_pass(ways.full, ways.course.step, tau) - ways.full
         by = (np.ones(ways.course.rows), ways.share, ways.clock - 0.5)
         columns += [ways.of_channels(difference * factor[:, None]) for factor in by]
@@ -199,6 +200,7 @@ def _friction(ways: _Ways) -> list[np.ndarray]:
     """Loading against unloading, by any width of play, whatever the rate."""
     columns: list[np.ndarray] = []
     top = np.abs(ways.full).max(axis=0)
+    # Sums of play operators follow nearly any hysteresis that is independent of rate (Prandtl and Ishlinskii).
     for width in WIDTHS:
         each = [play(reading, width * scale) - reading for reading, scale in zip(ways.full.T, top, strict=True)]
         columns.append(ways.of_channels(np.stack(each, axis=1)))

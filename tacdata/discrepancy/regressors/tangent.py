@@ -103,6 +103,7 @@ def tangents(
     chain = run or Chain(course, response, [*model_effects, *placed])
     baseline = streams.predicted(chain.prediction)
     values = np.zeros((*baseline.shape, len(knobs)), dtype=np.float32)
+    # Numbers of different channels do not touch each other's streams, so one run of the chain serves a whole group.
     for group in _groups(knobs, placed, model_effects):
         steps, trial = {}, list(placed)
         for k in group:

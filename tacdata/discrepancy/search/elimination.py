@@ -179,6 +179,7 @@ def _p_values(setting: Setting, selection: Selection, model: Refined) -> list[fl
     for at, placed in enumerate(model.placed):
         mechanism = placed.effect.called
         p = least_p.get(mechanism, 1.0)
+        # An effect may have been asked for only after others were there; then it is tested given these.
         if p > ALPHA:
             remaining = [p for k, p in enumerate(model.placed) if k != at]
             bare = prepare(replace(setting, response=model.response), selection.null, remaining)

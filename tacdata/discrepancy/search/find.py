@@ -27,6 +27,7 @@ def find(setting: Setting, note: Note = lambda text: None, until: str = "decide"
         until: The last step to make, one of `STEPS`.
     """
     note("gate: is there a gap")
+    # Noise is estimated once, without effects. An answer must not choose the noise that it is tested by.
     gated = gate(prepare(setting, null_model(setting)))
     least_p = min(gated.tests.p.min(initial=1.0), gated.tests.p_generic)
     note(f"{'there is a gap' if gated.gap else 'there is no gap'}, p = {least_p:.3f}")

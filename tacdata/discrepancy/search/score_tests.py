@@ -77,6 +77,7 @@ def score_tests(problem: Problem, seed: int = 0) -> ScoreTests:
     null = np.stack([s.bootstrap(normal) for s in scores], axis=1) if scores else np.zeros((DRAWS, 1))
     largest = null.max(axis=1)
     z = np.where([_numerics(problem, gram, c) for c in problem.candidates], np.minimum(z, 0.0), z)
+    # Against the largest of all candidates in each draw: the correction for their number knows their correlation.
     p = (1 + (largest[:, None] >= z).sum(axis=0)) / (DRAWS + 1) if problem.setting.correct_p else ndtr(-z)
     gain = np.array([0.5 * float(np.sum(np.square(s.total))) for s in scores])
     return ScoreTests(z, p, gain, _test_generic(problem, gram, seed, largest), priors)

@@ -36,6 +36,7 @@ def shortlist(problem: Problem, tested: ScoreTests) -> list[list[Candidate]]:
     # The penalty of many parameters, as a drift of each channel has, may hide a finding of the test.
     singles = ranked[:TOP] + [entry for entry in ranked[TOP:] if entry[1].effect.name in significant]
     gains_held_out = {c.effect.name: held_out(problem, [c]) for _, c in singles}
+    # Significant, and better on episodes left out: either alone is passed by a stand-in now and then.
     order = [c for _, c in singles if c.effect.name in significant and gains_held_out[c.effect.name].sum() > 0]
     pair = _pair(problem, [c for _, c in singles], available)
     if order:
@@ -69,6 +70,7 @@ def _beside(problem: Problem, first: Candidate, partners: list[Candidate]) -> li
     total = problem.grams.of(np.arange(len(problem.folds)))
     ridge = np.concatenate([problem.fixed_ridge(1.0), np.zeros(len(first.columns))])
     matrix = total[np.ix_(fixed, fixed)] + np.diag(ridge + 1e-9 * max(float(np.trace(total)), 1e-12) / len(total))
+    # The Schur complement: each partner then costs a small system instead of the whole one.
     conditional = total - total[:, fixed] @ np.linalg.solve(matrix, total[fixed])
     single_gain, fee = _gain(problem, [first]), 0.5 * float(np.log(max(len(problem.folds), 2)))
     result = []
