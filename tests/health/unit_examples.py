@@ -1,4 +1,4 @@
-"""Visits of a unit of the virtual rig, as the benchmark records them, and labels that predict given readings."""
+"""Visits of a unit of the virtual rig, and labels that predict given readings."""
 
 import sys
 from dataclasses import replace
@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks" / "health"))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "docs"))
 
 from example_folder import dent

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "recording"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "recording"))
 from recording_examples import LIMITS, SENSOR, T0, Header, Press, rig, rig_document
 
 from tacdata import documents
