@@ -85,8 +85,7 @@ class FittedResponse(Response):
         # Their value in the air: that is an offset of the place, which no history should go through.
         self._air = [self._design(basis, basis.t[:1]) for basis in self._bases]
         self._fit(streams)  # unsmoothed: its residual estimates the noise, which smoothing needs
-        # Of means of blocks: correlated noise bends a spline more than white noise of the same scatter.
-        self._shaken = _shaken(streams - self._followed(), reduced)
+        self._shaken = _shaken(streams - self._followed(), reduced)  # of blocks: correlated noise bends a spline more
         self._fit(streams)
         if count > EVEN_INTERVALS:
             self._bases = [self._bent(k, count) for k in range(len(self._bases))]
@@ -230,8 +229,7 @@ class FittedResponse(Response):
         each = [np.sqrt(np.sqrt(np.mean(np.square(b), axis=1))) for b in (bend, bend / (LITTLE + rise))]
         monitor = np.mean([m / max(float(m.mean()), 1e-12) for m in each], axis=0)
         inner = len(basis.t) - 7
-        # A part of the knots stays evenly spaced, so that no stretch is without any.
-        share = BENT * monitor + 1 - BENT
+        share = BENT * monitor + 1 - BENT  # some knots stay evenly spaced: no stretch is without any
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
         knots = np.interp(np.linspace(0, integral[-1], inner), integral, at)
         interior = [low]

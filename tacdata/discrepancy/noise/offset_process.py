@@ -163,8 +163,7 @@ def offset_process(
     walk, length, independent = _reml(own_way, error[usable], near, kinds, warmth)
     ratio = _variance_ratio(alike, (walk, length, independent), error[usable], near, kinds, warmth)
     walk, independent = walk * ratio, independent * ratio
-    # A level of each session and place, with a wide prior: only changes within them are predicted.
-    same = FREE_LEVEL**2 * np.sum([level[:, None] == level for level in levels], axis=0)
+    same = FREE_LEVEL**2 * np.sum([level[:, None] == level for level in levels], axis=0)  # only changes are predicted
     nugget = max(independent, LEAST_OWN**2) * np.eye(course.episodes)
     covariance, cross, variance = spans.covariances(length)
     more = same + nugget
@@ -375,8 +374,7 @@ def _reml(
         )
         walk, independent = (float(v) for v in np.exp(np.clip(optimum.x, -14, 14)))
         matrix = walk * alike + np.diag(error) + max(independent, LEAST_OWN**2) * np.eye(len(time))
-        # Among processes that are about as likely the one that leaves slow changes least certain: the choice must not
-        # make a drift significant.
+        # Of processes about as likely, the one least certain of slow changes: no choice may make a drift significant.
         best.append((float(optimum.fun), _doubt(matrix, basis), (walk, steps * between, independent)))
     smallest = min(value for value, _, _ in best)
     return max((b for b in best if b[0] <= smallest + LIKELY), key=lambda b: b[1])[2]

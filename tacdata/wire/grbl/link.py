@@ -71,10 +71,8 @@ class GrblLink:
         self._welcome_expected, self._reset_asked = True, False
         self.polled = False
         self._stopped, self._changed = clock.host.event(), clock.host.condition()
-        # Answers carry no name: lines are written in the order in which they wait.
-        self._turn = clock.host.lock()
-        # Reentrant, because a signal handler may send a feed hold while its own thread is writing a line.
-        self._writing = clock.host.lock()
+        self._turn = clock.host.lock()  # answers carry no name: lines are written in the order in which they wait
+        self._writing = clock.host.lock()  # reentrant: a signal handler may send a hold while its thread writes
         self._threads: list[Any] = []
 
     @property
@@ -162,11 +160,9 @@ class GrblLink:
         entry = SentLine(line)
         with self._turn:
             room = Owed("room in the controller's receive buffer", limit, motion)
-            # Counted here, as Grbl drops bytes without a word when its receive buffer is full.
-            self.wait(lambda: self._room() >= len(data), room)
+            self.wait(lambda: self._room() >= len(data), room)  # Grbl silently drops bytes when its buffer is full
             with self._changed:
-                # Before the line is written: its answer may come at once.
-                self._unanswered.append(entry)
+                self._unanswered.append(entry)  # before the line is written: its answer may come at once
             sent_ns = self._commanded_ns = self.clock.now_ns()
             self._write(data)
         # Replies to a query are expected; lines that come in answer to a move explain why it was not carried out.
@@ -192,8 +188,7 @@ class GrblLink:
                 if overdue := watch.ending(self.last, self.silence.late):
                     raise DeviceError(*PENDANT) if self.pendant else overdue
                 self._changed.wait(0.05)
-            # Nobody else asks before polling begins.
-            if not self.polled:
+            if not self.polled:  # nobody else asks before polling begins
                 self.ask()
 
     def write_off(self) -> None:
@@ -378,8 +373,7 @@ class GrblLink:
         self.welcome = line
         self.statuses.forget()
         self.resets += not self._reset_asked
-        # A reset empties the receive buffer: no earlier line is answered any more.
-        while self._unanswered:
+        while self._unanswered:  # a reset empties the receive buffer: no earlier line is answered any more
             self._unanswered.popleft().answer = "reset"
         if not self._welcome_expected:
             cause, allowed, remedy = WELCOME_IN_MID_STREAM
@@ -388,8 +382,7 @@ class GrblLink:
 
     def _take_status(self, report: StatusReport, arrival_ns: int) -> None:
         self.silence.restart()
-        # grblHAL states the pendant only when it changes.
-        self.pendant = self.pendant if report.pendant is None else report.pendant
+        self.pendant = self.pendant if report.pendant is None else report.pendant  # grblHAL states changes only
         again = self.last is not None and self.last.state == report.state
         place = self.last.position if again and self.last else None
         # The number comes with the alarm's own line or as a substate. A later report without it must not erase it.
