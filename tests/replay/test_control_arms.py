@@ -6,7 +6,7 @@ from test_scene import grasp
 
 from tacdata.replay.comparison.arms import CLOSE, CLOSING, CONSTANT, TAXELS, control_arms
 from tacdata.replay.comparison.challenges import CHALLENGES, changed
-from tacdata.replay.comparison.depth_feedback import BANDWIDTH, UNLIKE, DepthFeedback
+from tacdata.replay.comparison.depth_feedback import BANDWIDTH, UNLIKE, DepthFeedback, squeezing
 from tacdata.replay.comparison.paired import paired, worth
 from tacdata.replay.comparison.trials import like_published, rate
 from tacdata.replay.grasp import LEAST_DEPTH
@@ -91,6 +91,33 @@ def test_feedback_of_readings_is_off_by_the_gain_of_the_unit():
     for moment in np.arange(0, 4, step):
         depth = np.maximum(controller.shift(float(moment), depth, step)[:, 2] / softness, 0.0)
     assert depth[0] == pytest.approx(0.001 / 0.8, abs=0.0001)
+
+
+def test_fingers_that_disagree_do_not_carry_the_object_away():
+    """Two opposed fingers, whose forces balance: their depths are equal, whatever each of them estimates."""
+    seconds, softness, step = np.arange(0, 6, 0.05), 11.0, 0.005
+    outward = np.tile([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], (len(seconds), 1, 1))
+    controller = DepthFeedback(np.full((len(seconds), 2), 0.001), seconds, outward, softness, 1)
+    controller._shallow[:] = 0.0, 0.0002
+    depth, carried = np.zeros(2), []
+    for moment in np.arange(0, 6, step):
+        shift = controller.shift(float(moment), depth, step)[:, 0]
+        depth[:] = max((shift[0] - shift[1]) / 2 / softness, 0.0)
+        carried.append(shift.sum() / 2)
+    # Each for itself they would carry it by 3 mm/s.
+    assert np.abs(carried).max() < 0.0005
+    assert depth == pytest.approx(0.0011, abs=0.00005)
+
+
+def test_velocities_that_squeeze_are_kept():
+    angles = np.radians([0, 120, 240])
+    around = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    assert squeezing(np.ones(3), around) == pytest.approx(np.ones(3))
+    assert squeezing(around @ [0.3, -0.2, 0.0], around) == pytest.approx(np.zeros(3))
+    thumb_and_two = np.array([[1.0, 0, 0], [-1.0, 0, 0], [-1.0, 0, 0]])
+    assert squeezing(np.array([2.0, 1.0, 1.0]), thumb_and_two) == pytest.approx([2.0, 1.0, 1.0])
+    # Two on one side press against a table.
+    assert squeezing(np.array([1.0, 2.0]), thumb_and_two[1:]) == pytest.approx([1.0, 2.0])
 
 
 @pytest.mark.parametrize("name", CHALLENGES)

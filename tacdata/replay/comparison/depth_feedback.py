@@ -26,6 +26,11 @@ MOST = 0.03
 """Largest correction along the normal [m]."""
 MOST_INWARD = -0.01
 """Largest correction away from the object [m]."""
+SHARED = 0.5
+"""Least sum of squared cosines between the normals and a direction along which fingers together move an object [1].
+
+Two opposed fingers have 2 along their line. Normals that scatter by 20 degrees about it have 0.2 across.
+"""
 
 
 @dataclass
@@ -74,6 +79,25 @@ class DepthFeedback:
         goal = self.goal[row]
         pressing = goal > 0
         rate = BANDWIDTH * self.softness * (goal - self._estimate)
+        if pressing.any() and (self._estimate[pressing] > 0).all():
+            rate = squeezing(rate * pressing, self.outward[row] * pressing[:, None])
         self._correction += step * np.where(pressing, rate, -RELEASE * self._correction)
         self._correction = np.clip(self._correction, MOST_INWARD, MOST)
         return self._correction[:, None] * self.outward[row]
+
+
+def squeezing(rate: np.ndarray, outward: np.ndarray) -> np.ndarray:
+    """Return the part of velocities that presses the object, without the part that carries it along.
+
+    Forces of the pads balance. So errors that differ between fingers can never all vanish, and a loop for each finger
+    would carry the object away without end.
+
+    Args:
+        rate: Velocity of each finger along its normal [m/s], shape (f,); 0 for one that does not press.
+        outward: Normals out of the pads [1], shape (f, 3); 0 for one that does not press.
+    """
+    modes, strength, _ = np.linalg.svd(outward, full_matrices=False)
+    # Fingers that all press to one side press against a support, which does not give way.
+    opposed = (modes.min(axis=0) < 0) & (modes.max(axis=0) > 0)
+    carried = modes[:, opposed & (strength**2 > SHARED)]
+    return rate - carried @ (carried.T @ rate)
