@@ -6,20 +6,26 @@ contacts that it had not learnt (`docs/how_to/hands.md`): each finger's is too s
 0.04 mm. The gain is found on one hand and tried on others, in other scenes.
 
     python benchmarks/replay_success.py [--hands N] [--scenes N] [--cases ball,can,box,eraser] [--json FILE]
-        [--arms sweep|challenges]
+        [--arms sweep|challenges] [--robot FILE] [--on-arm URDF]
 
 With `--arms`, control arms without depth run in the same scenes, over stiffnesses or in scenes unlike the
 demonstration.
 Readings of their arm `raw taxels` are proportional to depth, with a gain of each fingertip that is off by up to 20 %.
+
+With `--robot` the targets go through the joints of a hand, and with `--on-arm` its fingers are on an arm's flange.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
+import tempfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
+import yaml
 from hand_paths import FRAMES, START, rig_of, view
 from scipy.spatial.transform import Rotation
 
@@ -30,6 +36,7 @@ from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.sightings import sightings_of
 from tacdata.replay.comparison.gain_search import GripDemand
 from tacdata.replay.comparison.trials import Trials, challenged, like_published, rate, sweep
+from tacdata.replay.robot import read_robot
 from tacdata.replay.scene import scene_of
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, draw_hand
 
@@ -39,6 +46,11 @@ CASES = {"ball": "grasp", "can": "grasp", "box": "grasp", "eraser": "wipe"}
 """Object -> task."""
 TRAINING = 100
 """Seed of the hand on which the gain is found."""
+UPRIGHT = {"quaternion": [0.0, 0.0, 0.0, 1.0]}
+ELBOW_UP = 0.0, -1.9, 1.9, -1.57, -1.57, 0.0
+"""Posture of an arm with six hinges whose flange points down [rad]."""
+ARM_STIFFNESS = 10000.0
+"""Of an arm's joint under position control [N m/rad]; it gives way by little beside fingers of 5 N m/rad."""
 
 
 def demonstration(seed, thing):
@@ -76,20 +88,45 @@ def demonstration(seed, thing):
     return Demonstration(f"hand-{seed}", f"{seed:064x}", task, "table", FRAMES, times, tracks, {}, {}, identity)
 
 
-def judged(thing, hands, scenes):
+def on_arm(hand, urdf, folder):
+    """Return a robot file of a hand's fingers on the flange `tool0` of an arm, which points down over the table."""
+    document, palm = yaml.safe_load(hand.read_text()), "palm"
+    fingers = ElementTree.fromstring((hand.parent / document["urdf"]).read_text())
+    # The prefix is not declared in published files.
+    arm = ElementTree.fromstring(re.sub(r"\sdrake:", " ", urdf.read_text()))
+    kept = [joint for joint in fingers.findall("joint") if str(joint.get("name")).split("_")[0] in document["fingers"]]
+    links = [palm, *(str(child.get("link")) for joint in kept for child in joint.iter("child"))]
+    names = [str(joint.get("name")) for joint in arm.findall("joint") if joint.get("type") == "revolute"]
+    arm.extend([*(ElementTree.Element("link", name=link) for link in links), *kept])
+    flange = ElementTree.SubElement(arm, "joint", name="flange-palm", type="fixed")
+    ElementTree.SubElement(flange, "parent", link="tool0")
+    ElementTree.SubElement(flange, "child", link=palm)
+    ElementTree.SubElement(flange, "origin", rpy="3.14159265 0 0")
+    (folder / "arm.urdf").write_text(ElementTree.tostring(arm, encoding="unicode"))
+    document |= {"name": urdf.stem, "urdf": "arm.urdf", "base": {"position": [-0.5, -0.13, 0.0], **UPRIGHT}}
+    document["home"] = dict(zip(names, ELBOW_UP, strict=True))
+    own = {name: value for name, value in document["stiffness"].items() if name.split("_")[0] in document["fingers"]}
+    document["stiffness"] = own | dict.fromkeys(names, ARM_STIFFNESS)
+    (folder / "robot.yaml").write_text(yaml.safe_dump(document))
+    return folder / "robot.yaml"
+
+
+def judged(thing, hands, scenes, robot):
     """Return the found gain and all trials of one object."""
     scene, task = scene_of(CASES[thing], thing), CASES[thing]
-    found = Trials(demonstration(TRAINING, thing), {}, scene).find_gain(GripDemand())
+    found = Trials(demonstration(TRAINING, thing), {}, scene, robot).find_gain(GripDemand())
     print(f"{thing}: {found.text}", flush=True)
     gains = {"compensated": read_gains().of(task), "chosen": dict.fromkeys(DIRECTIONS, found.gain)}
-    trials = [t for seed in range(hands) for t in Trials(demonstration(seed, thing), gains, scene).trials(scenes)]
+    trials = [
+        t for seed in range(hands) for t in Trials(demonstration(seed, thing), gains, scene, robot).trials(scenes)
+    ]
     return {"found": found.document, "trials": trials}
 
 
-def compared(thing, hands, scenes, table):
+def compared(thing, hands, scenes, table, robot):
     """Print and return how often every arm held, a row for each stiffness or challenge."""
     scene, gains = scene_of(CASES[thing], thing), {"compensated": read_gains().of(CASES[thing])}
-    tried = [Trials(demonstration(seed, thing), gains, scene) for seed in range(hands)]
+    tried = [Trials(demonstration(seed, thing), gains, scene, robot) for seed in range(hands)]
     rows = sweep(tried, scene, scenes) if table == "sweep" else challenged(tried, scene, scenes)
     print(f"{thing}: held of {hands * scenes}: " + ", ".join(rows[0]["rates"]), flush=True)
     for row in rows:
@@ -109,15 +146,21 @@ def main():
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--json", type=Path)
     parser.add_argument("--arms", choices=("sweep", "challenges"))
+    parser.add_argument("--robot", type=Path, help="robot file, in place of pads without links")
+    parser.add_argument("--on-arm", type=Path, help="URDF of an arm that carries the fingers of --robot")
     chosen = parser.parse_args()
-    whole = {}
+    robot, whole = None, {}
+    with tempfile.TemporaryDirectory() as folder:
+        if chosen.robot:
+            path = on_arm(chosen.robot, chosen.on_arm, Path(folder)) if chosen.on_arm else chosen.robot
+            robot = read_robot(path)
     for thing in chosen.cases.split(","):
         if chosen.arms:
-            whole[thing] = compared(thing, chosen.hands, chosen.scenes, chosen.arms)
+            whole[thing] = compared(thing, chosen.hands, chosen.scenes, chosen.arms, robot)
             if chosen.json:
                 chosen.json.write_text(json.dumps(whole, indent=1) + "\n")
             continue
-        whole[thing] = judged(thing, chosen.hands, chosen.scenes)
+        whole[thing] = judged(thing, chosen.hands, chosen.scenes, robot)
         for kind in ("direct", "compensated", "chosen"):
             own = [trial for trial in whole[thing]["trials"] if trial["kind"] == kind]
             low, high = (found := rate([t["held"] for t in own]))["wilson_95"]

@@ -19,7 +19,7 @@ PANEL = HANDS
 EXAMPLES = (
     "tacdata replay demos",
     "tacdata replay demos/episode-000000.mcap --seeds 20 --out replay.json",
-    "tacdata replay demos --find-gain --video replay.mp4",
+    "tacdata replay demos --robot examples/two_finger_hand/robot.yaml",
 )
 
 
@@ -60,6 +60,9 @@ def run(
         bool,
         typer.Option("--challenges", help="All arms, and depth fed back, in scenes unlike the demonstration as well."),
     ] = False,
+    robot: Annotated[
+        Path | None, typer.Option(help="Robot file: its joints follow the targets, in place of pads without links.")
+    ] = None,
     with_guesses: Annotated[
         bool, typer.Option("--with-guesses", help="Let targets pass that bridge gaps and are known badly.")
     ] = False,
@@ -71,6 +74,7 @@ def run(
     from tacdata.errors import UsageError
     from tacdata.replay.comparison.gain_search import GripDemand
     from tacdata.replay.comparison.trials import Trials, challenged, result, sweep
+    from tacdata.replay.robot import read_robot
     from tacdata.replay.scene import scene_of
     from tacdata.replay.targets import check_guesses, doubts
 
@@ -101,12 +105,13 @@ def run(
     name = names.pop()
     weight = {} if mass is None else {"mass": mass}
     scene = scene_of(name, thing, None if radius is None else radius / 1000, stiffness=stiffness, **weight)
+    hand = None if robot is None else read_robot(robot)
     gain_sets, gain = {"compensated": read_gains(gains).of(name)}, None
     # Before the search: these remarks may explain its failure.
     for demonstration in {
         demonstration.recording_hash: demonstration for demonstration in (source, *demonstrations)
     }.values():
-        original = Trials(demonstration, {}, scene).seen
+        original = Trials(demonstration, {}, scene, hand).seen
         if not with_guesses:
             check_guesses(original)
         for words in (
@@ -116,10 +121,12 @@ def run(
         ):
             print(f"note: {demonstration.recording}: {words}")
     if find_gain:
-        search = Trials(source, {}, scene).find_gain(GripDemand(preliminary, most_slip / 1000, most_force, least_grip))
+        search = Trials(source, {}, scene, hand).find_gain(
+            GripDemand(preliminary, most_slip / 1000, most_force, least_grip)
+        )
         print(f"found on {source.recording}: {search.text}")
         gain, gain_sets["chosen"] = (source, search), dict.fromkeys(source.tracks, search.gain)
-    tried = [Trials(demonstration, gain_sets, scene) for demonstration in demonstrations]
+    tried = [Trials(demonstration, gain_sets, scene, hand) for demonstration in demonstrations]
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
     document = result(tried, seeds, scene, gain)

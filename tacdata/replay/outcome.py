@@ -15,7 +15,7 @@ import numpy as np
 from tacdata.errors import UsageError
 from tacdata.replay.grasp import touching
 from tacdata.replay.scene import ReplayScene
-from tacdata.replay.scene_model import PAD, Feedback, Rollout, SceneModel
+from tacdata.replay.scene_model import PAD, Feedback, FreePads, PadDrive, Rollout, SceneModel
 from tacdata.replay.targets import FingertipTargets
 
 HIGH = 0.9
@@ -93,11 +93,16 @@ def normals(targets: FingertipTargets) -> np.ndarray:
 
 
 def replay_targets(
-    targets: FingertipTargets, scene: ReplayScene, centre: np.ndarray, feedback: Feedback | None = None
+    targets: FingertipTargets,
+    scene: ReplayScene,
+    centre: np.ndarray,
+    feedback: Feedback | None = None,
+    hand: PadDrive | None = None,
 ) -> ReplayOutcome:
     """Return the outcome of a replay for an object whose centre starts at ``centre`` [m].
 
-    With ``feedback``, a controller moves the targets by the readings of the simulated skin.
+    With ``feedback``, a controller moves the targets by the readings of the simulated skin. Without ``hand``, pads
+    without links follow the targets.
 
     An object that is lifted is held if it stays high while the fingers are. An eraser is held if it never falls behind
     the fingers' strokes.
@@ -112,7 +117,7 @@ def replay_targets(
         pads = pads + np.array(scene.bias)
     ground = np.array(centre) + scene.place
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
-    path = SceneModel(scene, pads[0], ground).run(pads, seconds, feedback)
+    path = SceneModel(scene, hand or FreePads(pads[0]), ground).run(pads, seconds, feedback)
     first, last = int(np.argmax(touch)), int(np.flatnonzero(high)[-1])
     lag = _behind(path.tips.mean(axis=1), path.centre, first, high if wiped else None)
     lowest = float((path.centre[high, 2] - ground[2]).min())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,6 +21,8 @@ PAD = 0.009
 """Radius of a fingertip's pad [m]."""
 TIP_MASS = 0.05
 """Mass that moves with a fingertip [kg]."""
+PADS = 2
+"""Collision class of pads: they touch the object and the support, not each other (MuJoCo's contype)."""
 TORSION = 0.003
 """Coefficient of torsional friction about a contact's normal [m]: a patch of a few millimetres."""
 XML = """
@@ -31,18 +34,10 @@ XML = """
    <freejoint/>
    <geom name="object" type="{kind}" size="{size}" mass="{mass}" condim="4" friction="{friction} {torsion} 0.0001"/>
   </body>
-  {tips}
  </worldbody>
- <actuator>{springs}</actuator>
 </mujoco>"""
-TIP = """<body name="tip{k}" pos="{x} {y} {z}" gravcomp="1">
- <joint name="tip{k}x" type="slide" axis="1 0 0"/><joint name="tip{k}y" type="slide" axis="0 1 0"/>
- <joint name="tip{k}z" type="slide" axis="0 0 1"/>
- <geom name="tip{k}" type="sphere" size="{pad}" mass="{mass}" contype="2" conaffinity="1" condim="4" priority="1"
-  friction="{friction} {torsion} 0.0001" solref="-{skin} -{damping}" solimp="{impedance} {impedance} 0.001"/></body>"""
 IMPEDANCE = 0.9
 """Impedance of the contact between skin and object [1] (MuJoCo, solver parameters)."""
-SPRING = '<position name="{joint}" joint="{joint}" kp="{kp}" kv="{kv}"/>'
 
 
 Feedback = Callable[[float, np.ndarray, float], np.ndarray]
@@ -72,35 +67,88 @@ class Rollout:
         return np.linalg.norm(self.slid, axis=-1)
 
 
+class PadDrive(Protocol):
+    """Fingers of a scene: their bodies, actuators and commands."""
+
+    def mount(self, spec: Any, scene: ReplayScene) -> None:
+        """Add bodies, actuators, and a pad for each finger by `add_pad`, to MuJoCo's model of a scene."""
+
+    def begin(self, model: Any, data: Any) -> None:
+        """Bring the fingers to their start."""
+
+    def commands(self, pads: np.ndarray, seconds: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """Return the actuators' commands at moments [s], shape (m, actuators); pads and seconds as `SceneModel.run`."""
+        ...
+
+    def moved(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the change of the commands that moves the pads by a displacement [m], shape (f, 3), from now on."""
+        ...
+
+
+def add_pad(body: Any, k: int, scene: ReplayScene, sizes: Sequence[float] = (PAD, PAD, PAD), **placed: Any) -> None:
+    """Add the pad of finger ``k`` to a body of MuJoCo: an ellipsoid of half axes ``sizes`` [m]."""
+    kind = mujoco().mjtGeom
+    body.add_geom(
+        name=f"tip{k}",
+        type=kind.mjGEOM_SPHERE if len(set(sizes)) == 1 else kind.mjGEOM_ELLIPSOID,
+        size=list(sizes),
+        mass=TIP_MASS,
+        contype=PADS,
+        conaffinity=1,
+        condim=4,
+        priority=1,
+        friction=[scene.friction, TORSION, 0.0001],
+        solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
+        **placed,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FreePads:
+    """Pads without links, each on three springs."""
+
+    start: np.ndarray
+    """Their centres at the beginning [m], shape (f, 3)."""
+
+    def mount(self, spec: Any, scene: ReplayScene) -> None:
+        """Add them."""
+        slide = mujoco().mjtJoint.mjJNT_SLIDE
+        for k, place in enumerate(self.start):
+            body = spec.worldbody.add_body(name=f"tip{k}", pos=place, gravcomp=1)
+            add_pad(body, k, scene)
+            for axis in np.eye(3):
+                joint = body.add_joint(name=f"tip{k}{'xyz'[int(axis.argmax())]}", type=slide, axis=axis)
+                add_actuator(spec, joint.name, scene.stiffness, 2 * np.sqrt(scene.stiffness * TIP_MASS))
+
+    def begin(self, model: Any, data: Any) -> None:
+        """Leave them where they were built."""
+
+    def commands(self, pads: np.ndarray, seconds: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """Return the springs' lengths at moments [s], shape (m, 3 f)."""
+        return interpolated(pads.reshape(len(pads), -1), seconds, moments) - self.start.ravel()
+
+    def moved(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the displacement itself."""
+        return displacement.ravel()
+
+
+def add_actuator(spec: Any, joint: str, stiffness: float, damping: float) -> None:
+    """Hold a joint at its command by a spring [N/m or N m/rad] and a damper [N s/m or N m s/rad]."""
+    actuator = spec.add_actuator(name=joint, target=joint, trntype=mujoco().mjtTrn.mjTRN_JOINT)
+    actuator.set_to_position(kp=stiffness, kv=damping)
+
+
+def interpolated(values: np.ndarray, seconds: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Return columns of values, shape (n, k), at other times, shape (m, k)."""
+    return np.stack([np.interp(moments, seconds, column) for column in values.T], axis=1)
+
+
 class SceneModel:
     """The simulation of one trial."""
 
-    def __init__(self, scene: ReplayScene, begin: np.ndarray, centre: np.ndarray) -> None:
-        """Build it with the pads' centres at ``begin`` [m], shape (f, 3), and the object's at ``centre`` [m]."""
+    def __init__(self, scene: ReplayScene, hand: PadDrive, centre: np.ndarray) -> None:
+        """Build it with a hand, and the object's centre at ``centre`` [m]."""
         engine = mujoco()
-        count, critical = len(begin), 2 * np.sqrt(scene.stiffness * TIP_MASS)
-        contact = f"{scene.friction:.6g}"
-        # MuJoCo's direct solref: a contact at rest gives way by (1 - d) force / (mass rate), with impedance d.
-        reduced = TIP_MASS * scene.mass / (TIP_MASS + scene.mass)
-        rate = scene.skin * (1 - IMPEDANCE) / reduced
-        tips = "".join(
-            TIP.format(
-                k=k,
-                x=place[0],
-                y=place[1],
-                z=place[2],
-                pad=PAD,
-                mass=TIP_MASS,
-                friction=contact,
-                torsion=TORSION,
-                skin=rate,
-                damping=2 * np.sqrt(rate),
-                impedance=IMPEDANCE,
-            )
-            for k, place in enumerate(begin)
-        )
-        joints = [f"tip{k}{axis}" for k in range(count) for axis in "xyz"]
-        springs = "".join(SPRING.format(joint=joint, kp=scene.stiffness, kv=critical) for joint in joints)
         x, y, z = centre
         text = XML.format(
             step=STEP,
@@ -110,20 +158,27 @@ class SceneModel:
             z=z,
             kind=scene.body.geometry,
             mass=scene.mass,
-            friction=contact,
+            friction=f"{scene.friction:.6g}",
             size=" ".join(f"{v:.6g}" for v in scene.body.sizes),
             board=scene.board_friction,
             torsion=TORSION,
-            tips=tips,
-            springs=springs,
         )
-        self._begin, self._model = begin, engine.MjModel.from_xml_string(text)
+        spec = engine.MjSpec.from_string(text)
+        hand.mount(spec, scene)
+        self._hand, self._model = hand, spec.compile()
         self._data = engine.MjData(self._model)
         self._object = self._model.body("object").id
-        self._tips = [self._model.body(f"tip{k}").id for k in range(count)]
         self._object_geom = self._model.geom("object").id
+        self._pads = [k for k in range(self._model.ngeom) if self._model.geom_contype[k] == PADS]
+        self._pads.sort(key=lambda k: int(self._model.geom(k).name.rpartition("tip")[2]))
         self._pad_of = np.full(self._model.ngeom, -1)
-        self._pad_of[[self._model.geom(f"tip{k}").id for k in range(count)]] = range(count)
+        self._pad_of[self._pads] = range(len(self._pads))
+        for pad in self._pads:
+            # MuJoCo's direct solref: a contact at rest gives way by (1 - d) force / (mass rate), with impedance d.
+            inverse = self._model.body_invweight0[self._model.geom_bodyid[pad], 0] + 1 / scene.mass
+            rate = scene.skin * (1 - IMPEDANCE) * inverse
+            self._model.geom_solref[pad] = -rate, -2 * np.sqrt(rate)
+        hand.begin(self._model, self._data)
         self._data.xfrc_applied[self._object, 2] = -scene.body.pull
 
     def run(self, pads: np.ndarray, seconds: np.ndarray, feedback: Feedback | None = None) -> Rollout:
@@ -136,10 +191,8 @@ class SceneModel:
                 -> displacement [m], shape (f, 3).
         """
         step = mujoco().mj_step
-        rows, count = len(seconds), len(self._tips)
+        rows, count = len(seconds), len(self._pads)
         moments = np.arange(-SETTLE, seconds[-1] + STEP * COMMAND, STEP * COMMAND)
-        flat = pads.reshape(rows, -1)
-        targets = np.stack([np.interp(moments, seconds, flat[:, c]) for c in range(flat.shape[1])], axis=1)
         rollout = Rollout(
             np.empty((rows, 3)),
             np.empty((rows, count, 3)),
@@ -148,19 +201,19 @@ class SceneModel:
             np.zeros((rows, count, 3)),
         )
         row, slid, data = 0, np.zeros((count, 3)), self._data
-        depth, correction = np.zeros(count), 0.0
-        for moment, command in zip(moments, targets - self._begin.ravel(), strict=True):
-            data.ctrl[:] = command + correction
+        depth, correction = np.zeros(count), np.zeros((count, 3))
+        for moment, command in zip(moments, self._hand.commands(pads, seconds, moments), strict=True):
+            data.ctrl[:] = command + self._hand.moved(correction)
             step(self._model, data, COMMAND)
             contacts, touching = self._contacts()
             if feedback is not None:
                 depth[:] = 0.0
                 np.maximum.at(depth, touching, -data.contact.dist[contacts])
-                correction = feedback(float(moment), depth, STEP * COMMAND).ravel()
+                correction = feedback(float(moment), depth, STEP * COMMAND)
             if len(contacts):
                 slid[touching] += self._sliding(contacts, touching) * STEP * COMMAND
             while row < rows and seconds[row] <= moment + STEP * COMMAND:
-                rollout.centre[row], rollout.tips[row] = data.xpos[self._object], data.xpos[self._tips]
+                rollout.centre[row], rollout.tips[row] = data.xpos[self._object], data.geom_xpos[self._pads]
                 self._press(contacts, touching, rollout.force[row], rollout.depth[row])
                 rollout.slid[row] = slid
                 row += 1
@@ -179,8 +232,19 @@ class SceneModel:
         a, b, c = data.xmat[self._object].reshape(3, 3) @ data.qvel[3:6]  # MuJoCo gives it about the body's axes
         arm, normal = data.contact.pos[contacts] - data.xpos[self._object], data.contact.frame[contacts, :3]
         turning = arm @ np.array([[0, c, -b], [-c, 0, a], [b, -a, 0]])
-        distance = data.qvel[:3] + turning - data.qvel[6:].reshape(-1, 3)[pads]
+        distance = data.qvel[:3] + turning - self._velocity(contacts, pads)
         return distance - (distance * normal).sum(axis=1, keepdims=True) * normal
+
+    def _velocity(self, contacts: np.ndarray, pads: np.ndarray) -> np.ndarray:
+        """Return the velocity of each contact's pad there [m/s], shape (k, 3)."""
+        data, jacobian = self._data, np.zeros((3, self._model.nv))
+        velocities = np.empty((len(contacts), 3))
+        for row, (k, pad) in enumerate(zip(contacts.tolist(), pads.tolist(), strict=True)):
+            body = self._model.geom_bodyid[self._pads[pad]]
+            # Not `mj_objectVelocity`: its velocities are a step older than the object's.
+            mujoco().mj_jac(self._model, data, jacobian, None, data.contact.pos[k], body)
+            velocities[row] = jacobian @ data.qvel
+        return velocities
 
     def _press(self, contacts: np.ndarray, pads: np.ndarray, force: np.ndarray, depth: np.ndarray) -> None:
         """Write the normal force [N] and the depth [m] of each pad on the object, shapes (f,)."""

@@ -47,21 +47,22 @@ def paired(first: Sequence[bool], second: Sequence[bool]) -> PairedDifference:
     return PairedDifference(sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs), len(pairs))
 
 
-def worth(depth: Sequence[bool], controls: dict[str, list[bool]]) -> str:
-    """Return the benefit of depth over the best of the other arms, as a sentence.
+def worth(outcomes: Sequence[bool], controls: dict[str, list[bool]], what: str = "depth") -> str:
+    """Return the benefit of an arm over the best of the others, as a sentence.
 
     Args:
-        depth: Outcomes (held or not) of the arm with depth, scene by scene.
+        outcomes: Outcomes of that arm (held or not), scene by scene.
         controls: Arm -> its outcomes in the same scenes.
+        what: Noun for the difference between that arm and the others.
     """
     if not controls:
-        return "what depth was worth is not known: there is no other arm"
+        return f"what {what} was worth is not known: there is no other arm"
     best = max(controls, key=lambda name: sum(controls[name]))
-    difference = paired(depth, controls[best])
+    difference = paired(outcomes, controls[best])
     low, high = difference.interval
-    measured = f"depth against {best}: {difference.text}, paired over {difference.of} scenes"
+    measured = f"{what} against {best}: {difference.text}, paired over {difference.of} scenes"
     if low > 0:
-        return f"{measured}: depth was worth that much"
+        return f"{measured}: {what} was worth that much"
     if high < 0:
-        return f"{measured}: depth did worse than moving without it"
-    return f"{measured}: depth was worth nothing that these scenes show"
+        return f"{measured}: {what} did worse than moving without it"
+    return f"{measured}: {what} was worth nothing that these scenes show"

@@ -15,9 +15,11 @@ from tacdata.replay.comparison.arms import CONTROLS, DEPTH, DIRECT, TAXELS, cont
 from tacdata.replay.comparison.challenges import CHALLENGES, changed
 from tacdata.replay.comparison.depth_feedback import DepthFeedback
 from tacdata.replay.comparison.gain_search import FoundGain, GripDemand, GripSearch
+from tacdata.replay.comparison.linked_hand import LinkedHand
 from tacdata.replay.comparison.paired import worth
 from tacdata.replay.grasp import cut, first_grasp
 from tacdata.replay.outcome import ReplayOutcome, normals, object_centre, replay_targets
+from tacdata.replay.robot import Robot
 from tacdata.replay.scene import SPREADS, ReplayScene, drawn
 from tacdata.replay.targets import FingertipTargets, targets_of
 
@@ -34,21 +36,29 @@ STIFFNESSES = 150.0, 300.0, 1000.0, 3000.0
 class Trials:
     """The first grasp or wipe of a demonstration, ready for trials."""
 
-    def __init__(self, demonstration: Demonstration, gains: dict[str, dict[str, float]], scene: ReplayScene) -> None:
+    def __init__(
+        self,
+        demonstration: Demonstration,
+        gains: dict[str, dict[str, float]],
+        scene: ReplayScene,
+        robot: Robot | None = None,
+    ) -> None:
         """Cut it out and find where the object was.
 
         Args:
             demonstration: A demonstration with predicted depth.
             gains: Kind of replay ("compensated", "chosen") -> finger -> gain [m/mm]; "direct" is added.
             scene: The undisturbed scene.
+            robot: Replays through its joints, with the fingers that it has; by default pads without links.
 
         Raises:
             UsageError: If it holds no grasp, or fingers lack predicted depth or gains.
         """
-        self.made, self._scene = demonstration, scene
-        targets = targets_of(
-            demonstration, next(iter(gains.values())) if gains else dict.fromkeys(demonstration.tracks, 0.0)
-        )
+        self.made, self._scene, self.robot = demonstration, scene, robot
+        self._names = tuple(name for name in demonstration.tracks if robot is None or name in robot.tips)
+        self._hands: dict[str, LinkedHand] = {}
+        usual = next(iter(gains.values())) if gains else dict.fromkeys(demonstration.tracks, 0.0)
+        targets = targets_of(demonstration, usual, self._names)
         self._span = first_grasp(targets)
         self.seen = cut(targets, self._span[0], self._span[2])
         self._centre = object_centre(targets, self._span[1], scene.reach)
@@ -60,18 +70,19 @@ class Trials:
 
     def one(self, kind: str, scene: ReplayScene, seed: int = 0) -> ReplayOutcome:
         """Return the outcome of one trial, of a kind of replay, in a scene; the seed draws a controller's errors."""
-        if kind not in (CLOSED, CLOSED_RAW):
-            return replay_targets(self.paths[kind], scene, self._centre)
-        path = self.paths[DEPTH if kind == CLOSED else TAXELS]
+        followed = {CLOSED: DEPTH, CLOSED_RAW: TAXELS}.get(kind, kind)
+        path, hand = self.paths[followed], self._hand(followed)
+        if kind == followed:
+            return replay_targets(path, scene, self._centre, hand=hand)
         goal = np.clip(np.nan_to_num(path.depth), 0, None) / 1000
         if kind == CLOSED_RAW and (level := self._readings()) is not None:
             # One gain for all units: what a reading says without a network of its own.
             goal = np.clip(np.nan_to_num(level), 0, None) * (goal.sum() / max(float(np.nansum(level)), 1e-9))
         seconds = (path.time_ns - path.time_ns[0]) * 1e-9
         # Of the undisturbed scene: the controller does not know the drawn one.
-        softness = 1 + self._scene.skin / self._scene.stiffness
+        softness = 1 + self._scene.skin / (self._scene.stiffness if hand is None else hand.stiffness)
         controller = DepthFeedback(goal, seconds, normals(path), softness, seed, kind == CLOSED_RAW)
-        return replay_targets(path, scene, self._centre, controller.shift)
+        return replay_targets(path, scene, self._centre, controller.shift, hand)
 
     def held_in(
         self, scene: ReplayScene, kinds: Sequence[str], seeds: int, challenge: str = ""
@@ -113,10 +124,13 @@ class Trials:
             UsageError: If none does.
         """
         fingers = self.paths[DIRECT].fingers
+        hands: dict[float, LinkedHand] = {}
 
         def outcome(gain: float, seed: int) -> ReplayOutcome:
             path = self._cut(dict.fromkeys(fingers, gain))
-            return replay_targets(path, drawn(self._scene, len(fingers), seed), self._centre)
+            if self.robot is not None and gain not in hands:
+                hands[gain] = LinkedHand(self.robot, path, self._scene)
+            return replay_targets(path, drawn(self._scene, len(fingers), seed), self._centre, hand=hands.get(gain))
 
         return GripSearch(outcome, demand).find()
 
@@ -145,8 +159,14 @@ class Trials:
                 )
         return records
 
+    def _hand(self, kind: str) -> LinkedHand | None:
+        """Return the joints that follow an arm's path; None without a robot."""
+        if self.robot is not None and kind not in self._hands:
+            self._hands[kind] = LinkedHand(self.robot, self.paths[kind], self._scene)
+        return self._hands.get(kind)
+
     def _cut(self, gains: dict[str, float] | None) -> FingertipTargets:
-        return cut(targets_of(self.made, gains), self._span[0], self._span[2])
+        return cut(targets_of(self.made, gains, self._names), self._span[0], self._span[2])
 
 
 def result(
@@ -171,6 +191,7 @@ def result(
         "task": first.made.task,
         "gains": gains[DEPTH],
         "scene": {**scene.document, "spreads": SPREADS},
+        **({"robot": first.robot.document} if first.robot else {}),
         **{kind: rate(outcomes[kind]) for kind in kinds if kind not in CONTROLS},
         "controls": {kind: rate(outcomes[kind]) for kind in kinds if kind in CONTROLS},
         "worth": worth(outcomes[DEPTH], {kind: outcomes[kind] for kind in kinds if kind in CONTROLS}),
@@ -221,20 +242,24 @@ def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[
     kinds = [kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)]
     kinds += [CLOSED_RAW, CLOSED] if TAXELS in kinds else [CLOSED]
     return [
-        _row({"challenge": name}, [recording.held_in(scene, kinds, seeds, name) for recording in tried], CLOSED)
+        _row({"challenge": name}, [recording.held_in(scene, kinds, seeds, name) for recording in tried])
         for name in CHALLENGES
     ]
 
 
-def _row(named: dict[str, Any], each: Sequence[dict[str, list[bool]]], judged: str = DEPTH) -> dict[str, Any]:
+def _row(named: dict[str, Any], each: Sequence[dict[str, list[bool]]]) -> dict[str, Any]:
     outcomes = {kind: [hit for results in each for hit in results[kind]] for kind in each[0]}
-    against = CONTROLS if judged == DEPTH else (*CONTROLS, DEPTH, CLOSED_RAW)
-    rivals = {kind: outcomes[kind] for kind in outcomes if kind in against}
-    return {
-        **named,
-        "rates": {kind: rate(values) for kind, values in outcomes.items()},
-        "worth": worth(outcomes[judged], rivals),
-    }
+
+    def against(kinds: Sequence[str], what: str = "depth") -> str:
+        judged = CLOSED if CLOSED in outcomes else DEPTH
+        return worth(outcomes[judged], {kind: outcomes[kind] for kind in kinds if kind in outcomes}, what)
+
+    # Depth is compared in the same loop, and the loop with the arms that only move.
+    words = [against(CONTROLS)] if CLOSED not in outcomes else []
+    words += [against((CLOSED_RAW,))] if CLOSED_RAW in outcomes else []
+    words += [against((*CONTROLS, DEPTH), "the loop")] if CLOSED in outcomes else []
+    rates = {kind: rate(values) for kind, values in outcomes.items()}
+    return {**named, "rates": rates, "worth": "; ".join(words)}
 
 
 def like_published(row: dict[str, Any], task: str) -> bool:

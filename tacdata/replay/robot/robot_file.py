@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,8 @@ ROTATION_TOLERANCE = float(np.radians(2.0))
 ORIENTATION_WEIGHT = 0.02
 """Weight of a rotation error relative to a position error [m/rad]: 1 deg counts as 0.35 mm."""
 
+NAMED = ("home", "velocity", "acceleration", "stiffness")
+"""Entries of a robot file that name joints."""
 LONGEST = 1.0
 """Largest plausible distance of a fingertip from its link [m]."""
 
@@ -53,6 +55,10 @@ class Robot:
     document: dict[str, Any]
     remarks: tuple[str, ...] = ()
     """Remarks about the URDF's limits."""
+    stiffness: dict[str, float] = field(default_factory=dict)
+    """Joint -> stiffness with which its controller holds it [N m/rad or N/m], where the robot file gives one."""
+    pads: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    """Finger -> half axes of its pad along the fingertip's x, y and z [m], where the robot file gives them."""
     source: Path | None = None
     """The URDF's file, with its shapes."""
 
@@ -69,7 +75,7 @@ def read_robot(path: StrPath) -> Robot:
     urdf = read_urdf(origin)
     for what, entries, members in (
         ("link", [entry["link"] for entry in document["fingers"].values()], urdf.links),
-        ("joint", [n for key in ("home", "velocity", "acceleration") for n in document.get(key, {})], urdf.joints),
+        ("joint", [n for key in NAMED for n in document.get(key, {})], urdf.joints),
     ):
         unknown = sorted(set(entries) - set(members))
         if unknown:
@@ -101,6 +107,8 @@ def read_robot(path: StrPath) -> Robot:
         _workspace(document, str(path)),
         document,
         urdf.remarks,
+        document.get("stiffness", {}),
+        {name: tuple(entry["pad"]) for name, entry in document["fingers"].items() if "pad" in entry},
         origin,
     )
 
