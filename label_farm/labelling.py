@@ -35,7 +35,7 @@ from tacdata.recording.files.reader import read_episode
 from tacdata.sensor import Sensor
 
 Progress = Callable[[str, int, int], None]
-"""Called with the stage ("read", "look" or "solve"), how much of it is done, and how much there is."""
+"""Called with the stage ("read", "look", "compile" or "solve"), how much of it is done, and how much there is."""
 
 Delivered = Callable[[int, str], None]
 """Called with an episode's number and "" once its label is written, or the reason why it has none."""
@@ -353,6 +353,7 @@ class Labelling:
                     since,
                     self.settle,
                     lambda sensors=sensors: self._take_in(sensor, later, set(sensors)),
+                    partial(self.progress, "compile"),
                 )
             finally:
                 pool.close()

@@ -11,13 +11,14 @@ import shutil
 import sys
 import tempfile
 import uuid
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import warp as wp  # noqa: TID251
 from warp import Function  # noqa: TID251
 
-__all__ = ["Function", "start", "wp"]
+__all__ = ["Function", "report_modules", "start", "wp"]
 
 NO_GPU = b"Could not find or load the NVIDIA CUDA driver"
 """Printed by Warp's native library, past Python, at every start on a machine without a GPU."""
@@ -28,6 +29,9 @@ Kernels loop over an element's four points, ten nodes and three directions. Writ
 as fast and take longer to compile, in Python and in LLVM. On an empty cache, `pytest
 tests/skin/elasticity/test_skin_elasticity.py` takes 28 s of the processor, and 37 with 6 passes.
 """
+
+MODULES = {"cpu": 29, "cuda": 37}
+"""Modules of kernels that the shipped session's first label takes, by kind of device: others take about as many."""
 
 KERNELS = "TACDATA_KERNELS"
 """Variable with the folder of shipped kernels; by default that in this package."""
@@ -55,6 +59,32 @@ def start() -> None:
             wp.config.cpu_compiler_flags = flags.replace("-march=native", f"-target-cpu {processor}")
             copy_to_cache(shipped)
             break
+
+
+def report_modules(loaded: Callable[[int, int], None]) -> None:
+    """Report modules of kernels as they are compiled or loaded: the number so far, and of all, after each."""
+    wp.set_logger(_ModuleCount(loaded))
+    wp.config.log_level = wp.LOG_INFO
+
+
+class _ModuleCount:
+    """Warp's logger: counts the modules it names, and is silent as `start` has made Warp."""
+
+    def __init__(self, loaded: Callable[[int, int], None]) -> None:
+        self._loaded, self._count = loaded, 0
+        self._about = MODULES["cuda" if wp.is_cuda_available() else "cpu"]
+
+    def info(self, message: str) -> None:
+        if message.lstrip().startswith("Module ") and " load on device " in message:
+            self._count += 1
+            self._loaded(self._count, max(self._about, self._count))
+
+    def debug(self, message: str) -> None: ...
+
+    def warning(self, message: str, category: type[Warning] | None = None, stacklevel: int = 1) -> None: ...
+
+    def error(self, message: str) -> None:
+        sys.stderr.write(f"Warp Error: {message}\n")
 
 
 def shipped_kernels() -> Path:

@@ -55,8 +55,12 @@ class Roster:
         )
 
     def note(self, owner: str, text: str) -> None:
-        """Store why a worker does not work."""
+        """Store why a worker does not work, or does not solve yet."""
         self._ledger.rows("UPDATE worker SET note = ? WHERE owner = ?", (text, owner))
+
+    def notes(self) -> list[str]:
+        """Return the notes of all workers."""
+        return [note for [note] in self._ledger.rows("SELECT coalesce(note, '') FROM worker")]
 
     def leave(self, owner: str) -> None:
         """Remove a worker."""

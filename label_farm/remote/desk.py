@@ -100,7 +100,7 @@ class RemoteDesk:
             raise URLError(str(error)) from None
 
     def note(self, text: str) -> None:
-        """Say in words why this worker does not work."""
+        """Say in words why this worker does not work, or does not solve yet."""
         self._client.post("/api/work/beat", self._me(note=text[:2000]))
 
     def leave(self) -> None:

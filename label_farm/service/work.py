@@ -28,7 +28,7 @@ class RemoteWorker(BaseModel):
     model_config = ConfigDict(extra="forbid")
     owner: str = Field(pattern=f"^{OWNER}$")
     device: str = Field("cpu", max_length=40)
-    note: str = Field("", max_length=2000)
+    note: str | None = Field(None, max_length=2000)
 
 
 class ClaimRequest(RemoteWorker):
@@ -119,10 +119,10 @@ def add_work(api: FastAPI, foreman: Foreman) -> None:
 
     @api.post("/api/work/beat")
     def beat(hands: SignOfLife) -> dict[str, Any]:
-        """Give a sign of life, by which claims stay valid; with a note, say why the worker does not work."""
+        """Give a sign of life, by which claims stay valid; a note says why the worker does not solve, "" ends it."""
         with opened() as ledger:
             ledger.heartbeat(remote(hands.owner))
-            if hands.note:
+            if hands.note is not None:
                 Roster(ledger).note(remote(hands.owner), hands.note)
         if hands.processor is not None and hands.memory is not None:
             foreman.gauges.tell(remote(hands.owner), Usage(hands.processor, hands.memory))

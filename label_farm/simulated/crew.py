@@ -14,6 +14,9 @@ from tacdata.label_farm import environment
 from tacdata.label_farm.simulated.simulation import Simulation
 from tacdata.label_farm.simulated.solving import solve
 
+KERNELS = "kernels"
+"""First word of a line about modules of kernels; other lines begin with the number of a press."""
+
 
 def chosen_devices(name: str) -> tuple[str, ...]:
     """Return the devices: "auto" takes all GPUs of this machine, or its CPU where it has none.
@@ -30,7 +33,12 @@ def chosen_devices(name: str) -> tuple[str, ...]:
 
 
 def solve_all(
-    simulation: Simulation, presses: int, devices: Sequence[str], workers: int, settled: Callable[[int, str], None]
+    simulation: Simulation,
+    presses: int,
+    devices: Sequence[str],
+    workers: int,
+    settled: Callable[[int, str], None],
+    loading: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
     """Solve missing presses by ``workers`` processes; in this one for 1.
 
@@ -40,15 +48,20 @@ def solve_all(
         devices: Devices of the workers, one after the other.
         workers: How many processes.
         settled: Called with each press's number, and why it was given up or "".
+        loading: Called with the modules of kernels that a process has loaded, and of all.
 
     Raises:
         SolveError: If a specimen cannot be modelled, or a worker dies.
     """
     simulation.open()
     if workers == 1:
+        from tacdata.warp_runtime import report_modules
+
+        report_modules(loading)
         solve(simulation, presses, devices[0], settled=settled)
         return
-    crew = [_Hand(simulation.folder, presses, k, workers, devices[k % len(devices)], settled) for k in range(workers)]
+    hear = settled, loading
+    crew = [_Hand(simulation.folder, presses, k, workers, devices[k % len(devices)], *hear) for k in range(workers)]
     try:
         for hand in crew:
             hand.join()
@@ -61,7 +74,14 @@ class _Hand:
     """One process, and a thread that listens to it."""
 
     def __init__(
-        self, folder: Path, presses: int, index: int, of: int, device: str, settled: Callable[[int, str], None]
+        self,
+        folder: Path,
+        presses: int,
+        index: int,
+        of: int,
+        device: str,
+        settled: Callable[[int, str], None],
+        loading: Callable[[int, int], None],
     ) -> None:
         self._errors: IO[bytes] = tempfile.TemporaryFile()
         # A process group of its own: Ctrl-C reaches this process alone, which stops the others.
@@ -73,16 +93,19 @@ class _Hand:
             text=True,
             process_group=0,
         )
-        self._thread = threading.Thread(target=self._listen, args=(settled,), daemon=True)
+        self._thread = threading.Thread(target=self._listen, args=(settled, loading), daemon=True)
         self._thread.start()
 
-    def _listen(self, settled: Callable[[int, str], None]) -> None:
+    def _listen(self, settled: Callable[[int, str], None], loading: Callable[[int, int], None]) -> None:
         if self._process.stdout is None:
             return
         with self._process.stdout as lines:
             for line in lines:
                 number, _, reason = line.rstrip("\n").partition(" ")
-                settled(int(number), reason)
+                if number == KERNELS:
+                    loading(*map(int, reason.split()))
+                else:
+                    settled(int(number), reason)
 
     def join(self) -> None:
         """Wait for its end.

@@ -51,7 +51,7 @@ class Desk(Protocol):
         ...
 
     def note(self, text: str) -> None:
-        """Store in words why this worker does not work."""
+        """Store in words why this worker does not work, or does not solve yet."""
         ...
 
     def leave(self) -> None:
@@ -133,7 +133,7 @@ class LocalDesk:
         self.ledger.heartbeat(self.owner)
 
     def note(self, text: str) -> None:
-        """Store in words why this worker does not work."""
+        """Store in words why this worker does not work, or does not solve yet."""
         self._roster.note(self.owner, text)
 
     def leave(self) -> None:

@@ -9,7 +9,9 @@ from typing import Protocol
 
 from tacdata.errors import UsageError
 from tacdata.label_farm.ledger.ledger import JobOutcome, Ledger
+from tacdata.label_farm.ledger.roster import Roster
 from tacdata.label_farm.store.store import Store
+from tacdata.label_farm.workers.loading import modules_of
 from tacdata.sensor import Sensor
 
 POLL_SECONDS = 0.1
@@ -42,6 +44,7 @@ class Engine(ABC):
         since: int,
         on_change: Callable[[JobOutcome], None],
         grow: Callable[[], set[str] | None] = lambda: None,
+        on_loading: Callable[[int, int], None] = lambda done, total: None,
     ) -> int:
         """Run until every job is solved or failed, by these workers or those of another run.
 
@@ -50,6 +53,7 @@ class Engine(ABC):
             since: The ledger's last change before the store was asked for results.
             on_change: Called for each of the keys as it is finished or failed.
             grow: Asked several times a second for further keys, in the ledger as well; None ends the asking.
+            on_loading: Called with the modules of kernels that a worker has loaded and of all, before its first press.
 
         Returns:
             Number of the last reported change.
@@ -60,7 +64,7 @@ class Engine(ABC):
             SolveError: If workers cannot start or keep dying.
             DeviceError: If the workers' cluster cannot be reached.
         """
-        pending, settled, growing = set(keys), False, True
+        pending, settled, growing, roster = set(keys), False, True, Roster(self._ledger)
         # Claims of processes that have ended would otherwise wait for the end of their leases.
         self._ledger.release_dead()
         try:
@@ -71,6 +75,8 @@ class Engine(ABC):
                     pending |= added or set()
                 self.tend(len(pending), settled)
                 time.sleep(POLL_SECONDS)
+                if modules := modules_of(roster.notes()):
+                    on_loading(*modules)
                 settled = False
                 for change in self._ledger.changes(since):
                     since, settled = change.number, True

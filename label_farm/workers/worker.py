@@ -28,6 +28,7 @@ from tacdata.label_farm.ledger.ledger import MAX_TRIES, Lease, owner_name
 from tacdata.label_farm.presses.model import Model, batch_size, build, solve_each
 from tacdata.label_farm.store.failure import Failure
 from tacdata.label_farm.workers.desk import Desk, LocalDesk
+from tacdata.label_farm.workers.loading import Loading
 from tacdata.labels import PathSolution
 
 IDLE_SECONDS = 0.1
@@ -90,6 +91,7 @@ class Worker:
         self._models: dict[str, Model] = {}
         self._refused: dict[str, str] = {}
         self._begun: set[str] = set()
+        self._loading = Loading(lambda words: self.desk.note(words))
 
     def step(self) -> bool:
         """Take one batch of jobs and settle it; False without jobs."""
@@ -113,6 +115,7 @@ class Worker:
         try:
             for job, outcome in solve_each(model, [lease.job for lease in todo.values()]):
                 seconds, began = time.monotonic() - began, time.monotonic()
+                self._loading.end()
                 self._leave(todo.pop(job.key), outcome, seconds)
             if todo:
                 raise RuntimeError(f"the model left {len(todo)} jobs unanswered")
@@ -164,6 +167,7 @@ class Worker:
 
     def _built(self, version: str) -> Model:
         model = build(self._factory, self.desk.sensor(version))
+        self._loading.begin()
         if model.content_hash != version:
             raise OtherCodeError(
                 f"this worker's model is {model.content_hash[:12]}… ({provenance.code_version()}), "

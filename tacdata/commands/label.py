@@ -24,6 +24,9 @@ EXAMPLES = (
     "tacdata label session --follow --into dataset",
 )
 
+SAY_SECONDS = 10.0
+"""Seconds between two lines about kernels where there is no terminal."""
+
 
 def run(
     session: Annotated[Path, typer.Argument(help="Folder that `tacdata record` wrote.")],
@@ -105,6 +108,7 @@ class _Bars:
         if sys.stdout.isatty():
             self._progress.start()
         self._tasks: dict = {}
+        self._spoke = -SAY_SECONDS
         self._began = time.monotonic()
         return self
 
@@ -116,12 +120,22 @@ class _Bars:
 
     def show(self, stage: str, done: int, total: int) -> None:
         """Move the bar of a stage."""
-        names = {"read": "reading recordings", "look": "looking for labels", "solve": "solving presses"}
+        names = {
+            "read": "reading recordings",
+            "look": "looking for labels",
+            "compile": "compiling kernels",
+            "solve": "solving presses",
+        }
         if stage not in self._tasks:
             self._tasks[stage] = self._progress.add_task(names[stage], total=total)
         self._progress.update(self._tasks[stage], completed=done)
-        if not sys.stdout.isatty() and stage == "solve" and done:
+        if sys.stdout.isatty():
+            return
+        if stage == "solve" and done:
             say(", ".join(filter(None, [f"  press {done} of {total} solved", self._estimate(done, total)])))
+        if stage == "compile" and time.monotonic() - self._spoke > SAY_SECONDS:
+            self._spoke = time.monotonic()
+            say(f"  compiling kernels: {done} of about {total} modules")
 
 
 def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:

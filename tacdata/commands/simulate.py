@@ -110,16 +110,19 @@ class _Bars:
     def show(self, stage: str, done: int, total: int) -> None:
         """Move the bar of a stage."""
         if stage not in self._tasks:
-            names = {"solve": "solving presses", "write": "writing episodes"}
+            names = {"compile": "compiling kernels", "solve": "solving presses", "write": "writing episodes"}
             self._tasks[stage] = self._bar.add_task(names[stage], total=total)
         self._bar.update(self._tasks[stage], completed=done)
-        if stage != "solve":
+        if stage == "write":
             return
-        self.solving_seconds = time.monotonic() - self._began
+        words = f"  compiling kernels: {done} of about {total} modules"
+        if stage == "solve":
+            self.solving_seconds = time.monotonic() - self._began
+            estimate = remaining(done, total, self.solving_seconds)
+            words = ", ".join(filter(None, [f"  press {done} of {total} solved", estimate]))
         if not sys.stdout.isatty() and time.monotonic() - self._spoke > SAY_SECONDS:
             self._spoke = time.monotonic()
-            estimate = remaining(done, total, self.solving_seconds)
-            say(", ".join(filter(None, [f"  press {done} of {total} solved", estimate])))
+            say(words)
 
 
 def _report(done: SimulatedPresses, seconds: float) -> None:

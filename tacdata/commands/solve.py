@@ -28,10 +28,14 @@ def run(
     """Solve one press with the skin model: displacements, forces, readings and their error, as files."""
     from tacdata import documents
     from tacdata.cases.case import read_case, solve_case
+    from tacdata.warp_runtime import report_modules
 
     console = progress.console()
     problem = read_case(case)
     with console.status(f"{problem.name}: meshing and factorizing") as status:
+        report_modules(
+            lambda count, about: status.update(f"{problem.name}: compiling kernels, {count} of about {about} modules")
+        )
         report = solve_case(problem, out, lambda depth: status.update(f"{problem.name}: {depth:g} mm solved"), picture)
     answer = documents.read(report, "case_result")
     mesh = answer["mesh"]

@@ -67,7 +67,7 @@ def label(
         into: Dataset that each label is appended to as soon as it is finished.
         dask: Address of a Dask scheduler to solve on, or "here".
         factory: Builder of the model, "module:name"; for tests.
-        progress: Called with the stage ("read", "look", "solve"), the number done and the number of all.
+        progress: Called with the stage ("read", "look", "compile", "solve"), the number done and the number of all.
 
     Raises:
         UsageError: If the folder holds no recording, or labels of another model version (without ``redo``).

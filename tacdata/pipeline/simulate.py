@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,11 +22,11 @@ if TYPE_CHECKING:
     from tacdata.dataset.reader import Dataset
 
 # A computer that only solves needs no recorder: the packer of datasets is imported when one is asked for.
-SOLVE, WRITE = "solve", "write"
+COMPILE, SOLVE, WRITE = "compile", "solve", "write"
 """Stages."""
 
 type SimulationProgress = Callable[[str, int, int], None]
-"""Called with the stage, the number of presses done and of all."""
+"""Called with the stage, the number of presses done and of all; while kernels compile, of their modules."""
 
 
 @dataclass(frozen=True)
@@ -165,5 +166,5 @@ def _solve(
         progress(SOLVE, done, missing)
 
     count = max(1, min(workers or (cores() if devices == ("cpu",) else len(devices)), missing))
-    solve_all(simulation, presses, devices, count, settled)
+    solve_all(simulation, presses, devices, count, settled, partial(progress, COMPILE))
     return given_up

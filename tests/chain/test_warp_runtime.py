@@ -57,6 +57,21 @@ _filter.module.load("cpu", block_dim=1)
 """
 
 
+REPORT = """
+from tacdata import warp_runtime
+warp_runtime.report_modules(lambda *modules: print(*modules))
+for _ in range(2):
+    from tacdata.chain.memory_kernels import _filter
+    _filter.module.load("cpu", block_dim=1)
+"""
+
+
+def test_modules_are_reported_as_they_load():
+    done = subprocess.run([sys.executable, "-c", REPORT], capture_output=True, text=True, check=True)
+    expected = warp_runtime.MODULES["cuda" if wp.is_cuda_available() else "cpu"]
+    assert (done.stdout, done.stderr) == (f"1 {expected}\n", "")
+
+
 def compiled(cache, kernels):
     """Load a kernel with an empty cache; return the object files there, with the times of their making."""
     places = {"WARP_CACHE_PATH": str(cache), "TACDATA_KERNELS": str(kernels)}

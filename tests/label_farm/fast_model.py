@@ -1,6 +1,7 @@
 """A model that answers at once; it notes each solve in a file, so that a test can count them."""
 
 import os
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,9 @@ class FastModel:
 
     def __init__(self, sensor):
         self.sensor = sensor
+        self.modules = int(os.environ.get("FAST_MODEL_MODULES", "0"))
+        if self.modules:
+            from tacdata import warp_runtime  # noqa: F401 -- as a model with kernels does
         self.batch = int(os.environ.get("FAST_MODEL_BATCH", "1"))
         self.remarks = tuple(filter(None, [os.environ.get("FAST_MODEL_REMARK")]))
         self.content_hash = provenance.content_hash(
@@ -30,6 +34,7 @@ class FastModel:
         if log:
             with open(log, "a") as stream:
                 stream.write(f"{os.getpid()} {job.x:g}\n")
+        self.load_kernels()
         if closed := os.environ.get(gate.VARIABLE):
             gate.pass_gate(closed)
         time.sleep(float(os.environ.get("FAST_MODEL_SECONDS", "0")))
@@ -45,6 +50,13 @@ class FastModel:
         solution = path(self.sensor, job.depths, lambda d: d, job.x, bad=os.environ.get("FAST_MODEL_NAN") == "1")
         # A tenth of everything for every spread that the sensor states.
         return with_spread(solution, 0.1 * len(self.sensor.uncertainty)) if self.sensor.uncertainty else solution
+
+    def load_kernels(self):
+        """Say what Warp says of modules that take long to compile."""
+        for number in range(self.modules):
+            time.sleep(1.2)
+            sys.modules["tacdata.warp_runtime"].wp.get_logger().info(f"Module m{number} load on device 'cpu' took 1 ms")
+        self.modules = 0
 
 
 def with_spread(solution, share):
