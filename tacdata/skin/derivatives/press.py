@@ -89,7 +89,7 @@ def sensitivities(
     skin = model.skin
     press, reader = skin.placed(0, request), _Reader(model, request, names)
     touch = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
-    changes = directions(model.sensor, request.indenter, names, press.conditions, touch)
+    changes = directions(model.sensor, request.indenter, names, press.conditions.on(model.device), touch)
     at_touch = _without_depth(names, changes)
     label = f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm"
     weight = None if spreads is None else torch.tensor(spreads, dtype=torch.float64, device=model.device)

@@ -156,16 +156,16 @@ def _checked(model: SkinModel, request: PressRequest, spreads: Mapping[str, floa
 def _moved(model: SkinModel, request: PressRequest, number: int, moves: dict[str, float]) -> PlacedPress:
     """Return the press with its parameters moved."""
     press = model.skin.placed(number, request)
-    names, values = list(moves), torch.tensor(list(moves.values()), dtype=torch.float64, device=model.device)
-    pose = Pose(*(torch.as_tensor(value, device=model.device)[..., None] for value in (press.touch, press.turn)))
+    names, values = list(moves), torch.tensor(list(moves.values()), dtype=torch.float64)
+    pose = Pose(*(torch.as_tensor(value)[..., None] for value in (press.touch, press.turn)))
     changes = directions(model.sensor, request.indenter, names, press.conditions, pose)
     pairs = ((getattr(press.conditions, f.name), getattr(changes.conditions, f.name)) for f in fields(Conditions))
     conditions = Conditions(*(value + (change * values).sum(dim=-1, keepdim=True) for value, change in pairs))
-    place = (changes.pose.place * values).sum(dim=-1).cpu().numpy()
+    place = (changes.pose.place * values).sum(dim=-1).numpy()
     # A place too low is a press too deep, on a path that starts where the indenter touches.
     place[2] -= moves.get("z", 0.0)
     depths = tuple(max(depth - moves.get("z", 0.0), 0.0) if depth else 0.0 for depth in request.depths)
-    turn = press.turn + (changes.pose.turn * values).sum(dim=-1).cpu().numpy()
+    turn = press.turn + (changes.pose.turn * values).sum(dim=-1).numpy()
     # The nearest rotation.
     left, _, right = np.linalg.svd(turn)
     path = replace(press.path, depths=depths)

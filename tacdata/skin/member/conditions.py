@@ -37,11 +37,15 @@ class Conditions(Columns):
             return self
         return Conditions(*(getattr(self, field.name).to(dtype) for field in fields(self)))
 
-    def pressed_by(self, indenter: Indenter) -> Conditions:
-        """Return the same under a shape."""
-        device = str(self.law.device)
+    def on(self, device: str) -> Conditions:
+        """Return the same on a device."""
+        return Conditions(*(getattr(self, field.name).to(device) for field in fields(self)))
+
+    def pressed_by(self, indenter: Indenter, device: str = "cpu") -> Conditions:
+        """Return the same under a shape whose data lie on a device, such as "cuda:0"."""
+        mine = str(self.law.device)
         parameters, number = indenter.device_parameters(device), shape_number(indenter)
-        return replace(self, indenter=_column(parameters, device), shape=_scalar(number, device))
+        return replace(self, indenter=_column(parameters, mine), shape=_scalar(number, mine))
 
 
 def shape_number(indenter: Indenter) -> float:

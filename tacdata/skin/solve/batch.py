@@ -56,7 +56,7 @@ class PlacedPress:
     turn: np.ndarray
     """Rotation from the indenter's frame to the sensor's [1], shape (3, 3)."""
     conditions: Conditions
-    """Of one member."""
+    """Of one member, on the CPU."""
     coarse: CoarseStart | None = None
     """Its states on a coarser mesh, if they are known: its load steps start from there."""
 
@@ -273,7 +273,8 @@ class Batch:
             at, device = self._at, self._at.u.device
             new = np.isin(np.arange(len(self._presses)), list(presses))
             which = torch.as_tensor(list(presses), device=device)
-            at.conditions.put(which, Conditions.joined([press.conditions for press in presses.values()]))
+            joined = Conditions.joined([press.conditions for press in presses.values()])
+            at.conditions.put(which, joined.on(str(device)))
             touch, turn = ([getattr(press, name) for press in presses.values()] for name in ("touch", "turn"))
             at.poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
             at.poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
@@ -395,5 +396,6 @@ class Batch:
         return torch.as_tensor(mask, device=self._at.u.device)
 
     def _values(self, by_column: dict[int, float]) -> torch.Tensor:
-        values = [by_column.get(column, 0.0) for column in range(len(self._presses))]
-        return torch.tensor(values, dtype=torch.float64, device=self._at.u.device)
+        values = np.zeros(len(self._presses))
+        values[list(by_column)] = list(by_column.values())
+        return self._tensor(values)

@@ -102,8 +102,8 @@ class MeshedSkin:
 
     @cached_property
     def conditions(self) -> Conditions:
-        """The skin of one batch member, under nothing."""
-        return conditions(self.sensor.material, self.sensor.contact.friction, device=self.device)
+        """The skin of one batch member, under nothing, on the CPU: a copy to a GPU for each press waits for the GPU."""
+        return conditions(self.sensor.material, self.sensor.contact.friction)
 
     @property
     def free(self) -> torch.Tensor:
@@ -111,7 +111,7 @@ class MeshedSkin:
         return torch.as_tensor(~self.fixed, device=self.device).to(torch.float64)[:, None, None]
 
     def placed(self, number: int, request: PressRequest) -> PlacedPress:
-        """Return a press as a batch takes it: its load path, its indenter at depth 0, its conditions."""
+        """Return a press as a batch takes it: its load path, its indenter at depth 0, its conditions on the CPU."""
         adhesion = self.sensor.contact.adhesion
         path = LoadPath(
             request.depths,
@@ -120,8 +120,11 @@ class MeshedSkin:
             _FIRST * request.indenter.sharpest,
             _LIFT * adhesion.range if adhesion else _BACK * self.settings.step,
         )
-        origin, conditions = touch(self.sensor, self.face, request), self.conditions.pressed_by(request.indenter)
+        origin, conditions = touch(self.sensor, self.face, request), self._under(request)
         return PlacedPress(number, path, origin, rotation(request), conditions)
+
+    def _under(self, request: PressRequest) -> Conditions:
+        return self.conditions.pressed_by(request.indenter, self.device)
 
     def surfaces(self, requests: Sequence[PressRequest]) -> tuple[ContactSurface, ...]:
         """Return the contact surfaces of presses by the shapes of ``requests``: the outer face's, then the board's."""
@@ -144,7 +147,7 @@ class MeshedSkin:
     def batch(self, requests: Sequence[PressRequest], capacity: int) -> Batch:
         """Return an idle batch for presses by the shapes of ``requests``, so many at a time."""
         # The board just touches the tips of the undeformed protrusions.
-        idle, floor = self.conditions.pressed_by(requests[0].indenter), -self.sensor.skin.protrusion_tip
+        idle, floor = self._under(requests[0]).on(self.device), -self.sensor.skin.protrusion_tip
         return Batch(self.newton(requests), idle, len(self.mesh.nodes), capacity, floor)
 
     def _board(self) -> ContactSurface:
