@@ -41,8 +41,12 @@ _SPREADS = "tacdata.skin.derivatives"
 class FemModel:
     """The skin model of one sensor, kept by a worker for all its jobs."""
 
-    def __init__(self, sensor: Sensor) -> None:
+    def __init__(self, sensor: Sensor, alone: bool = False) -> None:
         """Mesh the skin, or take its mesh from the cache; costs seconds.
+
+        Args:
+            sensor: Whose skin.
+            alone: Whether each press is solved by itself (`tacdata.skin.model.ModelSettings`).
 
         Raises:
             SolveError: If the sensor cannot be modelled.
@@ -50,12 +54,12 @@ class FemModel:
         """
         from tacdata.indenters.sphere import Sphere
         from tacdata.skin.derivatives.path_uncertainty import check_spreads
-        from tacdata.skin.model import SkinModel
+        from tacdata.skin.model import ModelSettings, SkinModel
 
         check_spreads(sensor, Sphere(1.0))
         device = os.environ.get(environment.DEVICE, "cpu")
-        self._model = SkinModel(sensor, device=device)
-        self.batch = _AT_A_TIME[device.split(":")[0]]
+        self._model = SkinModel(sensor, ModelSettings(alone=alone), device)
+        self.batch = 1 if alone else _AT_A_TIME[device.split(":")[0]]
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -123,6 +127,14 @@ class FemModel:
             return with_uncertainty(self._model, _request(job), _with_ladder(job, request, solution), coarse)
         except SolveError as error:
             return error
+
+
+class LoneFemModel(FemModel):
+    """The same, whose labels do not depend, to the last bit, on what is labelled with them."""
+
+    def __init__(self, sensor: Sensor) -> None:
+        """As `FemModel`."""
+        super().__init__(sensor, alone=True)
 
 
 def _far_apart(tolerance: Tolerance, solution: PathSolution) -> bool:

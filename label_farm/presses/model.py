@@ -28,6 +28,9 @@ from tacdata.skin.code_version import PLUGGABLE
 FACTORY = "tacdata.label_farm.presses.fem:FemModel"
 """Dotted path of the function that builds the model of a sensor."""
 
+ALONE = "tacdata.label_farm.presses.fem:LoneFemModel"
+"""The same for a model that solves each press by itself, to the last bit."""
+
 _CODE = tuple(
     f"tacdata.{name}" for name in ("provenance", "sensor", "surfaces", "indenters", "skin", "label_farm.presses")
 )

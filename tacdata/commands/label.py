@@ -63,6 +63,9 @@ def run(
     dask: Annotated[
         str, typer.Option(help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler, or `here` to start one.")
     ] = "",
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Same bits whatever is labelled with a press; costs a quarter more; CPU.")
+    ] = False,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> Result:
     """Compute depth maps for every frame of a session; stopped and run again, it goes on."""
@@ -88,6 +91,7 @@ def run(
             uncertainty=uncertainty,
             into=into,
             dask=dask,
+            alone=alone,
             factory=factory,
             progress=bars.show,
         )

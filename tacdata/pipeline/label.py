@@ -14,7 +14,7 @@ from tacdata.label_farm.growing_session import GrowingSession
 from tacdata.label_farm.labelling import Labelling, LabellingSummary
 from tacdata.label_farm.labels.dataset_flow import DatasetFlow
 from tacdata.label_farm.presses.ladder import Ladder
-from tacdata.label_farm.presses.model import FACTORY
+from tacdata.label_farm.presses.model import ALONE, FACTORY
 from tacdata.label_farm.presses.tolerance import Tolerance
 from tacdata.label_farm.settings import FarmSettings
 from tacdata.label_farm.store.store import Store
@@ -46,6 +46,7 @@ def label(
     uncertainty: bool = True,
     into: StrPath | None = None,
     dask: str = "",
+    alone: bool = False,
     factory: str = "",
     progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
 ) -> LabellingSummary:
@@ -66,11 +67,14 @@ def label(
         uncertainty: Propagate the spreads that the sensor file states; costs two thirds more.
         into: Dataset that each label is appended to as soon as it is finished.
         dask: Address of a Dask scheduler to solve on, or "here".
+        alone: Solve each press by itself, on CPUs alone: labels are the same to the last bit whatever is labelled with
+            them; costs a quarter more.
         factory: Builder of the model, "module:name"; for tests.
         progress: Called with the stage ("read", "look", "compile", "solve"), the number done and the number of all.
 
     Raises:
-        UsageError: If the folder holds no recording, or labels of another model version (without ``redo``).
+        UsageError: If the folder holds no recording, or labels of another model version (without ``redo``), or presses
+            are to be solved alone on a GPU.
         SolveError: If the model cannot be built or the workers keep dying.
     """
     folder = Path(session)
@@ -83,9 +87,15 @@ def label(
         recorded = linked_session(recorded, Path(out))
         folder = recorded.folder
     workplaces = devices_named(devices)
+    if alone and set(workplaces) != {"cpu"}:
+        raise UsageError(
+            f"labels that are the same to the last bit, on {', '.join(workplaces)}",
+            "device cpu: sums on a GPU have no fixed order",
+            "leave --device out, or --alone",
+        )
     limit = Tolerance(least=tolerance) if tolerance else None
     settings = FarmSettings(
-        factory=factory or FACTORY,
+        factory=factory or (ALONE if alone else FACTORY),
         ladder=Ladder(load_step=load_step, unload_step=unload_step, tolerance=limit),
         uncertainty=uncertainty,
         workers=workers or (cores() if workplaces == ("cpu",) else len(workplaces)),

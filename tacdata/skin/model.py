@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from tacdata import provenance
-from tacdata.errors import SolveError
+from tacdata.errors import SolveError, UsageError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 from tacdata.skin.code_version import code_versions
@@ -78,8 +78,15 @@ class SkinModel:
 
         Raises:
             SolveError: If the geometry cannot be meshed or nothing holds the skin.
+            UsageError: If presses are to be solved alone, on a GPU.
         """
         self.sensor, self.settings, self.device = sensor, settings or ModelSettings(), device
+        if self.settings.alone and device != "cpu":
+            raise UsageError(
+                f"results on {device} that are the same to the last bit in every batch",
+                "device cpu: sums on a GPU have no fixed order",
+                "choose device cpu, or results within the solver's tolerance",
+            )
         self.skin = MeshedSkin(sensor, self.settings, device, mesh)
         self.mesh = self.skin.mesh
         self._companion_mesh = companion
@@ -145,13 +152,16 @@ class SkinModel:
                 yield number, 0.0, error
         if not possible:
             return
-        batch = self.skin.batch([request for _, request in possible], min(capacity, len(possible)))
         # Columns that fall idle at the end cost, above all on a GPU: the longest paths come first.
         possible.sort(key=lambda press: -press[1].steps(self.settings.step))
         starts = [self._start(press) for press in coarse or ()] or [None] * (1 + max(number for number, _ in possible))
-        presses = (replace(self.skin.placed(number, request), coarse=starts[number]) for number, request in possible)
-        yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement), observe)
-        self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
+        for group in [[press] for press in possible] if self.settings.alone else [possible]:
+            if self.settings.alone:
+                self.skin.forget()
+            batch = self.skin.batch([request for _, request in group], min(capacity, len(group)))
+            presses = (replace(self.skin.placed(number, request), coarse=starts[number]) for number, request in group)
+            yield from batch.run(presses, lambda found: self.skin.reader.states(found, with_displacement), observe)
+            self.last_run = {"ticks": batch.newton_iterations, "cg": batch.cg}
 
     @cached_property
     def _transfer(self) -> MeshTransfer | None:

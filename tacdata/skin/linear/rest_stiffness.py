@@ -154,6 +154,10 @@ class SparseRest:
         self.device = device
         self._free, self._mortar = torch.as_tensor(unfixed), _MortarRows(rows, device)
         self._factor = factor_of(stiffness[unfixed][:, unfixed])
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the table of `table`."""
         # Rows are filled when a press first needs them and serve every later one; memory is taken as they are.
         count = self._mortar.count
         self._table = torch.from_numpy(np.empty((count, count), dtype=np.float32))

@@ -21,7 +21,7 @@ from tacdata.skin.contact.kernels import board_distance
 from tacdata.skin.contact.mortar import Mortar
 from tacdata.skin.elasticity.body import Elasticity
 from tacdata.skin.linear.constraint_preconditioner import ConstraintPreconditioner
-from tacdata.skin.linear.rest_stiffness import RestSolver, rest_solver
+from tacdata.skin.linear.rest_stiffness import RestSolver, SparseRest, rest_solver
 from tacdata.skin.materials import load_law
 from tacdata.skin.member.conditions import Conditions, conditions, shape_number
 from tacdata.skin.mesh import elements
@@ -99,6 +99,11 @@ class MeshedSkin:
             faces.append((self.mesh.protrusions, np.eye(3)[2:]))
         rows = sp.csr_matrix(sp.vstack([sp.kron(self._mortar(face).mean, axes) for face, axes in faces]))
         return rest_solver(self.mesh, material, self.fixed, rows, self.device, self.averaged)
+
+    def forget(self) -> None:
+        """Forget what presses have left: parts of the compliance, whose last bits depend on the presses before."""
+        if isinstance(self.rest, SparseRest):
+            self.rest.forget()
 
     @cached_property
     def conditions(self) -> Conditions:

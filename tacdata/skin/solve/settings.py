@@ -63,3 +63,6 @@ class ModelSettings:
     at the points in any case."""
     error_estimate: bool = True
     """Whether `SkinModel.solve` also presses a coarser mesh, to say how far the mesh leaves the result off."""
+    alone: bool = False
+    """Whether each press is solved by itself, as by a new model: then its result does not depend, to the last bit, on
+    the presses that are asked for with it or before it. Only on a CPU."""
