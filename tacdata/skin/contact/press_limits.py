@@ -54,13 +54,16 @@ def check_press(request: PressRequest, sensor: Sensor) -> None:
             f"at most {high:g} mm",
             "reduce the depth, or give a mesh of the shape with its holder",
         )
+    if "sides" not in sensor.contact.bonded or max(request.depths) <= 0:
+        return
+    spare = [size / 2 - abs(place) for place, size in ((request.x, skin.size_x), (request.y, skin.size_y))]
+    # An upright shape that is wholly inside needs no search for the part of it that presses.
+    if not (request.tilt_x or request.tilt_y) and request.indenter.extent <= min(spare):
+        return
     half_x, half_y = reach(sensor, request)
-    excess = [
-        abs(place) + half - size / 2
-        for place, half, size in zip((request.x, request.y), (half_x, half_y), (skin.size_x, skin.size_y), strict=True)
-    ]
+    excess = half_x - spare[0], half_y - spare[1]
     # Beyond a bonded rim the shape would press the frame, which the model does not have.
-    if "sides" in sensor.contact.bonded and max(excess) > 0 and max(request.depths) > 0:
+    if max(excess) > 0:
         raise SolveError(
             f"{request.indenter.shape} at ({request.x:g}, {request.y:g}) mm, {max(request.depths):g} mm deep, reaches "
             f"{max(excess):.2f} mm over the rim, which is bonded to the frame",
