@@ -348,13 +348,8 @@ class Labelling:
             )
             try:
                 # A recording of another sensor ends this run: the next one has workers for it.
-                since = pool.run(
-                    set(self._jobs),
-                    since,
-                    self.settle,
-                    lambda sensors=sensors: self._take_in(sensor, later, set(sensors)),
-                    partial(self.progress, "compile"),
-                )
+                grow = partial(self._take_in, sensor, later, set(sensors))
+                since = pool.run(set(self._jobs), since, self.settle, grow, partial(self.progress, "compile"))
             finally:
                 pool.close()
 
