@@ -176,8 +176,7 @@ class Batch:
         return residual
 
     def _updated(self, residual: Residual, changed: np.ndarray) -> Residual:
-        which = torch.as_tensor(changed.nonzero()[0], device=self._at.u.device)
-        return self._newton.updated(residual, self._at, which)
+        return self._newton.updated(residual, self._at, self._tensor(changed.nonzero()[0]))
 
     def _judge(self, residual: Residual) -> list[str]:
         changed = self._status.changed(residual.contacts, self._at.conditions.friction).to(residual.relative.dtype)
@@ -271,10 +270,9 @@ class Batch:
                 self._presses[column] = presses[column] = following
         if presses:
             at, device = self._at, self._at.u.device
-            new = np.isin(np.arange(len(self._presses)), list(presses))
             which = torch.as_tensor(list(presses), device=device)
-            joined = Conditions.joined([press.conditions for press in presses.values()])
-            at.conditions.put(which, joined.on(str(device)))
+            joined = Conditions.joined([press.conditions for press in presses.values()]).on(str(device))
+            at.conditions.put(which, joined)
             touch, turn = ([getattr(press, name) for press in presses.values()] for name in ("touch", "turn"))
             at.poses[0].place[:, which] = torch.as_tensor(np.stack(touch, axis=-1), device=device).double()
             at.poses[0].turn[:, :, which] = torch.as_tensor(np.stack(turn, axis=-1), device=device).double()
@@ -282,7 +280,7 @@ class Batch:
             at.friction_tangent.index_fill_(0, which, 0.0)
             for history, first in zip(at.histories, self._touched(which, observe), strict=True):
                 history.put(which, first)
-            self._start(new)
+            self._start(np.isin(np.arange(len(self._presses)), list(presses)))
 
     def _touched(self, which: torch.Tensor, observe: Observe | None) -> tuple[ContactHistory, ...]:
         """Return the histories of columns, by index, whose indenter just touches the undeformed skin."""
@@ -397,5 +395,5 @@ class Batch:
 
     def _values(self, by_column: dict[int, float]) -> torch.Tensor:
         values = np.zeros(len(self._presses))
-        values[list(by_column)] = list(by_column.values())
+        values[list(by_column)] = [*by_column.values()]
         return self._tensor(values)
