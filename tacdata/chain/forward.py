@@ -107,6 +107,7 @@ def _steps(effects: Sequence[Acting]) -> list[Acting | str]:
     by_stage = {stage: [e for e in effects if e.stage == stage] for stage in STAGES}
     kinematic = by_stage["kinematics"]
     return [
+        # First what moves carriage and tag alike, then what moves the tip alone.
         *(e for e in kinematic if e.seen_by_tag),
         _TAG,
         *by_stage["view"],

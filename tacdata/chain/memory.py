@@ -56,6 +56,7 @@ def low_pass_between(values: np.ndarray, step: np.ndarray, tau: float) -> np.nda
     """
     ratio = np.minimum(step / tau, 700.0)
     decay = np.exp(-ratio)
+    # The filter's answer, at the end of a step, to a parabola that is zero at both rows.
     share = 0.5 * tau**2 * (2.0 - ratio - decay * (2.0 + ratio))
     return low_pass(values, step, tau) + _recursion(bends(values, step) * share[:, None], decay)
 
@@ -72,6 +73,7 @@ def second_order(values: np.ndarray, step: np.ndarray, tau: float, damping: floa
         damping: D; 1 is critical, from there on y does not overshoot [1].
     """
     discriminant = damping**2 - 1
+    # At a double pole partial fractions divide by zero: two poles a little apart stand for it.
     discriminant = discriminant if abs(discriminant) > DOUBLE else -DOUBLE
     if discriminant > 0:
         # Two real poles: by partial fractions, the difference of two first-order filters.
@@ -119,6 +121,7 @@ def bends(values: np.ndarray, step: np.ndarray) -> np.ndarray:
     np.divide(np.diff(slope, axis=0), width, out=bend[1:-1])
     count = np.zeros(len(values))
     count[1:-1] = even
+    # Between two rows the bend is the mean of theirs, or the one that is known.
     rows_around = np.maximum(count[1:] + count[:-1], 1.0)[:, None]
     result = np.zeros(values.shape)
     np.divide(bend[1:] + bend[:-1], rows_around, out=result[1:])

@@ -67,6 +67,7 @@ def rows_of(
 
     tip = tip_at(time)
     moving = np.abs(np.diff(tip, axis=0, prepend=tip[:1])).max(axis=1) > 1e-5
+    # An episode that begins at rest has rested long enough.
     last = np.maximum.accumulate(np.where(moving, time, time[0] - SETTLED if not moving[0] else time[0]))
     slow = SLOW * max(1.0, float(path[:, 2].max())) if moving.sum() > MANY else -1.0
     group = _groups(time, last, tip, slow)

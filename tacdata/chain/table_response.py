@@ -128,6 +128,7 @@ class TableResponse(Response):
         key = _key(pose, tool)
         if key in self._kept:
             return self._kept[key].force
+        # A compliant frame asks for the force alone, at many poses: its own table is one lane wide.
         if key not in self._forces:
             normal = np.zeros(len(pose))
             for rows, values in self._read(pose, tool, force=True):
@@ -169,6 +170,7 @@ class TableResponse(Response):
         """Give rows in contact with loads and then the force, or the force alone, shape (m, channels + 1) or (m, 1)."""
         from tacdata.chain.table_kernels import cubic
 
+        # Rows in the air have no load: they are not looked up.
         touching = pose[:, 2] > 0
         for t, table in enumerate(self._nodes if self._rough else self._splines):
             rows = np.flatnonzero(touching & (tool == t))
@@ -177,6 +179,7 @@ class TableResponse(Response):
 
     def _places(self, pose: np.ndarray) -> np.ndarray:
         """Return places in units of nodes, kept inside the table, shape (n, 3)."""
+        # Nodes are evenly spaced in the root of depth, where loads at first contact are smooth.
         root = np.sqrt(np.maximum(pose[:, 2], 0.0)) / np.sqrt(self.depth[-1]) * (len(self.depth) - 1)
         column = (pose[:, 0] - self.x[0]) / (self.x[1] - self.x[0])
         row = (pose[:, 1] - self.y[0]) / (self.y[1] - self.y[0])
@@ -255,6 +258,7 @@ def _straight_beyond(at: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _key(pose: np.ndarray, tool: np.ndarray) -> int:
+    # By content: candidates make equal poses anew, so that their identities differ.
     return hash((pose.tobytes(), tool.tobytes()))
 
 

@@ -33,9 +33,11 @@ class Adhesion(Effect):
         course = state.course
         leaving = np.zeros(course.rows, dtype=bool)
         for rows in np.split(np.arange(course.rows), np.flatnonzero(course.first)[1:]):
+            # Only what has touched sticks: from the deepest row of an episode on, if that row is in contact.
             top = int(np.argmax(state.depth[rows]))
             leaving[rows[top:]] = state.depth[rows[top]] > 0
         pose = state.pose.copy()
+        # The pattern of a light touch: at depth zero the response is zero and has none.
         pose[:, 2] = 0.1 * course.span
         pull = values["a"] * np.exp(-np.square(state.depth / values["w"])) * (leaving & (course.speed < 0))
         load = state.load - pull[:, None] * state.response.load(pose, course.tool)
@@ -59,11 +61,14 @@ class AdhesionPinned(Adhesion):
         if not sticks.any():
             return state
         response, tool, near = state.response, course.tool, NEAR * course.span
+        # While the contact stays as wide as it is, the skin unloads along a straight line, as under a flat punch: JKR's
+        # construction.
         deeper, higher, as_is = (
             np.column_stack([state.pose[:, :2], z]) for z in (contact + near, contact - near, depth)
         )
         stretch = sticks * (contact - depth) / (2 * near)
 
+        # The load at the depth of that contact is the mean of its neighbours: the slope needs them anyhow.
         def change(above: np.ndarray, below: np.ndarray, middle: np.ndarray) -> np.ndarray:
             by, on = (stretch, sticks) if middle.ndim == 1 else (stretch[:, None], sticks[:, None])
             return np.where(on, 0.5 * (above + below) - middle, 0.0) - by * (above - below)
@@ -83,6 +88,7 @@ def _peeling(depth: np.ndarray, work: float, span: float) -> np.ndarray:
     # Below the depth at which even the least contact peels, it is lost.
     smallest = (0.25 * stretch / span**0.25) ** (4 / 3)
     deepest = max(float(depth.max()), 0.0) + stretch + span
+    # Nodes are close where contacts are small: the curve is steepest there.
     contact = smallest + (deepest - smallest) * np.linspace(0.0, 1.0, NODES) ** 2
     stays_to = contact - stretch * (contact / span) ** 0.25
     return np.where(depth < stays_to[0], depth, np.maximum(np.interp(depth, stays_to, contact), depth))

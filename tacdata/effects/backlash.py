@@ -23,4 +23,5 @@ class Backlash(Effect):
         half = 0.5 * float(values["b"])
         if half == 0.0:
             return state
+        # Half the play is added: on the way down the depth is the commanded one.
         return state.deeper(dead_band(state.depth, half, state.course.dither) + half)

@@ -20,6 +20,7 @@ class Crosstalk(Effect):
         channels = state.signal.shape[1]
         mixed = float(values["k"]) * (np.eye(channels, k=1) + np.eye(channels, k=-1))
         signal = state.signal @ (np.eye(channels) + mixed)
+        # Only changes cross over: a constant share of a neighbour's offset is part of the own offset.
         signal -= state.idle @ mixed
         return state.with_signal(signal)
 

@@ -25,6 +25,7 @@ class DepthNodes(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         angle = 2 * np.pi * np.maximum(state.depth, 0.0) / values["p"]
+        # The cosine less 1, so that the wave is zero at first touch.
         wave = values["s"] * np.sin(angle) + values["c"] * (np.cos(angle) - 1)
         return state.with_signal(state.signal + (state.signal - state.idle) * wave[:, None])
 

@@ -17,5 +17,6 @@ class Drift(Effect):
     by_channel = True
 
     def apply(self, state: State, values: Values) -> State:
+        # About the middle of the recordings: a drift from their start would resemble an offset.
         scale = state.response.largest(state.signal)
         return state.with_signal(state.signal + scale * (state.course.clock - 0.5)[:, None] * values["r"])

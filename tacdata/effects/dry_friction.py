@@ -48,6 +48,7 @@ class DryFriction(Effect):
         way = max(float(values["w"]) * course.span, 1e-9)
         depth = np.maximum(state.depth, 0.0)
         turn = 0.5 * float(values["a"]) * (1 + slipping(depth, way, course.first | (state.depth <= 0)))
+        # By the load at the deepest point, so that the loop is as wide at every depth.
         top = _deepest(course, depth)
         return replace(
             state, load=state.load + turn[:, None] * state.load[top], force=state.force + turn * state.force[top]

@@ -19,6 +19,7 @@ def given_way(self: Effect, state: State, values: Values) -> State:
     for _ in range(STEPS):
         share = load / max(float(load.max()), 1e-12)
         pose = state.deeper(-values["c"] * share**power).pose
+        # Half steps: where the frame is softer than the skin, whole ones swing.
         load = 0.5 * (load + np.maximum(state.response.force(pose, tool), 0.0))
     return state.with_pose(pose)
 

@@ -18,4 +18,5 @@ class GapCurvature(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         rise = state.rise
+        # With the sign of the rise: readings of some sensors fall under load.
         return state.with_signal(state.idle + rise + values["k"] * rise * np.abs(rise) / max(np.abs(rise).max(), 1e-12))

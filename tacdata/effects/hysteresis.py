@@ -32,6 +32,7 @@ class Hysteresis(Effect):
         largest = max(float(force.max()), 1e-12)
         unloaded = state.depth <= 0
         lag = slip_lags(force, largest * np.array([0.05, 0.15, 0.4]), unloaded).mean(axis=0)
+        # Bounded, because near release the force vanishes before the lag does.
         share = np.minimum(lag / np.maximum(force, 0.02 * largest), 3.0)
         return state.scaled(np.maximum(1 - values["a"] * share, 0.0))
 

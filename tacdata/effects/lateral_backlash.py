@@ -21,6 +21,7 @@ class LateralBacklash(Effect):
         if half == 0.0:
             return state
         pose = state.pose.copy()
+        # Nothing is added here, as in depth: a place may be approached from either side.
         for axis in (0, 1):
             pose[:, axis] += dead_band(pose[:, axis], half, float(state.course.dithers[axis]))
         return state.with_pose(pose)

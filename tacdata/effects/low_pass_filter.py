@@ -19,5 +19,6 @@ class LowPassFilter(Effect):
         tau = float(values["tau"])
         if tau <= 0.0:
             return state
+        # The filter has settled before the first row, whatever is read there.
         start = state.signal[:1]
         return state.with_signal(start + low_pass_between(state.signal - start, state.course.step, tau))

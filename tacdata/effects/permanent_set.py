@@ -31,6 +31,7 @@ class PermanentSet(Effect):
                 dent[k] = -np.expm1(-len(same) / values["n"]) * deepest[same].max() / course.span
         shallower = state.deeper(-values["e"] * dent[course.episode]).pose
         response, tool = state.response, course.tool
+        # As a difference, so that changes of the load by other effects remain.
         load = response.load(shallower, tool) - response.load(state.pose, tool)
         force = response.force(shallower, tool) - response.force(state.pose, tool)
         return replace(state, load=state.load + load, force=state.force + force)

@@ -19,6 +19,7 @@ class Proximity(Effect):
     )
 
     def apply(self, state: State, values: Values) -> State:
+        # Before touch the response has no pattern: that of a light touch stands for it.
         pose = state.pose.copy()
         pose[:, 2] = 0.1 * state.course.span
         pattern = state.response.signal(state.response.load(pose, state.course.tool)) - state.idle

@@ -20,4 +20,5 @@ class QuantizationHysteresis(Effect):
         width = float(values["w"]) * state.response.largest(state.signal)
         if width <= 0.0:
             return state
+        # Half the band is added: rising readings stay, falling ones come late.
         return state.with_signal(play(state.signal, width) + width)

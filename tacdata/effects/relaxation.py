@@ -72,6 +72,7 @@ class RelaxationRead(Relaxation):
         share = loads / scale
         load = np.copysign(np.abs(share) ** (1 / power), share)
         net = load - values["f"] * self.late(load, state.course.step, values)
+        # A reading on the other side of idle is no load, and stays as it is.
         net = np.where(load > 0, np.maximum(net, 0.0) ** power, share)
         return state.with_loads(net * scale)
 
@@ -103,6 +104,7 @@ class NonlinearRelaxation(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         loads = state.loads
+        # Inside the mean: a share relaxes by the depth at which it was pressed, not by the present one.
         share = np.maximum(state.depth, 0.0)[:, None] / state.course.span
         loads = loads - values["f"] * low_pass(loads * share, state.course.step, float(values["tau"]))
         return state.with_loads(loads)
@@ -130,6 +132,7 @@ class PowerCreep(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         loads = state.loads
+        # Together these exponentials follow a power of time over 2.4 decades.
         taus = float(values["tau0"]) * 3.0 ** np.arange(6)
         return state.with_loads(loads - values["f"] * low_passes(loads, state.course.step, taus, np.full(6, 1 / 6)))
 

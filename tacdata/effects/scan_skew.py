@@ -22,6 +22,7 @@ class ScanSkew(Effect):
         course = state.course
         count = course.channels
         signal = state.signal.copy()
+        # About the middle channel: a delay common to all is another effect, `latency`.
         for i in range(count):
             delay = np.full(course.rows, values["D"] * (i / (count - 1) - 0.5))
             signal[:, i] = delayed(state.signal[:, [i]], course.time, course.episode, delay)[:, 0]

@@ -23,6 +23,7 @@ class ServoLag(Effect):
         if tau <= 0.0:
             return state
         pose = state.pose.copy()
+        # From rest at the height of the first row.
         way, step = pose[:, 2] - pose[0, 2], state.course.step
         pose[:, 2] = pose[0, 2] + second_order(way, step, tau, self.damping)
         return state.with_pose(pose)

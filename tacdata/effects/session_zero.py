@@ -19,6 +19,7 @@ class SessionZero(Effect):
     parameters = (Parameter("dz", "mm", "from one session to the next", 0.05, -1.0, 1.0),)
 
     def apply(self, state: State, values: Values) -> State:
+        # About their mean: a shift common to all sessions is another effect, `z_offset`.
         number = state.course.session[state.course.episode].astype(float)
         return state.deeper(values["dz"] * (number - number.mean()))
 

@@ -24,6 +24,7 @@ class Softening(Effect):
     )
 
     def apply(self, state: State, values: Values) -> State:
+        # Hertz: the force under a sphere grows as d^1.5, its work as d^2.5.
         work = np.maximum(state.depth, 0.0) ** 2.5
         largest = running_max(work, state.course.row_site)
         return state.scaled(1 - values["a"] * erf((largest - work) / (values["m"] * max(float(work.max()), 1e-9))))

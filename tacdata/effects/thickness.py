@@ -38,6 +38,7 @@ class Thickness(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         ease = 1 - 0.5 * values["e"] * (1 + np.clip(state.depth / state.course.span, 0.0, 1.0))
+        # Bounded: far from the tip loads fall off so steeply that the first order in e no longer holds.
         spread = np.exp(np.clip(-values["e"] * (2 + falls(state)), -1.0, 1.0))
         return replace(state, load=state.load * ease[:, None] * spread, force=state.force * ease)
 

@@ -27,6 +27,7 @@ class Viscosity(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         rate = state.course.speed / UNIT_RATE
+        # A skin never pulls: a fast release takes the load to zero, not below.
         factor = np.maximum(1 + values["k"] * np.sign(rate) * np.abs(rate) ** values["n"], 0.0)
         return state.scaled(factor)
 

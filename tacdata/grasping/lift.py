@@ -26,6 +26,8 @@ HEIGHT = 0.05
 """Rise of the hand [m] (paper)."""
 STAYS = 0.8
 """Share of the height above which an object counts as held, throughout the hold [1]."""
+# Elliptic cones, and friction harder than the normal contact (impratio): an object that friction alone holds would
+# creep.
 XML = """
 <mujoco>
  <option timestep="{step}" cone="elliptic" integrator="implicitfast" impratio="10"/>
@@ -41,6 +43,7 @@ XML = """
  </worldbody>
  <actuator><position name="rise" joint="rise" kp="20000" kv="400"/>{springs}</actuator>
 </mujoco>"""
+# Their masks (contype, conaffinity) let fingers touch the orange, but not each other.
 FINGER = """<body name="{name}" pos="0 {y} 0" gravcomp="1"><joint name="{name}" type="slide" axis="0 {inwards} 0"/>
   <geom name="{name}" type="capsule" size="{ridge} {half}" mass="{mass}" contype="2" conaffinity="1" condim="4"
    priority="1" friction="{friction} {torsion} 0.0001" solref="-{skin} -{damping}" solimp="{d} {d} 0.001"/></body>"""
@@ -114,6 +117,7 @@ def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
     for k, moment in enumerate(moments):
         closing = min(moment / CLOSE, 1.0) * grip.squeeze
         rise = float(np.clip((moment - CLOSE) / RISE, 0.0, 1.0))
+        # Smoothly: a jump of the hand's speed would shake the orange loose.
         hand[k] = HEIGHT * rise * rise * (3 - 2 * rise)
         data.ctrl[:] = hand[k], closing, closing
         engine.mj_step(model, data, 5)
@@ -128,6 +132,8 @@ def lifting_grip(grip: Grip, lateral: float) -> Grip:
     Raises:
         UsageError: If none does.
     """
+    # From loose to tight: a tight squeeze may push out an orange that is off the middle, so the first that holds
+    # counts.
     tried = LOOSEST * GROWTH ** np.arange(TRIES)
     high = next((s for s in tried.tolist() if lift(replace(grip, squeeze=s), lateral).held), None)
     if high is None:
@@ -163,6 +169,7 @@ def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
         )
         for name, side in SIDES.items()
     )
+    # Critically damped: swinging fingers would shake the orange.
     critical = 2 * np.sqrt(grip.stiffness * FINGER_MASS)
     springs = "".join(f'<position name="{n}" joint="{n}" kp="{grip.stiffness}" kv="{critical}"/>' for n in SIDES)
     text = XML.format(

@@ -74,6 +74,7 @@ def training_presses(sensor: Sensor, count: int) -> list[PressRequest]:
 
 def _radius(rng: np.random.Generator) -> float:
     while True:
+        # Evenly in the logarithm: a map changes with the ratio of two radii.
         radius = float(np.exp(rng.uniform(*np.log(RADII))))
         if not LEFT_OUT[0] <= radius <= LEFT_OUT[1]:
             return round(radius, 2)

@@ -80,5 +80,6 @@ class Sphere(Indenter):
         if top < 2 * self.radius:
             line = np.vstack([line, [0.0, top]])
         else:
+            # The sine of pi is not 0 in floating point, and `revolve` closes only what ends on the axis.
             line[-1, 0] = 0.0
         return revolve(line, sections=96)

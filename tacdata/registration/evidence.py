@@ -174,6 +174,7 @@ def _first_answer(
     threshold = ANSWER * noise / np.sqrt(frames)
     for height in heights:
         probe.go((*place, height), SPEED if height < heights[0] else LIFT_SPEED)
+        # Twice at the same height: a single spike is no touch.
         if all(bool((np.abs(probe.read(frames).mean - baseline) > threshold).any()) for _ in range(2)):
             return height
     return None

@@ -115,6 +115,7 @@ class GuardedProbe(Probe):
             return
         try:
             self._drive(position, speed)
+        # One stall, of a busy computer for example, should not cost a registration of five minutes.
         except OwesAnswer as error:
             if not self._lifted_to_try_again(error):
                 raise
@@ -156,6 +157,7 @@ class GuardedProbe(Probe):
     def read(self, frames: int) -> StillReading:
         """Collect frames sampled since the guide came to rest; see the base."""
         clock = self._rig.clock
+        # Five times as long as a board of 30 Hz needs; a virtual rig's clock may run faster than the host's.
         patience = Patience(PATIENCE + PATIENCE * frames / 30 / clock.rate, host=clock.host)
         while True:
             rows = [counts for sample_ns, counts in list(self._sink.frames) if sample_ns >= self._rested_ns]

@@ -31,12 +31,14 @@ def reference_taxels(sensor: Sensor) -> tuple[int, ...]:
     i = (1, columns - 2) if columns >= 4 else (0, columns - 1)
     j = (1, rows - 2) if rows >= 4 else (0, rows - 1)
     corners = [(i[0], j[0]), (i[1], j[1]), ((i[0] + i[1]) // 2, j[1])]
+    # In a small array some of the three coincide.
     return tuple(dict.fromkeys(a + columns * b for a, b in corners))
 
 
 def touch_sites(sensor: Sensor) -> dict[str, tuple[float, float]]:
     """Return the centre and three corners of the taxel array [mm, sensor frame] by their names."""
     a, b = np.abs(sensor.taxels.centers).max(axis=0).tolist()
+    # One place more than a plane needs: it shows a skin that is not flat.
     return {
         "the centre": (0.0, 0.0),
         "the corner -x -y": (-a, -b),
@@ -93,6 +95,7 @@ def register(
         f"plane: tilted {np.degrees(np.hypot(*plane.slope)):.2f} deg, touches within "
         f"{1000 * np.abs(plane.residual).max():.0f} um of it"
     )
+    # After the plane: depths of these presses count from it.
     crosses = _crosses(probe, sensor, guess, settings, plane, noise, say)
     centers = sensor.taxels.centers[[cross.taxel for cross in crosses]]
     motion = fit_rigid_motion(
@@ -173,6 +176,7 @@ def _check_plane(plane: Plane, touches: list[Touch], settings: RegistrationSetti
             f"at most {1000 * settings.flatness:g} um",
             "look for dirt, a lifted skin or a loose mount; a curved sensor cannot be registered to a plane",
         )
+    # The error of the common power moves all touches alike: it does not average out.
     model = float(np.mean([touch.onset.model for touch in touches]))
     uncertainty = float(np.hypot(np.sqrt(plane.covariance[0, 0]), model))
     if uncertainty > settings.tolerance:
@@ -193,6 +197,7 @@ def _crosses(
     say: Callable[[str], None],
 ) -> list[Cross]:
     taxels = settings.taxels or reference_taxels(sensor)
+    # By the expected yaw: a few degrees off slant the lines, and leave the centre where it is.
     angle = np.radians(guess.yaw)
     axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     pitch = sensor.taxels.pitch_x, sensor.taxels.pitch_y

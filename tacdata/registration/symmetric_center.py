@@ -57,12 +57,14 @@ def symmetric_center(place: np.ndarray, answer: np.ndarray, noise: float) -> Cen
     lower, upper = [place.min(), 0.1, 0.5, 0.3, -0.5], [place.max(), 3 * span, 20.0, 3.0, 0.7]
     # The search starts from Boussinesq's exponent, 5/2.
     start = [float(np.clip(place[peak], lower[0] + 1e-3, upper[0] - 1e-3)), 0.5 * span, 2.5, 1.0, 0.0]
+    # With a robust loss: one bad press must not move the centre.
     fit = least_squares(residual, start, bounds=(lower, upper), loss="soft_l1", x_scale=[0.1, 1.0, 1.0, 0.3, 0.1])
     center = float(fit.x[0])
     # At an end of the line one flank is missing, and the centre depends on both.
     if not place.min() + 0.1 * span < center < place.max() - 0.1 * span:
         return None
     residuals = residual(fit.x)
+    # Not below the stated noise: nine answers may fit five numbers by chance.
     scale = max(float((residuals**2).sum()) / max(len(place) - 5, 1), 1.0)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * scale
     spread = float(np.sqrt(np.mean(residuals**2))) * noise / abs(height)

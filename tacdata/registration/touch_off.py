@@ -86,6 +86,7 @@ def approach(
         DeviceError: If the answer shows no clear onset.
     """
     for above in ABOVE:
+        # Always from above, so that the drive's play is taken up on the same side.
         probe.go((*place, contact + max(above, HIGHER)), LIFT_SPEED)
         # The skin is still dented by the touch before.
         probe.wait(RECOVERY)
@@ -110,6 +111,7 @@ def search(probe: Probe, site: str, place: tuple[float, float], top: float, lowe
     """Go down in steps until a channel answers twice in a row; return the height of the first answer [mm]."""
     probe.go((*place, top), LIFT_SPEED)
     probe.wait(RECOVERY / 2)
+    # More frames than at a step: every later difference contains this noise.
     baseline = probe.read(2 * FRAMES).mean
     limit = ANSWER * noise / np.sqrt(FRAMES / 2)
     height, first = top, None

@@ -112,6 +112,7 @@ class Work:
             t = k % len(self.reaches)
             reach = self.reaches[t]
             x, y = (float(rng.uniform(a, b)) for a, b in zip(reach.low, reach.high, strict=True))
+            # Depths between the table's own, so that the error over depth counts as well.
             depths = np.linspace(0.0, reach.deepest, 4)
             press = request(reach, x, y, depths, self.sensor)
             if press is not None and len(press.depths) == len(depths):
@@ -150,10 +151,12 @@ class Work:
                 raise answer
             presses[t][node] = answer
         loads = [s.loads for solutions in presses for s in solutions.values()]
+        # Of all tools together, as they share one curve.
         all_loads = Loads(*(np.concatenate([getattr(v, n) for v in loads]) for n in ("force", "closure", "area")))
         reading = reading_of(self.sensor, all_loads)
         table = assembled(self.grid, presses, self.names, reading, self.sensor)
         deviation = self._off(table, probes, answers[len(requests) :])
+        # A few presses may agree with the table by luck: no error below the least one is claimed.
         return replace(table, error=max(deviation.share if deviation else 0.0, LEAST_ERROR)), deviation
 
     def _off(

@@ -84,6 +84,7 @@ def covering(reaches: list[Reach], sensor: Sensor, spacing: float) -> Grid:
     low, high = np.min([r.low for r in reaches], axis=0), np.max([r.high for r in reaches], axis=0)
     end = max(r.deepest for r in reaches) + DEEPER
     states = max(int(np.ceil(np.sqrt(end / UNIT) - 1e-9)) + 1, FEWEST)
+    # The same depths whatever the session: a deeper one adds nodes and reuses the others.
     depth = UNIT * np.arange(states + EDGE) ** 2
     sides = [(float(a), float(b)) for a, b in zip(low - MARGIN, high + MARGIN, strict=True)]
     x, y = (_axis(a, b, spacing) for a, b in sides)

@@ -53,6 +53,7 @@ class Shipped:
         return press.down_to(request.depths) if press else None
 
 
+# Hundreds of presses are asked for one by one, and all are in one file.
 @cache
 def _read(path: Path) -> dict[tuple[float, float, float], Solved]:
     if not path.is_file():

@@ -24,6 +24,7 @@ def round_about_axis(indenter: Indenter) -> bool:
     """Return whether rotating an indenter about its axis changes nothing."""
     x, y = _places(indenter)
     upright = _turned(indenter, x, y, 0.0)
+    # At odd angles, as a regular polygon repeats at none of them.
     return all(_same(upright, _turned(indenter, x, y, angle)) for angle in (17.0, 41.0, 90.0))
 
 

@@ -140,6 +140,7 @@ class Transducer:
             raise FormatError("a gain of 0 counts/pF", "gains other than 0", remedy)
         capacitance = self.rest + (counts - self.offset) / self.gain
         loads = self.principle.inverse(capacitance, np.zeros_like(counts) if area is None else area)
+        # A reading at the end of its range may stand for any larger load.
         low, high = self._clipped(counts, ends=True)
         return Loads(*(np.where(low | high, np.nan, v) for v in (loads.force, loads.closure, loads.area)))
 
