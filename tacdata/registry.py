@@ -77,6 +77,7 @@ def add_project(folder: Path) -> None:
     """
     path = folder / "pyproject.toml"
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    # Without this section nothing is parsed: other faults of a project's file are not reported here.
     if "[tool.tacdata]" not in text:
         return
     try:
@@ -225,6 +226,7 @@ def _plug_in_places(room: str, variable: str) -> tuple[str, ...]:
 def _refuse_shipped(plugged: Set[str], room: str, origin: str) -> None:
     """Refuse plug-ins that have the name of a member that ships."""
     spec = find_spec(room)
+    # The first folder is the room's own; those of plug-ins follow.
     shipped = list(spec.submodule_search_locations or ())[:1] if spec else []
     if conflicts := plugged & {module.name for module in pkgutil.iter_modules(shipped)}:
         problem = f"{origin} holds {min(conflicts)}, and tacdata ships {_kind(room)}/{min(conflicts)}"

@@ -131,6 +131,7 @@ class DatasetFlow:
     @contextmanager
     def _locked(self) -> Iterator[None]:
         self._out.parent.mkdir(parents=True, exist_ok=True)
+        # Beside the dataset, which does not exist before its first episode.
         handle = os.open(self._out.parent / f".{self._out.name}.lock", os.O_RDWR | os.O_CREAT, 0o644)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX)

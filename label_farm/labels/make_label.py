@@ -87,6 +87,7 @@ def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.n
     carried = [name for name in CARRIED if getattr(solution, name) is not None]
     values = _zeros(request, carried)
     for loading in (True, False):
+        # Friction makes the two branches differ at the same depth.
         frames = ((request.time_ns <= request.deepest_ns) == loading) & (request.tip[:, 2] > 0)
         if not frames.any():
             continue
@@ -95,6 +96,7 @@ def _along_path(request: LabelRequest, solution: PathSolution) -> dict[str, np.n
         mesh, mesh_force = (Branch.of(solution, name, loading).at(depth) for name in ("numerical", "force_error"))
         signed = values["signed"][frames] = surface.at(depth).reshape(shape)
         bound = surface.bound(depth).reshape(shape) + _offset(request, signed, frames)
+        # Interpolation and offset may point the same way and are added; the mesh's error is independent of them.
         values["error_map"][frames] = np.hypot(bound, mesh.reshape(shape))
         values["force"][frames] = force.at(depth)
         lost = np.linalg.norm(force.bound(depth), axis=1)

@@ -116,6 +116,7 @@ class Client:
             with error:
                 if error.code == 304:
                     raise _Unchanged from None
+                # Any other web server answers so; a farm's refusals come in words.
                 if error.code in (404, 405, 501):
                     raise self._stranger() from None
                 raise _in_words(error.code, error.read()) from None
@@ -140,6 +141,7 @@ def refusal(entry: dict[str, Any]) -> SolveError:
 def _is_address(url: str) -> bool:
     try:
         parts = urllib.parse.urlsplit(url)
+        # `port` raises if it is no number.
         fits = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port or 0) >= 0
     except ValueError:
         return False

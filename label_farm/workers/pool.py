@@ -75,6 +75,7 @@ class Pool(Engine):
         if settled:
             self._deaths = 0
         self._replace_dead()
+        # No more than there are jobs, as a worker takes seconds to start.
         while len(self._slots) < min(self.workers, pending):
             self._slots.append(self._start(len(self._slots)))
 

@@ -226,6 +226,7 @@ def _check_columns(root: Path, info: dict[str, Any]) -> None:
             "name such a dataset; others have no labels to train on",
         )
     for key in (*features.UNITS, *features.extra_of(info["features"])):
+        # LeRobot's depth maps are in metres; `read_dataset` gives millimetres.
         stored = "m" if key == features.DEPTH else features.unit(key)
         unit = (info["features"][key].get("info") or {}).get("unit", stored)
         if unit != stored:

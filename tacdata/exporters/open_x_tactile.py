@@ -156,6 +156,7 @@ def _felt(targets: FingertipTargets, side: str, names: list[str]) -> dict[str, n
     if demonstration is None:
         return {}
     for group, unit, of in (("fingertips", "counts", _readings), ("predicteddepth", "predicted mm", _depth)):
+        # An array has one shape: fingers with other boards need a group of their own.
         shapes: dict[tuple[int, ...], dict[str, np.ndarray]] = {}
         for name in names:
             if (values := of(targets, name)) is not None:
@@ -180,6 +181,7 @@ def _readings(targets: FingertipTargets, name: str) -> np.ndarray | None:
         return None
     taxels = demonstration.sensors[name].taxels
     shape = (taxels.rows, taxels.columns) if taxels.rows * taxels.columns == signals.shape[1] else signals.shape[1:]
+    # The layout knows no missing value; `valid_` arrays of the exact targets say which these are.
     return np.nan_to_num(signals[targets.rows]).astype(np.float32).reshape(-1, *shape)
 
 
@@ -217,6 +219,7 @@ def _array(folder: Path, values: np.ndarray) -> None:
 def _blocks(folder: Path, shape: tuple[int, ...], dtype: np.dtype, rows: Callable[[int, int], np.ndarray]) -> None:
     """Write an array of Zarr version 2, given its rows from one number to before another."""
     chunks = (min(ROWS, max(shape[0], 1)), *shape[1:])
+    # Its zlib needs no package beyond Python's own.
     described = {
         "zarr_format": 2,
         "shape": shape,

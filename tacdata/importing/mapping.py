@@ -119,6 +119,7 @@ class FileEntry:
         named = {key: entry[key] for key in ("table", "join", "derived") if key in entry}
         fields = {key: value for key, value in entry.items() if key not in ("path", "time", "missing", *named)}
         options = ReadOptions(**fields, missing=tuple(value for value in missing if isinstance(value, str)))
+        # Texts are left out before a value is parsed, numbers after it.
         numbers = tuple(value for value in missing if not isinstance(value, str))
         paths = tuple(path) if isinstance(path, list) else (path,)
         return cls(paths, options, missing=numbers, clock=_clock(entry), **named)
@@ -356,6 +357,7 @@ def _with_expressions(
     """Return the files, with the expression of each axis as a derived column."""
     for section in (position, schedule):
         axes = section.axes.values() if section else ()
+        # From here on an expression is a column like any other.
         further = {str(axis.column): axis.expression for axis in axes if isinstance(axis, Axis) and axis.expression}
         if section and further and section.file in files:
             entry = files[section.file]

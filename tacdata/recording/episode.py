@@ -244,6 +244,7 @@ class Episode(Displayed):
         yield f"sensor {self.sensor.name}, {frames} readings of {taxels} taxels in {seconds:.1f} s"
         streams = [f"{len(self.cnc.sample_ns)} motion reports", *(f"camera {tags.camera}" for tags in self.tags)]
         yield ", ".join([*streams, *(stream.name for stream in self.measured)])
+        # Without reading the label, whose maps are large.
         labelled = file_names.label(file_names.folder(self.path.parent), self.path).is_file()
         yield "labelled" if labelled else "not labelled"
         if not self.complete:

@@ -22,6 +22,7 @@ SHORT = 0.5
 def touching(targets: FingertipTargets) -> np.ndarray:
     """Return when all fingers touch at once, shape (n,), bool."""
     depth = np.nan_to_num(targets.depth)
+    # A finger that never feels the least depth counts as one that never touches.
     return (depth > FELT * np.maximum(depth.max(axis=0), LEAST_DEPTH / FELT)).all(axis=1)  # ty: ignore[invalid-explicit-return]
 
 

@@ -128,6 +128,7 @@ def _search(
     start, good, missed = model.home, model.home, 0
     for row, (place, turn) in enumerate(zip(places, turns, strict=True)):
         search.aim(place, turn)
+        # From the row before, so that the path keeps its posture where it can.
         start, cost = search.settle(start, STEPS if row else 10 * STEPS)
         if not _reached(search, start) and missed % AGAIN == 0:
             # Seeded by the row: the same targets give the same path, whatever part of them is solved.
@@ -172,6 +173,7 @@ def _limits(
     fast, abrupt = {}, {}
     for k, joint in enumerate(joints):
         if joint.velocity is not None:
+            # Rounding must not report a joint that runs at its limit.
             excess = np.abs(speed[:, k]) > joint.velocity * (1 + 1e-6)
             fast[joint.name] = tuple((1 + np.flatnonzero(excess)).tolist())
         if joint.acceleration is not None:

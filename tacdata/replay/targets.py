@@ -100,6 +100,7 @@ def targets_of(
     mask = np.all([np.isfinite(track.position).all(axis=1) for track in tracks], axis=0)
     if not mask.any():
         raise UsageError(f"no time at which {', '.join(names)} are all seen", "one or more", "choose fewer fingers")
+    # Only the ends are cut off: gaps between them are bridged and marked.
     first, last = np.flatnonzero(mask)[[0, -1]]
     rows, remarks = slice(int(first), int(last) + 1), list(demonstration.remarks)
     depths = [_depth(track.depth, len(demonstration.time_ns)) for track in tracks]

@@ -157,6 +157,7 @@ def revise(
     }
     note("curves, table")
     shown = tuple(curves(comparison, change, seal.numbers, SHOWN)) if change else ()
+    # After every stage, so that an interrupted revision leaves what it has.
     _write(document, verdict, shown, target)
     if added:
         document |= _about_labels(recordings, comparison, answer, target, options, note)
@@ -192,6 +193,7 @@ def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Pa
     parents = verdict["provenance"].get("parents", {})
     parent_digests = {name.removeprefix(KIND): digest for name, digest in parents.items() if name.startswith(KIND)}
     digests = {recording_hash(path): path for path in recordings if path.exists()}
+    # By content: recordings may have been moved since.
     if parent_digests and set(parent_digests.values()) != set(digests):
         strangers = [str(path) for digest, path in digests.items() if digest not in parent_digests.values()]
         raise UsageError(
@@ -303,6 +305,7 @@ def _added(verdict: dict[str, Any], judged: Path, spec: Spec, added: list[Additi
     evidence = f"{judged.name}/{VERDICT} sha256 {provenance.content_hash(verdict)}, from {', '.join(names)}"
     document = spec.with_effects(placed_of(added), errors, evidence)
     response = document["response"]
+    # Relative to the new folder: both can be moved together.
     if "file" in response:
         import os
 

@@ -108,6 +108,7 @@ class VirtualBoard:
     def _sample(self, sampled: int) -> None:
         frame = self._encoder.encode(self._read(sampled), self._counter, round(sampled / 1000))
         begin, bit = sampled + int(self.timing.conversion * NS), 10 * NS // self.baud
+        # Bytes of the frame before may still occupy the line.
         begin = max(begin, self._line[-1][0] if self._line else 0)
         self._line += [(begin + (i + 1) * bit, byte) for i, byte in enumerate(frame)]
         self._counter += 1
@@ -117,6 +118,7 @@ class VirtualBoard:
         timer = max(int(self.timing.timer * NS), 1_000_000)
         while self._line:
             first = self._line[0][0] - self.timing.start_ns
+            # Rounded up to a tick: the bridge's timer runs on whether or not bytes come.
             leaves = self.timing.start_ns + -(-first // timer) * timer
             if len(self._line) >= PACKET:
                 leaves = min(leaves, self._line[PACKET - 1][0])
@@ -127,4 +129,5 @@ class VirtualBoard:
                 data.append(self._line.popleft()[1])
             jitter = int(self._rng.uniform(0, 0.001) * NS)
             last = self._packets[-1][0] if self._packets else 0
+            # The bus delays packets by random times, and never lets one overtake another.
             self._packets.append((max(leaves + jitter, last), bytes(data)))

@@ -148,6 +148,7 @@ def evaluate(
 
 def _result(frames: Frames, span: EpisodeSpan, depth: np.ndarray) -> EpisodeResult:
     frame_rows = slice(span.start, span.stop)
+    # Within the network's range: what lies beyond it is no error of its training.
     label = np.clip(frames.depth[frame_rows], 0.0, frames.sensor.map.depth_max)
     scores = depth_maps.score_frames(depth, label)
     return EpisodeResult(span, depth, label, frames.valid[frame_rows], scores, at_full_depth(frames, span))

@@ -114,6 +114,7 @@ def _with_recording(scene: Scene, recorded: DemoRecording, images: Iterable[tupl
 def _with_tracks(scene: Scene, demonstration: Demonstration) -> Scene:
     time, curves, maps, clouds = demonstration.time_ns, [], [], []
     felt = {name: track for name, track in demonstration.tracks.items() if track.depth is not None}
+    # One scale for all fingers, so that their colours compare.
     highest = max((float(np.nan_to_num(t.depth).max()) for t in felt.values() if t.depth is not None), default=0.0)
     scale = scale_of(np.array([highest]), "mm", floor=DEPTH_FLOOR)
     if felt:
@@ -181,6 +182,7 @@ def contact(maps: DepthMaps, track: FingerTrack, time_ns: np.ndarray) -> Cloud:
     touched = (maps.values > DEPTH_FLOOR) & np.reshape(valid, (-1, 1, 1))
     frame, i, j = np.nonzero(touched)
     depth = maps.values[touched]
+    # A pad's z points outwards: pressed skin lies below its plane.
     local = np.column_stack([maps.x[i], maps.y[j], -depth])
     placed = np.zeros((0, 3))
     if len(frame):

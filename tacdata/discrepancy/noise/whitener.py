@@ -31,6 +31,7 @@ class Colour:
         decay = noise.memory ** np.clip(course.step / noise.step, 0.0, 50.0)
         decay = np.where(course.first, 0.0, decay)
         spread = np.sqrt(np.maximum(1 - decay**2, 1e-6) / max(1 - noise.memory**2, 1e-6))
+        # A mean counts as four readings at most: slow noise does not average out.
         factor = 1 / ((spread / np.sqrt(np.minimum(course.averaged, 4.0)))[:, None] * noise.scale)
         previous_factor = decay[:, None] * factor
         if noise.relative_scale is not None:
@@ -41,6 +42,7 @@ class Colour:
         gone = None
         if noise.missing is not None:
             gone = noise.missing.copy()
+            # A reading after a missing one cannot be whitened either.
             gone[1:] |= noise.missing[:-1] & ~course.first[1:, None]
             factor, previous_factor = np.where(gone, 0.0, factor), np.where(gone, 0.0, previous_factor)
         return cls(factor.astype(np.float32), previous_factor.astype(np.float32), gone)

@@ -124,6 +124,7 @@ def _upright(data: bytes, options: ReadOptions, path: Path, notes: list[str]) ->
         return data
     rows = [line.decode("utf-8", "ignore") for line in lines]
     marks = [mark for mark in DELIMITERS if mark != " "] + [" "]
+    # By the line with the fewest: a delimiter stands in every line.
     delimiter = max(marks, key=lambda mark: min(row.count(mark) for row in rows))
     table = [split(row, delimiter) for row in rows]
     widths = {len(row) for row in table}
@@ -143,6 +144,7 @@ def _is_cut(body: bytes, layout: TextLayout) -> bool:
     places = [len(field.partition(layout.decimal)[2]) if layout.decimal in field else 0 for field in fields]
     if len(fields) < FEWEST:
         return False
+    # With a fixed number of decimals, a cut row has fewer; without any, fewer digits than all before.
     if min(places[:-1]) == max(places[:-1]) > 0:
         return places[-1] < places[0]
     return max(places) == 0 and len(fields[-1].lstrip("-")) < min(len(field.lstrip("-")) for field in fields[:-1])
@@ -151,6 +153,7 @@ def _is_cut(body: bytes, layout: TextLayout) -> bool:
 def _with_receipt(data: bytes) -> bytes:
     """Return a serial monitor's lines with the time before "->" as a column of its own; other text as it is."""
     lines = data.split(b"\n")
+    # By the second half: a board that starts prints a header and messages first.
     tail = [line for line in lines[len(lines) // 2 :] if line.strip()]
     if 2 * sum(bool(RECEIPT.match(line)) for line in tail) <= len(tail):
         return data
@@ -265,6 +268,7 @@ def _body(data: bytes, layout: TextLayout, missing: tuple[str, ...]) -> tuple[by
         start = data.index(b"\n", start) + 1
     body = data[start:]
     head = data[:start].rstrip(b"\n").rsplit(b"\n", 1)[-1]
+    # A logger that starts again writes its header again.
     if head.strip() and not is_comment(head.decode("utf-8", "ignore"), missing) and b"\n" + head + b"\n" in body:
         lines = body.split(b"\n")
         body = b"\n".join(line for line in lines if line != head)

@@ -57,6 +57,7 @@ def _by_line(path: Path, text: str, doubts: list[str]) -> list[Any]:
             rows += [json.loads(line)] if line.strip() else []
         except json.JSONDecodeError:
             broken.append(number)
+    # One cut line is usual: the logger was switched off.
     if len(broken) > max(BROKEN * len(lines), 1):
         raise FormatError(
             f"{path}: {len(broken)} of {len(lines)} lines are no JSON, first line {broken[0]} "

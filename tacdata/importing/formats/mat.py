@@ -31,6 +31,7 @@ class Mat(SourceFormat):
         """Return the variables if they are trials: tables or structures, named by number; see the base."""
         try:
             loaded = _loaded(path)
+        # So scipy refuses version 7.3, which is HDF5.
         except NotImplementedError:
             return Hdf5().tables(path)
         names = [name for name in loaded if not name.startswith("__")]

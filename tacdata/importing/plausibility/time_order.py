@@ -129,6 +129,7 @@ def _since_set(rows: np.ndarray, time_ns: np.ndarray, policy: OrderPolicy) -> tu
     A clock that begins at 1970 or 2000 is set later, in the middle of a log.
     """
     leaps = np.flatnonzero(np.diff(time_ns) > policy.leap_ns) + 1
+    # A clock is set once; several leaps mean something else.
     if len(leaps) != 1:
         return rows, time_ns, ""
     cut = int(leaps[0])

@@ -76,10 +76,12 @@ def held_rows(position: Stream, readings: np.ndarray, span: float, policy: HeldP
         return HeldRows(repeated, (), 0)
     answer = _answer(path, readings)
     runs = list(pairwise([0, *updates.tolist(), len(path)]))
+    # The lower quartile: rests make intervals longer, and nothing makes them shorter.
     interval = int(np.quantile(np.diff(updates), 0.25, method="lower"))
     between = [run for run in runs[1:-1] if run[1] - run[0] >= policy.rows]
     if interval >= policy.rows and len(updates) >= policy.updates and _goes_on(path, answer, between, policy):
         for begin, end in runs[:-1]:
+            # Only the last interval of a run: before it the machine may have rested.
             repeated[max(begin + 1, end - interval + 1) : end] = True
     else:
         interval = 0
@@ -90,6 +92,7 @@ def held_rows(position: Stream, readings: np.ndarray, span: float, policy: HeldP
             if sharp and _goes_on(path, answer, [run], policy) and _arrived(path, answer, run, span, policy):
                 repeated[run[0] + 1 : run[1]] = True
     stuck = tuple((a, b - 1) for a, b in runs if b - a >= policy.stuck and _returns(answer, a, b, policy))
+    # Readings that do not follow the position elsewhere say nothing of where it is here.
     if _explained(path, answer, stuck) < policy.explained:
         stuck = ()
     for first, last in stuck:

@@ -246,6 +246,7 @@ def _path_doubt(taxels: Stream, position: Stream, depth: np.ndarray) -> str:
     low, high = at <= at.min() + 0.1 * stroke, at >= at.max() - 0.1 * stroke
     if min(low.sum(), high.sum()) < FEWEST:
         return ""
+    # No stretch at rest is known here: the usual change from row to row stands for the noise.
     noise = np.nanmedian(np.abs(np.diff(taxels.values, axis=0)), axis=0)
     change = np.abs(np.nanmedian(taxels.values[high], axis=0) - np.nanmedian(taxels.values[low], axis=0))
     if not (change > ANSWER * noise).any():
@@ -299,6 +300,7 @@ def _without_counter(streams: ImportedStreams) -> tuple[Stream, int, str]:
     steps = np.diff(counter[np.isfinite(counter)])
     lost = int(np.maximum(steps[steps > 0] - 1, 0).sum())
     falls = -steps[steps < 0]
+    # A fall by nearly a power of two is a counter that wrapped; by anything else, a device that began again.
     begun = falls[2.0 ** np.ceil(np.log2(falls + 1)) - falls > FEWEST]
     doubt = "taxels: the device's counter begins again: how many frames are missing there is not known"
     return replace(taxels, values=taxels.values[:, :-1]), lost, doubt * bool(len(begun))

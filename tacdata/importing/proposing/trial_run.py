@@ -97,6 +97,7 @@ def trial_run(
     except TacdataError as error:
         return TrialRun(mapping, refusals=(error,), policy=policy)
     by_set, refusals = [], list[TacdataError]()
+    # Spread over the whole source: neighbouring files resemble each other.
     for files in [sets[k] for k in sorted({round(k) for k in np.linspace(0, len(sets) - 1, policy.sets)})]:
         parts: list[ImportedPress | Refusal] = []
         try:

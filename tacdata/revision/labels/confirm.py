@@ -108,6 +108,7 @@ def _factor(comparison: Comparison, effect: Placed, pose: np.ndarray) -> np.ndar
     """Return the factor of a mechanical effect on the loads of every row, shape (rows,)."""
     from tacdata.chain.state import State
 
+    # What the effect makes of a load of 1 is its factor.
     ones = np.ones((len(pose), 1))
     state = State(comparison.course, comparison.setting.response, pose, ones, ones[:, 0], ones)
     return effect.act(state).load[:, 0]

@@ -41,6 +41,7 @@ def _placed_elsewhere(episodes: Sequence[Episode], placed: Sequence[Placed]) -> 
     course = _course(ready)
     empty = np.empty(0)
     state = State(course, None, course.tip, empty, empty, empty)  # ty: ignore[invalid-argument-type]
+    # In the chain's order: first what moves the carriage with its tag.
     for effect in sorted(kinematic, key=lambda p: not p.seen_by_tag):
         state = effect.act(state)
     cut = np.cumsum([len(e.tip_ns) for e in ready])[:-1]
@@ -58,6 +59,7 @@ def _dense(episode: Episode) -> Episode:
     share = (np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)) / count[first]
     gap = np.diff(episode.tip_ns)
     time = np.append(episode.tip_ns[first] + np.round(share * gap[first]).astype(np.int64), episode.tip_ns[-1])
+    # Rounded to nanoseconds, two points may coincide.
     time = np.unique(time)
     return replace(episode, tip_ns=time, tip=episode.tip_at(time))
 

@@ -44,6 +44,7 @@ class MachineLimits:
         A sine of amplitude A and peak speed v turns with v^2 / A; a ramp turns at least as sharply.
         """
         fastest = max((_pace(course, e) for e in range(course.episodes)), default=0.0) or RATES[0]
+        # v^2 = 2 a s, as if it had reached its fastest in a quarter of the stroke.
         sharpest = 2 * fastest**2 / course.stroke
         rates = tuple(float(f"{share * fastest:.2g}") for share in SHARES)
         limits = AxisLimits(np.full(3, sharpest), np.full(3, fastest))

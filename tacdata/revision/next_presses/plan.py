@@ -77,11 +77,13 @@ def choose(
     pairs = [(a, b) for i, a in enumerate(candidates) for b in candidates[i + 1 :]]
     have = {(a.mechanism, b.mechanism): 0.0 for a, b in pairs}
     peaks = {pair: max((c.nats[pair] for c in scored), default=0.0) for pair in have}
+    # Pairs that not even several plans would settle get no press.
     have = {pair: 0.0 for pair in have if standard_errors(PLANS * presses * REPEATS * peaks[pair]) >= SETTLES}
     choices: list[Choice] = []
     while scored and len(choices) < presses:
 
         def worth(choice: Choice) -> float:
+            # What a pair has already been given counts less and less.
             gain = [weight[i] * weight[j] * np.log1p(choice.nats[i, j] / (1.0 + have[i, j])) for i, j in have]
             return float(np.sum(gain)) / choice.trial.seconds**0.5
 
@@ -105,6 +107,7 @@ def left_open(choices: list[Choice]) -> str:
     sentences, beyond = [], []
     for pair in choices[0].nats:
         z = standard_errors(REPEATS * sum(c.nats[pair] for c in choices))
+        # Standard errors grow with the root of the number of presses.
         plans = int(np.ceil((SETTLES / max(z, 1e-9)) ** 2))
         if plans > PLANS:
             beyond.append(f"{pair[0]} from {pair[1]}")
@@ -196,6 +199,7 @@ def _distances(
     nats = {}
     for i, a in enumerate(candidates):
         for j in range(i + 1, len(candidates)):
+            # An episode's offset is free, and its depth uncertain by `JITTER`: what these explain separates no rivals.
             difference = predicted[i] - predicted[j]
             difference = difference - difference.mean(axis=0)
             share = (difference * slope).sum() / ((slope**2).sum() + JITTER**-2)

@@ -70,6 +70,7 @@ def rivals(
         first = candidate.placed(values[: len(candidate.columns)], comparison.course.channels)
         model = refine(setting, [*remainder, first], comparison.null)
         name = candidate.effect.called
+        # Of several forms of a mechanism, the one that fits best.
         if name not in best or model.energy.sum() < best[name].model.energy.sum():
             best[name] = Rival(name, model.placed, model)
     return [answer, *best.values()]

@@ -42,6 +42,7 @@ class VirtualCamera:
         self._stalled = False
         self._changed = threading.Condition()
         self._stopped = threading.Event()
+        # Port 0: the system chooses a free one, as several rigs may run side by side.
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
         self._server.daemon_threads = True
         self.url = f"http://127.0.0.1:{self._server.server_port}/stream.mjpg"

@@ -75,6 +75,7 @@ def render_scene(
     image = (_bench(width, height) if look.background is None else look.background).astype(np.float32)
     boxes = [
         box
+        # The farthest first: nearer cubes cover it.
         for pose, cube in sorted(cubes, key=lambda item: -float(item[0][2, 3]))
         if (box := _compose(image, pose, intrinsics, cube, look)) is not None
     ]
@@ -98,6 +99,7 @@ def expose(
     _put_before(image, look)
     image *= _light(width, height, look)
     margin = int(np.ceil(4 * look.blur)) + 1
+    # Blurred from a copy: where two boxes overlap, nothing is blurred twice.
     sharp = image.copy()
     for left, top, right, bottom in [(0, 0, width, height)] if look.covers or look.shadow else boxes:
         rows, columns = slice(max(top - margin, 0), bottom + margin), slice(max(left - margin, 0), right + margin)
@@ -123,6 +125,7 @@ def _compose(
     corners = np.array(boxes)
     (left, top), (right, bottom) = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
     box = (int(left), int(top), int(right), int(bottom))
+    # At most 1.5 million rays: a near cube would need many more.
     fine = max(2, min(look.rays, int(np.sqrt(1.5e6 / ((right - left) * (bottom - top))))))
     lens = Lens(box, fine, intrinsics)
     grey, share = np.zeros((2, bottom - top, right - left), np.float32)
@@ -134,6 +137,7 @@ def _compose(
         size = (int(right - left), int(bottom - top))
         grey += cv2.resize(np.maximum(canvas, 0), size, interpolation=cv2.INTER_AREA)
         share += cv2.resize(hit, size, interpolation=cv2.INTER_AREA)
+    # Where only some rays of a pixel hit, what lies behind shows through.
     part = image[top:bottom, left:right]
     part += (grey - share * part) / len(poses)
     return box
@@ -160,6 +164,7 @@ def _put_before(image: np.ndarray, look: Look) -> None:
 
     for polygon, is_shadow in [*((p, False) for p in look.covers), *(((look.shadow, True),) if look.shadow else ())]:
         mask = np.zeros(image.shape, np.uint8)
+        # `fillPoly` takes whole numbers with fractional bits: sixteenths of a pixel.
         places = np.round(np.array(polygon) * 16).astype(np.int32)
         cv2.fillPoly(mask, [places], 255, cv2.LINE_AA, shift=4)
         share = mask / np.float32(255)

@@ -46,6 +46,7 @@ def draw_scene(seed: int, carriage: tuple[float, float, float]) -> CubeScene:
     eye = cube + CAMERA_OFFSET + rng.normal(0, 4, 3)
     camera = looking_at(eye / 1000, cube / 1000)
     riding = np.eye(4)
+    # Glued on by hand: half a degree askew, and a little off.
     riding[:3, :3] = Rotation.from_rotvec(rng.normal(0, 0.5, 3), degrees=True).as_matrix()
     riding[:3, 3] = (np.array([0, 0, CUBE_HEIGHT]) + rng.normal(0, 0.3, 3)) / 1000
     return CubeScene(camera, riding)

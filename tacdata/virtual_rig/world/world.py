@@ -86,6 +86,7 @@ def draw(seed: int, sensor: Sensor, nominal: Registration, rough: bool = False) 
         rough: Whether the sensor was only put down (`put_down`), so that it must be registered first.
     """
     rng = np.random.default_rng([seed, 1])
+    # The modulus that contacts see (Hertz).
     modulus = sensor.material.youngs_modulus / (1 - sensor.material.poisson_ratio**2)
     error = rng.normal(0, (0.05, 0.05, 0.02))
     careful = Registration(
