@@ -48,6 +48,7 @@ def extremes(values: np.ndarray, limit: int) -> np.ndarray:
     count = len(values)
     if count <= limit:
         return np.arange(count)
+    # Two rows of each stretch are kept, its highest and its lowest.
     edges = np.linspace(0, count, limit // 2 + 1).astype(int)
     high = np.where(np.isfinite(values), values, -np.inf)
     low = np.where(np.isfinite(values), values, np.inf)

@@ -54,6 +54,7 @@ def maps_comparison(
             common, at, truth_rows = np.intersect1d(side.time_ns, truth.time_ns, return_indices=True)
             pairs.append((f"{side.name} − {truth.name}", side.depth[at], truth.depth[truth_rows], common))
     differences = [(name, (a - b).astype(np.float32), t) for name, a, b, t in pairs if len(t)]
+    # All differences on one scale, so that a small one looks small.
     signed = scale_of(
         np.array([float(np.abs(d).max(initial=0.0)) for _, d, _ in differences]), "mm", signed=True, floor=ERROR_FLOOR
     )
@@ -95,6 +96,7 @@ def readings_comparison(
     """
     columns, rows = shape
     labels = tuple(f"{k} ({k % columns}, {k // columns})" for k in range(columns * rows))
+    # Since the first frame: idle readings of channels differ by more than presses change them.
     start = measured[:1]
     residuals = {name: measured - values for name, values in predictions.items()}
     curves, arrays = [], []

@@ -126,6 +126,7 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
         on = float(depth[begin:end].max() - depth[begin])
         if begin == 0 or end - begin < FEWEST_STOPPED or on < DEEPER * float(np.ptp(depth)):
             continue
+        # Just as far before the stop: by as much as there, the reading should have gone on.
         shallower = np.flatnonzero(depth[:begin] <= depth[begin] - on)
         at = int(shallower[-1]) if len(shallower) else int(np.argmin(depth[:begin]))
         way = float(depth[begin] - depth[at])

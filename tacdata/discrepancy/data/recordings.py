@@ -60,6 +60,7 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
     paths = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
     numbered = [(number, read_recording(file)) for number, path in enumerate(paths) for file in _files(path)]
     numbered = [(number, r) for number, r in numbered if len(r.episode.taxels.sample_ns) > 1]
+    # By time, whatever the order of the arguments: memory follows the clock.
     numbered.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))
     numbered_episodes = [(number, r.episode) for number, r in numbered]
     notes: list[str] = []
@@ -166,6 +167,7 @@ def _measured(episode: Episode, name: str, time_ns: np.ndarray) -> np.ndarray:
     if stream is None or len(stream.sample_ns) < 2:
         return np.full(len(time_ns), np.nan)
     values = stream.values
+    # Of a force sensor's axes the normal one, else the one that moves most.
     column = next(
         (k for k, n in enumerate(stream.names) if n.lower().endswith("z")), int(np.argmax(np.nanstd(values, 0)))
     )

@@ -78,6 +78,7 @@ def _groups(parts: Sequence[Rows], channels: int) -> np.ndarray:
     group = none.copy()
     group[deep] = number
     for k in np.setdiff1d(np.arange(len(parts)), deep):
+        # Too shallow for the common depth: it is compared at its own.
         level_depth = 0.9 * float(deepest[k])
         stiffness = np.log(max(_level(parts[k], level_depth, channels), 1e-12))
         near = [
@@ -103,6 +104,7 @@ def _apart(level: np.ndarray) -> np.ndarray:
     number = none.copy()
     number[order] = np.repeat(np.arange(len(sizes)), sizes)
     within = max(float(np.ptp(level[number == k])) for k in range(len(sizes)))
+    # Softer from press to press may also be one specimen that wears.
     softer = bool(np.all(np.diff(number) <= 0))
     threshold = FAR_APART if len(sizes) == 2 or (softer and len(sizes) < SURELY) else APART
     required = within * (1.0 if len(sizes) >= SURELY else OVER_SCATTER)

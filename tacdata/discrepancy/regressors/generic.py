@@ -56,6 +56,7 @@ def histories(course: Course) -> np.ndarray:
     deepest = running_max(share, course.row_site)
     recent = np.maximum.accumulate(np.where(course.first, 0.0, share))
     stroke = _since_start(course, share)
+    # Clock columns have mean 0 (that of its square is 1/12): an offset is fitted anyhow.
     columns = [
         np.sign(speed),
         np.sign(speed) * fast,

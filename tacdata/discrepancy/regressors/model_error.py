@@ -133,6 +133,7 @@ def modulations(course: Course, streams: Streams, contribution: np.ndarray) -> l
     total = max(float(weight.sum()), 1e-30)
     result = []
     for row in (*rows, size):
+        # Without its weighted mean: a factor of the whole contribution is fitted anyhow.
         deviation = row - float((row * weight).sum()) / total
         spread = float(np.sqrt((np.square(deviation) * weight).sum() / total))
         result.append(deviation / spread if spread > 1e-9 else np.zeros_like(deviation))

@@ -128,6 +128,7 @@ def refine(setting: Setting, placed: Sequence[Placed], null: NullModel, steps: i
     begin, ended = (setting, response, current, view), None
     for _ in range(steps):
         state, best = _state(*begin, null), None
+        # The full step, then a shorter one; where both fail, the chain bends too much for a better one.
         for share in (1.0, 0.3):
             # A part s of a Newton step makes a quadratic fall by s (2 - s) of the fall of the full step.
             if state.fall * share * (2 - share) < HOPELESS:
@@ -258,6 +259,7 @@ def _state(setting: Setting, response: Response, placed: list[Placed], view: _Vi
     columns = np.concatenate([view.clean, clean], axis=2)
     grams = episode_grams(columns, course.reduced, null.nuisances, null.inner)
     rooms = np.array([knob.room(placed) for knob in moving.knobs]).reshape(-1, 2)
+    # A weak prior: where recordings say little of a shape, its logarithm would run away.
     weight = np.concatenate([[0.05 if knob.shape else 1e-6 for knob in moving.knobs], ridge])
     unbounded = np.full(len(ridge), np.inf)
     low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -unbounded])
@@ -302,6 +304,7 @@ def _covariance(grams: EpisodeGrams, values: np.ndarray, weight: np.ndarray, kno
     count, inverse = len(scores), root @ root
     share = np.maximum(np.einsum("ki,eij,kj->ek", inverse, each, inverse), 0.0)
     share = share / np.maximum(share.sum(axis=0), 1e-300)
+    # By how evenly episodes carry a parameter (Satterthwaite): a few heavy ones make wide intervals.
     freedom = np.maximum(1 / np.maximum(np.sum(share**2, axis=0), 1e-12) - 1, 1.0)
     wider = stdtrit(freedom, 0.95) / ndtri(0.95)
     return (

@@ -71,6 +71,7 @@ class Problem:
 
     def without(self, at: int) -> Problem:
         """Return the problem without one placed effect, to first order: the candidates' columns stay the same."""
+        # Column 0 is the residual: the effect's contribution goes back into it.
         gram, column = self.grams.gram.copy(), int(self.parts[at]) + 1
         gram[:, 0] += gram[:, column]
         gram[:, :, 0] += gram[:, :, column]

@@ -119,6 +119,7 @@ def _isolated(column: np.ndarray, policy: CodePolicy) -> np.ndarray:
     distinct = np.unique(column[np.isfinite(column)])
     if len(distinct) <= policy.levels:
         return codes
+    # Codes are outermost: a few numbers at either end are judged by all others.
     core = distinct[policy.few : -policy.few]
     for sign, outer in ((1, distinct[-policy.few :]), (-1, distinct[policy.few - 1 :: -1])):
         edge = float(core[-1] if sign > 0 else core[0])

@@ -60,6 +60,7 @@ def _old(column: np.ndarray, policy: RepeatPolicy) -> np.ndarray:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(np.int8)))
     old = np.zeros(len(column), dtype=bool)
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        # At an end of its range a reading may rest: idle, or at a rail.
         if end - begin + 1 < policy.run or column[begin] in (np.nanmin(column), np.nanmax(column)):
             continue
         near = np.abs(column - column[begin]) <= policy.near * (np.nanmax(column) - np.nanmin(column))

@@ -72,6 +72,7 @@ def lag_doubts(taxels: Stream, position: Stream, policy: LagPolicy = POLICY) -> 
     answer = _answer(taxels, grid)
     count = int(min(policy.windows, len(grid) // policy.rows))
     most = int(min(policy.largest * 1e9 / step, policy.share * len(grid) / count))
+    # A part without most of a stroke tells no lag.
     found = [
         _lag(a, b, most)
         for a, b in zip(np.array_split(path, count), np.array_split(answer, count), strict=True)
@@ -124,6 +125,7 @@ def _lag(path: np.ndarray, answer: np.ndarray, most: int) -> tuple[int, float, f
     def correlation(lag: int) -> float:
         a, b = (path[: len(path) - lag], answer[lag:]) if lag >= 0 else (path[-lag:], answer[:lag])
         spread = float(a.std() * b.std())
+        # Readings may fall under load: the sign does not matter.
         return abs(float(((a - a.mean()) * (b - b.mean())).mean())) / spread if spread > 0 else 0.0
 
     correlations = {lag: correlation(lag) for lag in sorted(range(-most, most + 1), key=abs)}
@@ -137,6 +139,7 @@ def _lag(path: np.ndarray, answer: np.ndarray, most: int) -> tuple[int, float, f
 
 def _drift(lags: np.ndarray, policy: LagPolicy) -> float:
     """Return the change of lags that grow or fall evenly from part to part [s]; 0 if they do not."""
+    # A lag that outgrows the search spoils the last parts: an even drift may do without them.
     for count in range(len(lags), policy.parts - 1, -1):
         part = lags[:count]
         numbers = np.arange(count)

@@ -124,6 +124,7 @@ def windows(
                 f"less than {depth.max():.3f} mm",
                 "correct press_above or the position's zero",
             )
+        # Half way between two presses: both keep readings without contact.
         ends[1:1] = [(int(time_ns[b]) + int(time_ns[e])) // 2 for e, b in zip(stops[:-1], begins[1:], strict=True)]
     return [(a, b) for a, b in pairwise(ends) if b > a]
 
