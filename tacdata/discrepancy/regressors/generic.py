@@ -54,7 +54,6 @@ def histories(course: Course) -> np.ndarray:
     fast = np.abs(speed) / max(float(np.abs(speed).max()), 1e-9)
     clock = course.time / max(float(course.time[-1]), 1e-9) - 0.5
     deepest = running_max(share, course.row_site)
-    recent = np.maximum.accumulate(np.where(course.first, 0.0, share))
     stroke = _since_start(course, share)
     # Clock columns have mean 0 (that of its square is 1/12): an offset is fitted anyhow.
     columns = [
@@ -65,7 +64,7 @@ def histories(course: Course) -> np.ndarray:
         clock**2 - 1 / 12,
         deepest - share,
         stroke - share,
-        deepest - recent * 0.0 - stroke,
+        deepest - stroke,
         *(low_pass(share, course.step, tau) for tau in TIME_CONSTANTS),
         *(np.square(low_pass(share, course.step, tau)) for tau in TIME_CONSTANTS[1::2]),
         *(play(share, r) - share for r in (0.03, 0.1, 0.3)),
