@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.errors import UsageError
 from tacdata.replay.engine import mujoco
+from tacdata.replay.scene_model import IMPEDANCE, soften
 
 STEP = 0.001
 """Time step [s]."""
@@ -30,7 +30,7 @@ STAYS = 0.8
 # creep.
 XML = """
 <mujoco>
- <option timestep="{step}" cone="elliptic" integrator="implicitfast" impratio="10"/>
+ <option timestep="{step}" cone="elliptic" integrator="implicitfast" impratio="100"/>
  <worldbody>
   <geom name="table" type="plane" size="1 1 0.1" pos="0 0 {table}" friction="0.5 0.005 0.0001"/>
   <body name="orange"><freejoint/>
@@ -46,13 +46,9 @@ XML = """
 # Their masks (contype, conaffinity) let fingers touch the orange, but not each other.
 FINGER = """<body name="{name}" pos="0 {y} 0" gravcomp="1"><joint name="{name}" type="slide" axis="0 {inwards} 0"/>
   <geom name="{name}" type="capsule" size="{ridge} {half}" mass="{mass}" contype="2" conaffinity="1" condim="4"
-   priority="1" friction="{friction} {torsion} 0.0001" solref="-{skin} -{damping}" solimp="{d} {d} 0.001"/></body>"""
-TORSION, IMPEDANCE, FINGER_MASS = 0.003, 0.9, 0.05
-"""Friction against turning about the normal [m], the contact's impedance [1] (MuJoCo, solver parameters), mass [kg]."""
-FINEST = 2e-6
-"""Tolerance of the search for the lifting configuration [m]."""
-LOOSEST, GROWTH, TRIES = 5e-4, 1.25, 12
-"""Squeezes of the search: the first [m], the ratio between two [1], and their number."""
+   priority="1" friction="{friction} {torsion} 0.0001" solimp="{d} {d} 0.001"/></body>"""
+TORSION, FINGER_MASS = 0.003, 0.05
+"""Friction against turning about the normal [m], and mass [kg]."""
 SIDES = {"near": -1, "far": 1}
 
 
@@ -126,33 +122,12 @@ def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
     return Lift(lowest > STAYS * HEIGHT, lowest, moments, path, hand)
 
 
-def lifting_grip(grip: Grip, lateral: float) -> Grip:
-    """Return the grip with the widest lifting configuration that still holds an orange at this offset [m].
-
-    Raises:
-        UsageError: If none does.
-    """
-    # From loose to tight: a tight squeeze may push out an orange that is off the middle, so the first that holds
-    # counts.
-    tried = LOOSEST * GROWTH ** np.arange(TRIES)
-    high = next((s for s in tried.tolist() if lift(replace(grip, squeeze=s), lateral).held), None)
-    if high is None:
-        raise UsageError(
-            f"an orange of {grip.mass:g} kg, {1000 * lateral:g} mm off, friction {grip.friction:g}",
-            "one that the fingers can hold at all",
-            "make it lighter, or the friction larger",
-        )
-    low = 0.0 if high == tried[0] else high / GROWTH
-    while high - low > FINEST:
-        middle = (low + high) / 2
-        low, high = (low, middle) if lift(replace(grip, squeeze=middle), lateral).held else (middle, high)
-    return replace(grip, squeeze=high)
+def pressing(grip: Grip, force: float) -> Grip:
+    """Return the grip whose fingertips each press a centred orange with a force [N]: finger and skin in series."""
+    return replace(grip, squeeze=force / grip.stiffness + force / grip.skin)
 
 
 def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
-    # At rest MuJoCo's contact is a spring of rate * reduced mass / (1 - impedance) [N/m].
-    reduced = FINGER_MASS * grip.mass / (FINGER_MASS + grip.mass)
-    rate = grip.skin * (1 - IMPEDANCE) / reduced
     fingers = "".join(
         FINGER.format(
             name=name,
@@ -163,8 +138,6 @@ def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
             mass=FINGER_MASS,
             friction=grip.friction,
             torsion=TORSION,
-            skin=rate,
-            damping=2 * np.sqrt(rate),
             d=IMPEDANCE,
         )
         for name, side in SIDES.items()
@@ -184,4 +157,6 @@ def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
     )
     engine = mujoco()
     model = engine.MjModel.from_xml_string(text)
+    for name in SIDES:
+        soften(model, model.geom(name).id, grip.skin, grip.mass)
     return model, engine.MjData(model)

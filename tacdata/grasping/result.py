@@ -13,7 +13,7 @@ from tacdata.grasping.bias import bias
 from tacdata.grasping.centre import Maps
 from tacdata.grasping.lift import Grip, lift
 from tacdata.grasping.press_set import PressSet
-from tacdata.grasping.study import MARGIN, OTHER_MARGINS, PUBLISHED, Setup, configured, lifted, rates, trials
+from tacdata.grasping.study import OTHER_FORCES, PUBLISHED, Setup, configured, lifted, rates, trials
 from tacdata.grasping.touch import OrangeTouch
 from tacdata.replay.comparison.paired import paired
 from tacdata.sensor import Sensor
@@ -35,7 +35,7 @@ def result(
     """Run a study.
 
     Args:
-        setup: Hand, protocol and disorder; the lifting configuration is found here.
+        setup: Hand, protocol and disorder; the lift presses a centred orange as hard as the measurement.
         presses: The orange's presses.
         sensor: The fingertip's sensor.
         maps: The trained network.
@@ -45,10 +45,10 @@ def result(
     touch, base = OrangeTouch(presses, sensor), configured(setup)
     outcomes = trials(base, touch, maps, progress)
     variants = []
-    for margin in OTHER_MARGINS:
-        variant = configured(setup, margin)
+    for force in OTHER_FORCES:
+        variant = configured(setup, force)
         again = [replace(trial, held=lifted(trial, variant.grip)) for trial in outcomes]
-        variants.append({"margin": margin, **_lifting(variant.grip), "rates": rates(again)})
+        variants.append({"force": force, **_lifting(variant.grip), "rates": rates(again)})
     parents = {
         "sensor": sensor.content_hash,
         "checkpoint": str(network["hash"]),
@@ -59,7 +59,7 @@ def result(
         "sensor": sensor.name,
         "network": network,
         "setup": base.document,
-        "lifting": {"margin": MARGIN, **_lifting(base.grip)},
+        "lifting": {"force": setup.protocol.force, **_lifting(base.grip)},
         "rates": rates(outcomes),
         "published": PUBLISHED,
         "other_lifting": variants,
@@ -145,10 +145,11 @@ def _bias_lines(study: dict[str, Any]) -> list[str]:
 def _lifting_lines(study: dict[str, Any]) -> list[str]:
     lifting = study["lifting"]
     sentences = [
-        f"the lift (fingertips {lifting['squeeze']:.2f} mm closer than touching) holds to {lifting['holds_to']:g} mm"
+        f"the lift presses a centred orange with {lifting['force']:g} N, as the measurement; it holds the usual one to "
+        f"{lifting['holds_to']:g} mm"
     ]
     for variant in study["other_lifting"]:
         shares = {name: lifting["overall"] for name, lifting in variant["rates"].items()}
         figures = ", ".join(f"{name} {share['held']}/{share['of']}" for name, share in shares.items())
-        sentences.append(f"  one that holds to {variant['holds_to']:g} mm: {figures}")
+        sentences.append(f"  one with {variant['force']:g} N holds to {variant['holds_to']:g} mm: {figures}")
     return sentences

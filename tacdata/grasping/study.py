@@ -10,19 +10,18 @@ import numpy as np
 from scipy.stats import binomtest
 
 from tacdata.grasping.centre import Maps
-from tacdata.grasping.lift import Grip, lift, lifting_grip
+from tacdata.grasping.lift import Grip, lift, pressing
 from tacdata.grasping.strategies import strategy as strategies
 from tacdata.grasping.touch import Fingertip, FingertipSpread, OrangeTouch
 from tacdata.grasping.trial import Approach, Protocol, approach
+from tacdata.replay.scene import SPREADS
 
 PLACES = (-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0)
 """Offsets of the orange from the gripper's middle [mm]: evenly over the pad's 16 mm; Pos. 1 to 8."""
 EDGE = (1, 2, 7, 8)
 """Positions that count as edge contact (paper)."""
-MARGIN = 0.5
-"""The lifting configuration is the widest one that holds an orange this far beyond the band [mm]."""
-OTHER_MARGINS = (0.0, 1.0)
-"""Other lifting configurations for which the rates are given [mm]."""
+OTHER_FORCES = 1.6, 2.2
+"""Other forces of the lift on a centred orange for which the rates are given [N]; at 1.5 N its weight just slips."""
 PUBLISHED = {
     "source": "paper, Exp. 3",
     "overall": {"contact_only": [15, 40], "raw_taxel": [27, 40], "dense_depth": [35, 40]},
@@ -45,10 +44,10 @@ class Disorder:
 
     place: float = 0.5
     """Largest offset of the orange from its position, sideways and in height [mm]."""
-    friction: float = 0.05
-    """Standard deviation of the friction [1]."""
-    mass: float = 0.02
-    """Standard deviation of the mass [1]."""
+    friction: float = SPREADS["friction"]["half_width"] / 3**0.5
+    """Standard deviation of the friction, as of objects of `tacdata replay` [1]."""
+    mass: float = SPREADS["mass"]["half_width"] / 3**0.5
+    """Standard deviation of the mass, likewise [1]."""
 
 
 @dataclass(frozen=True)
@@ -146,9 +145,9 @@ def lifted(trial: GraspTrial, grip: Grip) -> bool:
     return lift(configuration, trial.approach.lateral / 1000, trial.vertical / 1000).held
 
 
-def configured(setup: Setup, margin: float = MARGIN) -> Setup:
-    """Return the setup with the lifting configuration that holds an orange ``margin`` [mm] beyond the band."""
-    return replace(setup, grip=lifting_grip(setup.grip, (setup.protocol.band + margin) / 1000))
+def configured(setup: Setup, force: float | None = None) -> Setup:
+    """Return the setup whose lift presses a centred orange with a force [N]; by default the one it measures with."""
+    return replace(setup, grip=pressing(setup.grip, setup.protocol.force if force is None else force))
 
 
 def rates(outcomes: list[GraspTrial]) -> dict[str, Any]:

@@ -103,6 +103,15 @@ def add_pad(body: Any, k: int, scene: ReplayScene, sizes: Sequence[float] = (PAD
     )
 
 
+def soften(model: Any, pad: int, skin: float, mass: float) -> None:
+    """Give a pad of MuJoCo's model the stiffness of a skin [N/m], for contact with an object of a mass [kg]."""
+    # Direct solref: a contact at rest gives way by (1 - d) force / (reduced mass * rate), with impedance d. MuJoCo's
+    # mass is a mean over all directions of motion, so a link that moves along one axis counts as heavier.
+    inverse = model.body_invweight0[model.geom_bodyid[pad], 0] + 1 / mass
+    rate = skin * (1 - IMPEDANCE) * inverse
+    model.geom_solref[pad] = -rate, -2 * np.sqrt(rate)
+
+
 @dataclass(frozen=True, eq=False)
 class FreePads:
     """Pads without links, each on three springs."""
@@ -174,10 +183,7 @@ class SceneModel:
         self._pad_of = np.full(self._model.ngeom, -1)
         self._pad_of[self._pads] = range(len(self._pads))
         for pad in self._pads:
-            # MuJoCo's direct solref: a contact at rest gives way by (1 - d) force / (mass rate), with impedance d.
-            inverse = self._model.body_invweight0[self._model.geom_bodyid[pad], 0] + 1 / scene.mass
-            rate = scene.skin * (1 - IMPEDANCE) * inverse
-            self._model.geom_solref[pad] = -rate, -2 * np.sqrt(rate)
+            soften(self._model, pad, scene.skin, scene.mass)
         hand.begin(self._model, self._data)
         self._data.xfrc_applied[self._object, 2] = -scene.body.pull
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from tacdata import documents
-from tacdata.errors import FormatError, UsageError
+from tacdata.errors import FormatError
 from tacdata.grasping import picture, result
 from tacdata.grasping.bias import bias
 from tacdata.grasping.centre import dense_centre, map_centre, raw_centre
 from tacdata.grasping.fingertip import fingertip_sensor
 from tacdata.grasping.lessons import REST, lessons
-from tacdata.grasping.lift import Grip, lift, lifting_grip
+from tacdata.grasping.lift import Grip, lift, pressing
 from tacdata.grasping.press_set import FOLDER, read_presses
 from tacdata.grasping.presses import LEFT_OUT, RADIUS
 from tacdata.grasping.strategies import strategy as strategies
@@ -147,22 +147,21 @@ def test_a_strategy_that_never_arrives_is_stopped(touch):
 
 
 def test_the_lift_is_decided_by_where_the_orange_lies_and_by_friction():
-    grip = lifting_grip(Grip(), 0.0025)
-    assert lift(grip, 0.0).held and lift(grip, 0.0025).held
+    grip = pressing(Grip(), 1.8)
+    assert lift(grip, 0.0).held and lift(grip, 0.0015).held
     assert not lift(grip, 0.004).held and not lift(grip, -0.004).held
     assert not lift(replace(grip, friction=0.1), 0.0).held
     assert not lift(replace(grip, mass=0.12), 0.0).held
-    with pytest.raises(UsageError, match=r"friction 0\.01"):
-        lifting_grip(Grip(friction=0.01), 0.0)
+    # Friction at two pads carries 0.06 kg from 1.47 N on.
+    assert not lift(pressing(Grip(), 1.44), 0.0).held and lift(pressing(Grip(), 1.5), 0.0).held
 
 
 def small(monkeypatch):
-    """Make a study one of two places with a lift that need not be found."""
+    """Make a study one of two places with a single lift."""
     monkeypatch.setattr("tacdata.grasping.study.PLACES", (-5.0, 1.0))
     monkeypatch.setattr("tacdata.grasping.study.EDGE", (1,))
-    monkeypatch.setattr("tacdata.grasping.result.OTHER_MARGINS", ())
+    monkeypatch.setattr("tacdata.grasping.result.OTHER_FORCES", ())
     monkeypatch.setattr("tacdata.grasping.result._lifting", lambda grip: {"squeeze": 1.0, "holds_to": 2.5})
-    monkeypatch.setattr("tacdata.grasping.study.lifting_grip", lambda grip, lateral: replace(grip, squeeze=1.07e-3))
 
 
 def test_a_small_study_is_a_valid_document_and_the_same_again(presses, sensor, tmp_path, monkeypatch):
