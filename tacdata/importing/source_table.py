@@ -89,6 +89,10 @@ def select(table: SourceTable, selector: Selector, where: str) -> list[str]:
         for candidates in (names, list(bare.values())):
             if selector in candidates:
                 return [names[candidates.index(selector)]]
+        name, unit = split_unit(selector)
+        same = [each for each in names if unit and not unit.isdigit() and bare[each] == name]
+        if len(same) == 1:  # the same quantity in another unit, which `unit_of` reads
+            return same
         if match := re.fullmatch(r"(\d+)\s*-\s*(\d+)", selector):
             return [name for k in range(int(match[1]), int(match[2]) + 1) for name in select(table, k, where)]
         if selection := _inner(table, selector):

@@ -28,6 +28,9 @@ from tacdata.importing.text.layout import (
     split,
     text_layout,
 )
+from tacdata.importing.text.serial_lines import with_receipt, without_labels
+from tacdata.importing.text.stated_rate import stated_rate
+from tacdata.importing.text.written_numbers import ungrouped
 
 SHOWN = 40
 """Letters of a text that an error quotes."""
@@ -39,24 +42,16 @@ UNREADABLE = 0.01
 """Largest share of a column's cells that hold no number and are missing [1]; above it the file is refused."""
 WORDS, OF_WORDS = 5, 0.05
 """Most different words that may stand for no value, and the largest share of their cells [1]."""
-SNIFFED, HEAD = 256 * 1024, 4096
-"""Bytes from which the layout is recognized; among which a header's cells may hold line breaks."""
-STATED_RATE = re.compile(
-    r"(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq\w*)?[^\d\n]{0,20}?"
-    r"(\d+(?:\.\d+)?)\s*(k?)(?:hz|s/s|sps|1/s)",
-    re.IGNORECASE,
-)
-"""How a file states its rate above its rows."""
-STATED_STEP = re.compile(r"^Delta_X\t(\d*[.,]?\d+(?:[eE][-+]?\d+)?)", re.MULTILINE)
-"""How LabVIEW states the time between two rows [s]."""
+SNIFFED, HEAD, SETTINGS = 256 * 1024, 4096, 16 * 1024 * 1024
+"""Bytes from which the layout is recognized; among which a header's cells may hold line breaks; of long first lines."""
+EXPONENT = re.compile(rb"(?<=\d)[dD](?=[-+]\d\d)")
+"""The exponent's sign of Fortran, as in 1.20D+01."""
 TYPOGRAPHIC_MINUS = re.compile(rb"\xe2\x88\x92(?=[\d.,])")
 """The minus of a text program before a number, in UTF-8."""
 HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+")
 """A number to base 16, as boards print registers."""
 LARGEST = 256 * 1024 * 1024
 """Most bytes that a compressed text may become; the memory holds them some four times over."""
-RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
-"""How a serial monitor marks when a line came."""
 MARKS = {b"\xff\xfe\0\0": "utf-32", b"\0\0\xfe\xff": "utf-32", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 """Byte order marks and their encodings; the longer ones first."""
 
@@ -84,8 +79,11 @@ def table_of(path: Path, data: bytes, options: ReadOptions, notes: list[str]) ->
     Raises:
         FormatError: If it has no rows of numbers.
     """
-    data = _upright(_with_receipt(data), options, path, notes)
-    layout = text_layout(data[:SNIFFED].decode("utf-8", "ignore"), options, str(path))
+    data = _upright(without_labels(with_receipt(data)), options, path, notes)
+    # A line of settings may be longer than all that is looked at otherwise.
+    begin = data[:SNIFFED] if data.count(b"\n", 0, SNIFFED) >= FEWEST else data[: SETTINGS + SNIFFED]
+    head = begin.decode("utf-8", "ignore")
+    layout = text_layout(head, options, str(path))
     body, comments, headers = _body(data, layout, options.missing)
     if comments:
         notes.append(f"{path.name}: {comments} comment lines among the rows are left out")
@@ -102,18 +100,8 @@ def table_of(path: Path, data: bytes, options: ReadOptions, notes: list[str]) ->
         doubts.append(f"{path.name}: the last number is cut off with the file and is missing")
     if skipped:
         notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
-    rate = _stated_rate(data, layout.skip)
+    rate = stated_rate(head, layout.skip)
     return SourceTable(path, columns, dict(layout.units), notes=tuple(notes), doubts=tuple(doubts), rate=rate)
-
-
-def _stated_rate(data: bytes, skip: int) -> float:
-    """Return the rate that the lines above the rows state [Hz]; 0 if they state none."""
-    head = b"\n".join(data[:SNIFFED].split(b"\n")[:skip]).decode("utf-8", "ignore")
-    match = STATED_RATE.search(head)
-    if match:
-        return float(match[1]) * (1000.0 if match[2] else 1.0)
-    step = STATED_STEP.search(head)
-    return 1 / float(step[1].replace(",", ".")) if step and float(step[1].replace(",", ".")) > 0 else 0.0
 
 
 def _upright(data: bytes, options: ReadOptions, path: Path, notes: list[str]) -> bytes:
@@ -148,25 +136,6 @@ def _is_cut(body: bytes, layout: TextLayout) -> bool:
     if min(places[:-1]) == max(places[:-1]) > 0:
         return places[-1] < places[0]
     return max(places) == 0 and len(fields[-1].lstrip("-")) < min(len(field.lstrip("-")) for field in fields[:-1])
-
-
-def _with_receipt(data: bytes) -> bytes:
-    """Return a serial monitor's lines with the time before "->" as a column of its own; other text as it is."""
-    lines = data.split(b"\n")
-    # By the second half: a board that starts prints a header and messages first.
-    tail = [line for line in lines[len(lines) // 2 :] if line.strip()]
-    if 2 * sum(bool(RECEIPT.match(line)) for line in tail) <= len(tail):
-        return data
-    cut = [line.partition(b"->")[2].strip() if RECEIPT.match(line) else b"" for line in lines]
-    layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), ReadOptions(), "")
-    between = b"\t" if layout.delimiter == " " else layout.delimiter.encode()
-    bodies = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]
-    begin = [b"received" if number < layout.skip else RECEIPT.match(line) for number, line in enumerate(lines)]
-    rows = [
-        (first if isinstance(first, bytes) else first[1]) + between + text if first and text else b""
-        for first, text in zip(begin, bodies, strict=True)
-    ]
-    return b"\n".join(rows)
 
 
 def _decoded(path: Path, options: ReadOptions) -> tuple[bytes, list[str]]:
@@ -205,7 +174,7 @@ def _decoded(path: Path, options: ReadOptions) -> tuple[bytes, list[str]]:
             advice = " by guess; if names look wrong, give encoding under the file" if doubtful else ""
             notes.append(f"{path.name}: not UTF-8, read as {ENCODINGS.get(encoding, encoding)}{advice}")
     # Windows ends lines with \r\n, and an old Macintosh with \r: from here on every line ends with \n.
-    raw = TYPOGRAPHIC_MINUS.sub(b"-", raw)
+    raw = EXPONENT.sub(b"E", TYPOGRAPHIC_MINUS.sub(b"-", raw))
     raw = raw.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return _whole_cells(raw[:HEAD]) + raw[HEAD:], notes
 
@@ -364,6 +333,9 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path,
             wrong.append(row)
         elif field not in MISSING:
             values[row] = float(field.replace(",", ".") if layout.decimal == "," else field)
+    fields = ["" if text is None or text.strip() in MISSING else text.strip() for text in texts]
+    if wrong and (plain := ungrouped(fields)):
+        return np.array([float(text) if text else np.nan for text in plain])
     if not wrong:
         return values
     grouped = next((row for row in wrong if THOUSANDS.fullmatch((texts[row] or "").strip())), None)

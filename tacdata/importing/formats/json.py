@@ -34,7 +34,7 @@ class Json(SourceFormat):
         text = path.read_text(encoding="utf-8-sig")
         by_line = path.suffix.lower() in LINES
         doubts: list[str] = []
-        content = _by_line(path, text, doubts) if by_line else json.loads(text)
+        content = _by_line(path, text, doubts) if by_line else _by_name(json.loads(text))
         arrays = {name: _array(values) for name, values in _lists(content).items()}
         table = rows_of(path, arrays, options)
         if table.rows < FEWEST:
@@ -46,6 +46,16 @@ class Json(SourceFormat):
         stated = _units(content)
         units = {name: unit for name in table.columns if (unit := stated.get(name.rpartition(".")[2]))}
         return replace(table, units={**units, **table.units}, doubts=tuple(doubts))
+
+
+def _by_name(content: Any) -> Any:
+    """Return a list of rows next to a list of their columns, as pandas splits a table, as columns by name."""
+    names, rows = (content.get(key) for key in ("columns", "data")) if isinstance(content, dict) else (None, None)
+    if not (isinstance(names, list) and isinstance(rows, list)) or not all(isinstance(row, list) for row in rows):
+        return content
+    if len({str(name) for name in names}) < len(names) or {len(row) for row in rows} != {len(names)}:
+        return content
+    return {str(name): list(values) for name, values in zip(names, zip(*rows, strict=True), strict=True)}
 
 
 def _by_line(path: Path, text: str, doubts: list[str]) -> list[Any]:

@@ -16,6 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tacdata import registry
 from tacdata.errors import FormatError, TacdataError, UsageError
 from tacdata.importing.mapping import ReadOptions
@@ -94,7 +96,22 @@ def read_table(path: Path, options: ReadOptions = AUTOMATIC) -> SourceTable:
         table: SourceTable = kind.read(path, options)
     if not table.rows:
         raise FormatError(f"{path} holds no rows of data", "one row or more", "leave it out, or correct the mapping")
-    return _with_numbers(table)
+    return _without_empty_end(_with_numbers(table))
+
+
+def _without_empty_end(table: SourceTable) -> SourceTable:
+    """Return a table without last rows of zeros alone, the clock's among them: rows that were never filled."""
+    numbers = [values.reshape(len(values), -1) for values in table.columns.values() if values.dtype != object]
+    if len(numbers) < len(table.columns) or sum(values.shape[1] for values in numbers) < 2:
+        return table
+    full = np.flatnonzero(np.any([values.any(axis=1) for values in numbers], axis=0))
+    end = int(full[-1]) + 1 if len(full) else 0
+    rising = any((np.diff(values[:end, 0]) > 0).all() and values[end - 1, 0] > 0 for values in numbers if end > 2)
+    if not rising or table.rows - end < 2:
+        return table
+    columns = {name: values[:end] for name, values in table.columns.items()}
+    note = f"{table.path.name}: {table.rows - end} rows at its end hold zeros alone, and are left out"
+    return replace(table, columns=columns, notes=(*table.notes, note))
 
 
 def _with_numbers(table: SourceTable) -> SourceTable:

@@ -197,7 +197,10 @@ def _joined_kind(order: PartsInOrder, kinds: dict[str, FoundKind]) -> FoundKind:
     tables = [kinds[key].table for key in order.keys]
     time = (roles_of(tables[0]).get("time") or [None])[0]
     if order.join == "columns":
-        table = side_by_side(tables, titles_of([key.replace(INSIDE, " ") for key in order.keys]), time)
+        outer, sheets = zip(*(key.partition(INSIDE)[::2] for key in order.keys), strict=True)
+        titles = titles_of(outer) if len(set(outer)) > 1 else [""] * len(outer)
+        labels = [" ".join(filter(None, pair)) for pair in zip(titles, sheets, strict=True)]
+        table = side_by_side(tables, labels, time)
     else:
         table = joined(tables, time if order.join == "continued" else None)
     return replace(kinds[order.keys[0]], table=table, parts=order.keys, join=order.join)

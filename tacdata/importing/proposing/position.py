@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -17,10 +18,12 @@ from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.proposing.strokes import CLEAR, PressingAxis, pressing_axis
 from tacdata.importing.source_table import SourceTable, unit_of
 from tacdata.importing.times import times
-from tacdata.importing.units import factor
+from tacdata.importing.units import factor, quantity_of, split_unit
 
 ENDS, FAR = 3, 5.0
 """Most first rows that are no positions [rows], and their smallest distance from all others [their range]."""
+COUNTED = re.compile(r"(?<![a-z])(micro)?(steps?|ticks?|pulses|counts|increments)(?![a-z])", re.IGNORECASE)
+"""Words of a position that a motor or an encoder counts."""
 SHORTEST = 0.02
 """Strokes below are hardly in mm [mm]."""
 
@@ -55,14 +58,19 @@ def proposed_position(
     if "by_shape" in roles:
         words = "taken for the position by its shape: it is smooth, comes back, and the readings follow it"
         questions.append(Question(f"{names['depth']}: {words}"))
-    unsaid = [name for name in names.values() if name not in table.units]
+    unsaid = [name for name in names.values() if name not in table.units and quantity_of(split_unit(name)[1]) != "mm"]
     unit = _length(table, names[pressing]) if unsaid and "stand_in" not in roles else "mm"
-    axes = {key: Axis(name, unit if name in unsaid else "") for key, name in names.items()}
+    counted = [name for name in unsaid if COUNTED.search(name)]
+    units = dict.fromkeys(unsaid, unit) | dict.fromkeys(counted, "steps")
+    axes = {key: Axis(name, units.get(name, "")) for key, name in names.items()}
     if "error" in roles and roles.get("depth") == roles.get("set_point", [None])[:1]:
         axes["depth"], question = _without_error(table, names["depth"], roles["error"][0])
         questions.append(question)
     if "stand_in" in roles:
         axes["depth"] = replace(axes["depth"], unit=length_of(table, roles["stand_in"][0]))
+    elif counted:
+        words = "it counts steps: how many are a millimetre? Give unit: mm and scale: 1 / that number"
+        questions.append(Question(f"{listed(counted)}: {words}", "unit", tuple(counted)))
     elif unsaid:
         questions.append(Question(f"{listed(unsaid)}: no unit is given; {unit} is a guess", "unit", tuple(unsaid)))
     entry = PositionEntry(file=kind.alias, clock=clock, axes=dict[str, Quantity](axes))

@@ -18,6 +18,7 @@ from tacdata.importing.proposing.file_entry import proposed_file
 from tacdata.importing.proposing.file_kinds import listed
 from tacdata.importing.proposing.position import ProposedPosition, proposed_position
 from tacdata.importing.proposing.question import Question, questions_of
+from tacdata.importing.proposing.roles import later_blocks
 from tacdata.importing.proposing.shapes import counting_column, varying
 from tacdata.importing.proposing.source_kind import SourceKind, source_kinds, widest
 from tacdata.importing.proposing.specimens import place_in_path, specimen_of
@@ -156,6 +157,7 @@ def _unnamed(kind: SourceKind) -> list[str]:
     """Return questions about columns that have no names, or names that come again."""
     table, clocks, questions = kind.table, kind.roles.get("time", []), []
     again = [name for name in table.columns if name.endswith("'") and name.rstrip("'") not in clocks]
+    again = again or list(later_blocks(table))
     if again and not any(name.endswith("'") for name in kind.channels):
         questions.append(
             f"{table.path.name}: each name comes again, as in trials side by side; only the first is read. Put the "

@@ -17,7 +17,7 @@ BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|act
 """Bodies whose coordinates a column may hold."""
 GUESSES = {
     "time": (
-        r"(x_value|time|t|utc|gmt|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
+        r"(x_value|time|t|ts|utc|gmt|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
         r"([_ ]?(time|zeit|uhrzeit))?|\w+_(time_?)?stamp(_(ns|us|ms|s|sec))?"
     ),
     "depth": (
@@ -29,9 +29,9 @@ GUESSES = {
         r"(pos(ition)?|depth|disp(lacement)?|z)|(pos(ition)?|depth|p?_?z)_?(set|target|cmd|ref)"
     ),
     "error": r"((pos(ition)?|tracking|following|control|depth|z)_?)?(error|err|deviation)",
-    "x": rf"({BODY}[_.]?)?x|p_?x|x_{BODY}",
-    "y": rf"({BODY}[_.]?)?y|p_?y|y_{BODY}",
-    "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_{BODY}|height",
+    "x": rf"({BODY}[_.]?)?x|p_?x|x_{BODY}|(actual_)?tcp_pose_?0",
+    "y": rf"({BODY}[_.]?)?y|p_?y|y_{BODY}|(actual_)?tcp_pose_?1",
+    "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_{BODY}|height|(actual_)?tcp_pose_?2",
     "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)",
     "temperature": r"(temp(erature)?(_?\w{1,4})?|t_?amb)",
     "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|zyklus|element)(_?(id|no|nr|number))?",
@@ -77,6 +77,8 @@ ROWS = 50
 """Rows of a text column that are tried as times."""
 EVEN = 1e-4
 """Steps that scatter by less are uniform [step]."""
+AGAIN, NUMBERED = re.compile(r"(.+?)\.\d+"), re.compile(r"(.+?)[ _-]?[(#]?\d+\)?")
+"""A name that comes again, as pandas numbers it, and as people do."""
 NAMED = re.compile(r"_?(id|no|nr|number|index)$")
 """Ends of names of columns that number things, and so read nothing."""
 
@@ -84,10 +86,11 @@ NAMED = re.compile(r"_?(id|no|nr|number|index)$")
 def roles_of(table: SourceTable) -> dict[str, list[str]]:
     """Return the columns of each role; ``channels`` are those of no other."""
     roles: dict[str, list[str]] = {"channels": []}
+    later = later_blocks(table)
     lettered = are_letters(list(table.columns))
     for name, values in table.columns.items():
-        if values.dtype.kind == "f" and np.isnan(values).all():
-            continue  # a comma at the end of each row makes one
+        if name in later or (values.dtype.kind == "f" and np.isnan(values).all()):
+            continue  # a comma at the end of each row makes an empty one
         role = None if lettered and values.dtype != object else _role(table, name, values)
         if role == "place":
             for axis, number in zip("xyz", range(3), strict=True):
@@ -124,6 +127,23 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
         # Blocks of several trials are placed next to each other: each name comes again.
         roles = {role: [name for name in names if not name.endswith("'")] for role, names in roles.items()}
     return roles
+
+
+def later_blocks(table: SourceTable) -> frozenset[str]:
+    """Return the columns of all blocks but the first, where each name, the clock's too, comes again with a number.
+
+    So it is with trials side by side: t, depth, t.1, depth.1 or t_1, depth_1, t_2, depth_2.
+    """
+    for pattern in (AGAIN, NUMBERED):
+        blocks: dict[str, list[str]] = {}
+        for name in table.columns:
+            match = pattern.fullmatch(name if pattern is AGAIN else split_unit(name)[0])
+            blocks.setdefault(match[1] if match else name, []).append(name)
+        times_given = {len(names) for names in blocks.values()}
+        clocks = [base for base in blocks if re.fullmatch(GUESSES["time"], bare_name(base))]
+        if clocks and len(blocks) > 1 and len(times_given) == 1 and times_given != {1}:
+            return frozenset(name for names in blocks.values() for name in names[1:])
+    return frozenset()
 
 
 def _drive(table: SourceTable, roles: dict[str, list[str]]) -> None:

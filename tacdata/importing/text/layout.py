@@ -14,71 +14,22 @@ from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.units import BRACKETED, OTHERS, plain, quantity_of, split_unit
 
 COMMENTS = ("#", "%", "//")
-SHEET_ERRORS = (
-    "#N/A",
-    "#DIV/0!",
-    "#NAME?",
-    "#NULL!",
-    "#NUM!",
-    "#REF!",
-    "#VALUE!",
-    "#SPILL!",
-    "#CALC!",
-    "#FIELD!",
-    "#BLOCKED!",
-    "#CONNECT!",
-    "#BUSY!",
-    "#UNKNOWN!",
-    "#GETTING_DATA",
-    "#WERT!",
-    "#ZAHL!",
-    "#BEZUG!",
-    "#NV",
-    "#VALEUR!",
-    "#NOMBRE!",
-    "#VALOR!",
-    "#NUM.",
+SHEET_ERRORS = tuple(
+    (
+        "#N/A #DIV/0! #NAME? #NULL! #NUM! #REF! #VALUE! #SPILL! #CALC! #FIELD! #BLOCKED! #CONNECT! #BUSY! "
+        "#UNKNOWN! #GETTING_DATA #WERT! #ZAHL! #BEZUG! #NV #VALEUR! #NOMBRE! #VALOR! #NUM. "
+    ).split()
 )
 """Error values of spreadsheets, in cells without a value; they begin like a comment and are none."""
 MISSING = (
     "",
-    "nan",
-    "NaN",
-    "NAN",
-    "na",
-    "NA",
-    "n/a",
-    "N/A",
-    "n.a.",
-    "null",
-    "NULL",
-    "(null)",
-    "None",
-    "<NA>",
-    "NaT",
-    "-",
-    "--",
-    "---",
-    "?",
-    "-nan",
-    "-nan(ind)",
-    "nan(ind)",
-    "1.#QNAN",
-    "-1.#QNAN",
-    "1.#IND",
-    "-1.#IND",
-    "1.#INF",
-    "-1.#INF",
-    "N.A.",
-    "n.d.",
-    "k.A.",
-    "s.o.",
-    "\\N",
     "no data",
     "No Data",
     "Bad Input",
-    "\u2013",
-    "\u2014",
+    *(
+        "nan NaN NAN na NA n/a N/A n.a. null NULL (null) None <NA> NaT - -- --- ? -nan -nan(ind) nan(ind) "
+        "1.#QNAN -1.#QNAN 1.#IND -1.#IND 1.#INF -1.#INF N.A. n.d. k.A. s.o. \\N \u2013 \u2014 "
+    ).split(),
     *(f"{sign}1,#{word}" for sign in ("", "-") for word in ("QNAN", "IND", "INF")),
     *(f"{sign}1.#{word}" for sign in ("", "-") for word in ("IND0", "IND00", "INF0", "INF00", "QNAN0", "QNB", "J")),
     *(f"Err:{number}" for number in range(501, 541)),
@@ -91,6 +42,8 @@ GUESSED = ("delimiter", "decimal")
 """Options of a mapping that can be inferred from the file instead."""
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(([.,' \u00a0\u202f])\d{3})(\2\d{3})*([.,]\d+)?")
 """A number with a sign between its thousands."""
+THREE, DECIMAL = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}"), re.compile(r"[-+]?\d*([.,])\d+([eE][-+]?\d+)?")
+"""A number that may be thousands, or have three decimal places; a number with a decimal sign."""
 SAMPLE, TAIL = 2000, 100
 """Lines that are examined, and the last of them, which tell the layout."""
 
@@ -161,6 +114,7 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
         header = [[ROW_NAME, *row] if len(row) == width - 1 else row for row in header]
     names, units = _names(header, width)
     start = _line_of(lines, lines_of_data[first], skip)
+    _refuse_unclear_signs(sample, names, origin)
     kinds = tuple(_kind([row[k] for row in sample], decimal) for k in range(width))
     return TextLayout(delimiter, decimal, start, names, units, kinds)
 
@@ -211,6 +165,28 @@ def _refuse_commas_for_both(
             "one sign for each",
             "save it again with semicolons or tabs between the fields, or with decimal points",
         )
+
+
+def _refuse_unclear_signs(rows: list[list[str]], names: tuple[str, ...], origin: str) -> None:
+    """Refuse a column of numbers as 10.000 in a file whose other columns have decimal commas, or the other way round.
+
+    Raises:
+        FormatError: Naming the column.
+    """
+    columns = [[field for field in column if "." in field or "," in field] for column in zip(*rows, strict=True)]
+    decimal = {
+        match[1] for fields in columns for field in fields
+        if (match := DECIMAL.fullmatch(field)) and not THREE.fullmatch(field)
+    }  # fmt: skip
+    for name, fields in zip(names, columns, strict=True):
+        signs = {match[1] for field in fields if (match := THREE.fullmatch(field))}
+        if len(signs) == 1 and len(decimal) == 1 and signs != decimal and all(map(THREE.fullmatch, fields)):
+            raise FormatError(
+                f"{origin}: column {name}: {fields[0]!r} has {min(signs)!r} where others have {min(decimal)!r} before "
+                "decimal places: does it stand between thousands?",
+                "one decimal sign in all columns",
+                "save it again without signs between thousands, and with one decimal sign",
+            )
 
 
 def _commented_header(lines: list[str], first: str, delimiter: str, width: int) -> list[list[str]]:

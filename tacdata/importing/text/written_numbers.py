@@ -1,8 +1,9 @@
-"""Numbers that a table holds as texts: with a decimal comma, or with a unit in each cell."""
+"""Numbers that a table holds as texts: with a decimal comma, signs between thousands, or a unit in each cell."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +14,9 @@ FEWEST = 20
 """Fewest different texts of measured numbers; fewer may be names of trials."""
 WRITTEN = re.compile(r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,+-].{0,9})?")
 """A number, with a unit behind it or without."""
+GROUPED = re.compile(r"[-+]?\d{1,3}([.,'\u2019 \u00a0\u202f])\d{3}(?:\1\d{3})*(?:([.,])\d+)?")
+"""A number with a sign between its thousands; with its decimal sign, if it has one."""
+SIGN = re.compile(r"[-+]?\d*([.,])?\d*(?:[eE][-+]?\d+)?")
 PADDED = re.compile(r"0\d+")
 """A number that is rather a name."""
 
@@ -31,8 +35,31 @@ def written_numbers(columns: dict[str, np.ndarray]) -> dict[str, tuple[np.ndarra
     return found
 
 
+def ungrouped(texts: Sequence[str]) -> list[str] | None:
+    """Return numbers without the signs between their thousands; None where such a sign may be a decimal one.
+
+    It is none if a cell has two of it, or another sign before its decimal places, or if it is no point and no comma.
+    """
+    between, before, is_clear = set(), set(), False
+    for text in filter(None, texts):
+        if grouped := GROUPED.fullmatch(text):
+            between.add(grouped[1])
+            before.add(grouped[2])
+            is_clear |= grouped[1] not in ".," or bool(grouped[2]) or text.count(grouped[1]) > 1
+        elif number := SIGN.fullmatch(text):
+            before.add(number[1])
+        else:
+            return None
+    before.discard(None)
+    if not is_clear or len(between) != 1 or len(before) > 1 or between & before:
+        return None
+    sign = between.pop()
+    return [text.replace(sign, "").replace(",", ".") for text in texts]
+
+
 def _read(texts: list[str]) -> tuple[np.ndarray, str] | None:
     """Return texts as numbers, shape (rows,), and their unit; None if they are not all numbers of one quantity."""
+    texts = ungrouped(texts) or texts
     matches = {text: WRITTEN.fullmatch(text) for text in dict.fromkeys(texts) if text}
     if len(matches) < FEWEST or not all(matches.values()):
         return None

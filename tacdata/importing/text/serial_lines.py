@@ -1,0 +1,53 @@
+"""Lines of serial monitors as columns: a time before an arrow, or a name before each value."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+from tacdata.importing.mapping import ReadOptions
+from tacdata.importing.text.layout import text_layout
+
+TAIL, SNIFFED = 16 * 1024, 256 * 1024
+"""Bytes at a text's end that tell whether its lines have labels, and bytes from which its layout is recognized."""
+ALIKE = 0.8
+"""Smallest share of last lines with the same labels [1]: the last one may be cut off."""
+RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
+"""How a serial monitor marks when a line came."""
+LABELLED = re.compile(r"([A-Za-z_][\w%/\[\]]*)[ \t]*[:=][ \t]*([-+]?\.?\d[^\s,;|]*|nan|NaN)")
+"""A name with its value, as a serial plotter reads them."""
+
+
+def without_labels(data: bytes) -> bytes:
+    """Return lines of t:0.05,depth:0.1 or t=0.05 depth=0.1 as columns below a header; other text as it is."""
+    tail = [line for line in data[-TAIL:].decode("utf-8", "replace").split("\n")[1:] if line.strip()]
+    found = Counter(tuple(name for name, _ in LABELLED.findall(line)) for line in tail)
+    names, count = found.most_common(1)[0] if found else ((), 0)
+    if len(set(names)) < max(len(names), 2) or count < ALIKE * len(tail):
+        return data
+    if any(LABELLED.sub("", line).strip(" \t,;|\r") for line in tail[: len(tail) // 2]):
+        return data
+    rows = ["\t".join(names)]
+    for line in data.decode("utf-8", "replace").split("\n"):
+        pairs = LABELLED.findall(line)
+        rows.append("\t".join(value for _, value in pairs) if tuple(name for name, _ in pairs) == names else line)
+    return "\n".join(rows).encode()
+
+
+def with_receipt(data: bytes) -> bytes:
+    """Return a serial monitor's lines with the time before "->" as a column of its own; other text as it is."""
+    lines = data.split(b"\n")
+    # By the second half: a board that starts prints a header and messages first.
+    tail = [line for line in lines[len(lines) // 2 :] if line.strip()]
+    if 2 * sum(bool(RECEIPT.match(line)) for line in tail) <= len(tail):
+        return data
+    cut = [line.partition(b"->")[2].strip() if RECEIPT.match(line) else b"" for line in lines]
+    layout = text_layout(b"\n".join(cut)[:SNIFFED].decode("utf-8", "ignore"), ReadOptions(), "")
+    between = b"\t" if layout.delimiter == " " else layout.delimiter.encode()
+    bodies = [between.join(text.split()) if layout.delimiter == " " else text for text in cut]
+    begin = [b"received" if number < layout.skip else RECEIPT.match(line) for number, line in enumerate(lines)]
+    rows = [
+        (first if isinstance(first, bytes) else first[1]) + between + text if first and text else b""
+        for first, text in zip(begin, bodies, strict=True)
+    ]
+    return b"\n".join(rows)
