@@ -98,6 +98,13 @@ def test_files_in_different_units_are_read_each_in_its_own(tmp_path):
     are_right(imported(tmp_path, {"run_1.csv": lines(ROWS), "run_2.csv": inches})[0], 4)
 
 
+def test_other_units_in_mid_file_are_refused(tmp_path):
+    head = ("t,depth,c0,c1\ns,mm,pF,pF\n", "t,depth,c0,c1\ns,cm,pF,pF\n")
+    parts = [lines(part, names=()).lstrip() for part in (ROWS[:120], ROWS[120:] / [1, 10, 1, 1])]
+    with pytest.raises(TacdataError, match="other units"):
+        imported(tmp_path, {"run.csv": head[0] + parts[0] + head[1] + parts[1]})
+
+
 def test_trials_side_by_side_are_not_taken_for_channels(tmp_path):
     for number, names in enumerate(
         ((*NAMES, *(f"{name}.1" for name in NAMES)), [f"{n}_{k}" for k in (1, 2) for n in ("t", "depth", "c0", "c1")])

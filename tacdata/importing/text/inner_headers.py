@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tacdata.errors import FormatError
-from tacdata.importing.text.layout import MISSING, TextLayout, is_number
+from tacdata.importing.text.layout import MISSING, TextLayout, are_units, is_number
 from tacdata.importing.units import quantity_of, split_unit
 
 
@@ -28,9 +28,10 @@ def without_headers(table: Any, layout: TextLayout, path: Path) -> tuple[Any, in
         fields = {name: str(texts[name][row]).strip() for name in numeric}
         if all(_repeats(name, field, layout) for name, field in fields.items()):
             repeated.append(row)
-        elif _is_header(list(fields.values()), layout):
+        elif _is_header(list(fields.values()), layout) or are_units(list(fields.values())):
+            words = f"the header of another table, or has other units ({', '.join(fields.values())})"
             raise FormatError(
-                f"{path}: row {row + 1} of the data is the header of another table ({', '.join(fields.values())})",
+                f"{path}: row {row + 1} of the data is {words}",
                 f"one table a file, here of {', '.join(numeric)}",
                 "save each table as a file of its own",
             )

@@ -287,7 +287,7 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         return tuple(str(k) for k in range(width)), {}
     rows = [[field.lstrip("\ufeff").strip() for field in [*row, *[""] * width][:width]] for row in header]
     rows = rows[-LINES_OF_HEADER:]
-    below = next((k for k in range(len(rows) - 1, 0, -1) if _are_units(rows[k])), None)
+    below = next((k for k in range(len(rows) - 1, 0, -1) if are_units(rows[k])), None)
     if below is not None and not all(_filled(rows[:below])[1:]):
         below = None
     units_row = rows[below] if below is not None else None
@@ -331,7 +331,7 @@ def _groups(rows: list[list[str]], column: int, title: str) -> list[str]:
     return []
 
 
-def _are_units(fields: list[str]) -> bool:
+def are_units(fields: list[str]) -> bool:
     """Return whether a second header line gives units: short, and at least half of them in brackets or known."""
     texts = [field for field in fields if field]
     is_unit = [
