@@ -100,7 +100,7 @@ def test_numbers_to_base_16_are_read_and_their_largest_is_none(tmp_path):
 def test_a_clock_is_no_channel_and_text_is_named_as_such(tmp_path):
     rows = table()
     lines = ["t [s];depth [mm];c0 [fF];c1 [fF]"]
-    lines += [f"{t:.3f};{d:.4f};1 {a:06.2f};1 {b:06.2f}".replace(".", ",") for t, d, a, b in rows.tolist()]
+    lines += [f"{t:.3f};{d:.4f};R{a:06.2f};R{b:06.2f}".replace(".", ",") for t, d, a, b in rows.tolist()]
     path = tmp_path / "run.csv"
     path.write_text("\n".join(lines) + "\n")
     proposal = proposed_mapping(path, described(path)[0])
