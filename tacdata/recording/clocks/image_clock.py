@@ -234,8 +234,13 @@ def _period(begun: np.ndarray, usual: float, nominal: float | None) -> tuple[flo
         shares = agreeing(tried)
         return float(tried[int(shares.argmax())]), float(shares.max())
 
-    # Arrivals in batches have a median interval of nearly nothing.
-    found = fitted(max(usual, 0.5 * float(begun[-1]) / (len(begun) - 1)))
+    mean = float(begun[-1]) / (len(begun) - 1)
+    if usual >= 0.5 * mean:
+        found = fitted(usual)
+    else:
+        # Arrivals in batches have a median interval of nearly nothing, and any part of a batch's period agrees as well.
+        found, half = fitted(mean), fitted(0.5 * mean)
+        found = found if found[1] > AS_WELL * half[1] else half
     # Pairs a quarter of a period off are those without a period.
     odd, stray = (float(agreeing(np.array([found[0]]), shift)[0]) for shift in (0.5, 0.25))
     if odd - stray > ODD * max(found[1] - stray, CHANCE):

@@ -134,3 +134,15 @@ def test_a_camera_that_goes_on_at_half_its_rate_is_not_late_before():
 def test_too_few_images_have_no_clock():
     none = np.zeros(2, np.int64)
     assert image_clock(none, np.arange(2), none - 1, None) is None
+
+
+@pytest.mark.parametrize("size", [2, 3, 4, 5])
+@pytest.mark.parametrize("stamped", [False, True])
+def test_batches_need_no_nominal_rate(size, stamped):
+    """Images are held back and arrive together, half a millisecond apart, with stamps of the batch."""
+    times, arrivals = images(7)
+    place = np.arange(len(times)) % size
+    last = np.minimum(np.arange(len(times)) - place + size - 1, len(times) - 1)
+    stamps = times[last] + 0.0002 * place if stamped else None
+    off, sigma, _ = errors(times, arrivals[last] + 0.0005 * place, rate=None, stamps=stamps)
+    assert (np.abs(off) < 3 * sigma).mean() > 0.98 and np.abs(off[:-5]).max() < 0.012 and np.median(sigma) < 0.01
