@@ -149,10 +149,10 @@ def _touch(
     interruption: Interruption,
 ) -> tuple[dict[str, Any], str]:
     from tacdata.errors import UsageError
+    from tacdata.registration.contact_search import LIFT_SPEED
     from tacdata.registration.guarded_probe import guarded_probe
     from tacdata.registration.procedure import described, register
     from tacdata.registration.result import document_of
-    from tacdata.registration.touch_off import LIFT_SPEED
 
     safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
     guard.before_homing(resumed=False)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.errors import DeviceError
+from tacdata.registration.contact_search import LIFT_SPEED, SPEED
 from tacdata.registration.probe import Probe
 from tacdata.registration.symmetric_center import symmetric_center
-from tacdata.registration.touch_off import LIFT_SPEED, SPEED
 
 PRESSES = 9
 """Presses along a line."""

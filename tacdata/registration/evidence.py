@@ -13,9 +13,10 @@ from tacdata.recording.live.guarded_motion import GuardedMotion
 from tacdata.recording.live.interruption import Interruption
 from tacdata.recording.live.rig_devices import RigDevices
 from tacdata.recording.live.rig_streams import RigStreams
+from tacdata.registration.contact_search import COARSE, LIFT_SPEED, ContactSearch
 from tacdata.registration.guarded_probe import probing
 from tacdata.registration.probe import Position, Probe
-from tacdata.registration.touch_off import ANSWER, COARSE, FRAMES, LIFT_SPEED, SPEED, approach
+from tacdata.registration.touch_off import first_touch
 from tacdata.rig import Registration, Rig
 from tacdata.sensor import Sensor
 
@@ -113,13 +114,16 @@ def touch_evidence(
     near = min(height, expected + NEAR)
     far, fine = np.arange(height - FAR, near, -FAR), np.arange(near, expected - limit - BELOW, -COARSE)
     heights = [*far.tolist(), *fine.tolist()]
-    contact = _first_answer(probe, place, heights, idle.mean, noise)
-    if contact is None:
+    search = ContactSearch(probe, place, height, heights, idle.mean, noise)
+
+    def check(contact: float) -> None:
+        # A step into the skin may have been a long one; the approach would go deeper.
+        if contact > expected + NEAR - 1e-9:
+            raise _contradiction(f"the skin answers already at machine height {contact:.2f} mm", expected, limit)
+
+    touch = first_touch(search, probe, "the touch before the first press", place, heights[-1] - BELOW, noise, check)
+    if touch is None:
         raise _contradiction(f"no channel answers down to machine height {heights[-1]:.2f} mm", expected, limit)
-    # The search resolves the contact to one step only.
-    if contact > expected + limit + COARSE:
-        raise _contradiction(f"the skin answers already at machine height {contact:.2f} mm", expected, limit)
-    touch = approach(probe, "the touch before the first press", place, contact, contact - BELOW, noise)
     sigma = float(np.hypot(touch.onset.uncertainty, touch.onset.model))
     evidence = Evidence(expected, touch.onset.height, sigma, limit)
     if abs(evidence.difference) > limit + 2.0 * sigma:
@@ -164,20 +168,6 @@ def prove_zero(
         evidence = touch_evidence(probe, probe.position, (x, y), expected, limit)
     say(evidence.text)
     return probe.position
-
-
-def _first_answer(
-    probe: Probe, place: tuple[float, float], heights: list[float], baseline: np.ndarray, noise: np.ndarray
-) -> float | None:
-    """Go down to each height in turn; return the first at which a channel answers twice, or None."""
-    frames = FRAMES // 2 + 1
-    threshold = ANSWER * noise / np.sqrt(frames)
-    for height in heights:
-        probe.go((*place, height), SPEED if height < heights[0] else LIFT_SPEED)
-        # Twice at the same height: a single spike is no touch.
-        if all(bool((np.abs(probe.read(frames).mean - baseline) > threshold).any()) for _ in range(2)):
-            return height
-    return None
 
 
 def _contradiction(observation: str, expected: float, limit: float) -> DeviceError:

@@ -9,12 +9,13 @@ import numpy as np
 
 from tacdata.errors import DeviceError
 from tacdata.recording.onset import POWERS, onset, shared_power
+from tacdata.registration.contact_search import LIFT_SPEED
 from tacdata.registration.cross_scan import Cross, cross_scan
 from tacdata.registration.probe import Probe
 from tacdata.registration.result import Found
 from tacdata.registration.settings import RegistrationSettings
 from tacdata.registration.solution import Plane, fit_plane, fit_rigid_motion
-from tacdata.registration.touch_off import LIFT_SPEED, Touch, touch_off
+from tacdata.registration.touch_off import Touch, touch_off
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tacdata.errors import DeviceError
-from tacdata.recording.onset import Onset, combined, onset
+from tacdata.recording.onset import CLEAR, Onset, combined, onset
+from tacdata.registration.contact_search import COARSE, LIFT_SPEED, SPEED, ContactSearch
 from tacdata.registration.probe import Probe
 
-COARSE = 0.1
-"""Step of the search [mm]."""
 FINE = 0.02
 """Step of the slow approach [mm]."""
 ABOVE, BELOW = (0.28, 0.6), 0.12
@@ -22,10 +22,10 @@ RECOVERY = 2.0
 """Recovery time of the skin before each approach [s]."""
 FRAMES = 6
 """Readings averaged at each step [count]."""
-ANSWER = 7.0
-"""Minimum answer of a channel [standard deviations of a step's mean], needed twice in a row."""
-SPEED, LIFT_SPEED = 1.0, 5.0
-"""Speeds downwards and upwards [mm/s]."""
+
+
+class NoOnset(DeviceError):
+    """An approach whose answer is too weak for a first contact."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,8 @@ class Touch:
     """Heights of the approach [mm], shape (n,)."""
     answer: np.ndarray
     """The channels' combined answer [standard deviations], shape (n,)."""
+    contact: float
+    """Height of the search's answer [mm, machine]."""
 
 
 def touch_off(
@@ -63,10 +65,70 @@ def touch_off(
         DeviceError: If nothing answers down to the limit, or something does already at the top, or the
             answer shows no clear onset.
     """
-    contact = search(probe, site, place, top, lowest, noise)
-    touches = [approach(probe, site, place, contact, lowest, noise) for _ in range(repeats)]
+    probe.go((*place, top), LIFT_SPEED)
+    probe.wait(RECOVERY / 2)
+    idle = probe.read(2 * FRAMES).mean
+    heights = np.arange(top - COARSE, lowest - 1e-9, -COARSE).tolist()
+    search = ContactSearch(probe, place, top, heights, idle, noise)
+
+    def check(contact: float) -> None:
+        # The first step already, or the one below it.
+        if contact >= top - 1.5 * COARSE:
+            raise DeviceError(
+                f"{site}: the sensor answers already {top - contact:.1f} mm below the start of the search, "
+                f"at machine height {contact:.2f} mm",
+                "a search that begins clear of the skin",
+                "correct registration/origin (z) in the rig file, or start higher with --above",
+            )
+
+    touch = first_touch(search, probe, site, place, lowest, noise, check)
+    if touch is None:
+        probe.go((*place, top), LIFT_SPEED)
+        raise DeviceError(
+            f"{site}: no channel answered down to machine height {heights[-1]:.2f} mm, the limit",
+            "a taxel that answers before the limit",
+            "is the indenter mounted, the board connected, the place right? Correct registration/origin (z) in the "
+            "rig file, or allow a deeper search with --limit",
+        )
+    contact = touch.contact
+    touches = [touch, *(approach(probe, site, place, contact, lowest, noise) for _ in range(repeats - 1))]
     probe.go((*place, contact + HIGHER), LIFT_SPEED)
     return touches
+
+
+def first_touch(
+    search: ContactSearch,
+    probe: Probe,
+    site: str,
+    place: tuple[float, float],
+    lowest: float,
+    noise: np.ndarray,
+    check: Callable[[float], None],
+) -> Touch | None:
+    """Search and approach; go on below an answer that the approach finds free of contact.
+
+    Args:
+        search: The search.
+        probe: The indenter.
+        site: Name of the place, for errors.
+        place: x and y [mm, machine].
+        lowest: Height below which no approach goes [mm, machine].
+        noise: Standard deviation of a reading [counts], shape (channels,).
+        check: Called with the height of an answer [mm, machine]; raises where it can be no contact.
+
+    Returns:
+        The touch, or None if no channel answers down to the end of the search.
+
+    Raises:
+        DeviceError: If an approach begins in contact.
+    """
+    while (contact := search.first_answer()) is not None:
+        check(contact)
+        try:
+            return approach(probe, site, place, contact, lowest, noise)
+        except NoOnset:
+            search.go_on_below(max(contact - BELOW, lowest))
+    return None
 
 
 def approach(
@@ -83,6 +145,7 @@ def approach(
         noise: Standard deviation of a reading [counts], shape (channels,).
 
     Raises:
+        NoOnset: If the answer is too weak for an onset.
         DeviceError: If the answer shows no clear onset.
     """
     for above in ABOVE:
@@ -97,43 +160,12 @@ def approach(
             readings.append(probe.read(FRAMES).mean)
         answer = combined(np.array(readings), noise / np.sqrt(FRAMES))
         if first := onset(heights, answer):
-            return Touch(site, *place, first, heights, answer)
+            return Touch(site, *place, first, heights, answer, contact)
     probe.go((*place, contact + HIGHER), LIFT_SPEED)
-    raise DeviceError(
+    weak = answer[-3:].mean() - answer[:3].mean() < CLEAR
+    raise (NoOnset if weak else DeviceError)(
         f"{site}: the answer between {heights[0]:.2f} and {heights[-1]:.2f} mm shows no clear onset "
         f"({answer[-1]:.0f} standard deviations at the lowest point)",
         "an answer that begins within the approach and rises well above the noise",
         f"check for electrical noise (median {np.median(noise):.1f} counts) and a loose indenter, then register again",
-    )
-
-
-def search(probe: Probe, site: str, place: tuple[float, float], top: float, lowest: float, noise: np.ndarray) -> float:
-    """Go down in steps until a channel answers twice in a row; return the height of the first answer [mm]."""
-    probe.go((*place, top), LIFT_SPEED)
-    probe.wait(RECOVERY / 2)
-    # More frames than at a step: every later difference contains this noise.
-    baseline = probe.read(2 * FRAMES).mean
-    limit = ANSWER * noise / np.sqrt(FRAMES / 2)
-    height, first = top, None
-    while height - COARSE >= lowest:
-        height -= COARSE
-        probe.go((*place, height), SPEED)
-        answers = bool((np.abs(probe.read(FRAMES // 2 + 1).mean - baseline) > limit).any())
-        # Two answers in a row: a single one may be noise.
-        if answers and first is not None:
-            if first >= top - 1.5 * COARSE:
-                raise DeviceError(
-                    f"{site}: the sensor answers already {top - first:.1f} mm below the start of the search, "
-                    f"at machine height {first:.2f} mm",
-                    "a search that begins clear of the skin",
-                    "correct registration/origin (z) in the rig file, or start higher with --above",
-                )
-            return first
-        first = height if answers else None
-    probe.go((*place, top), LIFT_SPEED)
-    raise DeviceError(
-        f"{site}: no channel answered down to machine height {height:.2f} mm, the limit",
-        "a taxel that answers before the limit",
-        "is the indenter mounted, the board connected, the place right? Correct registration/origin (z) in the "
-        "rig file, or allow a deeper search with --limit",
     )
