@@ -172,10 +172,10 @@ class VirtualRig:
         }
         documents.write(self.directory / "truth.yaml", truth, "virtual_truth")
         self.mounted.start()
-        shutil.rmtree(self.directory / STATE, ignore_errors=True)  # its machine is made at a known place
         for device in (self.controller, self.board, self.camera):
             if device:
                 device.start()
+        self._state_place()
         documents.write(self.path, self.document, "rig")
 
     def stop(self) -> None:
@@ -188,6 +188,22 @@ class VirtualRig:
         self.mounted.stop()
         if self._lock:
             self._lock.close()
+
+    def _state_place(self) -> None:
+        """Write where its machine stands, as a recorder that has homed it would: nobody need be asked."""
+        shutil.rmtree(self.directory / STATE, ignore_errors=True)
+        port = self.controller.port.path
+        document = {
+            "version": schemas.version("machine_state"),
+            "port": port,
+            "name": port,
+            "controller": {"driver": "grbl", "firmware": self.controller.firmware.identity, "usb": ""},
+            "number": 1,
+            "written": datetime.now(UTC).isoformat(timespec="seconds"),
+            "moving": False,
+            "position": self.controller.position_at(self.clock.now_ns()).tolist(),
+        }
+        documents.write(self.directory / STATE / "virtual.json", document, "machine_state")
 
     def _readings(self, sampled_ns: int) -> np.ndarray:
         tip = self.controller.position_at(sampled_ns)

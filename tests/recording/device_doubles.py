@@ -39,7 +39,7 @@ class Controller(MotionController):
         self.calls.append("close")
 
     def settings(self):
-        return {"banner": "double", "$110": "3000"}
+        return {"banner": "double", "$110": "3000", "homed_before": "yes"}
 
     @property
     def acceleration(self):

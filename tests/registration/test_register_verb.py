@@ -272,7 +272,7 @@ def test_a_ctrl_c_before_anything_is_opened_says_that_nothing_moved(verb, tmp_pa
 
 def test_after_a_power_cycle_in_mid_press_nothing_moves_before_an_answer(virtual, tmp_path, monkeypatch, capfd):
     """Without homing the controller counts from where it was switched on."""
-    monkeypatch.setattr("builtins.input", lambda question: "y" if "there is no record" in question else "n")
+    monkeypatch.setattr("builtins.input", lambda question: "n")
     virtual.controller.settings.update({"$20": "0", "$22": "0"})
     surface = read_rig(virtual.path).registration.origin[2]
     pressing = tmp_path / "session" / "episode-000000.partial.mcap"

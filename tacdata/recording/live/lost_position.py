@@ -62,8 +62,9 @@ class PositionGuard:
         """Return why the position of the opened controller is not known, in words; empty if it is."""
         if self._cnc.settings().get("homed_at_opening") == "yes":
             return ""
-        unhomed = self._cnc.settings().get("homed_before") == "no"
-        unmet = UNKNOWN if (resumed or unhomed) and not self._state.is_known else ""
+        # A Grbl never states whether it was homed: $X unlocks it without.
+        homed = self._cnc.settings().get("homed_before") == "yes"
+        unmet = UNKNOWN if (resumed or not homed) and not self._state.is_known else ""
         return self._state.why_lost or self._cnc.position_lost or self._state.difference or unmet
 
     def require_known(self, height: float, resumed: bool = False) -> None:
@@ -78,10 +79,11 @@ class PositionGuard:
         """
         why = self.doubt(resumed)
         code = self._code("known", why) if why else ""
+        since = "it was switched on" if why == UNKNOWN else "then"
         question = (
             f"THE POSITION IS NOT KNOWN: {why}.\n"
-            f"Has the machine been homed, or its zero found again by a touch-off, since then? And is the way straight "
-            f"up free, to machine height {height:.2f} mm? [y/N] "
+            f"Has the machine been homed, or its zero found again by a touch-off, since {since}? And is the way "
+            f"straight up free, to machine height {height:.2f} mm? [y/N] "
         )
         if why and not self._agreed(question, code):
             raise DeviceError(

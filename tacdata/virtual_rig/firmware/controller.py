@@ -55,7 +55,7 @@ class Controller:
         """
         self.clock = clock
         self.port = port or VirtualPort(115200, seed)
-        kind = NAMES[firmware]
+        self.firmware = kind = NAMES[firmware]
         self.settings = {**texts.DEFAULTS, **kind.changed, **(settings or {})}
         self._rng = np.random.default_rng(seed)
         self.machine = Interpreter(

@@ -48,6 +48,12 @@ class Firmware:
     changed: dict[str, str] = field(default_factory=dict)
     """Settings whose defaults differ."""
 
+    @property
+    def identity(self) -> str:
+        """Name, version and options, as its record of state has them (`schemas/machine_state.schema.json`)."""
+        answers = dict(line[1:-1].split(":", 1) for line in self.information)
+        return " ".join(answers[tag] for tag in ("FIRMWARE", "VER", "OPT") if tag in answers)
+
 
 GRBL = Firmware(
     "Grbl 1.1h ['$' for help]",

@@ -199,6 +199,27 @@ def test_a_machine_without_homing_that_nobody_remembers_is_asked_about(world, ch
     assert "there is no record of where the machine was left" in refused(world).given
 
 
+@pytest.mark.parametrize("up", [0.0, 1.0])
+def test_a_grbl_with_homing_that_nobody_remembers_is_asked_about(tmp_path, up):
+    """Unlocked by $X after a power cycle in mid-press, it looks like one that was homed."""
+    world = World(1, tmp_path / "session", zero=True)
+    broken_in_mid_press(world, world.controller.inject_brown_out)
+    world.controller.machine.alarm = None
+    jog(world, up)
+    next((world.folder.parent / "machines").glob("*.json")).unlink()
+    world.folder = world.folder.with_name("session2")
+    assert "the position is not known" in refused(world).given
+    world.home()
+    world.answer = lambda question: True
+    assert world.record().remaining == ()
+    world.reboot()
+    world.folder, world.answer = world.folder.with_name("session3"), lambda question: False
+    world.asked.clear()
+    assert world.record().remaining == ()
+    assert world.asked == [], "one yes is enough"
+    world.end()
+
+
 def test_a_port_that_was_renamed_is_known_by_its_link(world):
     """A board without a serial number is on another port after a reboot; its link in /dev/serial/by-id is the same."""
     broken_in_mid_press(world, world.controller.inject_brown_out)
