@@ -68,6 +68,8 @@ class Guide:
 
     damaged_reports = 0
 
+    damaged_reports = 0
+
     def __init__(self, clock: Clock) -> None:
         self.clock, self._next = clock, clock.now_ns()
 

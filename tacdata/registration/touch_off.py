@@ -25,7 +25,12 @@ FRAMES = 6
 
 
 class NoOnset(DeviceError):
-    """An approach whose answer is too weak for a first contact."""
+    """An approach without a first contact."""
+
+    def __init__(self, given: str, allowed: str, remedy: str, strength: float) -> None:
+        """Besides the words, the answer at the lowest point [standard deviations]."""
+        super().__init__(given, allowed, remedy)
+        self.strength = strength
 
 
 @dataclass(frozen=True)
@@ -126,7 +131,9 @@ def first_touch(
         check(contact)
         try:
             return approach(probe, site, place, contact, lowest, noise)
-        except NoOnset:
+        except NoOnset as error:
+            if error.strength >= CLEAR:
+                raise
             search.go_on_below(max(contact - BELOW, lowest))
     return None
 
@@ -145,8 +152,7 @@ def approach(
         noise: Standard deviation of a reading [counts], shape (channels,).
 
     Raises:
-        NoOnset: If the answer is too weak for an onset.
-        DeviceError: If the answer shows no clear onset.
+        NoOnset: If the answer shows no clear onset.
     """
     for above in ABOVE:
         # Always from above, so that the drive's play is taken up on the same side.
@@ -162,10 +168,10 @@ def approach(
         if first := onset(heights, answer):
             return Touch(site, *place, first, heights, answer, contact)
     probe.go((*place, contact + HIGHER), LIFT_SPEED)
-    weak = answer[-3:].mean() - answer[:3].mean() < CLEAR
-    raise (NoOnset if weak else DeviceError)(
+    raise NoOnset(
         f"{site}: the answer between {heights[0]:.2f} and {heights[-1]:.2f} mm shows no clear onset "
         f"({answer[-1]:.0f} standard deviations at the lowest point)",
         "an answer that begins within the approach and rises well above the noise",
         f"check for electrical noise (median {np.median(noise):.1f} counts) and a loose indenter, then register again",
+        float(answer[-3:].mean() - answer[:3].mean()),
     )

@@ -318,7 +318,8 @@ def _play(world, faults, anew=False, unlocks=False, course=""):
     cut = run.killed and run.here[2] < ORIGIN[2] + CLEARANCE - NEAR  # nobody saw its motion end
     calm = world.repair(world.lost or alarm is not None, unlocks)
     # A hard limit may have cost steps even where it did not. No report states one of the last moments of a run.
-    lost = world.lost or (alarm not in UNLOCKED and not run.end - REPORT < faults.alarmed < np.inf)
+    stated = "zero:   LOST" in run.words  # who reads that finds the zero again
+    lost = world.lost or stated or (alarm not in UNLOCKED and not run.end - REPORT < faults.alarmed < np.inf)
     resume = world.folder.exists()
     before = world.path[-1][1:4] if world.path else None
     if lost or cut:
