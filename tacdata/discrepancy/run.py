@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tacdata import documents, provenance
-from tacdata.discrepancy.data.recordings import course_of
+from tacdata.discrepancy.data.recordings import course_of, recordings_in
 from tacdata.discrepancy.heading import Heading
 from tacdata.discrepancy.judge import judge
 from tacdata.discrepancy.model.spec import Spec
@@ -21,6 +21,9 @@ from tacdata.discrepancy.verdict.picture import draw
 from tacdata.discrepancy.verdict.sealed import chosen
 from tacdata.discrepancy.verdict.text import in_text
 from tacdata.errors import UsageError
+from tacdata.recording.check.figures import RecordingFigures, figures
+from tacdata.recording.check.session import depth_findings
+from tacdata.recording.files.reader import read_recording
 
 VERDICT, TEXT, PICTURE, PAGE, SPEC = "verdict.json", "verdict.txt", "verdict.png", "verdict.html", "spec.json"
 """Files of the folder; the new spec only where something was named."""
@@ -65,7 +68,8 @@ def run(
     verdict = judge(course, spec, note, parents, until=until)
     heading = Heading.of(paths, out)
     following = [heading.filled(words) for words in verdict.document["next"]]
-    document = verdict.document | {"heading": heading.document(), "next": following}
+    remarks = [*_depth_remarks(paths), *verdict.document["remarks"]]
+    document = verdict.document | {"heading": heading.document(), "next": following, "remarks": remarks}
     out.mkdir(parents=True)
     documents.write(out / VERDICT, document, "verdict")
     text = in_text(document)
@@ -83,6 +87,16 @@ def run(
         interrupt.add_note(f"  kept: {out}: {document['why']}")
         raise interrupt
     return Written(document, text, out)
+
+
+def _depth_remarks(paths: list[Path]) -> list[str]:
+    """Return the findings of `tacdata check` on depths: a machine that loses steps looks like many an effect."""
+    groups: dict[Path, list[RecordingFigures]] = {}
+    for path in paths:
+        group = groups.setdefault(path if path.is_dir() else path.parent, [])
+        group += [figures(read_recording(file)) for file in recordings_in(path)]
+    found = [(folder, finding) for folder, entries in groups.items() for finding in depth_findings(entries)]
+    return [f"{folder.name}: {finding.text}" for folder, finding in found]
 
 
 def recording_hash(path: Path) -> str:

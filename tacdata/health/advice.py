@@ -1,4 +1,4 @@
-"""Advice on a unit: nothing, tare, register, recalibrate, check the wiring of channels, replace."""
+"""Advice on a unit: nothing, tare, register, check the machine, recalibrate, check wiring, replace."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tacdata.health.wiring import Wiring
 NOTHING, FIRST, TARE, REGISTER = "nothing", "first visit", "tare again", "register again"
 ALL_WELL = "all well"
 """Printed where there is nothing to do."""
-RECALIBRATE, WIRING, REPLACE = "recalibrate", "check wiring", "replace"
+MACHINE, RECALIBRATE, WIRING, REPLACE = "check the machine", "recalibrate", "check wiring", "replace"
 MOST_FAULTY = 0.125
 """Share of channels without readings from which a unit is to be replaced [1]; three at least."""
 MANY = 0.5
@@ -59,7 +59,9 @@ def advice(history: History) -> tuple[Advice, ...]:
     shifted = elsewhere(history)
     if shifted:  # gains cannot be distinguished from so large a shift
         changed = tuple(c for c in changed if c[1].quantity not in ("common gain", "gain"))
-    advices = [*_wiring(history, faults), *_noise(history, [c for c in changed if c[1].quantity == "noise"])]
+    advices = [*_wiring(history, faults)]
+    advices += [Advice(MACHINE, (), finding.text) for finding in history.last.depth_findings]
+    advices += [*_noise(history, [c for c in changed if c[1].quantity == "noise"])]
     for do, quantities in (
         (REGISTER, ("depth", "x", "y", "repeatability")),
         (RECALIBRATE, ("common gain", "gain", "loop", "network error")),

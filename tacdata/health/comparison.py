@@ -224,11 +224,17 @@ def _channel_changes(later: Visit, earlier: Visit, faults: Wiring, order: np.nda
         changes.append(_change("zero", channel, shift, later.unit, ZERO * float(strongest[taxel])))
         changes.append(_change("drift", channel, drift[channel], f"{later.unit}/min", DRIFT * float(strongest[taxel])))
         changes.append(_louder(channel, noise[channel], noisy[taxel]))
-    if repeated := later.repeatability:
-        low, high = repeated.interval
-        p = repeated.p_above(REPEATABLE)
-        changes.append(Change("repeatability", None, repeated.value, low, high, "1", REPEATABLE, p))
-    return changes
+    return [*changes, *repeatability_changes(later)]
+
+
+def repeatability_changes(visit: Visit) -> list[Change]:
+    """Return the test of a visit's repeatability, which needs no other visit; empty without a press repeated."""
+    repeated = visit.repeatability
+    if repeated is None:
+        return []
+    low, high = repeated.interval
+    p = repeated.p_above(REPEATABLE)
+    return [Change("repeatability", None, repeated.value, low, high, "1", REPEATABLE, p, p)]
 
 
 def _louder(channel: int, later: Spread, earlier: Spread) -> Change:

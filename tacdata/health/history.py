@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tacdata.errors import UsageError
-from tacdata.health.comparison import Change, VisitComparison, compare, corrected, model_gains, wiring_alone
+from tacdata.health.comparison import (
+    Change,
+    VisitComparison,
+    compare,
+    corrected,
+    model_gains,
+    repeatability_changes,
+    wiring_alone,
+)
 from tacdata.health.gains import GainFit
 from tacdata.health.network_error import NetworkError
 from tacdata.health.visit import Visit
@@ -52,6 +60,8 @@ class History:
 
         A change against both the visit before and the first is listed once, against the visit before.
         """
+        if not self.comparisons[-1]:
+            return tuple((0, change) for change in repeatability_changes(self.last) if change.changed)
         latest: dict[tuple[str, int | None], tuple[int, Change]] = {}
         for comparison in self.comparisons[-1]:
             for change in comparison.changes:

@@ -19,6 +19,8 @@ from tacdata.labels import file_names, read_label
 from tacdata.paths import StrPath
 from tacdata.recording.check.channel_health import in_phase
 from tacdata.recording.check.figures import RecordingFigures, figures
+from tacdata.recording.check.findings import Finding
+from tacdata.recording.check.session import depth_findings
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.session import Session, read_session
 from tacdata.sensor import Sensor
@@ -66,6 +68,11 @@ class Visit:
     def unit(self) -> str:
         """Unit of the readings."""
         return self.entries[0].document["taxels"]["unit"]
+
+    @property
+    def depth_findings(self) -> list[Finding]:
+        """Findings of `tacdata check` on where its presses went in depth."""
+        return depth_findings(list(self.entries))
 
     @property
     def noise(self) -> dict[int, Spread]:

@@ -1,16 +1,21 @@
 """A rig, a plan and a press with known answers, for the tests of the recording room."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tacdata.clock import Clock
 from tacdata.devices.device import CncStatus, StreamCounts, TaxelFrame
 from tacdata.plans import Plan
+from tacdata.recording import read_session
 from tacdata.recording.clocks import envelope_fit
+from tacdata.recording.files import file_names
 from tacdata.recording.files.writer import CubePoseRecord, EpisodeWriter, Header
 from tacdata.recording.motion.move_times import Command
 from tacdata.recording.motion.press_steps import steps
 from tacdata.recording.motion.trapezoid import AxisLimits
 from tacdata.recording.recorder import Recorder
+from tacdata.recording.session import create_session, refresh
 from tacdata.rig import read_rig
 from tacdata.rig import rig as rig_file
 from tacdata.sensor import default_sensor
@@ -173,3 +178,24 @@ class Press:
             writer.image("side", time, time, k, b"jpeg %d" % k)
             pose = CubePoseRecord((0.1, 0.2, 0.4 + 1e-6 * k), (0.0, 0.6, 0.0, 0.8), 0.25, 2) if k % 3 else None
             writer.cube("side", time, time, k, pose)
+
+
+def pressed(path, number=0, shift=0.0, off=0.0):
+    """A recording of a skin that begins so far below depth zero [mm]; the guide reports so much deeper at rest."""
+    press = Press(number)
+    tip = rig().registration.to_sensor(press.position(press.sample))
+    press.counts = press._counts(tip - [0.0, 0.0, shift])
+    lowest = min(status.position[2] for status in press.statuses)
+    press.statuses = [
+        replace(status, position=status.position - [0.0, 0.0, off]) if status.position[2] < lowest + 1e-3 else status
+        for status in press.statuses
+    ]
+    return press.write(path)
+
+
+def session_of(folder, shifts, off=0.0):
+    """A session of such presses."""
+    create_session(folder, plan(len(shifts)), SENSOR, rig().document)
+    for number, shift in enumerate(shifts):
+        pressed(file_names.episode(folder, number), number, shift, off)
+    return refresh(read_session(folder))

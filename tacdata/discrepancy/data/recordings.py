@@ -58,7 +58,7 @@ def course_of(paths: StrPath | Iterable[StrPath]) -> Course:
         FormatError: If they do not have the same channels, or hold no readings.
     """
     paths = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
-    numbered = [(number, read_recording(file)) for number, path in enumerate(paths) for file in _files(path)]
+    numbered = [(number, read_recording(file)) for number, path in enumerate(paths) for file in recordings_in(path)]
     numbered = [(number, r) for number, r in numbered if len(r.episode.taxels.sample_ns) > 1]
     # By time, whatever the order of the arguments: memory follows the clock.
     numbered.sort(key=lambda item: int(item[1].episode.taxels.sample_ns[0]))
@@ -145,7 +145,12 @@ def _dropouts(episodes: list[Episode]) -> list[str]:
     return [f"position: {sum(lost)} values in {np.count_nonzero(lost)} recordings jump there and back: set aside"]
 
 
-def _files(path: Path) -> list[Path]:
+def recordings_in(path: Path) -> list[Path]:
+    """Return the recordings of a path: itself, or those in the folder.
+
+    Raises:
+        UsageError: If it is neither.
+    """
     if path.is_dir():
         if not (path / FILE).is_file():
             loose = sorted(path.glob("*.mcap"))

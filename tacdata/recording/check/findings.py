@@ -252,14 +252,20 @@ def _cnc(figures: RecordingFigures) -> list[Judgement]:
         if values["contradiction"]:
             text += f": reports contradict the commanded profile by {values['contradiction']:.0f} ms"
         judgements.append((severity, "cnc", text))
+    return [*judgements, *hold_judgements(figures)]
+
+
+def hold_judgements(figures: RecordingFigures) -> list[Judgement]:
+    """Judge by the reports at rest whether the guide stood where it was sent."""
+    error = figures.document["cnc"]["hold_error"]
     # A distance in space: the resolution counts on three axes.
     exact = EXACT_MM + np.sqrt(3.0) * figures.recording.height_resolution
-    if values["hold_error"] is not None and values["hold_error"] > min(exact, HOLD_MM):
-        text = f"the guide stood {values['hold_error']:.3f} mm from the commanded position in the hold"
-        if values["hold_error"] <= HOLD_MM:
-            text += f"; steps and reports explain {exact - EXACT_MM:.3f} mm"
-        judgements.append((UNUSABLE if values["hold_error"] > HOLD_MM else WARNING, "cnc", text))
-    return judgements
+    if error is None or error <= min(exact, HOLD_MM):
+        return []
+    text = f"the guide stood {error:.3f} mm from the commanded position in the hold"
+    if error <= HOLD_MM:
+        text += f"; steps and reports explain {exact - EXACT_MM:.3f} mm"
+    return [(UNUSABLE if error > HOLD_MM else WARNING, "cnc", text)]
 
 
 def _cameras(figures: RecordingFigures) -> list[Judgement]:

@@ -20,8 +20,9 @@ from tacdata.recording.check.channel_order import (
 )
 from tacdata.recording.check.clocks import DRIFT_PPM
 from tacdata.recording.check.figures import RecordingFigures
-from tacdata.recording.check.findings import DEPTH_MM, UNUSABLE, WARNING, Finding
+from tacdata.recording.check.findings import DEPTH_MM, UNUSABLE, WARNING, Finding, hold_judgements
 from tacdata.recording.check.first_contact import LIMITS, drift_words, first_contact, height_words
+from tacdata.recording.check.imported import is_imported
 from tacdata.recording.check.possible import ANSWER, CONTACT, answer
 from tacdata.recording.check.session_steps import TELLING, height_step, slip, strength_step
 
@@ -74,6 +75,23 @@ def session_findings(entries: list[RecordingFigures]) -> list[Finding]:
     if not swaps:
         texts += _steps(entries, sample, names)
     return [*faults, *(Finding(severity, "taxels", "", text) for severity, text in texts)]
+
+
+def depth_findings(entries: list[RecordingFigures]) -> list[Finding]:
+    """Return the findings on where presses went in depth, for readers that judge something else by them.
+
+    Where the skin begins, whether that drifts or steps, and whether the guide stood where it was sent. Imported
+    recordings are left out: their depth has a zero of its own.
+    """
+    entries = [entry for entry in entries if not is_imported(entry.recording.episode)]
+    faults = _heights(entries)
+    if step := _height_step(entries):
+        faults.append(Finding(step[0], "taxels", "", step[1]))
+    off = [(entry.document["cnc"]["hold_error"], j) for entry in entries for j in hold_judgements(entry)]
+    if off:
+        severity, stream, text = max(off)[1]
+        faults.append(Finding(severity, stream, "", f"{text}, at most, in {len(off)} of {len(entries)} presses"))
+    return faults
 
 
 def session_not_assessed(entries: list[RecordingFigures]) -> list[str]:
@@ -192,18 +210,27 @@ def _steps(entries: list[RecordingFigures], sample: Answers, names: list[str]) -
         x, y = slipped.size
         words = "the tool or the skin slipped, or the registration changed"
         return [(UNUSABLE, f"answers lie x {x:+.1f}, y {y:+.1f} mm elsewhere from {names[slipped.row]} on: {words}")]
-    if step := height_step(entries).step:
-        # For an answer linear in depth, a surface lower by h moves the depth at a share s by (1 - s) h.
-        height = float(step.size[0]) / (1 - FELT)
-        way = "deeper" if height > 0 else "higher"
-        words = f"the skin is felt about {abs(height):.2f} mm {way} from {names[step.row]} on"
-        severity = UNUSABLE if abs(height) > DEPTH_MM[1] else WARNING
-        return [(severity, f"{words}: the tool or the skin slipped, or the registration changed")]
+    if found := _height_step(entries):
+        return [found]
     if step := strength_step(entries, sample).step:
         factor = float(np.exp(step.size[0]))
         words = "the board's gain or supply changed, or the skin did"
         return [(UNUSABLE, f"all channels answer {factor:.2f} times as strongly from {names[step.row]} on: {words}")]
     return []
+
+
+def _height_step(entries: list[RecordingFigures]) -> tuple[str, str] | None:
+    """Describe a step of the height at which the skin is felt."""
+    step = height_step(entries).step
+    if step is None:
+        return None
+    # For an answer linear in depth, a surface lower by h moves the depth at a share s by (1 - s) h.
+    height = float(step.size[0]) / (1 - FELT)
+    way = "deeper" if height > 0 else "higher"
+    name = [entry.recording.episode.path.name for entry in entries if counts_as_press(entry)][step.row]
+    words = f"the skin is felt about {abs(height):.2f} mm {way} from {name} on"
+    severity = UNUSABLE if abs(height) > DEPTH_MM[1] else WARNING
+    return severity, f"{words}: the tool or the skin slipped, or the registration changed"
 
 
 def _louder(entries: list[RecordingFigures]) -> list[Finding]:

@@ -1,28 +1,16 @@
 """The skin must begin at depth zero, in the first presses and in all of a session."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from recording_examples import SENSOR, Press, plan, rig
+from recording_examples import pressed, session_of
 
 from tacdata.errors import DeviceError
-from tacdata.recording import read_session
 from tacdata.recording.check.figures import figures
 from tacdata.recording.check.first_contact import FirstContact, drift_words, first_contact, height_words
 from tacdata.recording.check.report import check
-from tacdata.recording.files import file_names
+from tacdata.recording.check.session import depth_findings
 from tacdata.recording.files.reader import read_recording
 from tacdata.recording.live.pressed_depth import require_contact
-from tacdata.recording.session import create_session, refresh
-
-
-def pressed(path, number=0, shift=0.0):
-    """A recording of a skin that begins so far below depth zero [mm]."""
-    press = Press(number)
-    tip = rig().registration.to_sensor(press.position(press.sample))
-    press.counts = press._counts(tip - [0.0, 0.0, shift])
-    return press.write(path)
 
 
 @pytest.mark.parametrize("shift", [-1.0, -0.3, 0.0, 0.1, 0.3])
@@ -47,13 +35,6 @@ def test_a_true_press_is_taken(tmp_path):
     require_contact(pressed(tmp_path / "episode-000000.mcap"))
 
 
-def session_of(folder, shifts):
-    create_session(folder, plan(len(shifts)), SENSOR, rig().document)
-    for number, shift in enumerate(shifts):
-        pressed(file_names.episode(folder, number), number, shift)
-    return refresh(read_session(folder))
-
-
 @pytest.mark.parametrize(("shift", "severity"), [(-0.25, "WARNING"), (-1.0, "UNUSABLE"), (0.0, None)])
 def test_check_states_where_the_skin_begins(tmp_path, shift, severity):
     session_of(tmp_path / "session", [shift] * 3)
@@ -75,13 +56,14 @@ def test_a_drift_of_a_few_micrometres_a_press_is_stated():
 
 @pytest.mark.parametrize(("off", "severity"), [(0.0, None), (0.04, "warning"), (0.08, "unusable")])
 def test_reports_at_rest_that_state_another_depth_are_stated(tmp_path, off, severity):
-    press = Press(0)
-    lowest = min(status.position[2] for status in press.statuses)
-    press.statuses = [
-        replace(status, position=status.position - [0.0, 0.0, off]) if status.position[2] < lowest + 1e-3 else status
-        for status in press.statuses
-    ]
-    report = check(press.write(tmp_path / "episode-000000.mcap"))
+    report = check(pressed(tmp_path / "episode-000000.mcap", off=off))
     found = [f for f in report.findings if "from the commanded position in the hold" in f.text]
     assert [f.severity for f in found] == ([severity] if severity else [])
     assert not found or f"stood {off:.3f} mm" in found[0].text
+
+
+@pytest.mark.parametrize(("off", "words"), [(0.0, None), (0.04, "stood 0.040 mm from the commanded position")])
+def test_the_findings_on_depths_count_the_presses_that_reports_contradict(tmp_path, off, words):
+    session = session_of(tmp_path / "session", [0.0] * 3, off)
+    found = depth_findings([figures(read_recording(path)) for path in session.episodes])
+    assert [words in f.text and f.text.endswith("in 3 of 3 presses") for f in found] == ([True] if words else [])
