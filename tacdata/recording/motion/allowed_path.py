@@ -131,6 +131,8 @@ class AllowedPath:
             deviation, is_ahead = self._distance(leg, asked_ns, status)
             # One move that explains the report is enough: the guide may be in any of those sent.
             if deviation <= self._tolerance and not is_ahead:
+                if self._is_dropped(leg, status):
+                    return _dropped(leg, status)
                 if not self._is_behind(leg, asked_ns, status):
                     self._seen = status
                     return None
@@ -138,7 +140,7 @@ class AllowedPath:
             if deviation < distance:
                 nearest, distance = leg, deviation
         if laggard:
-            return _slow(laggard, asked_ns, status)
+            return _dropped(laggard, status) if status.state == "Idle" else _slow(laggard, asked_ns, status)
         if far := self.out_of_reach((x, y, z), status.arrival_ns):
             return DeviceError(
                 f"the guide cannot be where a report says: {far}",
@@ -196,6 +198,13 @@ class AllowedPath:
         deviation = float(np.linalg.norm(status.position - leg.profile.target))
         return leg.due_ns is not None and leg.due_ns < asked_ns and deviation > self._tolerance
 
+    def _is_dropped(self, leg: _Leg, status: CncStatus) -> bool:
+        """Whether the controller is idle in the middle of a move that it accepted and that nothing says has ended."""
+        if status.state != "Idle" or leg.expected_ns is None or leg.ended_ns is not None:
+            return False
+        ends = leg.profile.start, leg.profile.target
+        return min(float(np.linalg.norm(status.position - end)) for end in ends) > self._tolerance
+
     def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
         """Return the distance of a report from the move [mm], and whether it is farther along than time allows."""
         profile, position = leg.profile, status.position
@@ -217,6 +226,16 @@ def _slow(leg: _Leg, asked_ns: int, status: CncStatus) -> DeviceError:
         f"moves within {LATE[0]:g} times their duration and {LATE[1]:g} s",
         "set the feed override back to 100 % (a pendant may have changed it), and let $110 to $122 be what the machine "
         "can do; then start again",
+    )
+
+
+def _dropped(leg: _Leg, status: CncStatus) -> DeviceError:
+    return DeviceError(
+        f"the guide stands idle at {_text(status.position)} mm, still on its way from "
+        f"{_text(leg.profile.start)} to {_text(leg.profile.target)} mm: the controller dropped the move",
+        "a move that is carried out to its end",
+        "see that no other program and no pendant uses this controller (one may empty its queue); check cable and "
+        "ground; then start again",
     )
 
 
