@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from tacdata import documents
 from tacdata.dataset import cache
 from tacdata.dataset.format import features, folder, metadata, statistics, tiff
 from tacdata.dataset.format.metadata import EpisodeRecord
+from tacdata.dataset.format.whole_dataset import episode_table
 from tacdata.errors import FormatError, UsageError
 from tacdata.sensor import Sensor
 
@@ -198,7 +198,9 @@ class DatasetWriter:
     ) -> None:
         folder.write_parquet(
             self.root / folder.data_path(self.data_file),
-            _table(frame_columns, self.info["features"], metadata.shard_metadata(self.sensor, record)),
+            episode_table(
+                frame_columns, self.info["features"], {metadata.SHARD_KEY: metadata.shard_metadata(self.sensor, record)}
+            ),
         )
         metadata.append_record(self.root, record)
         row = folder.EpisodeRow(
@@ -289,18 +291,3 @@ def _check(columns: dict[str, np.ndarray], sensor: Sensor, extra: tuple[str, ...
                 "leave this episode out, or record or label it again",
             )
     return frames
-
-
-def _table(frame_columns: dict[str, np.ndarray], described: dict[str, Any], stamp: bytes) -> pa.Table:
-    arrays = {}
-    for key in described:
-        values = frame_columns[key]
-        if described[key]["dtype"] == "image":
-            arrays[key] = tiff.encode(values)
-        elif values.ndim == 2:
-            arrays[key] = pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
-        else:
-            arrays[key] = pa.array(values)
-    return pa.table(arrays).replace_schema_metadata(
-        {b"huggingface": folder.huggingface_metadata(described), metadata.SHARD_KEY: stamp}
-    )

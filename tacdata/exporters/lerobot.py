@@ -11,8 +11,9 @@ import numpy as np
 import pyarrow as pa
 
 from tacdata import documents
-from tacdata.dataset.format import folder, statistics, tiff
+from tacdata.dataset.format import folder, tiff
 from tacdata.dataset.format.features import INDEX_COLUMNS
+from tacdata.dataset.format.whole_dataset import write_whole
 from tacdata.errors import FormatError, UsageError
 from tacdata.exporters.exporter import Exporter, new_folder
 from tacdata.replay.columns import AXES, TURNS
@@ -52,32 +53,12 @@ class Lerobot(Exporter):
         if any(set(names) != set(columns[0]) for names in columns):
             raise UsageError("demonstrations with boards on other fingers", "the same in all", "export them separately")
         new_folder(directory)
-        info = folder.empty_info(features, rate, "fingertips " + " ".join(fingers))
-        tasks, first, parts = list(dict.fromkeys(t.task for t in episodes)), 0, []
-        for number, (targets, record) in enumerate(zip(episodes, columns, strict=True)):
-            count = len(targets.time_ns)
-            record |= {
-                "timestamp": (np.arange(count) / info["fps"]).astype(np.float32),
-                "frame_index": np.arange(count),
-                "episode_index": np.full(count, number),
-                "index": np.arange(first, first + count),
-                "task_index": np.full(count, tasks.index(targets.task)),
-            }
-            stats = {key: statistics.column_statistics(record[key]) for key in features}
-            parts.append(stats)
-            folder.write_parquet(directory / folder.data_path(number), _table(record, features))
-            row = folder.EpisodeRow(number, first, first + count, (targets.task,), number, number)
-            folder.write_row(directory, row, stats, {})
-            first += count
-        folder.write_tasks(directory, tasks)
-        folder.write_stats(directory, {key: statistics.merge([part[key] for part in parts]) for key in features})
-        entries = [targets.header(features) for targets in episodes]
+        entries = [targets.header([*features, *INDEX_COLUMNS]) for targets in episodes]
         for entry in entries:
             documents.check(entry, "fingertip_targets", str(directory / META))
         documents.write_text(directory / META, json.dumps(entries, indent=1))
-        info |= {"total_episodes": len(episodes), "total_frames": first, "total_tasks": len(tasks)}
-        info["splits"] = {"train": f"0:{len(episodes)}"}
-        documents.write_text(directory / folder.INFO, json.dumps(info, indent=4))
+        packed = [(record, targets.task) for targets, record in zip(episodes, columns, strict=True)]
+        info = write_whole(directory, features, packed, rate, "fingertips " + " ".join(fingers))
         note = f"fps is {info['fps']} where the grid has {rate:g} Hz: LeRobot wants whole numbers"
         return [] if info["fps"] == rate else [note]
 
@@ -160,20 +141,7 @@ def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict
         if "predicted" in key:
             info |= {"prediction": True, "checkpoint": (targets.network or {}).get("hash", "")}  # ty: ignore[unsupported-operator]
         features[key] = {"dtype": dtype, "shape": shape, "names": names, "info": info}
-    return features | {k: {"dtype": dtype, "shape": [1], "names": None} for k, dtype in INDEX_COLUMNS.items()}
-
-
-def _table(record: dict[str, np.ndarray], features: dict[str, Any]) -> pa.Table:
-    arrays: dict[str, Any] = {}
-    for key, feature in features.items():
-        values = record[key]
-        if feature["dtype"] == "image":
-            arrays[key] = tiff.encode(values)
-        elif values.ndim == 2:
-            arrays[key] = pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
-        else:
-            arrays[key] = pa.array(values)
-    return pa.table(arrays).replace_schema_metadata({b"huggingface": folder.huggingface_metadata(features)})
+    return features
 
 
 def _read(directory: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> FingertipTargets:

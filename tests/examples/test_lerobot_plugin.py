@@ -18,7 +18,7 @@ from tacdata.wire.frames.frame_format import from_document
 
 ROOT = Path(__file__).resolve().parents[2]
 PLUGIN = ROOT / "examples" / "lerobot_robot_tacdata"
-RATE, BAUD, CHANNELS = 150, 460800, 24
+RATE, BAUD, CHANNELS, STUCK = 150, 460800, 24, 5
 pytestmark = pytest.mark.long(
     "examples/lerobot_robot_tacdata",
     "tacdata/recording",
@@ -52,7 +52,7 @@ def recorded(tmp_path_factory):
             clock,
             from_document(layout, "test"),
             draw_timing(seed, clock.now_ns(), RATE),
-            lambda sampled_ns: 1000 + rng.normal(0, 3, CHANNELS).round(),
+            lambda sampled_ns: 1000 + (np.arange(CHANNELS) != STUCK) * rng.normal(0, 3, CHANNELS).round(),
             BAUD,
             seed,
         )
@@ -179,11 +179,25 @@ def test_lerobot_streams_it(recorded):
     assert sum(1 for _ in stream) == len(opened(recorded / "data"))
 
 
-def test_the_recordings_go_into_the_folder_that_is_pushed(recorded, plugin, tmp_path, monkeypatch, capsys):
+def test_recordings_and_channels_go_into_the_folder_that_is_pushed(recorded, plugin, tmp_path, monkeypatch, capsys):
+    from lerobot.datasets import dataset_tools as tools
     from lerobot_robot_tacdata.samples import main
+
+    from tacdata.sensor import default_sensor
 
     shutil.copytree(recorded / "data", tmp_path / "data")
     monkeypatch.setattr(sys, "argv", ["samples", str(tmp_path / "data"), str(recorded / "records")])
     main()
-    assert "1 recordings in" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "1 recordings in" in printed
+    assert printed.count(f"stuck or saturated: channels [{STUCK}]") == 4, printed  # two boards, two episodes
     check_rows(plugin, tmp_path / "data", tmp_path / "data" / "tacdata", 0)
+    parts = tools.split_dataset(opened(tmp_path / "data"), {"a": [0], "b": [1]}, output_dir=tmp_path / "parts")
+    merged = tools.merge_datasets([parts["b"], parts["a"]], output_repo_id="local/m", output_dir=tmp_path / "m")
+    described = merged.meta.features["observation.state"]["info"]["channels"]
+    places = default_sensor().taxels.centers
+    for board in ("thumb", "index"):
+        entry = described[f"{board}.taxel_07.counts"]
+        assert entry == {"unit": "counts", "frame": f"skin of {board}", "place_mm": places[7].tolist()}
+    assert len(described) == 2 * CHANNELS
+    assert not plugin.samples(tmp_path / "data", 1, tmp_path / "data" / "tacdata")["index"].valid[STUCK]
