@@ -107,7 +107,7 @@ class BoardStreams(DeviceStreams):
             self._host.sleep(0.01)
 
     def _silent(self, name: str) -> None:
-        self._why = f"{name}: {self._what(name)} for {self.silence:g} s"
+        self._why = f"{name}: {self._what(name)} for {self.silence:g} s{self._busy(name)}"
 
     def _broken(self, name: str, error: TacdataError) -> None:
         self._why = f"{name}: {error.given}"
