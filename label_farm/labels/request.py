@@ -128,7 +128,8 @@ def _check_known(episode: Episode, sensor: Sensor) -> None:
         raise FormatError(
             f"{episode.path}: imported without {', '.join(stand_ins)}",
             "a recording whose sensor, indenter and height of contact are known",
-            "import it again with a mapping that names a sensor file, the indenter and contact",
+            "import it again with a mapping that names a sensor file, the indenter and contact "
+            "(docs/how_to/foreign_data.md, labels)",
         )
 
 

@@ -14,6 +14,9 @@ from tacdata.progress import say, suggest
 if TYPE_CHECKING:
     from tacdata.recording.check.report import Report
 
+HELP = "docs/how_to/foreign_data.md"
+CONTACT = {"contact/z", "contact/x, y"}
+"""Unknown values that are the place of the skin in the machine, and none of the sensor."""
 ORDER = 40
 PANEL = RECORD
 EXAMPLES = (
@@ -41,18 +44,24 @@ def run(
         say(f"the report is not written: {error.given}; --out names another folder")
         report = td.check(path)
     if path.is_dir() and report.usable:
-        if unknown_skin(report):
-            say("labels need the skin's size and material: give them under sensor in the mapping, and import again")
+        if unknown := unknown_press(report):
+            say(f"labels need more than the mapping says: give {unknown} there, and import again ({HELP})")
             suggest("browse", path)
         else:
             suggest("label", path)
     return Result(report.document, Exit.DONE if report.usable else Exit.UNFIT)
 
 
-def unknown_skin(report: Report) -> bool:
-    """Return whether the skin of imported recordings is a stand-in, so that their labels would be of another skin."""
+def unknown_press(report: Report) -> str:
+    """Return the keys of a mapping without which labels of imported recordings are refused; "" if all are given."""
     rigs = [entry.recording.episode.rig.get("imported", {}) for entry in report.episodes]
-    return any(text.startswith("skin/") for rig in rigs for text in rig.get("stand_ins", []))
+    names = {text.split(":")[0] for rig in rigs for text in rig.get("stand_ins", [])}
+    keys = {
+        "sensor: FILE": {name for name in names if "/" in name or name in ("contact", "map")} - CONTACT,
+        "indenter": names & {"indenter"},
+        "contact": names & CONTACT,
+    }
+    return " and ".join(key for key, unknown in keys.items() if unknown)
 
 
 def checked(path: Path, folder: Path) -> Report:

@@ -163,10 +163,12 @@ def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:
     print(f"labels lie in {labels}")
     if summary.failed:
         count = len(summary.failed) + len(summary.written) + len(summary.current)
+        remedies = {reason.partition("next:")[2].strip() for reason in summary.failed.values()}
+        same = remedies.pop() if len(remedies) == 1 else ""
         error = SolveError(
             f"{len(summary.failed)} of {count} episodes have no label",
             "a label for every episode",
-            f"read {labels}/episode-*.failure.json; `tacdata label {session} --redo` tries again",
+            same or f"read {labels}/episode-*.failure.json; `tacdata label {session} --redo` tries again",
         )
         return Result(summary, error)
     suggest("pack", session, "--out DATASET")

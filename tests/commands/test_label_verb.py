@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tacdata import cli
-from tacdata.errors import SolveError
+from tacdata.errors import FormatError, SolveError
 
 FARM = Path(__file__).resolve().parent.parent / "label_farm"
 
@@ -92,3 +92,14 @@ def test_what_the_model_says_of_itself_reaches_the_user(label, monkeypatch):
     shown = label()
     assert shown.exit_code == 0
     assert "warning: material law yeoh is unstable above 1.5" in shown.stderr
+
+
+def test_failures_of_one_reason_end_with_its_remedy(label, monkeypatch):
+    request = importlib.import_module("tacdata.label_farm.labels.request")
+
+    def refuse(episode, sensor):
+        raise FormatError(f"{episode.path}: imported without indenter", "a known one", "name the indenter")
+
+    monkeypatch.setattr(request, "_check_known", refuse)
+    error = label().exception
+    assert "3 of 3 episodes have no label" in error.given and error.remedy == "name the indenter"

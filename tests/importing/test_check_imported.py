@@ -98,5 +98,5 @@ def test_an_unknown_skin_is_not_to_be_labelled_next(tmp_path, capsys):
     session = tmp_path / "session"
     importlib.import_module("tacdata.commands.check").run(session)
     shown = capsys.readouterr().out
-    assert "labels need the skin's size and material" in shown
+    assert "give sensor: FILE there, and import again" in shown
     assert "next: tacdata label" not in shown

@@ -106,6 +106,7 @@ def proposed_mapping(source: Path, found: dict[str, FoundKind]) -> Proposal:
         *(question for file in proposed.values() for question in file.questions),
         *questions_of(doubts),
         *place.questions,
+        *questions_of([f"{listed([*path])} of the press: taken from the files' names, in mm"] if path else []),
         *(question for _, further in specimens for question in further),
         *questions_of([*_unnamed(wide), *shared, *_unused(kinds, used, wide)]),
     )
