@@ -99,8 +99,8 @@ def _other_rate(rate: float | None, stated: float) -> list[Doubt]:
     if not rate or max(rate / stated, stated / rate) <= RATE_RATIO:
         return []
     text = (
-        f"{rate:.4g} rows a second, and the source states {stated:.4g}, in its data or its sensor file: the unit of the "
-        "times or the rate is wrong"
+        f"{rate:.4g} rows a second, and the source states {stated:.4g}, in its data or its sensor file: the unit of "
+        "the times or the rate is wrong"
     )
     return [(UNUSABLE, "taxels", text)]
 
