@@ -64,7 +64,7 @@ class Engine(ABC):
             SolveError: If workers cannot start or keep dying.
             DeviceError: If the workers' cluster cannot be reached.
         """
-        pending, settled, growing, roster = set(keys), False, True, Roster(self._ledger)
+        pending, settled, growing, roster, reported = set(keys), False, True, Roster(self._ledger), None
         # Claims of processes that have ended would otherwise wait for the end of their leases.
         self._ledger.release_dead()
         try:
@@ -75,7 +75,8 @@ class Engine(ABC):
                     pending |= added or set()
                 self.tend(len(pending), settled)
                 time.sleep(POLL_SECONDS)
-                if modules := modules_of(roster.notes()):
+                if (modules := modules_of(roster.notes())) and modules != reported:
+                    reported = modules
                     on_loading(*modules)
                 settled = False
                 for change in self._ledger.changes(since):

@@ -30,7 +30,7 @@ def test_kernels_of_a_worker_are_progress_of_the_run(tmp_path, label_by_workers,
     stages = []
     label_by_workers([press_episode(tmp_path, k, x=float(k)) for k in range(2)], progress=lambda *s: stages.append(s))
     counts = [done for stage, done, _ in stages if stage == "compile"]
-    assert counts[0] == 1 and counts == sorted(counts)
+    assert counts[0] == 1 and counts == sorted(set(counts))
     assert stages.index(("solve", 1, 2)) > len(counts)
 
 
