@@ -110,11 +110,15 @@ class SkinModel:
         estimated = self.settings.error_estimate
         # The companion decides the stated error, and starts of loading: another one gives other bits.
         coarse = {"companion": self.companion.mesh.content_hash} if estimated and self.companion else {}
+        settings = asdict(self.settings)
+        if not self.settings.alone:
+            # Results without it are those of releases that did not have it.
+            del settings["alone"]
         return {
             "sensor": self.sensor.content_hash,
             "mesh": self.mesh.content_hash,
             **coarse,
-            "settings": provenance.content_hash(asdict(self.settings)),
+            "settings": provenance.content_hash(settings),
             **code_versions(),
         }
 
