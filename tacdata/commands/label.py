@@ -64,7 +64,7 @@ def run(
         str, typer.Option(help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler, or `here` to start one.")
     ] = "",
     alone: Annotated[
-        bool, typer.Option("--alone", help="Same bits whatever is labelled with a press; costs a quarter more; CPU.")
+        bool, typer.Option("--alone", help="Same bits whatever is labelled with a press; costs twice as much; CPU.")
     ] = False,
     factory: Annotated[str, typer.Option(hidden=True, help="What builds the model: module:name.")] = "",
 ) -> Result:

@@ -68,7 +68,7 @@ def label(
         into: Dataset that each label is appended to as soon as it is finished.
         dask: Address of a Dask scheduler to solve on, or "here".
         alone: Solve each press by itself, on CPUs alone: labels are the same to the last bit whatever is labelled with
-            them; costs a quarter more.
+            them; costs twice as much.
         factory: Builder of the model, "module:name"; for tests.
         progress: Called with the stage ("read", "look", "compile", "solve"), the number done and the number of all.
 
