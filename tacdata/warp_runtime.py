@@ -10,15 +10,16 @@ import os
 import shutil
 import sys
 import tempfile
+import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 
 import warp as wp  # noqa: TID251
 from warp import Function  # noqa: TID251
 
-__all__ = ["Function", "report_modules", "start", "wp"]
+__all__ = ["Function", "load_modules", "report_modules", "start", "wp"]
 
 NO_GPU = b"Could not find or load the NVIDIA CUDA driver"
 """Printed by Warp's native library, past Python, at every start on a machine without a GPU."""
@@ -32,6 +33,9 @@ tests/skin/elasticity/test_skin_elasticity.py` takes 28 s of the processor, and 
 
 MODULES = {"cpu": 29, "cuda": 37}
 """Modules of kernels that the shipped session's first label takes, by kind of device: others take about as many."""
+
+TOGETHER = 8
+"""Modules that are compiled at a time where many are known to be needed."""
 
 KERNELS = "TACDATA_KERNELS"
 """Variable with the folder of shipped kernels; by default that in this package."""
@@ -67,6 +71,15 @@ def report_modules(loaded: Callable[[int, int], None]) -> None:
     wp.config.log_level = wp.LOG_INFO
 
 
+def load_modules(modules: Collection[wp.Module], device: str) -> None:
+    """Compile or load modules of kernels side by side, by a few threads."""
+    some = list(modules)
+    for start in range(0, len(some), TOGETHER):
+        wp.force_load(device, some[start : start + TOGETHER], max_workers=TOGETHER)
+        if isinstance(logger := wp.get_logger(), _ModuleCount):
+            logger.report()
+
+
 class _ModuleCount:
     """Warp's logger: counts the modules it names, and is silent as `start` has made Warp."""
 
@@ -77,7 +90,12 @@ class _ModuleCount:
     def info(self, message: str) -> None:
         if message.lstrip().startswith("Module ") and " load on device " in message:
             self._count += 1
-            self._loaded(self._count, max(self._about, self._count))
+            # Whoever listens may not be called from another thread, such as those of `load_modules`.
+            if threading.current_thread() is threading.main_thread():
+                self.report()
+
+    def report(self) -> None:
+        self._loaded(self._count, max(self._about, self._count))
 
     def debug(self, message: str) -> None: ...
 

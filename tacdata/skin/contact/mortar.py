@@ -18,7 +18,7 @@ from tacdata.warp_runtime import wp
 
 
 @cache
-def _product(real: type) -> wp.Kernel:
+def product_kernel(real: type) -> wp.Kernel:
     """Compile the kernel that multiplies with a sparse matrix, in one precision."""
 
     @wp.kernel(module="unique", enable_backward=False)
@@ -58,7 +58,7 @@ class _Rows:
     def add(self, field: torch.Tensor, result: torch.Tensor) -> None:
         start, column, row = self._where
         wp.launch(
-            _product(REAL[field.dtype]),
+            product_kernel(REAL[field.dtype]),
             dim=(self._count, field.shape[2]),
             inputs=[argument(value) for value in (start, column, self._value[field.dtype], row, field)],
             outputs=[argument(result)],

@@ -31,7 +31,9 @@ CORRECTIONS = 3
 
 
 @cache
-def _mass_kernel(real: type) -> wp.Kernel:
+def mass_kernel(real: type) -> wp.Kernel:
+    """Compile the kernel of a step of Richardson's iteration, in one precision."""
+
     @wp.kernel(module="unique", enable_backward=False)
     def correct(
         first: wp.array(dtype=wp.int32),
@@ -127,7 +129,7 @@ class AveragedVolume:
         for _ in range(CORRECTIONS + 1):
             corrected = torch.empty_like(sums)
             wp.launch(
-                _mass_kernel(REAL[sums.dtype]),
+                mass_kernel(REAL[sums.dtype]),
                 dim=tuple(sums.shape),
                 inputs=[*self.pattern, *self.mass[sums.dtype], *map(argument, (conditions.thickness, sums, average))],
                 outputs=[argument(corrected)],

@@ -22,7 +22,7 @@ from tacdata.warp_runtime import wp
 
 
 @cache
-def _kernels(law_name: str, real: type) -> SimpleNamespace:
+def element_kernels(law_name: str, real: type) -> SimpleNamespace:
     """Compile the element kernels of one law in one precision."""
     law = load_law(law_name)
     energy_of, stress_of = law.energy_function(real, "H"), law.stress_function(real, "H")
@@ -112,6 +112,11 @@ class Elasticity:
         self._data = _data(mesh, slab, device)
         self._averaged = AveragedVolume(mesh, law, slab, self._data, device) if averaged else None
 
+    @property
+    def averages(self) -> bool:
+        """Whether volume changes are averaged at the corners."""
+        return self._averaged is not None
+
     def internal_force(self, u: torch.Tensor, conditions: Conditions) -> tuple[torch.Tensor, torch.Tensor]:
         """Return nodal forces [N], shape (n, 3, b), and the smallest det F [1], shape (b,), of displacements [mm]."""
         force = torch.zeros_like(u)
@@ -170,7 +175,7 @@ class Elasticity:
             constant_data(real), law=material.law, modulus=material.modulus, thickness=material.thickness
         )
         wp.launch(
-            getattr(_kernels(self.law, real), name),
+            getattr(element_kernels(self.law, real), name),
             dim=(len(self.mesh.tets), fields[0].shape[2]),
             inputs=[*map(argument, fields), self._data[fields[0].dtype], constants],
             outputs=[*map(argument, out)],

@@ -64,7 +64,9 @@ _SWEEPS = """
 
 
 @cache
-def _kernel(real: type, name: str) -> wp.Kernel:
+def invert_kernel(real: type, name: str) -> wp.Kernel:
+    """Compile the kernel of `invert_in_place` for numbers of a type, by Warp's and by C's name."""
+
     @wp.func_native(f"typedef {name} real;\n{_SWEEPS}")
     def sweep(matrices: wp.array(dtype=real), matrix: int, lane: int): ...
 
@@ -80,7 +82,7 @@ def invert_in_place(matrices: torch.Tensor) -> None:
     """Invert symmetric positive definite matrices on a GPU, shape (b, 128, 128), contiguous."""
     kind = (wp.float64, "double") if matrices.dtype == torch.float64 else (wp.float32, "float")
     wp.launch(
-        _kernel(*kind),
+        invert_kernel(*kind),
         dim=(len(matrices), _THREADS),
         inputs=[argument(matrices.view(-1))],
         device=str(matrices.device),

@@ -29,6 +29,7 @@ from tacdata.skin.mesh.build import build_mesh
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.batch import Batch, PlacedPress
+from tacdata.skin.solve.compilation import compile_kernels
 from tacdata.skin.solve.equilibrium import StateReader
 from tacdata.skin.solve.load_path import LoadPath
 from tacdata.skin.solve.newton import Newton
@@ -153,7 +154,10 @@ class MeshedSkin:
         """Return an idle batch for presses by the shapes of ``requests``, so many at a time."""
         # The board just touches the tips of the undeformed protrusions.
         idle, floor = self._under(requests[0]).on(self.device), -self.sensor.skin.protrusion_tip
-        return Batch(self.newton(requests), idle, len(self.mesh.nodes), capacity, floor)
+        newton = self.newton(requests)
+        if self.device != "cpu":
+            compile_kernels(self.body, newton.surfaces, self.device)
+        return Batch(newton, idle, len(self.mesh.nodes), capacity, floor)
 
     def _board(self) -> ContactSurface:
         bumps = torch.as_tensor(self.mesh.protrusions, device=self.device)

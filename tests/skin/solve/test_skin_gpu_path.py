@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from skin_examples import EXACT, PLAIN, box_mesh, bumps_sensor, slab_sensor
 
+from tacdata.indenters.flat_punch import FlatPunch
 from tacdata.indenters.sphere import Sphere
 from tacdata.skin.linear import constraint_preconditioner
 from tacdata.skin.linear.constraint_solvers import InvertedCompliance
@@ -13,7 +14,8 @@ from tacdata.skin.linear.rest_stiffness import DenseRest, rest_stiffness
 from tacdata.skin.mesh.build import MeshSettings, build_mesh
 from tacdata.skin.model import SkinModel
 from tacdata.skin.press import PressRequest
-from tacdata.skin.solve import meshed_skin
+from tacdata.skin.solve import compilation, meshed_skin
+from tacdata.warp_runtime import wp
 
 
 @pytest.fixture
@@ -60,6 +62,21 @@ def test_presses_on_a_slab_agree(as_on_a_gpu):
     requests = [PressRequest(Sphere(radius), x, y, 0.0, (0.15, 0.3)) for radius, x, y in places]
     requests.insert(2, PressRequest(Sphere(1.5), 0.2, -0.3, 0.0, (0.2, 0.4, 0.2, 0.0)))
     both_ways_agree(sensor, box_mesh(sensor, 6, 6, 2), requests, as_on_a_gpu)
+
+
+def test_all_kernels_of_a_batch_are_compiled_before_it(as_on_a_gpu, monkeypatch):
+    as_on_a_gpu()
+    sensor = slab_sensor(size=4.0, friction=0.2, pixels=9)
+    model = SkinModel(sensor, PLAIN, mesh=box_mesh(sensor, 6, 6, 2))
+    requests = [PressRequest(shape, 0.0, 0.0, 0.0, (0.1,)) for shape in (Sphere(1.3), FlatPunch(0.9, 0.3))]
+    compiled, used, launch = set(), set(), wp.launch
+    monkeypatch.setattr(compilation, "load_modules", lambda modules, device: compiled.update(modules))
+    compilation.compile_kernels(model.skin.body, model.skin.newton(requests).surfaces, "cpu")
+    monkeypatch.setattr(
+        wp, "launch", lambda kernel, *more, **named: (used.add(kernel.module), launch(kernel, *more, **named))
+    )
+    assert len(list(model.states_many(requests, 2))) == 2
+    assert len(used) > 15 and used <= compiled
 
 
 def test_labels_that_start_from_a_coarser_mesh_agree(as_on_a_gpu):
