@@ -272,6 +272,9 @@ class DenseRest:
         """Number of mortar rows."""
         self._compliance(rows, unfixed)
         self.spreads = SpreadRows(rows, unfixed, device)
+        if device != "cpu":
+            # What the inverse in double precision took is for other processes on this GPU.
+            torch.cuda.empty_cache()
 
     def _compliance(self, rows: sp.csr_matrix, unfixed: np.ndarray) -> None:
         """Make M K0^-1 and M K0^-1 M^T of the rounded inverse."""
