@@ -84,7 +84,7 @@ class _ModuleCount:
     """Warp's logger: counts the modules it names, and is silent as `start` has made Warp."""
 
     def __init__(self, loaded: Callable[[int, int], None]) -> None:
-        self._loaded, self._count = loaded, 0
+        self._loaded, self._count, self._reported = loaded, 0, 0
         self._about = MODULES["cuda" if wp.is_cuda_available() else "cpu"]
 
     def info(self, message: str) -> None:
@@ -95,7 +95,9 @@ class _ModuleCount:
                 self.report()
 
     def report(self) -> None:
-        self._loaded(self._count, max(self._about, self._count))
+        if self._count > self._reported:
+            self._reported = self._count
+            self._loaded(self._count, max(self._about, self._count))
 
     def debug(self, message: str) -> None: ...
 

@@ -62,7 +62,7 @@ from tacdata import warp_runtime
 warp_runtime.report_modules(lambda *modules: print(*modules))
 for _ in range(2):
     from tacdata.chain.memory_kernels import _filter
-    _filter.module.load("cpu", block_dim=1)
+    warp_runtime.load_modules({_filter.module}, "cpu")
 """
 
 
