@@ -135,6 +135,17 @@ def test_a_rate_without_a_unit_is_in_hertz(tmp_path):
     are_right(imported(tmp_path, {"run.txt": text})[0])
 
 
+def test_the_actions_of_a_policy_are_no_readings(tmp_path):
+    (tmp_path / "files").mkdir()
+    with h5py.File(tmp_path / "files" / "run.h5", "w") as file:
+        for trial in (0, 1):
+            rows = table(seed=trial)  # a copy would be left out
+            for name, values in (("obs/t", rows[:, 0]), ("obs/depth", rows[:, 1]), ("obs/c", rows[:, 2:])):
+                file[f"data/demo_{trial}/{name}"] = values
+            file[f"data/demo_{trial}/actions"] = np.ones((len(rows), 4))
+    are_right(of(tmp_path / "files")[0], 4)
+
+
 def test_two_boards_in_one_file_stand_side_by_side(tmp_path):
     (tmp_path / "files").mkdir()
     with h5py.File(tmp_path / "files" / "run.h5", "w") as file:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError
-from tacdata.importing.formats.npz import rows_of
+from tacdata.importing.formats.npz import WHOLE, rows_of
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth
 from tacdata.importing.formats.zarr import WIDEST, by_attributes
 from tacdata.importing.mapping import ReadOptions
@@ -51,6 +51,8 @@ class Hdf5(SourceFormat):
             tables = _tables(datasets)
             name = chosen_table(path, list(tables), options)
             inside = {column: datasets[key] for key, column in columns_of(tables.get(name, ())).items()}
+            if name in datasets and len(_shape(datasets[name])) > 1 and len(inside) == 1:  # a trial has no name
+                inside = {WHOLE: datasets[name]}
             refuse_growth(path, float(sum(8 * math.prod(each.shape) for each in inside.values())))
             for column, dataset in inside.items():
                 values, words = _values(dataset)
@@ -133,7 +135,9 @@ def _add(
     counts: dict[Hashable, list[str]] = {}
     for name in names:
         counts.setdefault(rows[name], []).append(name)
-    tables |= {group if len(counts) == 1 else members[0]: members for members in counts.values()}
+    # The most arrays bear the group's name, so that trials of which one holds a setting more are alike.
+    main = max(counts.values(), key=len, default=[]) if group or len(counts) == 1 else []
+    tables |= {group if members is main else members[0]: members for members in counts.values()}
 
 
 def _opened(path: Path) -> Any:
@@ -206,7 +210,8 @@ def _attributes(entry: Any) -> dict[str, Any]:
         value = entry.attrs[name] if entry.attrs.get_id(name).dtype.kind in "biufSO" else None
         value = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
         if isinstance(value, str | bytes | int | float):
-            attributes[name] = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+            key = name.lower() if name.lower() in ("unit", "units") else name
+            attributes[key] = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
     return attributes
 
 

@@ -46,7 +46,7 @@ GUESSES = {
     "value": r"(value|val|reading|wert)",
     "setting": (
         r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))"
-        r"|(set|target|cmd|demand|desired|commanded)_\w+|\w+_(limit|target|set)|gain|k[pid]"
+        r"|(set|target|cmd|demand|desired|commanded)_\w+|\w+_(limit|target|set)|gain|k[pid]|(\w+_)?actions?"
     ),
     "state": (
         r"(segment|segm|state|status|moving|flag|block|mode|phase|enabled?|valid)(_?(id|no|nr|number|index))?"
@@ -66,7 +66,7 @@ GUESSES = {
     "angle": r"((rotary|joint|motor)_?)?(encoder|angle)(_?(pos(ition)?|counts?))?",
 }
 """Meaning of a column by its name without the unit."""
-PLACE = r"(tip|tcp|pos(ition)?s?|pose|xyz|probe|indenter|stage|ee(_?pos)?|end_?effector|robot(_?pos)?)"
+PLACE = r"(pos(ition)?s?|pose|xyz|(tip|tcp|probe|indenter|stage|eef?|end_?effector|robot)(_?pos(e|ition)?)?)"
 """Name of an array whose first three columns are a place."""
 GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 """Words that mark a length as measured, in addition to the commanded one."""

@@ -24,6 +24,7 @@ START = np.datetime64("2025-11-29T12:00:00")
          {"data/demo_0": 2, "data/demo_1": 2}),
         ({"stage/t": 5, "stage/z": 5, "board/t": 9, "board/c": 9}, {"stage": 2, "board": 2}),
         ({"t": 9, "left/c": 9, "right/c": 9}, {"": 3}),
+        ({"d_0/t": 9, "d_0/z": 9, "d_0/k": 24, "d_1/t": 8, "d_1/z": 8}, {"d_0": 2, "d_0/k": 1, "d_1": 2}),
         ({"t": 9, "trial_1/z": 9, "trial_2/z": 9}, {"trial_1": 1, "trial_2": 1, "": 1}),
         ({"soft/t": 9, "soft/z": 9, "hard/t": 8, "hard/z": 8}, {"soft": 2, "hard": 2}),
     ),
@@ -53,7 +54,7 @@ def test_attributes_give_units_scales_fills_and_a_rate(tmp_path):
         counts = np.round(ROWS[:, 1] * 1000).astype("i2")
         counts[7] = -1
         file["depth"], file["c0"] = counts, ROWS[:, 2]
-        for name, value in (("units", "mm"), ("scale_factor", 0.001), ("_FillValue", np.int16(-1))):
+        for name, value in (("Units", "mm"), ("scale_factor", 0.001), ("_FillValue", np.int16(-1))):
             file["depth"].attrs[name] = value
     found = read_table(tmp_path / "run.h5")
     assert found.units == {"depth": "mm"} and found.rate == 20.0
