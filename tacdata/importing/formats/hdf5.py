@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+import os
 import posixpath
 import re
+import resource
+import signal
+import warnings
 from collections import Counter
 from collections.abc import Collection, Hashable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +25,8 @@ from tacdata.importing.formats.zarr import WIDEST, by_attributes
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
 
+LONGEST, LONGEST_WAIT, RATE_OF_INDEX = 5, 120, 10_000_000
+"""Time that the index of a small file may take, of the processor and by the clock [s]; of a large one [byte/s]."""
 CLASS = "MATLAB_class"
 """Attribute of MATLAB's variables, whose axes are in reverse order."""
 RATE = re.compile(r"((sampl\w*|scan|acquisition)[ _-]*)?(rate|freq(uency)?|fs)([ _-]*hz)?", re.IGNORECASE)
@@ -141,8 +148,28 @@ def _add(
 
 
 def _opened(path: Path) -> Any:
+    """Return an open file.
+
+    Raises:
+        FormatError: If the library goes round in circles in its index, or crashes there.
+    """
     import h5py
 
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of threads, none of which the copy needs
+        copy = os.fork()
+    if not copy:
+        # Here, and not in this process: a loop inside the library ends by no exception, and by no Ctrl-C.
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(LONGEST_WAIT)
+        seconds = LONGEST + path.stat().st_size // RATE_OF_INDEX
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        with suppress(BaseException), h5py.File(path, "r", locking="best-effort") as file:
+            for dataset in _datasets(file)[0].values():
+                _chunks(dataset)
+        os._exit(0)
+    if os.WIFSIGNALED(os.waitpid(copy, 0)[1]):
+        raise FormatError(f"{path}: its index is damaged", "a whole file", "copy it again, or save its arrays anew")
     return h5py.File(path, "r", locking="best-effort")
 
 
@@ -193,14 +220,20 @@ def _values(dataset: Any) -> tuple[np.ndarray, str]:
 
     values, words = dataset.asstr(errors="replace")[:] if h5py.check_string_dtype(dataset.dtype) else dataset[:], ""
     parts = math.prod(-(-n // k) for n, k in zip(dataset.shape, dataset.chunks, strict=True)) if dataset.chunks else 1
-    written = dataset.id.get_num_chunks() if dataset.chunks else int(dataset.id.get_storage_size() > 0)
+    chunks = _chunks(dataset)
+    written = len(chunks) if dataset.chunks else int(dataset.id.get_storage_size() > 0)
     if written < parts and values.dtype.kind in "biuf":
         stored = np.zeros(values.shape, bool)
-        for number in range(written if dataset.chunks else 0):
-            start = dataset.id.get_chunk_info(number).chunk_offset
+        for start in chunks:
             stored[tuple(slice(a, a + size) for a, size in zip(start, dataset.chunks, strict=True))] = True
         values, words = np.where(stored, values, np.nan), f"({parts - written} of {parts} parts were never written)"
     return values.T if CLASS in dataset.attrs else values, words
+
+
+def _chunks(dataset: Any) -> list[tuple[int, ...]]:
+    """Return the first index of each part of a dataset that was written; [] where it has no parts."""
+    count = dataset.id.get_num_chunks() if dataset.chunks else 0
+    return [dataset.id.get_chunk_info(number).chunk_offset for number in range(count)]
 
 
 def _attributes(entry: Any) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from nptdms import ChannelObject, TdmsWriter
 from sources import table
 
 from tacdata.errors import FormatError
+from tacdata.importing.formats import hdf5
 from tacdata.importing.formats.hdf5 import tables_of
 from tacdata.importing.formats.source_format import read_table, tables_in
 from tacdata.importing.mapping import ReadOptions
@@ -46,6 +47,20 @@ def test_one_of_several_tables_is_named_and_none_is_guessed(tmp_path):
         read_table(tmp_path / "run.h5")
     assert error.value.allowed == "board, stage"
     assert read_table(tmp_path / "run.h5", ReadOptions(table="stage")).columns["values"].shape == (len(ROWS) // 4, 3)
+
+
+def test_an_index_without_an_end_is_refused(tmp_path, monkeypatch):
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["c"] = ROWS
+
+    def circle(_):
+        while True:
+            pass
+
+    monkeypatch.setattr(hdf5, "_datasets", circle)
+    monkeypatch.setattr(hdf5, "LONGEST", 1)
+    with pytest.raises(FormatError, match="its index is damaged"):
+        read_table(tmp_path / "run.h5")
 
 
 def test_attributes_give_units_scales_fills_and_a_rate(tmp_path):
