@@ -16,6 +16,8 @@ from tacdata.health.history import History
 
 DECIDING = ("tacdata.health", "tacdata.recording.check")
 """Code that decides the findings."""
+MISMATCH = 1.5
+"""Ratio of answers to predictions, or its inverse, beyond which the prediction is not of this unit [1]."""
 
 
 def document(history: History) -> dict[str, Any]:
@@ -131,7 +133,13 @@ def not_assessed(history: History) -> list[str]:
 def remarks(history: History) -> list[str]:
     """Return remarks on the sessions, as sentences."""
     lines = []
-    for visit in history.visits:
+    for visit, model in zip(history.visits, history.model, strict=True):
+        if model and not 1 / MISMATCH < model.common.value < MISMATCH:
+            lines.append(
+                f"{visit.name}: it answers {model.common.value:.3g} times as strongly as its labels predict: the sensor "
+                "file's transduction is not that of this unit (a nominal one, or not calibrated). Its size is no fault; "
+                "compare visits with each other"
+            )
         lines += [f"{visit.name}: {file} is left out: {reason}" for file, reason in visit.left_out]
         if visit.label_remark:
             lines.append(f"{visit.name}: {visit.label_remark}")

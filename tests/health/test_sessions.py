@@ -95,6 +95,14 @@ def test_labels_tell_gains_beside_the_model(copied, monday):
     assert np.ptp([gain.value for gain in found.model[0].channels.values()]) < 0.1
     assert "labels of monday" in document(found)["provenance"]["parents"]
     assert "200" in text(found)
+    (remark,) = remarks(found)
+    assert remark.startswith("monday: it answers 2 times as strongly as its labels predict: the sensor file's transd")
+
+
+def test_predictions_of_about_the_measured_size_are_not_remarked_on(copied):
+    found = history([read_visit(label(copied / "monday", lambda counts: 0.8 * counts))])
+    assert found.model[0].common.value == pytest.approx(1.25, rel=0.02)
+    assert remarks(found) == []
 
 
 def test_labelled_visits_of_different_plans_are_compared(tmp_path):
