@@ -136,9 +136,9 @@ def remarks(history: History) -> list[str]:
     for visit, model in zip(history.visits, history.model, strict=True):
         if model and not 1 / MISMATCH < model.common.value < MISMATCH:
             lines.append(
-                f"{visit.name}: it answers {model.common.value:.3g} times as strongly as its labels predict: the sensor "
-                "file's transduction is not that of this unit (a nominal one, or not calibrated). Its size is no fault; "
-                "compare visits with each other"
+                f"{visit.name}: it answers {model.common.value:.3g} times as strongly as its labels predict: the "
+                "sensor file's transduction is not that of this unit (a nominal one, or not calibrated). The size of "
+                "this gain is no fault; compare visits with each other"
             )
         lines += [f"{visit.name}: {file} is left out: {reason}" for file, reason in visit.left_out]
         if visit.label_remark:

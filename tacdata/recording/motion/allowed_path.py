@@ -13,6 +13,8 @@ from tacdata.recording.motion.trapezoid import AxisLimits, Trapezoid
 
 TOLERANCE = 0.05
 """Distance from the path that is still on it [mm], beyond the resolution of a report."""
+AT_REST = 0.01
+"""Distance from an end of a move at which an idle guide still stands there [mm], beyond the resolution of a report."""
 EARLY = (1.05, 0.05)
 """By how much a move may seem to run ahead: this many times the time since it was sent, and so much more [s]. A
 controller's own clock is good to a per cent; a move whose feed was damaged on the line runs far ahead."""
@@ -203,7 +205,7 @@ class AllowedPath:
         if status.state != "Idle" or leg.expected_ns is None or leg.ended_ns is not None:
             return False
         ends = leg.profile.start, leg.profile.target
-        return min(float(np.linalg.norm(status.position - end)) for end in ends) > self._tolerance
+        return min(float(np.linalg.norm(status.position - end)) for end in ends) > self._tolerance - TOLERANCE + AT_REST
 
     def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
         """Return the distance of a report from the move [mm], and whether it is farther along than time allows."""

@@ -36,7 +36,7 @@ def streams(path):
     return np.diff(episode.taxels.arrival_ns).max() / SECOND, np.diff(episode.cnc.sample_ns).max() / SECOND
 
 
-@pytest.mark.parametrize("at", [0.6, 4.5, RELEASING])
+@pytest.mark.parametrize("at", [0.6, 5.0, 7.2, RELEASING])
 @pytest.mark.parametrize("firmware", ["Grbl", "grblHAL"])
 def test_a_queue_that_was_dropped_is_no_override(tmp_path, firmware, at):
     world = World(5, tmp_path / "session", presses=1, firmware=firmware)
