@@ -136,7 +136,8 @@ class GuardedProbe(Probe):
             return False
         self._retried = True
         self._motion.lift(self._height, LIFT_SPEED)
-        if not self._motion.lifted:
+        # A stream may have failed during the lift.
+        if not self._motion.lifted or self._streams.fault:
             return False
         self._say(f"{error.given}; the indenter was lifted, and the way is tried once more")
         self._position, self.stopped = self._motion.go_on(), False

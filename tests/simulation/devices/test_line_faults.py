@@ -80,6 +80,34 @@ def test_a_way_of_the_registration_is_tried_once_more(tmp_path, lost, done):
     assert sum("tried once more" in words for words in world.said) == 1
 
 
+def test_no_way_is_tried_again_after_a_stream_failed_in_the_lift(tmp_path):
+    world = World(6, tmp_path / "session")
+    low, high = (ORIGIN[0], ORIGIN[1], ORIGIN[2] - 0.5), ORIGIN[2] + 5.0
+    rig = world.rig()
+    devices = RigDevices.of(rig)
+
+    def unplugging(line):
+        if f"Z{high:.4f}" in line:
+            world.board_line.close()
+        return line
+
+    def work():
+        with devices.opened(), guarded_probe(rig, devices, high, 5.0, say=world.said.append) as probe:
+            probe.go(low, 2.0)
+            losing(world, 1)
+            world.controller.inject_wire(to_controller=unplugging)
+            for _ in range(6):
+                probe.go((*low[:2], low[2] + 0.3), 2.0)
+                probe.go(low, 2.0)
+
+    with pytest.raises(DeviceError):
+        world.computer.run(work)
+    assert not world.board_line.plugged
+    world.end()
+    assert not any("tried once more" in words for words in world.said)
+    assert world.position()[2] == pytest.approx(high, abs=0.01)
+
+
 def deeper(line):
     """One digit is another: 10 mm deeper."""
     return re.sub(r"Z-(\d)", lambda match: f"Z-{int(match[1]) + 1}", line, count=1)
