@@ -129,6 +129,7 @@ def test_kill_9_in_mid_press_loses_less_than_a_second_and_the_session_goes_on(be
     child = subprocess.Popen(bench, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     # The touch that proves the zero goes as deep, before any file is open.
     while height(virtual) > -0.2 or not list(out.glob("*.partial.mcap")):
+        assert child.poll() is None, "it ended by itself"
         time.sleep(0.002)
     time.sleep(0.7)  # the first chunk is on disk half a second after the file was opened, later on a busy machine
     killed_ns = virtual.clock.now_ns()
