@@ -181,7 +181,7 @@ class ReplayCurves:
         self._now = axes.axvline(0.0, color="black", linewidth=1)
         self._lost = axes.axvspan(replay.decided, replay.time[-1], color="crimson", alpha=0.12, visible=False)
         self._word = axes.text(
-            replay.decided, 0.8 * limit, " lost", fontsize=8, color="crimson", visible=False, clip_on=True
+            replay.decided, 0.6 * limit, " lost", fontsize=8, color="crimson", visible=False, clip_on=True
         )
 
     def show(self, time: float) -> None:
