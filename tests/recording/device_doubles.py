@@ -26,7 +26,7 @@ class Controller(MotionController):
         super().__init__(clock)
         self.calls, self.refuses, self.fault_at, self.on_fault = [], False, None, None
         self._at, self._move, self._begin, self._until = np.array(at, float), None, 0, 0
-        self._told, self._reset = 0, threading.Event()
+        self._told, self._reset, self._held = 0, threading.Event(), False
         self._lock = threading.RLock()
 
     def describe(self):
@@ -96,22 +96,26 @@ class Controller(MotionController):
             return []
         self._told = now
         position = np.round(self.position(), 3)
-        return [CncStatus(now, self.clock.now_ns(), "Idle", position, 0.0)]
+        move = self._move
+        moves = move is not None and not np.allclose(position, move.target, atol=1e-3)
+        state = "Hold:0" if self._held else "Run" if moves else "Idle"
+        return [CncStatus(now, self.clock.now_ns(), state, position, 0.0)]
 
     def feed_hold(self):
         with self._lock:
-            self._at, self._move = self.position(), None
+            self._at, self._move, self._held = self.position(), None, True
         self.calls.append("feed_hold")
         self._reset.set()
 
     def resume(self):
         self.calls.append("resume")
+        self._held = False
 
     def abandon(self):
         self.calls.append("abandon")
         if self.refuses:
             raise DeviceError("the controller does not obey", "one that does", "free it by hand")
-        self._until = 0
+        self._until, self._held = 0, False
         self._reset.set()
         x, y, z = self.position().tolist()
         return x, y, z
