@@ -32,7 +32,7 @@ class CncStatus:
     arrival_ns: int
     """Host time at which the answer was complete [ns]."""
     state: str
-    """Controller state as it names it, for example "Run", "Idle", "Hold:0", "Alarm"."""
+    """Controller state as it names it, for example "Run", "Hold:0", "Alarm"; "Idle" only at rest."""
     position: np.ndarray
     """Machine position [mm], shape (3,)."""
     feed: float

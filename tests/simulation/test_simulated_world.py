@@ -134,6 +134,8 @@ def test_what_must_hold_of_every_run_holds(seed):
         (1339, ()),  # a lift that was interrupted moved on after the end: "it stands somewhere on it"
         (1593, ()),  # a board pulled out while its reader did not run: no fault of the recorder
         (5582, ()),  # a board that freezes twice shows another reading once: no fault of the recorder
+        (2347, ()),  # told that the zero was lost, the person did not find it: no fault of the recorder
+        (2594, ()),  # a board pulled out in a lift: the way of the registration was tried again all the same
     ],
 )
 def test_seeds_that_once_failed(seed, kinds):
