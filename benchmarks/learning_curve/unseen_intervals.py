@@ -16,7 +16,7 @@ import numpy as np
 import run
 
 from tacdata.training.frames.windows import Windows
-from tacdata.training.inference.predictor import predict
+from tacdata.training.inference.predictor import deviations, predict
 from tacdata.training.metrics import conformal_intervals
 from tacdata.training.metrics.conformal_intervals import ConformalIntervals, reliability
 from tacdata.training.pretraining.cross_fit import fit
@@ -30,12 +30,14 @@ EVERY = 5
 
 def coverage(intervals: ConformalIntervals, network, frames, numbers: tuple[int, ...]) -> dict[str, float]:
     """Return the share of errors inside the 68, 90 and 95 % intervals, and the width of the first [mm]."""
-    windows, maps, labels = Windows(frames, network.offsets), [], []
+    windows, maps, labels, spreads = Windows(frames, network.offsets), [], [], []
     for number in numbers:
         chosen = frames.indices((number,))[::EVERY]
         maps.append(predict(network, windows, chosen, frames.sensor.map.depth_max))
         labels.append(np.clip(frames.depth[chosen], 0.0, frames.sensor.map.depth_max))
-    rows = {row["level"]: row for row in reliability(intervals, maps, labels, frames.sensor.map.pixel_pitch)}
+        spreads.append(deviations(network, windows, chosen))
+    levels = reliability(intervals, maps, labels, frames.sensor.map.pixel_pitch, spreads)
+    rows = {row["level"]: row for row in levels}
     return {
         **{f"{level:g}": rows[level]["inside"] for level in (0.68, 0.9, 0.95)},
         "width": rows[0.68]["mean_width_mm"],

@@ -23,7 +23,7 @@ from tacdata.errors import FormatError, UsageError
 from tacdata.paths import StrPath
 from tacdata.sensor import Sensor
 from tacdata.training.frames.channel_calibration import ChannelCalibration
-from tacdata.training.frames.peak_regression import PeakRegression
+from tacdata.training.frames.peak_process import PeakProcess
 from tacdata.training.networks.network import Network, create
 from tacdata.training.settings import TrainingSettings
 from tacdata.training.splits.split import Split
@@ -60,12 +60,6 @@ class Checkpoint:
         """How it turns readings into forces; None if it takes readings as they are."""
         document = self.document.get("calibration")
         return ChannelCalibration.from_document(document, self.sensor.taxels) if document else None
-
-    @property
-    def peak(self) -> PeakRegression | None:
-        """Correction of its maps' maxima; None without."""
-        document = self.document.get("peak")
-        return PeakRegression.from_document(document) if document else None
 
     @property
     def content_hash(self) -> str:
@@ -106,6 +100,8 @@ def save(path: Path, network: Network, optimizer: torch.optim.Optimizer | None, 
     documents.check(document, "checkpoint", str(path))
     # safetensors takes contiguous tensors only.
     tensors = {f"network.{k}": v.detach().cpu().contiguous() for k, v in network.state_dict().items()}
+    if isinstance(network.peak, PeakProcess):
+        tensors |= network.peak.tensors
     if optimizer is not None:
         for index, values in optimizer.state_dict()["state"].items():
             # The optimizer's moments, too: without them a resumed run takes other steps.
@@ -161,8 +157,14 @@ def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
         network.set_calibration(channel_calibration.gain, channel_calibration.exponent, channel_calibration.mixing)
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
     loaded = Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
-    if peak := loaded.peak:
-        network.set_peak(peak.mean, peak.scale, peak.weight)
+    if peak := document.get("peak"):
+        start = {k.removeprefix("origin."): v for k, v in tensors.items() if k.startswith("origin.")}
+        origin = create(network.name, sensor, network.arguments) if start else None
+        if origin:
+            origin.load_state_dict(start)
+            origin.set_normalization(mean, sd)
+            origin.requires_grad_(False).to(device).eval()
+        network.peak = PeakProcess.from_document(peak, tensors, sensor.taxels.centers, origin, device)
     return loaded
 
 

@@ -7,6 +7,7 @@ import time
 import numpy as np
 import torch
 
+from tacdata.training.frames.peak_process import PeakProcess
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference.compute import reproducible
 from tacdata.training.networks.network import Network
@@ -29,6 +30,15 @@ def predict(network: Network, windows: Windows, frames: np.ndarray, depth_max: f
         maps = network(windows.batch(batch)).clamp(0.0, 1.0) * depth_max
         result[start : start + BATCH] = maps.cpu().numpy()
     return result
+
+
+def deviations(network: Network, windows: Windows, frames: np.ndarray) -> np.ndarray | None:
+    """Return the deviation of the network's Gaussian process [1], shape (m,): larger away from the presses it knows.
+
+    None if the network has no such process (`training.frames.peak_process`).
+    """
+    process = network.peak
+    return process.answers(network, windows, frames)[1] if isinstance(process, PeakProcess) else None
 
 
 @torch.inference_mode()

@@ -10,13 +10,17 @@ predicted depth and by the depth's slope there. Conformal prediction (Angelopoul
    which such a share of them is.
 
 Whole episodes are left out, because frames of one press have correlated errors. The intervals hold for presses like
-those of validation. Outside the area that was pressed they are wider (`training.metrics.pressed_area`). Readings do not
-tell that a shape is new, so on unseen shapes less of the errors is inside. `training.pretraining.unseen_shapes`
-calibrates on shapes left out of training instead. `reliability` measures the share inside on the scored episodes.
+those of validation. Away from the presses that were learned from, they are wider: errors are divided by a power of the
+deviation of the network's Gaussian process (`training.frames.peak_process`) too. So the scores are normalized ones
+(H. Papadopoulos et al., Journal of Artificial Intelligence Research 40 (2011) 815).
+
+`training.pretraining.unseen_shapes` calibrates on shapes left out of training instead. `reliability` measures the share
+inside on the scored episodes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +30,6 @@ import numpy as np
 from tacdata import documents, provenance, schemas
 from tacdata.errors import FormatError, UsageError
 from tacdata.training.metrics.depth_maps import CONTACT_THRESHOLD
-from tacdata.training.metrics.pressed_area import PressedArea
 
 FILE = "spread.json"
 VALIDATION = "validation episodes"
@@ -41,6 +44,10 @@ LEAST = 200
 """Pixels that a cell needs for a deviation of its own."""
 NOT_KNOWN = 1e9
 """Factor where nothing is known: an interval that holds everything."""
+EXPONENT = 1.5
+"""Power of the Gaussian process's deviation in that of a pixel [1]; chosen on rigs 30 and 31 with 8 and 96 presses.
+
+Place and shape err with the maximum, so that a pixel's error grows faster than the maximum's."""
 FLOOR = 1e-4
 """Smallest deviation [mm]."""
 _PARTS = 40
@@ -59,8 +66,8 @@ class ConformalIntervals:
     """SHA-256 of the checkpoint that it belongs to."""
     source: str = VALIDATION
     """Calibration data, as a phrase."""
-    area: PressedArea | None = None
-    """Area that was pressed in training; None if it is not known: nothing is wider outside then."""
+    typical: float | None = None
+    """Median deviation of the Gaussian process on the calibration data in contact [1]; None without a process."""
 
     @property
     def definition(self) -> str:
@@ -70,17 +77,29 @@ class ConformalIntervals:
             "prediction"
         )
 
-    def sigma(self, depth: np.ndarray, pitch: float) -> np.ndarray:
+    def sigma(self, depth: np.ndarray, pitch: float, spread: np.ndarray | None = None) -> np.ndarray:
         """Return the standard deviation of each pixel [mm], same shape as ``depth``.
 
         Args:
             depth: Predicted maps [mm], shape (n, pixels_x, pixels_y).
             pitch: Distance of pixels [mm].
+            spread: Deviation of the network's Gaussian process [1], shape (n,) (`inference.predictor.deviations`).
+
+        Raises:
+            UsageError: If the intervals need the spread and there is none.
         """
         deviation = self.deviation[cells(depth, pitch)]
-        return deviation if self.area is None else deviation * self.area.widening(depth, pitch)[:, None, None]
+        if self.typical is None:
+            return deviation
+        if spread is None:
+            raise UsageError(
+                "maps without the deviation of the network's Gaussian process",
+                "one value a map: these intervals are scaled by it",
+                "take it from tacdata.training.inference.predictor.deviations",
+            )
+        return deviation * ((spread / self.typical) ** EXPONENT)[:, None, None]
 
-    def half_width(self, depth: np.ndarray, pitch: float, level: float) -> np.ndarray:
+    def half_width(self, depth: np.ndarray, pitch: float, level: float, spread: np.ndarray | None = None) -> np.ndarray:
         """Return half the width of a level's interval [mm], same shape as ``depth``.
 
         Raises:
@@ -88,7 +107,7 @@ class ConformalIntervals:
         """
         if level not in LEVELS:
             raise UsageError(f"level {level}", ", ".join(map(str, LEVELS)), "choose one of them")
-        return self.factors[LEVELS.index(level)] * self.sigma(depth, pitch)
+        return self.factors[LEVELS.index(level)] * self.sigma(depth, pitch, spread)
 
     @property
     def document(self) -> dict[str, Any]:
@@ -102,7 +121,7 @@ class ConformalIntervals:
             "deviation": self.deviation.tolist(),
             "levels": list(LEVELS),
             "factors": list(self.factors),
-            **({"pressed": {"low": list(self.area.low), "high": list(self.area.high)}} if self.area else {}),
+            **({"typical": self.typical} if self.typical is not None else {}),
             "provenance": provenance.stamp("training.metrics.conformal_intervals", {"checkpoint": self.checkpoint}, {}),
         }
 
@@ -119,7 +138,7 @@ def calibrate(
     pitch: float,
     checkpoint: str,
     source: str = VALIDATION,
-    area: PressedArea | None = None,
+    spreads: list[np.ndarray] | None = None,
 ) -> ConformalIntervals:
     """Calibrate on episodes that the network did not learn from.
 
@@ -129,7 +148,7 @@ def calibrate(
         pitch: Distance of pixels [mm].
         checkpoint: SHA-256 of the checkpoint.
         source: Description of the episodes.
-        area: Area that was pressed in training.
+        spreads: Deviations of the network's Gaussian process for each episode [1], shapes (n,); None without one.
 
     Raises:
         UsageError: If there are fewer than two episodes.
@@ -137,36 +156,43 @@ def calibrate(
     if len(maps) < 2:
         raise UsageError(f"{len(maps)} validation episodes", "two or more, to calibrate intervals", "record more")
     parts = np.arange(len(maps)) % min(len(maps), _PARTS)
-    episode_sums = [_sums(depth, label, pitch) for depth, label in zip(maps, labels, strict=True)]
+    masks = [_interesting(depth, label) for depth, label in zip(maps, labels, strict=True)]
+    typical, units = None, [np.ones(len(depth)) for depth in maps]
+    if spreads is not None:
+        touching = [s[mask.any(axis=(1, 2))] for s, mask in zip(spreads, masks, strict=True)]
+        typical = float(np.median(np.concatenate(touching))) if any(map(len, touching)) else 1.0
+        units = [(s / typical) ** EXPONENT for s in spreads]
+    episode_sums = [_sums(*episode, pitch) for episode in zip(maps, labels, units, strict=True)]
     sums = [
         np.sum([episode_sum for episode_sum, at in zip(episode_sums, parts, strict=True) if at == part], axis=0)
         for part in range(parts.max() + 1)
     ]
     total = np.sum(sums, axis=0)
     deviation, quotients = _filled(*total), []
-    for depth, label, part in zip(maps, labels, parts, strict=True):
+    for k, (depth, mask) in enumerate(zip(maps, masks, strict=True)):
         # Each press is judged by deviations of the others: by its own, intervals would be too narrow.
-        remaining = ConformalIntervals(_filled(*(total - sums[part])), (), checkpoint, source, area)
-        mask = _interesting(depth, label)
-        quotients.append(np.abs(depth - label)[mask] / remaining.sigma(depth, pitch)[mask])
+        sigma = _filled(*(total - sums[parts[k]]))[cells(depth, pitch)] * units[k][:, None, None]
+        quotients.append((np.abs(depth - labels[k]) / sigma)[mask])
     together = np.concatenate(quotients)
-    if not len(together):
-        # Nothing touched: there is nothing to calibrate on, and the widest claim is the honest one.
-        return ConformalIntervals(deviation, (NOT_KNOWN,) * len(LEVELS), checkpoint, source, area)
-    factors = tuple(float(q) for q in np.quantile(together, LEVELS))
-    return ConformalIntervals(deviation, factors, checkpoint, source, area)
+    # Where nothing touched there is nothing to calibrate on, and the widest claim is the honest one.
+    factors = tuple(float(q) for q in np.quantile(together, LEVELS)) if len(together) else (NOT_KNOWN,) * len(LEVELS)
+    return ConformalIntervals(deviation, factors, checkpoint, source, typical)
 
 
-def _sums(depth: np.ndarray, label: np.ndarray, pitch: float) -> np.ndarray:
-    """Return the squared errors [mm^2] and the number of pixels of each cell, shape (2, depths, slopes)."""
+def _sums(depth: np.ndarray, label: np.ndarray, unit: np.ndarray, pitch: float) -> np.ndarray:
+    """Return the squared errors over ``unit`` (n,) [mm^2] and the pixels of each cell, shape (2, depths, slopes)."""
     shape = (len(DEPTHS) + 1, len(SLOPES) + 1)
     place = np.ravel_multi_index(cells(depth, pitch), shape).reshape(-1)
-    error = (depth - label).astype(np.float64).reshape(-1)
+    error = ((depth - label).astype(np.float64) / unit[:, None, None]).reshape(-1)
     return np.stack([np.bincount(place, w, minlength=shape[0] * shape[1]).reshape(shape) for w in (error**2, None)])
 
 
 def reliability(
-    intervals: ConformalIntervals, maps: list[np.ndarray], labels: list[np.ndarray], pitch: float
+    intervals: ConformalIntervals,
+    maps: list[np.ndarray],
+    labels: list[np.ndarray],
+    pitch: float,
+    spreads: Sequence[np.ndarray | None] | None = None,
 ) -> list[dict[str, float | int]]:
     """Return for each level the share of errors inside its interval, over pixels in contact in label or prediction.
 
@@ -175,11 +201,12 @@ def reliability(
         maps: Predicted maps of each episode [mm], shape (n, pixels_x, pixels_y).
         labels: Their labels [mm], same shapes.
         pitch: Distance of pixels [mm].
+        spreads: Deviations of the network's Gaussian process for each episode [1], shapes (n,); None without one.
     """
     inside, width, total = np.zeros(len(LEVELS)), np.zeros(len(LEVELS)), 0
-    for depth, label in zip(maps, labels, strict=True):
+    for depth, label, spread in zip(maps, labels, spreads or [None] * len(maps), strict=True):
         mask = _interesting(depth, label)
-        sigma, error = intervals.sigma(depth, pitch)[mask], np.abs(depth - label)[mask]
+        sigma, error = intervals.sigma(depth, pitch, spread)[mask], np.abs(depth - label)[mask]
         for k, factor in enumerate(intervals.factors):
             inside[k] += (error <= factor * sigma).sum()
             width[k] += (2 * factor * sigma).sum()
@@ -217,10 +244,8 @@ def read(run: Path, checkpoint: str) -> ConformalIntervals | None:
         raise FormatError(f"{path}: cells of another release", "cells of this release", "remove it and train again")
     if document["checkpoint"] != checkpoint:
         return None
-    pressed = document.get("pressed")
-    area = PressedArea(tuple(pressed["low"]), tuple(pressed["high"])) if pressed else None
     source = document.get("calibrated_on", VALIDATION)
-    return ConformalIntervals(deviation, tuple(document["factors"]), checkpoint, source, area)
+    return ConformalIntervals(deviation, tuple(document["factors"]), checkpoint, source, document.get("typical"))
 
 
 def _interesting(depth: np.ndarray, label: np.ndarray) -> np.ndarray:

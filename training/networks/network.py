@@ -8,7 +8,8 @@ and implements `estimate`. Every size must follow from the sensor's, so that ano
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import torch
@@ -21,14 +22,18 @@ from tacdata.sensor import Sensor
 ROOM, BASE = "tacdata.training.networks", "network"
 CALIBRATION_UNIT = 1000.0
 """Reading at which a calibrated channel's force is its gain [counts]."""
-SHALLOW = 0.01
-"""Maximum of a map over D_max below which it is not corrected [1]: 0.03 mm at D_max = 3 mm."""
-EDGE = 1 / 30
-"""Depth over D_max from which a pixel counts as in contact [1]: 0.1 mm at D_max = 3 mm."""
-FARTHEST = 0.4
-"""Largest correction of a maximum, in its logarithm [1]."""
-_BEYOND = 3.0
-"""Standard deviations beyond which a feature is not extrapolated [1]."""
+
+
+class Correction(Protocol):
+    """Change of a network's maps by what presses of the unit show."""
+
+    def corrected(self, depth: torch.Tensor, signals: torch.Tensor, network: Network) -> torch.Tensor:
+        """Return maps over D_max from maps and the output of `Network.calibrated`."""
+        ...
+
+    def moved(self, change: Callable[[torch.Tensor], torch.Tensor]) -> Correction:
+        """Return the correction with each tensor changed: another device or precision."""
+        ...
 
 
 class Network(nn.Module, ABC):
@@ -51,8 +56,8 @@ class Network(nn.Module, ABC):
         self.register_buffer("mixing", torch.eye(taxels), persistent=False)
         self.is_calibrated = False
         """Whether readings are turned into forces before anything else."""
-        self.peak: tuple[torch.Tensor, torch.Tensor, torch.Tensor] | None = None
-        """Mean and deviation of `peak_features` and the coefficients of the maximum's correction; None without."""
+        self.peak: Correction | None = None
+        """Correction of each map's maximum (`training.frames.peak_process`); None without."""
 
     @property
     def name(self) -> str:
@@ -78,27 +83,17 @@ class Network(nn.Module, ABC):
         self.get_buffer("exponent").fill_(exponent)
         self.is_calibrated = True
 
-    def set_peak(self, mean: np.ndarray, scale: np.ndarray, weight: np.ndarray) -> None:
-        """Correct the maximum of each map from now on (`training.frames.peak_regression`)."""
-        place = self.get_buffer("mean").device
-        mean_, scale_, weight_ = (torch.as_tensor(v, dtype=torch.float32, device=place) for v in (mean, scale, weight))
-        self.peak = mean_, scale_, weight_
+    def _apply(self, fn: Callable[[torch.Tensor], torch.Tensor], recurse: bool = True) -> Network:
+        # The correction is no module, as its values are not trained: it moves with the weights here.
+        if self.peak is not None:
+            self.peak = self.peak.moved(fn)
+        return super()._apply(fn, recurse)
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
         """Return depth maps over D_max, not clipped; (b, T, taxels) [counts] -> (b, pixels_x, pixels_y)."""
         signals = self.calibrated(windows)
         depth = self.respond(signals)
-        if self.peak is None:
-            return depth
-        mean, scale, weight = (values.to(depth.device) for values in self.peak)
-        features, largest = peak_features(depth, signals, self)
-        # Beyond the presses of the fit a straight line is no guide; it is held at its end.
-        standard = ((features - mean) / scale).clamp(-_BEYOND, _BEYOND)
-        ratio = (weight[0] + standard @ weight[1:]).clamp(-FARTHEST, FARTHEST).exp()
-        ratio = torch.where(largest > SHALLOW, ratio, torch.ones_like(ratio))
-        # In proportion to the depth: the maximum takes all of the correction, the region's edge nearly none.
-        share = depth.clamp(min=0.0) / largest[:, None, None]
-        return depth * (1.0 + (ratio[:, None, None] - 1.0) * share)
+        return depth if self.peak is None else self.peak.corrected(depth, signals, self)
 
     def calibrated(self, windows: torch.Tensor) -> torch.Tensor:
         """Return forces [N] for readings [counts], (b, T, taxels); the readings where there is no calibration."""
@@ -115,30 +110,6 @@ class Network(nn.Module, ABC):
     @abstractmethod
     def estimate(self, signals: torch.Tensor) -> torch.Tensor:
         """Return maps over D_max from standardized windows; (b, T, taxels) -> (b, pixels_x, pixels_y)."""
-
-
-def peak_features(depth: torch.Tensor, signals: torch.Tensor, network: Network) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return quantities of map and loads on which a maximum's error depends (b, features), and the maxima (b,).
-
-    Depth, region and load of a contact, how the load is shared between taxels, and how it changes with time.
-
-    Args:
-        depth: Maps over D_max, shape (b, pixels_x, pixels_y).
-        signals: Output of `Network.calibrated`, shape (b, T, taxels).
-        network: The network, for the scale of its signals and its window.
-    """
-    largest = depth.amax(dim=(1, 2)).clamp(min=SHALLOW)
-    size = signals.abs() / network.get_buffer("sd").square().mean().sqrt()
-    newest, oldest = size[:, network.offsets.index(0)], size[:, 0].sum(dim=1).clamp(min=1e-3)
-    total = newest.sum(dim=1).clamp(min=1e-3)
-    area = (depth > EDGE).float().sum(dim=(1, 2)) + 1.0
-    half = (depth > 0.5 * largest[:, None, None]).float().sum(dim=(1, 2)) + 1.0
-    deep, load = largest.log(), total.log()
-    concentration = (newest.topk(4, dim=1).values.sum(dim=1) / total).clamp(min=1e-3).log()
-    # Loading or unloading: a relaxing skin has two depths for one reading.
-    change = (total / oldest).log().clamp(-2.0, 2.0)
-    products = [deep**2, load**2, deep * load, concentration * deep, concentration * load]
-    return torch.stack([deep, load, area.log(), half.log(), change, concentration, *products], dim=1), largest
 
 
 class ResidualLayers(nn.ModuleList):

@@ -153,7 +153,12 @@ def fit(
             document["calibration"] = fitted.document
         # Intervals come from members and the presses that they never saw.
         held_out = [
-            HeldOut(between(pretrained.network, [end], share, end), member.split.train, member.split.validation)
+            HeldOut(
+                between(pretrained.network, [end], share, end),
+                member.split.train,
+                member.split.validation,
+                shape_groups is not None,
+            )
             for end, member in zip(ends, members, strict=True)
         ]
         best = Checkpoint(out / checkpoint.BEST, document, network, members[0].sensor, {})

@@ -17,7 +17,7 @@ from tacdata.training.frames.trials import at_full_depth
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference.checkpoint import Checkpoint
 from tacdata.training.inference.compute import choose_device, reproducible
-from tacdata.training.inference.predictor import milliseconds_per_frame, predict
+from tacdata.training.inference.predictor import deviations, milliseconds_per_frame, predict
 from tacdata.training.metrics import conformal_intervals, depth_maps, physical
 from tacdata.training.metrics.depth_maps import FrameScores
 from tacdata.training.metrics.physical import PressScore
@@ -283,10 +283,15 @@ def _uncertainty(
 ) -> dict[str, Any]:
     """Return the share of errors in each interval; empty if the run was not calibrated."""
     intervals = conformal_intervals.read(trained.path.parent, identity)
-    if intervals is None:
+    scaled = intervals is not None and intervals.typical is not None
+    # Intervals that a process scales are those of the network with it alone.
+    if intervals is None or (scaled and trained.network.peak is None):
         return {}
     maps, labels = ([getattr(e, name)[e.valid] for e in episodes] for name in ("depth", "label"))
-    levels = conformal_intervals.reliability(intervals, maps, labels, frames.sensor.map.pixel_pitch)
+    windows = Windows(frames, trained.network.offsets, trained.network.get_buffer("mean").device)
+    rows = [np.arange(e.span.start, e.span.stop)[e.valid] for e in episodes]
+    spreads = [deviations(trained.network, windows, chosen) for chosen in rows] if scaled else None
+    levels = conformal_intervals.reliability(intervals, maps, labels, frames.sensor.map.pixel_pitch, spreads)
     return {"uncertainty": {"definition": intervals.definition, "levels": levels}}
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from tacdata.errors import FormatError, UsageError
 from tacdata.training.metrics import conformal_intervals
-from tacdata.training.metrics.conformal_intervals import LEVELS, calibrate, reliability
+from tacdata.training.metrics.conformal_intervals import EXPONENT, LEVELS, calibrate, reliability
 
 PITCH = 0.4
 
@@ -89,3 +89,26 @@ def test_intervals_say_what_they_were_calibrated_on(tmp_path):
     conformal_intervals.write(tmp_path, known)
     again = conformal_intervals.read(tmp_path, "a" * 64)
     assert again.source == "presses of another kind" and again.source in again.definition
+
+
+def test_intervals_widen_with_the_deviation_of_the_process(tmp_path):
+    rng = np.random.default_rng(3)
+    maps, labels = episodes(20, 0)
+    spreads = [rng.uniform(0.5, 2.0, len(depth)) for depth in maps]
+    scattered = [
+        m + (label - m) * s[:, None, None] ** EXPONENT for m, label, s in zip(maps, labels, spreads, strict=True)
+    ]
+    known = calibrate(maps, scattered, PITCH, "a" * 64, spreads=spreads)
+    conformal_intervals.write(tmp_path, known)
+    again = conformal_intervals.read(tmp_path, "a" * 64)
+    near, far = (again.half_width(maps[0], PITCH, 0.68, np.full(len(maps[0]), s)) for s in (0.5, 2.0))
+    np.testing.assert_allclose(far, 4.0**EXPONENT * near)
+    # Among frames of large deviation alone, an interval of one width for all would hold too few errors.
+    wide = [np.flatnonzero(spread > 1.6) for spread in spreads]
+    picked = [[part[k] for part, k in zip(parts, wide, strict=True)] for parts in (maps, scattered, spreads)]
+    level = conformal_intervals.LEVELS.index(0.68)
+    inside = reliability(known, *picked[:2], PITCH, picked[2])[level]["inside"]
+    plain = reliability(calibrate(maps, scattered, PITCH, "a" * 64), *picked[:2], PITCH)[level]["inside"]
+    assert inside == pytest.approx(0.68, abs=0.06) and plain < 0.55
+    with pytest.raises(UsageError, match="deviation of the network's Gaussian process"):
+        again.sigma(maps[0], PITCH)

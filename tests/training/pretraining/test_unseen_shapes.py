@@ -37,13 +37,17 @@ def test_intervals_hold_what_networks_without_the_shape_err(odd, tmp_path):
         assert not shapes["train"] & shapes["test"]
         assert not set(division.test) & set(run.split.test), "what is scored calibrates nothing"
     from tacdata.training.frames.windows import Windows
-    from tacdata.training.inference.predictor import predict
+    from tacdata.training.inference.predictor import deviations, predict
 
     spans = odd.spans(run.split.test)
     windows = Windows(odd, run.network.offsets)
-    maps = [predict(run.network, windows, np.arange(s.start, s.stop), 3.0) for s in spans]
+    chosen = [np.arange(s.start, s.stop) for s in spans]
+    maps = [predict(run.network, windows, rows, 3.0) for rows in chosen]
+    spreads = [deviations(run.network, windows, rows) for rows in chosen]
     labels = [odd.depth[s.start : s.stop] for s in spans]
-    share = [{e["level"]: e["inside"] for e in reliability(k, maps, labels, 0.4)}[0.9] for k in (before, after)]
+    share = [
+        {e["level"]: e["inside"] for e in reliability(k, maps, labels, 0.4, spreads)}[0.9] for k in (before, after)
+    ]
     assert share[1] > share[0] + 0.05
 
 
