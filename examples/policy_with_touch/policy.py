@@ -1,6 +1,6 @@
 """ACT policies of LeRobot with touch and without, trained on the same demonstrations, tried on the same oranges.
 
-python examples/policy_with_touch/policy.py FOLDER [--camera 3] [--episodes 300] [--steps 3000] [--trials 40]
+python examples/policy_with_touch/policy.py FOLDER [--camera 3] [--episodes 300] [--steps 2000] [--trials 40]
 """
 
 import argparse
@@ -34,6 +34,12 @@ ACT = {
     "push_to_hub": False,
 }
 """Options of `lerobot-train --policy.type=act`."""
+SCRIPTED = {
+    "raw taxels, scripted": lambda trial: scene.by_touch(trial, "raw_taxel"),
+    "camera alone, scripted": lambda _: scene.by_camera,
+    "true place, scripted": scene.by_place,
+}
+"""Controllers that were not trained: the demonstrator, and two limits."""
 BATCH, CLIP = 32, 10.0
 """Frames of a step [count]; norm to which gradients are clipped, as LeRobot does."""
 
@@ -89,8 +95,7 @@ def trials(world: scene.World, count: int, seed: int, arms: dict[str, Path | Non
             trial = scene.Trial(world, (seed, number))
             if policy is not None:
                 policy.reset()
-            own = scene.by_camera if name == "camera alone, scripted" else scene.by_touch(trial, "raw_taxel")
-            held, steps, _ = scene.run(trial, controller or own)
+            held, steps, _ = scene.run(trial, controller or SCRIPTED[name](trial))
             results[name].append((held, steps, trial.place - trial.arm))
     return results
 
@@ -113,25 +118,26 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--camera", type=float, default=3.0, help="camera's error [mm]")
     parser.add_argument("--episodes", type=int, default=300)
-    parser.add_argument("--steps", type=int, default=3000)
+    parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--trials", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     torch.set_num_threads(1)
     world = scene.World(given.camera)
-    episodes = scene.demonstrate(world, given.episodes, given.seed)
+    episodes: list[dict[str, np.ndarray]] = []
     arms: dict[str, Path | None] = {}
     for touch in (True, False):
         name = f"{'with' if touch else 'without'} touch"
         root, out = (given.folder / f"{kind}_{name.replace(' ', '_')}" for kind in ("dataset", "policy"))
         begun = time.process_time()
         if not root.exists():
+            episodes = episodes or scene.demonstrate(world, given.episodes, given.seed)
             scene.write(root, episodes, touch, world.sensor.taxels.count)
         if not out.exists():
             train(root, out, given.steps, given.seed)
             print(f"policy {name}: {time.process_time() - begun:.0f} s of the processor")
         arms[f"ACT {name}"] = out
-    arms |= {"raw taxels, scripted": None, "camera alone, scripted": None}
+    arms |= dict.fromkeys(SCRIPTED)
     # Seeds of the trials begin far from those of the demonstrations.
     results = trials(world, given.trials, given.seed + 1000, arms)
     print("\n".join(table(results)))
