@@ -13,8 +13,6 @@ from tacdata.recording.motion.trapezoid import AxisLimits, Trapezoid
 
 TOLERANCE = 0.05
 """Distance from the path that is still on it [mm], beyond the resolution of a report."""
-AT_REST = 0.01
-"""Distance from an end of a move at which an idle guide still stands there [mm], beyond the resolution of a report."""
 EARLY = (1.05, 0.05)
 """By how much a move may seem to run ahead: this many times the time since it was sent, and so much more [s]. A
 controller's own clock is good to a per cent; a move whose feed was damaged on the line runs far ahead."""
@@ -133,8 +131,6 @@ class AllowedPath:
             deviation, is_ahead = self._distance(leg, asked_ns, status)
             # One move that explains the report is enough: the guide may be in any of those sent.
             if deviation <= self._tolerance and not is_ahead:
-                if self._is_dropped(leg, status):
-                    return _dropped(leg, status)
                 if not self._is_behind(leg, asked_ns, status):
                     self._seen = status
                     return None
@@ -199,13 +195,6 @@ class AllowedPath:
     def _is_behind(self, leg: _Leg, asked_ns: int, status: CncStatus) -> bool:
         deviation = float(np.linalg.norm(status.position - leg.profile.target))
         return leg.due_ns is not None and leg.due_ns < asked_ns and deviation > self._tolerance
-
-    def _is_dropped(self, leg: _Leg, status: CncStatus) -> bool:
-        """Whether the controller is idle in the middle of a move that it accepted and that nothing says has ended."""
-        if status.state != "Idle" or leg.expected_ns is None or leg.ended_ns is not None:
-            return False
-        ends = leg.profile.start, leg.profile.target
-        return min(float(np.linalg.norm(status.position - end)) for end in ends) > self._tolerance - TOLERANCE + AT_REST
 
     def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
         """Return the distance of a report from the move [mm], and whether it is farther along than time allows."""

@@ -8,10 +8,10 @@ from simulated_run import Run
 
 from tacdata.recording.files.reader import read_recording
 
-PRESSING, RELEASING = 7.0, 9.0
+PRESSING, RELEASING = 7.0, 8.5
 """Times at which the tip is on its way into the skin, and out [s]."""
-TOLD = 0.5
-"""Time in which a dropped move is told [s]: the interval of two reports, and their way."""
+TOLD = 4.5
+"""Time in which a dropped move is told [s]: its duration and a third, and a second more."""
 SILENT = 3.2
 """Time in which a silent device is told [s]."""
 FRAME, REPORT = 0.06, 0.3
@@ -36,7 +36,7 @@ def streams(path):
     return np.diff(episode.taxels.arrival_ns).max() / SECOND, np.diff(episode.cnc.sample_ns).max() / SECOND
 
 
-@pytest.mark.parametrize("at", [0.6, 5.0, 7.2, RELEASING])
+@pytest.mark.parametrize("at", [0.6, 7.2, RELEASING])
 @pytest.mark.parametrize("firmware", ["Grbl", "grblHAL"])
 def test_a_queue_that_was_dropped_is_no_override(tmp_path, firmware, at):
     world = World(5, tmp_path / "session", presses=1, firmware=firmware)
