@@ -169,23 +169,22 @@ def slip_lags(values: np.ndarray, widths: np.ndarray, anew: np.ndarray) -> np.nd
     return np.stack([play(values, width, anew) + width - values for width in widths.tolist()])
 
 
-def slipping(values: np.ndarray, width: float, first: np.ndarray) -> np.ndarray:
-    """Return z of dz = (1 - z sgn du) du / w: -1 to 1 as an input rises by far more than ``width``, shape (n,).
+def slipping(values: np.ndarray, width: float, start: np.ndarray, gap: float = 0.0, power: float = 1.0) -> np.ndarray:
+    """Return z of w dz/du = |1 - z sgn u'|^p, from -1 to 1, behind a gap, shape (n,).
 
-    Exact between rows, as u is monotone there: z_i = s + (z_{i-1} - s) exp(-|du| / w), s the sign of du.
+    The gap is in series: it is crossed, with z = 0, between the fall of z and its rise. Exact between rows, as u is
+    monotone there.
 
     Args:
         values: Input u, shape (n,).
-        width: Of the turn, in the input's unit, above 0.
-        first: Rows at which z is reset to -1, shape (n,), bool.
+        width: w of the turn, in the input's unit, above 0.
+        start: z where it is set, NaN at all other rows, shape (n,); the first row's is.
+        gap: Its width, in the input's unit.
+        power: p: at 0 an element sticks until it slips (Jenkins), at 1 it yields gradually (Dahl) [1].
     """
-    from tacdata.chain.memory_kernels import filtered
+    from tacdata.chain.memory_kernels import slipped
 
-    change = np.where(first, 0.0, np.diff(values, prepend=values[:1]))
-    keep = np.where(first, 0.0, np.exp(-np.abs(change) / width))
-    toward = np.where(first, -1.0, np.sign(change))
-    # Shifted by 1, as the filter starts at 0 and z at -1.
-    return filtered(_wide(toward + 1.0), keep[:, None], keep[:, None], np.ones(1)).reshape(values.shape) - 1.0
+    return slipped(np.asarray(values, dtype=float) / width, gap / width, power, start)
 
 
 def _wide(values: np.ndarray) -> np.ndarray:

@@ -46,6 +46,49 @@ def _play(
                 result[i, j] = wp.max(u - width, wp.min(u + width, result[i - 1, j]))
 
 
+@wp.func
+def _rest(below: wp.float64, way: wp.float64, power: wp.float64):
+    """Return y at the end of a way by dy/du = -y^p, y first ``below``."""
+    q = wp.float64(1.0) - power
+    if wp.abs(q) < wp.float64(1e-6):
+        return below * wp.exp(-way)
+    return wp.pow(wp.max(wp.pow(below, q) - q * way, wp.float64(0.0)), wp.float64(1.0) / q)
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def _slip(
+    values: wp.array(dtype=wp.float64),
+    gap: wp.float64,
+    power: wp.float64,
+    start: wp.array(dtype=wp.float64),
+    result: wp.array(dtype=wp.float64),
+):
+    none, one = wp.float64(0.0), wp.float64(1.0)
+    turn, crossed = wp.float64(0.0), wp.float64(0.0)
+    for i in range(values.shape[0]):
+        if i == 0 or not wp.isnan(start[i]):
+            turn = wp.float64(start[i])
+            crossed = wp.float64(0.5) * (one + turn) * gap
+        else:
+            way = values[i] - values[i - 1]
+            sign = wp.where(way < none, -one, one)
+            left, below = wp.abs(way), one - sign * turn
+            # The force of the other direction goes first, then the gap is crossed, then the force rises.
+            if below > one:
+                q = one - power
+                fall = wp.log(below)
+                if wp.abs(q) > wp.float64(1e-6):
+                    fall = (wp.pow(below, q) - one) / q
+                below = wp.where(left < fall, _rest(below, left, power), one)
+                left = wp.max(left - fall, none)
+            if left > none:
+                free = wp.min(left, wp.where(sign > none, gap - crossed, crossed))
+                crossed += sign * free
+                below = _rest(below, left - free, power)
+            turn = sign * (one - below)
+        result[i] = turn
+
+
 @wp.kernel(module="unique", enable_backward=False)
 def _between(
     values: wp.array2d(dtype=wp.float64),
@@ -106,6 +149,22 @@ def played(values: np.ndarray, width: float, anew: np.ndarray) -> np.ndarray:
     if len(values):
         forgets = wp.array(np.ascontiguousarray(anew, dtype=np.int8), dtype=wp.int8, device="cpu", copy=False)
         wp.launch(_play, 1, [_shared(values), wp.float64(width), forgets, _shared(result)], device="cpu")
+    return result
+
+
+def slipped(values: np.ndarray, gap: float, power: float, start: np.ndarray) -> np.ndarray:
+    """Return z, -1 to 1, of a friction behind a gap, shape (n,).
+
+    Args:
+        values: u over the way of the turn, shape (n,), float64.
+        gap: Over that way.
+        power: p of dz/du = |1 - z sgn u'|^p, 0 or more.
+        start: z where it is set, NaN at all other rows, shape (n,), float64; the first row's is.
+    """
+    result = np.empty(len(values))
+    if len(values):
+        arguments = [_shared(values), wp.float64(gap), wp.float64(power), _shared(start), _shared(result)]
+        wp.launch(_slip, 1, arguments, device="cpu")
     return result
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tacdata.chain.memory import play, slipping
+from tacdata.chain.memory import slipping
 from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values, Whole
 
 FEW = 4
@@ -47,7 +47,8 @@ class DryFriction(Effect):
         course = state.course
         way = max(float(values["w"]) * course.span, 1e-9)
         depth = np.maximum(state.depth, 0.0)
-        turn = 0.5 * float(values["a"]) * (1 + slipping(depth, way, course.first | (state.depth <= 0)))
+        start = np.where(course.first | (state.depth <= 0), -1.0, np.nan)
+        turn = 0.5 * float(values["a"]) * (1 + slipping(depth, way, start))
         # By the load at the deepest point, so that the loop is as wide at every depth.
         top = _deepest(course, depth)
         return replace(
@@ -61,11 +62,8 @@ class SealFriction(DryFriction):
     stage = "readout"
     moves = ("signal",)
     by_channel = True
-    equation = (
-        "s = s_e + F R z, z = (u - play_w(u)) / w from -1 to 1, -1 at first, u the depth; R: the range of the readings "
-        "of a place"
-    )
-    source = "Coulomb, behind an elastic way (Jenkins, J. Appl. Mech. 29, 1962, 457)"
+    equation = "s = s_e + F R z, w dz/du = |1 - z sgn u'|^p, u the depth; R: the range of the readings of a place"
+    source = "p near 0: Jenkins, J. Appl. Mech. 29, 1962, 457; p = 1: Dahl, The Aerospace Corp. TOR-158 (1968)"
     parameters = (
         Parameter(
             "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
@@ -80,6 +78,7 @@ class SealFriction(DryFriction):
             grid=(0.005, 0.02, 0.08),
             of=Whole.HALF_STROKE,
         ),
+        Parameter("p", "1", "power of the turn, from sudden to gradual", 0.5, 0.02, 1.5, grid=(0.5,)),
     )
 
     def apply(self, state: State, values: Values) -> State:
@@ -87,9 +86,17 @@ class SealFriction(DryFriction):
 
     def turn(self, state: State, values: Values) -> np.ndarray:
         """Return the friction over its largest value [1], shape (n,)."""
-        way = max(float(values["w"]) * 0.5 * state.course.stroke, 1e-9)
-        # A stroke begins where the one before has ended: it came from above.
-        return (state.depth + play(-state.depth, way, state.course.first)) / way
+        course, half = state.course, 0.5 * state.course.stroke
+        way, gap = max(float(values["w"]) * half, 1e-9), float(values.get("b", 0.0)) * half
+        # Strokes of one recording follow each other. One that begins at the top came from below, and so on.
+        first = course.first
+        if course.recording is not None:
+            first = np.diff(course.recording[course.episode], prepend=-1) != 0
+        begins = np.flatnonzero(first)
+        low, high = (reach.reduceat(state.depth, begins) for reach in (np.minimum, np.maximum))
+        start = np.full(course.rows, np.nan)
+        start[begins] = 2 * (state.depth[begins] - low) / np.maximum(high - low, 1e-9) - 1
+        return slipping(state.depth, way, start, gap, float(values["p"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         return super().unjudgeable(course, response) or _many(course)
@@ -99,10 +106,10 @@ class FrictionClearance(SealFriction):
     """Dry friction behind a clearance: after a reversal nothing rubs until the clearance is crossed."""
 
     equation = (
-        "s = s_e + F R sgn(g) min(max(|g| - b/2, 0) / w, 1), g = u - play_{b/2 + w}(u), u the depth; R: the range of "
-        "the readings of a place"
+        "s = s_e + F R z, w dz/du = |1 - z sgn u'|^p but for a way b at z = 0, u the depth; R: the range of the "
+        "readings of a place"
     )
-    source = "Jenkins element with a gap; Coble et al., Dataset Friction Damper with Backlash (2022)"
+    source = "a gap in series with Dahl's element; Coble et al., Dataset Friction Damper with Backlash (2022)"
     experiment = "strokes to three depths: after each reversal the force is zero over the same way"
     parameters = (
         Parameter(
@@ -121,14 +128,8 @@ class FrictionClearance(SealFriction):
             grid=(0.015, 0.05),
             of=Whole.HALF_STROKE,
         ),
+        *SealFriction.parameters[2:],
     )
-
-    def turn(self, state: State, values: Values) -> np.ndarray:
-        """Return the friction over its largest value [1], shape (n,)."""
-        half = 0.5 * state.course.stroke
-        gap, way = 0.5 * float(values["b"]) * half, max(float(values["w"]) * half, 1e-9)
-        off = state.depth + play(-state.depth, gap + way, state.course.first)
-        return np.sign(off) * np.clip((np.abs(off) - gap) / way, 0.0, 1.0)
 
 
 class EffortFriction(SealFriction):

@@ -50,7 +50,8 @@ class BoucWen(Hysteresis):
     def apply(self, state: State, values: Values) -> State:
         course = state.course
         width = max(float(values["w"]) * course.span, 1e-9)
-        z = slipping(np.maximum(state.depth, 0.0), width, course.first | (state.depth <= 0))
+        start = np.where(course.first | (state.depth <= 0), -1.0, np.nan)
+        z = slipping(np.maximum(state.depth, 0.0), width, start)
         return state.scaled(1 - 0.5 * values["a"] * (1 - z))
 
 

@@ -157,8 +157,26 @@ def test_friction_slips_gradually_and_begins_anew():
     for step in np.diff(fine):
         z += (step - abs(step) * z) / 0.2
         stepped.append(z)
-    first = np.zeros(2 * len(turns), dtype=bool)
-    first[[0, len(turns)]] = True
-    found = slipping(np.concatenate([turns, turns]), 0.2, first)
+    start = np.full(2 * len(turns), np.nan)
+    start[[0, len(turns)]] = -1.0
+    found = slipping(np.concatenate([turns, turns]), 0.2, start)
     np.testing.assert_allclose(found[: len(turns)], stepped[::200], atol=2e-3)
     np.testing.assert_array_equal(found[len(turns) :], found[: len(turns)])
+
+
+@pytest.mark.parametrize("power", [0.02, 0.5, 1.0, 1.4])
+def test_friction_behind_a_gap_is_zero_over_the_gap(power):
+    """Against small steps of the equation, up and down, with a gap of 0.3 that is open at z = 0 alone."""
+    turns = np.concatenate([np.linspace(0, 1, 21), np.linspace(1, 0.2, 17)[1:], np.linspace(0.2, 0.7, 11)[1:]])
+    fine = np.interp(np.linspace(0, len(turns) - 1, 500 * (len(turns) - 1) + 1), np.arange(len(turns)), turns)
+    z, crossed, stepped = -1.0, 0.0, [-1.0]
+    for step in np.diff(fine):
+        sign, room = np.sign(step), 0.3 - crossed if step > 0 else crossed
+        if z * sign >= 0 and room > 0:
+            z, crossed = 0.0, crossed + sign * min(abs(step), room)
+        else:
+            z = float(np.clip(z + sign * abs(step) * max(1 - sign * z, 0.0) ** power / 0.2, -1, 1))
+        stepped.append(z)
+    start = np.full(len(turns), np.nan)
+    start[0] = -1.0
+    np.testing.assert_allclose(slipping(turns, 0.2, start, 0.3, power), stepped[::500], atol=5e-3)

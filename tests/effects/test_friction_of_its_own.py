@@ -17,8 +17,8 @@ from tacdata.effects import Placed, load
 
 STEP, STROKES = 0.01, (20.0, 35.0, 50.0)
 STARTS = {
-    "friction_clearance": {"F": [0.3], "b": 0.14, "w": 0.05},
-    "seal_friction": {"F": [0.3], "w": 0.08},
+    "friction_clearance": {"F": [0.3], "b": 0.14, "w": 0.05, "p": 0.5},
+    "seal_friction": {"F": [0.3], "w": 0.08, "p": 0.5},
     "effort_friction": {"F": [0.3], "c": 0.02},
     "drag": {"D": [0.3], "n": 1.0},
     "bouc_wen": {"a": 0.5, "w": 0.12},
@@ -63,6 +63,21 @@ def damper(depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
     return np.array(force)
 
 
+def band(depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Return the force of a band that lets go at once, is loose over 4 mm, and pulls tight slowly, then faster."""
+    z, crossed, force = -1.0, 0.0, [-1.0]
+    for step in np.diff(depth, prepend=depth[:1])[1:]:
+        sign, room = (1.0, 4.0 - crossed) if step > 0 else (-1.0, crossed)
+        if z * sign < 0:
+            z = sign * min(z * sign + abs(step), 0.0)
+        elif z == 0 and room > 0:
+            crossed += sign * min(abs(step), room)
+        else:
+            z = sign * min(abs(z) + abs(step) * (0.3 + 2.2 * abs(z) * (1.3 - abs(z))) / 2.5, 1.0)
+        force.append(z)
+    return np.array(force)
+
+
 def motor(depth: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Return a motor's current for a friction of 0.3: nothing at rest."""
     return 0.3 * rate / (np.abs(rate) + 1.0)
@@ -93,7 +108,22 @@ def test_each_law_leaves_a_third_of_every_other_at_most(law, name):
     assert made[name].loss < min(others.values()) / 3, others
 
 
-def test_a_damper_has_its_friction_and_its_clearance():
+@pytest.mark.parametrize("drag", [0.0, 0.3])
+@pytest.mark.parametrize("law", [damper, band])
+def test_a_damper_has_its_friction_and_its_drag_whatever_its_turn(law, drag):
+    """A turn of another shape would leave what resembles a drag, and take as much from the friction."""
+    fastest = float(np.abs(cycles(dashpot).speed).max())
+    course = cycles(lambda depth, rate: law(depth, rate) + drag * rate / fastest)
+    setting = Setting(course, FittedResponse(course), [])
+    first = [(name, STARTS[name]) for name in ("friction_clearance", "drag")]
+    placed = [Placed(load(name), {k: np.array(v) for k, v in values.items()}) for name, values in first]
+    friction, viscous = (p.values for p in refine(setting, placed, null_model(setting), 12).placed)
+    swing = float(np.ptp(np.quantile(course.readings, [0.02, 0.98])))
+    assert float(friction["F"][0]) * swing == pytest.approx(1.0, rel=0.1)
+    assert float(viscous["D"][0]) * swing == pytest.approx(drag, abs=0.1)
+
+
+def test_a_damper_has_its_clearance():
     made, swing = fits(cycles(damper), ("friction_clearance",))
     [found] = made["friction_clearance"].placed
     assert float(found.values["F"][0]) * swing == pytest.approx(1.0, rel=0.05)
