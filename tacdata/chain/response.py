@@ -8,6 +8,9 @@ import numpy as np
 
 from tacdata.chain.course import Course
 
+FAR = 1e4
+"""Largest rise of all channels, over the largest reading of one: beyond it, that channel has a unit of its own [1]."""
+
 
 class Response(ABC):
     """A response without memory: pose to loads, loads to readings."""
@@ -42,13 +45,17 @@ class Response(ABC):
     def signal(self, load: np.ndarray) -> np.ndarray:
         """Return the readings of loads, shape (n, channels)."""
 
-    def largest(self, signal: np.ndarray) -> float:
-        """Return the largest rise of readings above those in the air: the unit of some effects' sizes.
+    def largest(self, signal: np.ndarray) -> np.ndarray:
+        """Return the largest rise of all readings above those in the air: the unit of some effects' sizes.
+
+        It is the same for all channels, unless their units are far apart: shape (channels,).
 
         Args:
             signal: Readings of all rows, shape (n, channels).
         """
-        return float(np.abs(signal - self.signal(np.zeros_like(signal[:1]))).max())
+        largest = np.abs(signal - self.signal(np.zeros_like(signal[:1]))).max()
+        reach = np.abs(signal).max(axis=0)
+        return np.where(reach > 0, np.minimum(largest, FAR * reach), largest)
 
     def swing(self, signal: np.ndarray) -> np.ndarray:
         """Return the range of each channel's readings: the unit of a friction that no elastic load comes with.

@@ -17,8 +17,8 @@ class QuantizationHysteresis(Effect):
     at_rest = AtRest.STAYS
 
     def apply(self, state: State, values: Values) -> State:
-        width = float(values["w"]) * state.response.largest(state.signal)
+        width, largest = float(values["w"]), state.response.largest(state.signal)
         if width <= 0.0:
             return state
         # Half the band is added: rising readings stay, falling ones come late.
-        return state.with_signal(play(state.signal, width) + width)
+        return state.with_signal(largest * (play(state.signal / largest, width) + width))

@@ -42,8 +42,8 @@ class SplineResponse(Response):
         """Return the loads, shape (n, splines + 1)."""
         return load
 
-    def largest(self, signal: np.ndarray) -> float:
-        """Return the largest rise without any spline: a little more of one is no other unit for all."""
+    def largest(self, signal: np.ndarray) -> np.ndarray:
+        """Return the largest rise without any spline, shape (1,): a little more of one is no other unit for all."""
         return super().largest(signal[:, -1:])
 
 

@@ -87,7 +87,8 @@ def first_guess(residual: np.ndarray, course: Course, relative: np.ndarray | Non
         scale[enough] = 1.4826 * np.nanmedian(np.abs(second[:, enough]), axis=0) / np.sqrt(1.5)
     missing = ~np.isfinite(residual)
     tag = np.inf if course.tag is not None else None
-    floor = np.maximum(scale, 1e-3 * overall + 1e-12)
+    floor = np.maximum(scale, 1e-3 * overall)
+    floor[floor == 0] = 1e-12  # a constant
     return Noise(
         floor, 0.0, median_step(course), missing=missing if missing.any() else None, tag=tag, relative_scale=relative
     )
@@ -112,7 +113,7 @@ def refined(leftover: np.ndarray, course: Course, previous: Noise) -> Noise:
     pairs = ~course.first & (course.step < 1.5 * previous.step)
     later, earlier = leftover[pairs], leftover[np.flatnonzero(pairs) - 1]
     # Streams of different units: each counts by its own variance.
-    weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-24)
+    weight = 1 / np.maximum(np.nanmean(np.square(leftover), axis=0), 1e-300)
     products = float(np.nansum(later * earlier * weight))
     squares = float(np.nansum(np.where(np.isfinite(later * earlier), 0.5 * (later**2 + earlier**2) * weight, 0.0)))
     memory = float(np.clip(products / max(squares, 1e-12), 0.0, 0.98))

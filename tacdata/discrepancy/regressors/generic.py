@@ -18,11 +18,11 @@ TIME_CONSTANTS = (0.1, 0.4, 1.5, 6.0, 25.0, 100.0)
 
 def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
     """Return columns, shape (n, streams, k), float32: patterns of the streams times histories of the path."""
-    streams = Streams.of(course)
-    rise = streams.rise(predict(course, response, placed), response)
+    streams, predicted = Streams.of(course), predict(course, response, placed)
+    rise = streams.rise(predicted, response)
     slope = depth_slope(course, response, placed)
     level = np.zeros_like(rise)
-    level[:, : course.channels] = np.abs(rise[:, : course.channels]).max()
+    level[:, : course.channels] = response.largest(predicted.signal[streams.rows])
     # Clock histories are left to `slow`: offsets and drift would make this test fire at any session.
     path_histories = np.delete(histories(course), CLOCK_HISTORIES, axis=1)[streams.rows]
     parts = [rise[:, :, None] * path_histories[:, None, :], slope[:, :, None] * path_histories[:, None, :] * 0.1]

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from pressing import course
 
+from tacdata.discrepancy.judge import judge
+from tacdata.discrepancy.model.spec import read_spec
 from tacdata.discrepancy.noise.noise_model import Noise
 from tacdata.discrepancy.noise.readings import median_step
 from tacdata.discrepancy.noise.whitener import whiten
@@ -68,3 +70,15 @@ def test_a_press_is_whitened_alike_whatever_others_stand_beside_it():
     assert median_step(slower) > 3 * median_step(reduced)
     own = reduced.episode == 0
     assert whiten(values, slower, noise)[own] == pytest.approx(whiten(values, reduced, noise)[own], abs=1e-6)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("powers", [(0, -21, 0), (0, 0, 21), (-12, 0, 9)])
+def test_units_of_channels_that_are_far_apart_change_no_gap(powers):
+    """A square of 1e21 is beyond single precision."""
+    made = course(seed=1, episodes=24)
+    found = [
+        judge(replace(made, readings=made.readings * unit), read_spec(None), until="gate").document["gate"]["p"]
+        for unit in (1.0, 10.0 ** np.array(powers, dtype=float))
+    ]
+    assert found[1] == pytest.approx(found[0], abs=0.1)
