@@ -74,6 +74,8 @@ def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
             for channel_deviation, presses_of_channel in zip(deviation.T, finite.T, strict=True)
         ]
     )
+    # Few presses may seem calm by chance. The one that drops is no calmer than most.
+    scatter = np.maximum(scatter, np.median(scatter[np.isfinite(scatter)]))
     shares = np.abs(deviation) / np.maximum(LEAST, FAR_Z * scatter)
     far = finite & (shares > 1)
     count, presses_of_channel = far.sum(axis=0), finite.sum(axis=0)
@@ -93,5 +95,9 @@ def drops(logs: np.ndarray) -> tuple[int, np.ndarray, float] | None:
 
 
 def _scatter(deviation: np.ndarray) -> float:
-    """Return the usual scatter of a channel [1]; infinite where it has no presses."""
-    return float(np.quantile(np.abs(deviation), CALM)) / NORMAL if len(deviation) else np.inf
+    """Return the usual scatter of a channel [1]; infinite where it has no presses.
+
+    In some presses it is itself the median that was taken off: a deviation of 0 is no sign of calm.
+    """
+    size = np.abs(deviation[deviation != 0])
+    return float(np.quantile(size, CALM)) / NORMAL if len(size) else np.inf
