@@ -264,8 +264,11 @@ def _state(setting: Setting, response: Response, placed: list[Placed], view: _Vi
     unbounded = np.full(len(ridge), np.inf)
     low = np.concatenate([np.minimum(rooms[:, 0], -1e-12), -unbounded])
     high = np.concatenate([np.maximum(rooms[:, 1], 1e-12), unbounded])
-    best = solve(grams.gram.sum(axis=0), np.arange(k + len(ridge)), weight, low, high)
-    fall = float(view.energy.sum() - _energy(grams, best).sum()) if k else 0.0
+    total = grams.gram.sum(axis=0)
+    best = solve(total, np.arange(k + len(ridge)), weight, low, high)
+    still = np.concatenate([np.zeros(k), _without(total, k + np.arange(len(ridge)), ridge)])
+    # With the priors: a move that spares nuisances counts, although the readings alone then fit no better.
+    fall = float(np.diff([_energy(grams, at).sum() + 0.5 * weight @ at**2 for at in (best, still)])[0])
     return _State(moving.knobs, best[:k], fall, grams, best, weight)
 
 
