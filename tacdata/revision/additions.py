@@ -10,8 +10,8 @@ import numpy as np
 
 from tacdata.effects import Placed, load
 
-DECIDED = ("named", "named, incomplete")
-"""Statuses of a verdict that holds a name."""
+DECIDED = ("named", "named, incomplete", "ambiguous")
+"""Statuses of a verdict that may hold a name, beside what is open."""
 FAMILY = "family"
 """Level of a name that leaves the mechanism open."""
 

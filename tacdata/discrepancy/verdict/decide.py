@@ -20,7 +20,7 @@ from tacdata.discrepancy.verdict.calibration import calibration_error, complianc
 from tacdata.discrepancy.verdict.confidence import confidence, features
 from tacdata.discrepancy.verdict.lone_press import LonePress, lone_press
 from tacdata.discrepancy.verdict.sealed import Gap, borne_out, refuted
-from tacdata.effects import AtRest, Family, load
+from tacdata.effects import Family, load
 
 GAP_T = 3.0
 """Leftovers: if no effect helps, they are a gap from so many standard errors on [1]."""
@@ -153,8 +153,6 @@ def decide(
         clear_levels = beside_open(findings, answer, levels)
         if any(clear_levels) and not all(clear_levels):
             levels, status, reason = clear_levels, INCOMPLETE, Reason.INCOMPLETE
-    if status == "named" and lends_form(findings, answer):
-        levels, status, reason = [Level.FAMILY], INCOMPLETE, Reason.INCOMPLETE
     early_effects = [seems_early(f, answer) for f in answer]
     candidates = [status == "named" or k != leading(answer) for k in range(len(answer))]
     parts = [ask and stands_in(findings, f, lacking) for ask, f in zip(candidates, answer, strict=True)]
@@ -195,17 +193,6 @@ def _of_one_family(finding: FoundEffect) -> bool:
 def _within_bounds(finding: FoundEffect) -> FoundEffect:
     """Return an effect without rivals that need an unphysical size: these only fit part of the remainder."""
     return replace(finding, rivals=tuple(name for name in finding.rivals if name not in finding.unphysical))
-
-
-def lends_form(findings: Findings, answer: list[FoundEffect]) -> bool:
-    """Return whether the residual is large enough to make a delay and a filter indistinguishable.
-
-    The two differ only at the edges of a press, where a residual of this size hides the difference.
-    """
-    if len(answer) != 1 or findings.left.t < LEFT_T or findings.share_left < SHARE_LEFT:
-        return False
-    effect = answer[0].placed.effect
-    return effect.at_rest is AtRest.CATCHES_UP and effect.family is Family.DELAY_AND_FILTER
 
 
 def seems_early(finding: FoundEffect, answer: list[FoundEffect]) -> bool:

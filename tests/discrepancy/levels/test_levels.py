@@ -12,7 +12,7 @@ from tacdata.discrepancy.levels.margins import BesideRemainder, Level
 from tacdata.discrepancy.levels.remainder import _size
 from tacdata.discrepancy.levels.several_names import beside_open, stands_in
 from tacdata.discrepancy.search.findings import FoundEffect
-from tacdata.discrepancy.verdict.decide import beside_much, finest, leading, lends_form, seems_early, stands
+from tacdata.discrepancy.verdict.decide import beside_much, finest, leading, seems_early, stands
 from tacdata.discrepancy.verdict.sealed import Gap
 from tacdata.effects import Placed, load
 
@@ -99,22 +99,6 @@ def test_a_shape_at_its_bound_leaves_the_family():
     bent = replace(ONE, placed=read, bought=100.0, at_bound=("m",))
     assert beside_much(leaving(30.0), bent, beside) is Level.FAMILY
     assert beside_much(leaving(30.0), replace(bent, at_bound=("f",)), beside) is None
-
-
-@pytest.mark.parametrize(
-    ("name", "share", "t", "lent"),
-    [
-        ("low_pass_filter", 0.11, 5.0, True),
-        ("latency", 0.11, 5.0, True),
-        ("low_pass_filter", 0.02, 5.0, False),
-        ("low_pass_filter", 0.11, 1.0, False),
-        ("relaxation", 0.11, 5.0, False),
-    ],
-)
-def test_the_form_of_a_lag_is_no_name_where_much_is_left(name, share, t, lent):
-    found = cast(Any, SimpleNamespace(left=SimpleNamespace(t=t), share_left=share))
-    one = replace(ONE, placed=Placed(load(name), {}))
-    assert lends_form(found, [one]) is lent and not lends_form(found, [one, ONE])
 
 
 def test_readings_that_come_early_beside_a_memory_are_its_form():
