@@ -18,7 +18,7 @@ class QuantizationHysteresis(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         width, largest = float(values["w"]), state.response.largest(state.signal)
-        if width <= 0.0:
+        if width <= 0.0 or not largest.all():
             return state
         # Half the band is added: rising readings stay, falling ones come late.
         return state.with_signal(largest * (play(state.signal / largest, width) + width))
