@@ -74,8 +74,9 @@ def complete(
     if process:
         several = len(parts) > 1
         process = replace(process, share=MEAN if several else _share([press for part in results for press in part]))
-    best.network.peak = process
-    corrected = {**document, **({"peak": process.document} if process else {})}
+    # With too few presses for a process, the correction that the network had before the fit stays.
+    best.network.peak = process or (origin.peak if origin is not None else None)
+    corrected = {**document, **({"peak": peak.document} if isinstance(peak := best.network.peak, PeakProcess) else {})}
     # A resumed run that had ended is not written again: its hash is its identity.
     if not best.path.is_file() or corrected != checkpoint.load(best.path).document:
         checkpoint.save(best.path, best.network, None, corrected)
@@ -100,7 +101,7 @@ def complete(
 
 @dataclass(frozen=True)
 class _Press:
-    """A press left out: maps that are not corrected, and what a process without it answers."""
+    """A press left out: maps with the correction before the fit, and the answers of a process without it."""
 
     maps: np.ndarray
     """Maps [mm], shape (m, pixels_x, pixels_y)."""
@@ -126,7 +127,7 @@ def _predicted(
     part: HeldOut, frames: Frames, presses: tuple[int, ...], origin: Network | None, process: PeakProcess | None
 ) -> list[_Press]:
     """Return the presses left out, by a network without them, and by processes without each."""
-    part.network.peak = None
+    part.network.peak = origin.peak if origin is not None else None
     known = contacts(part.network, frames, presses, origin)
     windows = Windows(frames, part.network.offsets, part.network.get_buffer("mean").device)
     top, results = frames.sensor.map.depth_max, []

@@ -5,7 +5,8 @@ depends on the unit's skin. So the logarithm of labelled over predicted maximum 
 C. K. I. Williams, 2006) of features of a contact: its depth, region, place and loads.
 
 The predicted maximum is that of the network before it was fitted, with the unit's calibration. On presses that a
-network has learned from, its errors are too small to tell those on others.
+network has learned from, its errors are too small to tell those on others. A correction that the network had before
+the fit is the prior's mean, and is applied to the fitted one's maxima too.
 
 Kernel: a constant, a linear part, and a squared exponential. Its size, length and noise are those with the least error
 on presses left out. The process's deviation grows away from the presses, and scales intervals.
@@ -25,7 +26,7 @@ from tacdata.training.frames.windows import Windows
 
 if TYPE_CHECKING:
     from tacdata.training.frames.frames import Frames
-    from tacdata.training.networks.network import Network
+    from tacdata.training.networks.network import Correction, Network
 
 FEWEST = 6
 """Presses below which nothing is corrected [count]: with 3 presses the correction did harm on rig 20."""
@@ -118,7 +119,15 @@ class PeakProcess:
             signals: Output of `Network.calibrated`, shape (b, T, taxels).
             network: The network.
         """
-        return self.rescaled(depth, self._maximum(*self._features(depth, signals, network)))
+        maximum = self._maximum(*self._features(depth, signals, network))
+        if self.prior is not None:
+            depth = self.prior.corrected(depth, signals, network)
+        return self.rescaled(depth, maximum)
+
+    @property
+    def prior(self) -> Correction | None:
+        """Correction of the network before the fit, by other presses; None without."""
+        return self.origin.peak if self.origin is not None else None
 
     def moved(self, change: Callable[[torch.Tensor], torch.Tensor]) -> PeakProcess:
         """Return the process with each tensor changed: another device or precision."""
@@ -158,7 +167,8 @@ class PeakProcess:
     def document(self) -> dict[str, Any]:
         """Everything but the frames as plain data (in `schemas/checkpoint.schema.json`)."""
         values = {name: getattr(self, name).double().tolist() for name in ("mean", "scale", "weight")}
-        return {**values, "share": self.share, **({"kernel": asdict(self.kernel)} if self.kernel else {})}
+        prior = {"prior": self.prior.document} if isinstance(self.prior, PeakProcess) else {}
+        return {**values, "share": self.share, **({"kernel": asdict(self.kernel)} if self.kernel else {}), **prior}
 
     @property
     def tensors(self) -> dict[str, torch.Tensor]:
@@ -168,6 +178,8 @@ class PeakProcess:
             half = value.half()
             # The network that ships is kept in half precision: so is its copy.
             content[f"origin.{name}"] = half if bool((half == value).all()) else value
+        if isinstance(self.prior, PeakProcess):
+            content |= {f"prior.{name}": value for name, value in self.prior.tensors.items()}
         return {name: value.detach().cpu().contiguous() for name, value in content.items()}
 
     @classmethod
@@ -198,6 +210,8 @@ class PeakProcess:
         if self.origin is not None:
             network, depth = self.origin, self.origin.respond(signals)
         values, largest = features(depth, signals, network, self.centers)
+        if self.origin is not None:
+            largest = _known(largest, depth, signals, network)
         # A linear correction of an earlier release has the first features alone.
         values = values[:, : len(self.mean)]
         return ((values - self.mean) / self.scale).clamp(-_BEYOND, _BEYOND), largest
@@ -307,7 +321,10 @@ def contacts(network: Network, frames: Frames, presses: tuple[int, ...], origin:
     values, maxima = [], []
     for batch in torch.as_tensor(chosen).split(BATCH):
         signals = network.calibrated(windows.batch(batch.to(place)))
-        columns, largest = features(used.respond(signals), signals, used, centers)
+        depth = used.respond(signals)
+        columns, largest = features(depth, signals, used, centers)
+        if origin is not None:
+            largest = _known(largest, depth, signals, origin)
         values.append(columns.double().cpu())
         maxima.append(largest.double().cpu())
     target = (peak / top / torch.cat([*maxima, peak.new_empty(0)])).log()
@@ -348,6 +365,13 @@ def fit_process(known: Contacts, kernel: Kernel | None = None) -> PeakProcess | 
         kernel,
         known.origin,
     )
+
+
+def _known(largest: torch.Tensor, depth: torch.Tensor, signals: torch.Tensor, origin: Network) -> torch.Tensor:
+    """Return the maxima of the network before the fit (b,), by its own correction if it has one: the prior's mean."""
+    if origin.peak is None:
+        return largest
+    return origin.peak.corrected(depth, signals, origin).amax(dim=(1, 2)).clamp(min=SHALLOW)
 
 
 def _chosen(rows: torch.Tensor, known: Contacts) -> Kernel:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -158,13 +159,14 @@ def load(path: StrPath, device: torch.device | str = "cpu") -> Checkpoint:
     optimizer = {k.removeprefix("optimizer."): v for k, v in tensors.items() if k.startswith("optimizer.")}
     loaded = Checkpoint(path, document, network.to(device).eval(), sensor, optimizer)
     if peak := document.get("peak"):
-        start = {k.removeprefix("origin."): v for k, v in tensors.items() if k.startswith("origin.")}
-        origin = create(network.name, sensor, network.arguments) if start else None
-        if origin:
-            origin.load_state_dict(start)
+
+        def before(weights: dict[str, torch.Tensor]) -> Network:
+            origin = create(network.name, sensor, network.arguments)
+            origin.load_state_dict(weights)
             origin.set_normalization(mean, sd)
-            origin.requires_grad_(False).to(device).eval()
-        network.peak = PeakProcess.from_document(peak, tensors, sensor.taxels.centers, origin, device)
+            return origin.requires_grad_(False).to(device).eval()
+
+        network.peak = _correction(peak, tensors, before, sensor.taxels.centers, device)
     return loaded
 
 
@@ -176,6 +178,24 @@ def restore(optimizer: torch.optim.Optimizer, state: dict[str, torch.Tensor]) ->
         index, quantity = name.split(".", 1)
         nested.setdefault(int(index), {})[quantity] = value
     optimizer.load_state_dict({"state": nested, "param_groups": optimizer.state_dict()["param_groups"]})
+
+
+def _correction(
+    document: dict[str, Any],
+    tensors: dict[str, torch.Tensor],
+    before: Callable[[dict[str, torch.Tensor]], Network],
+    centers: np.ndarray,
+    device: torch.device | str,
+) -> PeakProcess:
+    """Return the correction of a file's maxima, with those of the networks before it."""
+    weights, earlier = (
+        {name.removeprefix(part): value for name, value in tensors.items() if name.startswith(part)}
+        for part in ("origin.", "prior.")
+    )
+    origin = before(weights) if weights else None
+    if origin is not None and "prior" in document:
+        origin.peak = _correction(document["prior"], earlier, before, centers, device)
+    return PeakProcess.from_document(document, tensors, centers, origin, device)
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:

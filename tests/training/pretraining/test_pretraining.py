@@ -63,13 +63,31 @@ def scores(network, frames):
 @pytest.mark.long("training", reason="networks are fitted with as many epochs as a person's")
 @pytest.mark.parametrize("presses", [4, 8])
 def test_a_fit_to_few_presses_is_no_worse_than_none(known, unit, presses, tmp_path):
-    """Contact RMSE of six presses that no fit saw: 0.104 mm without a fit, 0.090 mm with one."""
+    """Contact RMSE of six presses that no fit saw: 0.097 mm without a fit, 0.089 and 0.085 mm with 4 and 8 presses."""
     unseen = part(unit, range(10, 16))
     division = Split("episode", 0, tuple(range(1, presses)), (0,), (15,))
     fitted = fit(unit, recipe({}, known), tmp_path / "run", known, "cpu", threads=1, split=division)
     (without, without_peak), (rmse, peak) = scores(known.network, unseen), scores(fitted.network, unseen)
     assert fitted.document["cross_fit"]["share"] <= 0.25, "no press left out surely gains by moved weights"
-    assert rmse < 0.9 * without and peak < 0.7 * without_peak, (rmse, without, peak, without_peak)
+    # 0.094 mm is nine tenths of what the pretrained network had before its maxima were corrected by a process.
+    assert rmse < min(0.094, without) and peak < 0.4 * without_peak, (rmse, without, peak, without_peak)
+
+
+def test_a_fit_keeps_the_correction_of_the_network_before_it(known, unit, tmp_path):
+    """With too few presses for a process the old correction stays; with enough, it is the mean of the prior."""
+    settings = recipe({"epochs": 1}, known)
+    for presses in (4, 8):
+        division = Split("episode", 0, tuple(range(1, presses)), (0,), (15,))
+        run = fit(unit, settings, tmp_path / str(presses), known, "cpu", threads=1, split=division)
+        process = run.network.peak
+        assert (process.prior is not None) == (presses == 8)
+        before = process.prior or process
+        np.testing.assert_array_equal(before.rows, known.network.peak.rows)
+        loaded = checkpoint.load(run.path)
+        assert ("prior" in loaded.document["peak"]) == (presses == 8)
+        windows, chosen = Windows(unit, run.network.offsets), unit.indices((15,))
+        maps = [predict(network, windows, chosen, 3.0) for network in (run.network, loaded.network)]
+        np.testing.assert_array_equal(*maps)
 
 
 def test_a_fit_that_ended_is_not_written_again_and_an_interrupted_one_goes_on(known, unit, tmp_path):
