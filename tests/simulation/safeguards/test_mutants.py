@@ -17,4 +17,5 @@ def test_every_mutant_names_its_faults():
 )
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_missing_safeguard_is_noticed_by_its_own_faults(name):
-    assert noticed(name, range(25), KINDS[name]) is not None
+    # A motion without a mark is noticed in 8 of 100 seeds, the others in the first 25: a kill must fall into a motion.
+    assert noticed(name, range(100), KINDS[name]) is not None
