@@ -354,8 +354,8 @@ def fit_process(known: Contacts, kernel: Kernel | None = None) -> PeakProcess | 
         # As in the file: a checkpoint that is read again must answer the same way.
         return value.float().to(known.centers.device)
 
-    values = map(single, (mean, scale, weight, rows, effect, noise))
-    return PeakProcess(known.centers, *values, kernel, known.origin)
+    mean, scale, weight, rows, effect, noise = map(single, (mean, scale, weight, rows, effect, noise))
+    return PeakProcess(known.centers, mean, scale, weight, rows, effect, noise, kernel, known.origin)
 
 
 def _known(largest: torch.Tensor, depth: torch.Tensor, signals: torch.Tensor, origin: Network) -> torch.Tensor:
