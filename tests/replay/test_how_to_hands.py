@@ -82,6 +82,7 @@ def folder(tmp_path, monkeypatch):
     for number in range(2):
         (tmp_path / "demos" / f"episode-{number:06d}.mcap").write_bytes(b"stand-in")
         tracks(tmp_path / "demos", draw_hand(number + 1), "grasp", f"{number}" * 64, number)
+    (tmp_path / "examples").symlink_to(PAGES[0].parents[2] / "examples")
     monkeypatch.chdir(tmp_path)
     (block,) = blocks(PAGES[1], "python")
     exec(compile(block, "own_robot.md", "exec"), {})
