@@ -12,8 +12,8 @@ import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Callable, Collection
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import warp as wp  # noqa: TID251
@@ -65,10 +65,17 @@ def start() -> None:
             break
 
 
-def report_modules(loaded: Callable[[int, int], None]) -> None:
+@contextmanager
+def report_modules(loaded: Callable[[int, int], None]) -> Iterator[None]:
     """Report modules of kernels as they are compiled or loaded: the number so far, and of all, after each."""
+    logger, level = wp.get_logger(), wp.config.log_level
     wp.set_logger(_ModuleCount(loaded))
     wp.config.log_level = wp.LOG_INFO
+    try:
+        yield
+    finally:
+        wp.set_logger(logger)
+        wp.config.log_level = level
 
 
 def load_modules(modules: Collection[wp.Module], device: str) -> None:

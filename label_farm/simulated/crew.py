@@ -57,8 +57,8 @@ def solve_all(
     if workers == 1:
         from tacdata.warp_runtime import report_modules
 
-        report_modules(loading)
-        solve(simulation, presses, devices[0], settled=settled)
+        with report_modules(loading):
+            solve(simulation, presses, devices[0], settled=settled)
         return
     hear = settled, loading
     crew = [_Hand(simulation.folder, presses, k, workers, devices[k % len(devices)], *hear) for k in range(workers)]

@@ -19,14 +19,14 @@ def main() -> None:
     os.dup2(2, 1)  # output of libraries must not mix with it
     from tacdata.warp_runtime import report_modules
 
-    report_modules(lambda count, about: print(KERNELS, count, about, file=tell))
-    solve(
-        Simulation.read(Path(folder)),
-        int(presses),
-        os.environ.get(environment.DEVICE, "cpu"),
-        Share(int(index), int(of)),
-        lambda number, reason: print(number, reason.replace("\n", " "), file=tell),
-    )
+    with report_modules(lambda count, about: print(KERNELS, count, about, file=tell)):
+        solve(
+            Simulation.read(Path(folder)),
+            int(presses),
+            os.environ.get(environment.DEVICE, "cpu"),
+            Share(int(index), int(of)),
+            lambda number, reason: print(number, reason.replace("\n", " "), file=tell),
+        )
 
 
 if __name__ == "__main__":

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 
 _WORDS = re.compile(r"compiles or loads kernels: (\d+) of about (\d+) modules")
 PAUSE_SECONDS = 1.0
@@ -18,12 +19,21 @@ class Loading:
     def __init__(self, note: Callable[[str], None]) -> None:
         """Bind the note of a desk."""
         self._note, self._spoke, self._noted = note, time.monotonic(), False
+        self._reports: ExitStack | None = None
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Listen within the context: Warp outlives a worker and its desk."""
+        with ExitStack() as self._reports:
+            self.begin()
+            yield
+        self._reports = None
 
     def begin(self) -> None:
         """Listen, if this process has begun to use kernels at all."""
         self._spoke = time.monotonic()
-        if runtime := sys.modules.get("tacdata.warp_runtime"):
-            runtime.report_modules(self.loaded)
+        if self._reports and (runtime := sys.modules.get("tacdata.warp_runtime")):
+            self._reports.enter_context(runtime.report_modules(self.loaded))
 
     def loaded(self, count: int, about: int) -> None:
         """Note the number of modules so far, of all."""

@@ -95,6 +95,10 @@ class Worker:
 
     def step(self) -> bool:
         """Take one batch of jobs and settle it; False without jobs."""
+        with self._loading.listening():
+            return self._step()
+
+    def _step(self) -> bool:
         for version in self.desk.offers():
             # Before a job is claimed: a model that cannot be built here is no fault of the press.
             model = self._model(version)

@@ -32,10 +32,12 @@ def run(
 
     console = progress.console()
     problem = read_case(case)
-    with console.status(f"{problem.name}: meshing and factorizing") as status:
+    with (
+        console.status(f"{problem.name}: meshing and factorizing") as status,
         report_modules(
             lambda count, about: status.update(f"{problem.name}: compiling kernels, {count} of about {about} modules")
-        )
+        ),
+    ):
         report = solve_case(problem, out, lambda depth: status.update(f"{problem.name}: {depth:g} mm solved"), picture)
     answer = documents.read(report, "case_result")
     mesh = answer["mesh"]

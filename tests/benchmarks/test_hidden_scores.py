@@ -12,8 +12,6 @@ FOLDER = Path(__file__).parents[2] / "benchmarks" / "hidden_worlds"
 @pytest.fixture(scope="module", autouse=True)
 def _bench():
     sys.path.insert(0, str(FOLDER))
-    yield
-    sys.path.remove(str(FOLDER))
 
 
 def verdict(status, *members):

@@ -31,8 +31,6 @@ TEN = {
 @pytest.fixture(scope="module", autouse=True)
 def _bench():
     sys.path.insert(0, str(FOLDER))
-    yield
-    sys.path.remove(str(FOLDER))
 
 
 def _run(out, *words):

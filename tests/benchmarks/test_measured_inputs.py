@@ -1,7 +1,6 @@
 """Files as strangers keep them: the outcome of each is the one that the table of the benchmark counts."""
 
 import json
-import os
 import sys
 from pathlib import Path
 
@@ -45,19 +44,11 @@ LONG = pytest.mark.long("benchmarks/measured_inputs", "tacdata/importing", reaso
 
 @pytest.fixture(scope="module")
 def bench():
-    """Return the benchmark's script; path and modules are as before when it is done."""
-    before, path, folder = set(sys.modules), list(sys.path), os.getcwd()
+    """Return the benchmark's script."""
     sys.path.insert(0, str(ROOM))
-    try:
-        import run
+    import run
 
-        yield run
-    finally:
-        os.chdir(folder)
-        sys.path[:] = path
-        for name in set(sys.modules) - before:
-            if str(getattr(sys.modules[name], "__file__", "") or "").startswith(str(ROOM)):
-                del sys.modules[name]
+    return run
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICK else LONG) for name in sorted(OUTCOMES)])

@@ -59,10 +59,12 @@ _filter.module.load("cpu", block_dim=1)
 
 REPORT = """
 from tacdata import warp_runtime
-warp_runtime.report_modules(lambda *modules: print(*modules))
-for _ in range(2):
-    from tacdata.chain.memory_kernels import _filter
-    warp_runtime.load_modules({_filter.module}, "cpu")
+from tacdata.chain.memory_kernels import _filter
+with warp_runtime.report_modules(lambda *modules: print(*modules)):
+    for _ in range(2):
+        warp_runtime.load_modules({_filter.module}, "cpu")
+_filter.module.unload()
+warp_runtime.load_modules({_filter.module}, "cpu")
 """
 
 

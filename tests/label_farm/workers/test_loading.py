@@ -2,8 +2,10 @@
 
 import sys
 
+import pytest
 from farm_examples import press_episode
 
+from tacdata import warp_runtime
 from tacdata.commands import label
 from tacdata.label_farm.simulated import crew
 from tacdata.label_farm.workers import loading
@@ -23,6 +25,15 @@ def test_kernels_that_load_at_once_are_not_worth_a_word(monkeypatch):
     report.end()
     report.end()
     assert said[2:] == [""] and modules_of(said[2:]) is None
+
+
+def test_a_worker_that_is_done_hears_nothing_more():
+    logger, said = warp_runtime.wp.get_logger(), []
+    report = Loading(said.append)
+    with pytest.raises(KeyError), report.listening():
+        assert warp_runtime.wp.get_logger() is not logger
+        raise KeyError
+    assert warp_runtime.wp.get_logger() is logger
 
 
 def test_kernels_of_a_worker_are_progress_of_the_run(tmp_path, label_by_workers, monkeypatch):
