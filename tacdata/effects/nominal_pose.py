@@ -7,7 +7,7 @@ from tacdata.effects.effect import Course, Effect, Family, Parameter, Response, 
 
 class NominalPose(Effect):
     stage = "simulator"
-    moves = ("label", "signal", "force")
+    moves = ("label", "signal")
     group = "simulator"
     family = Family.SIMULATION
     equation = "pose -> pose + k (tag - commanded)"

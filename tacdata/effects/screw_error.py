@@ -7,7 +7,7 @@ from tacdata.effects.effect import Effect, Family, Parameter, State, Values
 
 class ScrewError(Effect):
     stage = "kinematics"
-    moves = ("tag", "label", "signal")
+    moves = ("tag", "label", "signal", "force")
     group = "depth offset"
     family = Family.KINEMATICS
     memoryless = True

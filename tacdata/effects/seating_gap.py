@@ -9,7 +9,7 @@ from tacdata.effects.effect import Effect, Family, Parameter, State, Values
 
 class SeatingGap(Effect):
     stage = "contact"
-    moves = ("label", "signal", "force")
+    moves = ("label", "signal")
     group = "depth offset"
     family = Family.CONTACT
     memoryless = True

@@ -5,7 +5,7 @@ from tacdata.effects.effect import Effect, Family, Parameter, Scale, State, Valu
 
 class TravelScale(Effect):
     stage = "kinematics"
-    moves = ("tag", "label", "signal")
+    moves = ("tag", "label", "signal", "force")
     group = "amplitude"
     family = Family.KINEMATICS
     memoryless = True
