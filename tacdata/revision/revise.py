@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from tacdata import documents, provenance, schemas
 from tacdata.discrepancy.data.recordings import course_of
@@ -26,23 +29,16 @@ from tacdata.revision.evidence.card import card
 from tacdata.revision.evidence.curves import EpisodeCurves, curves
 from tacdata.revision.evidence.gap import GapReduction, ResidualChange, gap, noise_of
 from tacdata.revision.evidence.worst_slice import sealed_slices
-from tacdata.revision.labels.confirm import Confirmed, confirm, touches_fem
-from tacdata.revision.labels.realised import TipError, tip_error
+from tacdata.revision.labels.confirm import confirm, touches_fem
+from tacdata.revision.labels.realised import tip_error
 from tacdata.revision.labels.relabel import Moved, moves_labels, paths_moved, relabelled
-from tacdata.revision.labels.retrain import Recipe, Retrained, retrained
+from tacdata.revision.labels.retrain import Recipe, retrained
 from tacdata.revision.next_presses.recommend import recommend
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.pressed import pressed
 
-REVISION, SPEC, CARD, TABLE, CSV, CORRECTED, LABELS = (
-    "revision.json",
-    "spec.json",
-    "card.html",
-    "gap.md",
-    "gap.csv",
-    "corrected.csv",
-    "labels",
-)
+REVISION, SPEC, CARD, TABLE, CSV = "revision.json", "spec.json", "card.html", "gap.md", "gap.csv"
+CORRECTED, LABELS = "corrected.csv", "labels"
 """Names of the folder's files."""
 
 KIND = "recording "
@@ -132,11 +128,9 @@ def revise(
     change = gap(comparison, answer, seal, noise_of(verdict, comparison), note) if answer else None
     slices = sealed_slices(comparison, change, seal.numbers) if change else []
     new_hash = _added(verdict, judged, spec, added, target) if added else None
-    corrected = (
-        write_corrected(comparison, comparison.after(answer), target / CORRECTED)
-        if options.corrected and added
-        else None
-    )
+    corrected = None
+    if options.corrected and added:
+        corrected = {"file": CORRECTED, **write_corrected(comparison, comparison.after(answer), target / CORRECTED)}
     parents = {"verdict": provenance.content_hash(verdict), "spec": spec.content_hash}
     document = {
         "version": schemas.version("revision"),
@@ -151,7 +145,7 @@ def revise(
         "tips": [],
         "retrained": None,
         "confirmed": [],
-        "corrected": None if corrected is None else {"file": CORRECTED, **corrected},
+        "corrected": corrected,
         "next": {"plan": None, "presses": [], "remark": ""},
         "provenance": provenance.stamp("tacdata revise", parents, {"confirm": options.confirm}),
     }
@@ -159,34 +153,78 @@ def revise(
     shown = tuple(curves(comparison, change, seal.numbers, SHOWN)) if change else ()
     # After every stage, so that an interrupted revision leaves what it has.
     _write(document, verdict, shown, target)
+    steps = _Steps(recordings, comparison, answer, target, options, note)
     if added:
-        document |= _about_labels(recordings, comparison, answer, target, options, note)
-    document["tips"] = [{"session": s, **asdict(t)} for s, t in _tips(recordings, answer, options, note)]
+        document |= {"labels": steps.labels(), "confirmed": steps.confirmed(), "retrained": steps.retrained()}
+    document["tips"] = steps.tips()
     _write(document, verdict, shown, target)
     document["next"] = recommend(recordings, comparison, verdict, target, options.presses, note)
     _write(document, verdict, shown, target)
     return Revised(document, target, shown)
 
 
-def _about_labels(
-    recordings: list[Path],
-    comparison: Comparison,
-    answer: list[Placed],
-    target: Path,
-    options: RevisionOptions,
-    note: Note,
-) -> dict[str, Any]:
-    """Return the effects' influence on labels and networks, and their comparison with finite elements."""
-    shifts = _labels(recordings, answer, target, options, note)
-    confirmed = _confirmed(recordings, comparison, answer, options, note)
-    trained = _retrained(recordings, comparison, answer, target, options, note)
-    return {
-        "labels": [
-            {"session": s, **_finite(asdict(m)), "failed": {str(k): v for k, v in m.failed.items()}} for s, m in shifts
-        ],
-        "retrained": None if trained is None else {**asdict(trained), "metrics": list(trained.metrics)},
-        "confirmed": [{**_finite(asdict(c)), "place": list(c.place)} for c in confirmed],
-    }
+@dataclass(frozen=True)
+class _Steps:
+    """Steps after the gap, each an entry of the revision's document."""
+
+    recordings: list[Path]
+    comparison: Comparison
+    answer: list[Placed]
+    target: Path
+    options: RevisionOptions
+    note: Note
+
+    @property
+    def sessions(self) -> list[Path]:
+        return [p for p in self.recordings if (p / FILE).is_file()]
+
+    def labels(self) -> list[dict[str, Any]]:
+        entries = []
+        for session in self.sessions if moves_labels(self.answer) else ():
+            self.note(f"labels of {session.name}")
+            shift = self._shift(session)
+            failed = {str(k): reason for k, reason in shift.failed.items()}
+            entries.append({"session": session.name, **_finite(asdict(shift)), "failed": failed})
+        return entries
+
+    def _shift(self, session: Path) -> Moved:
+        settings, store = self.options.relabel, self.options.store
+        if settings is None:
+            return paths_moved(session, self.answer)
+
+        def progress(stage: str, done: int, of: int) -> None:
+            self.note(f"labels of {session.name}: {stage} {done} of {of}")
+
+        return relabelled(session, self.answer, self.target / LABELS / session.name, settings, store, progress)
+
+    def tips(self) -> list[dict[str, Any]]:
+        if not any(p.stage == "kinematics" for p in self.answer):
+            return []
+        self.note("where the tip truly was")
+        errors = [(session.name, tip_error(session, self.answer, self.options.truth)) for session in self.sessions]
+        return [{"session": name, **asdict(error)} for name, error in errors if error is not None]
+
+    def retrained(self) -> dict[str, Any] | None:
+        if self.options.retrain is None:
+            return None
+        labels = {s: self.target / LABELS / s.name for s in self.sessions} if moves_labels(self.answer) else {}
+        model, folder, recipe = (self.comparison, self.answer), self.target / NETWORKS, self.options.retrain
+        trained = retrained(self.sessions, labels, *model, folder, recipe, lambda t: self.note(f"networks, {t}"))
+        return {**asdict(trained), "metrics": list(trained.metrics)}
+
+    def confirmed(self) -> list[dict[str, Any]]:
+        spec, count = self.comparison.spec, self.options.confirm
+        response = spec.document["response"]
+        if count < 1 or response["kind"] != "table" or not touches_fem(self.answer):
+            return []
+        self.note("finite elements, where the revision moves the loads most")
+        mesh, what = _mesh(spec.folder / response["file"]), pressed(self.recordings)
+
+        def progress(done: int, of: int, remaining: float) -> None:
+            self.note(f"finite elements: {done} of {of}, about {remaining:.0f} s left")
+
+        solved = confirm(self.comparison, self.answer, what.sensor, what.reaches, count, mesh, progress)
+        return [{**_finite(asdict(press)), "place": list(press.place)} for press in solved]
 
 
 def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Path]) -> None:
@@ -201,7 +239,7 @@ def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Pa
             f"those that it was reached from, unchanged: {', '.join(parent_digests)}",
             "name them, or run `tacdata discrepancy` with the ones that there are",
         )
-    spec_hash = verdict["provenance"].get("parents", {}).get("spec")
+    spec_hash = parents.get("spec")
     major, minor = schemas.version("model_spec").split(".")
     # The number of an earlier minor version makes no other model.
     versions = [f"{major}.{k}" for k in range(int(minor) + 1)]
@@ -214,80 +252,8 @@ def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Pa
         )
 
 
-def _sessions(recordings: list[Path]) -> list[Path]:
-    return [p for p in recordings if (p / FILE).is_file()]
-
-
-def _labels(
-    recordings: list[Path], answer: list[Placed], target: Path, options: RevisionOptions, note: Note
-) -> list[tuple[str, Moved]]:
-    if not moves_labels(answer):
-        return []
-    shifts = []
-    for session in _sessions(recordings):
-        note(f"labels of {session.name}")
-        if options.relabel is None:
-            shifts.append((session.name, paths_moved(session, answer)))
-        else:
-            folder = target / LABELS / session.name
-            shift = relabelled(
-                session, answer, folder, options.relabel, options.store, _progress_note(note, session.name)
-            )
-            shifts.append((session.name, shift))
-    return shifts
-
-
-def _tips(
-    recordings: list[Path], answer: list[Placed], options: RevisionOptions, note: Note
-) -> list[tuple[str, TipError]]:
-    if not answer or not any(p.stage == "kinematics" for p in answer):
-        return []
-    note("where the tip truly was")
-    tips = [(session.name, tip_error(session, answer, options.truth)) for session in _sessions(recordings)]
-    return [(name, error) for name, error in tips if error is not None]
-
-
-def _retrained(
-    recordings: list[Path],
-    comparison: Comparison,
-    answer: list[Placed],
-    target: Path,
-    options: RevisionOptions,
-    note: Note,
-) -> Retrained | None:
-    if options.retrain is None:
-        return None
-    sessions = _sessions(recordings)
-    labels = {s: target / LABELS / s.name for s in sessions} if moves_labels(answer) else {}
-    return retrained(
-        sessions, labels, comparison, answer, target / NETWORKS, options.retrain, lambda t: note(f"networks, {t}")
-    )
-
-
-def _progress_note(note: Note, name: str) -> Callable[[str, int, int], None]:
-    return lambda stage, done, of: note(f"labels of {name}: {stage} {done} of {of}")
-
-
-def _confirmed(
-    recordings: list[Path], comparison: Comparison, answer: list[Placed], options: RevisionOptions, note: Note
-) -> list[Confirmed]:
-    response = comparison.spec.document["response"]
-    if options.confirm < 1 or response["kind"] != "table" or not touches_fem(answer):
-        return []
-    note("finite elements, where the revision moves the loads most")
-    mesh = _mesh(comparison.spec.folder / response["file"])
-    what = pressed(recordings)
-
-    def progress(done: int, of: int, remaining: float) -> None:
-        note(f"finite elements: {done} of {of}, about {remaining:.0f} s left")
-
-    return confirm(comparison, answer, what.sensor, what.reaches, options.confirm, mesh, progress)
-
-
 def _mesh(path: Path) -> MeshSettings:
     """Return the mesh of a table; the default one if it is not stated."""
-    import numpy as np
-
     with np.load(path, allow_pickle=False) as data:
         stamp = json.loads(str(data["provenance"])) if "provenance" in data else {}
     values: dict[str, Any] = stamp.get("parameters", {}).get("mesh") or {}
@@ -307,12 +273,8 @@ def _added(verdict: dict[str, Any], judged: Path, spec: Spec, added: list[Additi
     response = document["response"]
     # Relative to the new folder: both can be moved together.
     if "file" in response:
-        import os
-
-        document = {
-            **document,
-            "response": {**response, "file": os.path.relpath(spec.folder / response["file"], target)},
-        }
+        file = os.path.relpath(spec.folder / response["file"], target)
+        document = {**document, "response": {**response, "file": file}}
     documents.write(target / SPEC, document, "model_spec")
     return provenance.content_hash(document)
 
@@ -320,11 +282,11 @@ def _added(verdict: dict[str, Any], judged: Path, spec: Spec, added: list[Additi
 def _gap(change: GapReduction | None, slices: list[ResidualChange]) -> dict[str, Any] | None:
     if change is None:
         return None
-    changes = {"sealed": change.total, "worst": change.worst}
     return {
         "unseen": change.unseen,
         "predicted": change.predicted,
-        **{n: asdict(c) for n, c in changes.items()},
+        "sealed": asdict(change.total),
+        "worst": asdict(change.worst),
         "closed": _or_none(change.total.closed),
         "interval": [_or_none(v) for v in change.interval],
         "floor": 1.0,

@@ -78,49 +78,37 @@ def retrained(
         UsageError: If too few episodes have labels.
     """
     by = LABELS if labels else READINGS
-    pairs = _pairs(sessions, labels, placed)
-    if len(pairs) < FEWEST:
+    sides = _sides(sessions, labels, placed)
+    measured = sides["before"]
+    if len(measured) < FEWEST:
         raise UsageError(
-            f"{len(pairs)} episodes with a label",
+            f"{len(measured)} episodes with a label",
             f"{FEWEST} or more, to train on and to score",
             "run `tacdata label SESSION` first",
         )
     note("datasets of both models")
-    simulated = _Simulated(comparison) if by == READINGS else None
-    sides = {}
-    for side in ("before", "after"):
-        episodes = [pair.episode(side) for pair in pairs]
-        if simulated is not None:
-            effects = placed if side == "after" else []
-            episodes = [replace(e, taxels=replace(e.taxels, counts=simulated(e, effects))) for e in episodes]
-        sides[side] = _frames(folder / side, episodes, [pair.label(side) for pair in pairs])
+    if by == READINGS:
+        simulated = _Simulated(comparison)
+        for side, effects in (("before", []), ("after", placed)):
+            sides[side] = [
+                (replace(e, taxels=replace(e.taxels, counts=simulated(e, effects))), label) for e, label in sides[side]
+            ]
+    frames = {side: _frames(folder / side, examples) for side, examples in sides.items()}
     # One truth for both networks, or their scores would differ by the labels alone.
-    judge = sides["after"]
-    if simulated is not None:
-        judge = _frames(folder / "measured", [p.episode("before") for p in pairs], [p.label("before") for p in pairs])
-    scored = {}
-    for side, frames in sides.items():
-        scored[side] = _scored(frames, judge, folder / f"network-{side}", recipe, lambda t, s=side: note(f"{s}: {t}"))
-    return _outcome(by, recipe, scored["before"], scored["after"])
+    judge = frames["after"] if by == LABELS else _frames(folder / "measured", measured)
+    scores = [
+        _scored(frames[side], judge, folder / f"network-{side}", recipe, lambda t, s=side: note(f"{s}: {t}"))
+        for side in ("before", "after")
+    ]
+    return _outcome(by, recipe, *scores)
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """One recording under both models."""
-
-    before: Episode
-    after: Episode
-    labels: tuple[Label, Label]
-
-    def episode(self, side: str) -> Episode:
-        return self.before if side == "before" else self.after
-
-    def label(self, side: str) -> Label:
-        return self.labels[side == "after"]
+Examples = list[tuple[Episode, Label]]
 
 
-def _pairs(sessions: Sequence[Path], labels: dict[Path, Path], placed: Sequence[Placed]) -> list[_Pair]:
-    pairs = []
+def _sides(sessions: Sequence[Path], labels: dict[Path, Path], placed: Sequence[Placed]) -> dict[str, Examples]:
+    """Return the recordings with their labels under either model, those that both label."""
+    sides: dict[str, Examples] = {"before": [], "after": []}
     for session in sessions:
         if not file_names.folder(session).is_dir():
             raise UsageError(f"{session} has no labels", "a labelled session", f"run `tacdata label {session}` first")
@@ -130,10 +118,11 @@ def _pairs(sessions: Sequence[Path], labels: dict[Path, Path], placed: Sequence[
         if session in labels:
             new, revised = LabelFiles(labels[session]), {e.path: e for e in moved_episodes(episodes, placed)}
         for episode in episodes:
-            pair = old(episode), new(episode)
-            if pair[0] is not None and pair[1] is not None:
-                pairs.append(_Pair(episode, revised[episode.path], (pair[0], pair[1])))
-    return pairs
+            before, after = old(episode), new(episode)
+            if before is not None and after is not None:
+                sides["before"].append((episode, before))
+                sides["after"].append((revised[episode.path], after))
+    return sides
 
 
 class _Simulated:
@@ -166,11 +155,11 @@ class _Simulated:
         return counts
 
 
-def _frames(folder: Path, episodes: list[Episode], labels: list[Label]) -> Frames:
+def _frames(folder: Path, examples: Examples) -> Frames:
     from tacdata.training.frames.data import read_frames
 
-    by_path = {e.path: label for e, label in zip(episodes, labels, strict=True)}
-    pack(episodes, lambda episode: by_path[episode.path], folder)
+    labels = {episode.path: label for episode, label in examples}
+    pack([episode for episode, _ in examples], lambda episode: labels[episode.path], folder)
     return read_frames(folder)
 
 
@@ -208,26 +197,17 @@ def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
 def _outcome(by: str, recipe: Recipe, initial: dict[str, Any], final: dict[str, Any]) -> Retrained:
     from tacdata.training.scoring.evaluate import METRICS
 
+    pair = initial, final
     rows = [
-        {
-            "name": name,
-            "title": f"{METRICS[name][1]}, frames in contact",
-            "unit": METRICS[name][2],
-            "before": initial["contact_frames"][name]["mean"],
-            "after": final["contact_frames"][name]["mean"],
-        }
+        (name, f"{METRICS[name][1]}, frames in contact", METRICS[name][2], [d["contact_frames"][name] for d in pair])
         for name in METRICS
     ]
     for name, title in (("centre_depth", "Depth at the contact's centre"), ("position", "Place of the contact")):
-        pair = [d["prescribed"]["prediction"][name]["mean"] for d in (initial, final)]
-        rows.append(
-            {
-                "name": name,
-                "title": f"{title}, off the pose, at full depth",
-                "unit": "mm",
-                "before": pair[0],
-                "after": pair[1],
-            }
-        )
+        scores = [d["prescribed"]["prediction"][name] for d in pair]
+        rows.append((name, f"{title}, off the pose, at full depth", "mm", scores))
+    metrics = tuple(
+        {"name": name, "title": title, "unit": unit, "before": before["mean"], "after": after["mean"]}
+        for name, title, unit, (before, after) in rows
+    )
     frames = final["frames"]["in_contact"]
-    return Retrained(by, len(final["split"]["episodes"]), frames, recipe.epochs, tuple(rows))
+    return Retrained(by, len(final["split"]["episodes"]), frames, recipe.epochs, metrics)
