@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,62 +80,59 @@ def findings(figures: RecordingFigures) -> list[Finding]:
         doubts = [(WARNING, stream, text) for _, stream, text in _channels(figures)]
         judgements = [*imported_findings(figures), *doubts]
     else:
-        judgements = [*_recording(figures), *_taxels(figures), *_channels(figures), *_cnc(figures), *_cameras(figures)]
-        judgements += _together(figures)
+        parts = (_recording, _taxels, _channels, _cnc, _cameras, _together)
+        judgements = [judgement for part in parts for judgement in part(figures)]
     judgements += impossible(figures)
     name = figures.recording.episode.path.name
     return [Finding(severity, stream, name, text) for severity, stream, text in judgements]
 
 
 Judgement = tuple[str, str, str]
+"""Severity, stream, text."""
 
 
 def _rate_of_clock(figures: RecordingFigures) -> float:
     return float(figures.recording.episode.rig.get("clock", {}).get("rate", 1.0))
 
 
-def _recording(figures: RecordingFigures) -> list[Judgement]:
-    episode, judgements = figures.recording.episode, []
+def _recording(figures: RecordingFigures) -> Iterator[Judgement]:
+    episode = figures.recording.episode
     if not episode.complete:
-        judgements.append((UNUSABLE, "recording", "; ".join(episode.notes) or "it was broken off"))
+        yield UNUSABLE, "recording", "; ".join(episode.notes) or "it was broken off"
     registration = episode.rig.get("registration", {})
     if not registration.get("method") or not registration.get("date"):
-        judgements.append(
-            (WARNING, "registration", "the rig file does not say how and when the sensor was registered to the guide")
-        )
+        text = "the rig file does not say how and when the sensor was registered to the guide"
+        yield WARNING, "registration", text
     phases = {phase.name for phase in episode.phases}
     missing = [name for name in ("rest", "approach", "press", "hold", "release") if name not in phases]
     if episode.complete and missing:
-        judgements.append((UNUSABLE, "recording", f"no {', '.join(missing)} phase"))
-    return judgements
+        yield UNUSABLE, "recording", f"no {', '.join(missing)} phase"
 
 
-def _taxels(figures: RecordingFigures) -> list[Judgement]:
-    values, judgements = figures.document["taxels"], []
+def _taxels(figures: RecordingFigures) -> Iterator[Judgement]:
+    values, rate = figures.document["taxels"], _rate_of_clock(figures)
     if values["frames"] < 2:
-        return [(UNUSABLE, "taxels", f"{values['frames']} frames")]
-    period = 1000 / values["nominal_rate"]
+        yield UNUSABLE, "taxels", f"{values['frames']} frames"
+        return
+    period, gap = 1000 / values["nominal_rate"], values["longest_gap"]
     if values["lost"]:
         share = values["lost"] / (values["frames"] + values["lost"])
-        bad = share > LOST_SHARE or values["longest_gap"] > GAP_MS
-        text = f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {values['longest_gap']:.0f} ms"
-        judgements.append((UNUSABLE if bad else WARNING, "taxels", text))
+        text = f"{values['lost']} frames lost ({100 * share:.1f} %), longest gap {gap:.0f} ms"
+        yield UNUSABLE if share > LOST_SHARE or gap > GAP_MS else WARNING, "taxels", text
     # A counter that goes up by one across a gap: the board itself paused.
-    elif values["longest_gap"] > max(GAP_MS, 2.5 * period):
-        judgements.append((UNUSABLE, "taxels", f"a gap of {values['longest_gap']:.0f} ms without a sample"))
+    elif gap > max(GAP_MS, 2.5 * period):
+        yield UNUSABLE, "taxels", f"a gap of {gap:.0f} ms without a sample"
     if values["rate"] and abs(values["rate"] / values["nominal_rate"] - 1) > RATE_SHARE:
-        text = f"{values['rate']:.2f} Hz, nominal {values['nominal_rate']:g} Hz"
-        judgements.append((WARNING, "taxels", text))
-    judgements += [(WARNING, "taxels", text) for text in _line(values["driver_counts"])]
-    judgements += [(WARNING, "taxels", text) for text in clock_warnings(values["clock"], _rate_of_clock(figures))]
+        yield WARNING, "taxels", f"{values['rate']:.2f} Hz, nominal {values['nominal_rate']:g} Hz"
+    for text in (*_line(values["driver_counts"]), *clock_warnings(values["clock"], rate)):
+        yield WARNING, "taxels", text
     if figures.recording.episode.taxels.counter.min() < 0:
         text = "the board sends no counter: lost frames cannot be seen, sample times are arrival times"
-        judgements.append((WARNING, "taxels", text))
-    if values["latency"] / _rate_of_clock(figures) > LATENCY_MS:
-        judgements.append((WARNING, "taxels", f"the host was up to {values['latency']:.0f} ms late in reading"))
-    elif (silent := _longest_silence(figures)) > LATENCY_MS * _rate_of_clock(figures):
-        judgements.append((WARNING, "taxels", f"the host read nothing for {silent:.0f} ms, then what had waited"))
-    return judgements
+        yield WARNING, "taxels", text
+    if values["latency"] / rate > LATENCY_MS:
+        yield WARNING, "taxels", f"the host was up to {values['latency']:.0f} ms late in reading"
+    elif (silent := _longest_silence(figures)) > LATENCY_MS * rate:
+        yield WARNING, "taxels", f"the host read nothing for {silent:.0f} ms, then what had waited"
 
 
 def _longest_silence(figures: RecordingFigures) -> float:
@@ -145,114 +143,101 @@ def _longest_silence(figures: RecordingFigures) -> float:
     return float(stream.arrival_ns[longest + 1] - stream.arrival_ns[longest] - span) / 1e6
 
 
-def _line(counts: dict) -> list[str]:
+def _line(counts: dict) -> Iterator[str]:
     """Describe the driver's counts on the line."""
-    remarks = []
     if counts.get("corrupt", 0):
-        remarks.append(f"{counts['corrupt']} damaged frames discarded")
+        yield f"{counts['corrupt']} damaged frames discarded"
     if counts.get("repeated", 0):
-        remarks.append(f"{counts['repeated']} frames came twice and were discarded")
+        yield f"{counts['repeated']} frames came twice and were discarded"
     if counts.get("garbage_bytes", 0):
-        remarks.append(f"{counts['garbage_bytes']} bytes between the frames belong to none")
-    return [*remarks, *counts.get("notes", [])]
+        yield f"{counts['garbage_bytes']} bytes between the frames belong to none"
+    yield from counts.get("notes", [])
 
 
-def _channels(figures: RecordingFigures) -> list[Judgement]:
-    values, judgements = figures.document["taxels"], []
+def _channels(figures: RecordingFigures) -> Iterator[Judgement]:
+    values, episode = figures.document["taxels"], figures.recording.episode
     if values["undefined"]:
-        judgements.append(
-            (UNUSABLE, "taxels", f"channel {_list(values['undefined'])} has readings that are no numbers")
-        )
+        yield UNUSABLE, "taxels", f"channel {_list(values['undefined'])} has readings that are no numbers"
     for first, second in values["tied"]:
-        judgements.append(
-            (UNUSABLE, "taxels", f"channels {first} and {second} read the same throughout: tied together")
-        )
-    counts = figures.recording.episode.taxels.counts
-    if len(counts) > 1 and (counts == counts[:1]).all() and figures.recording.episode.press.depth >= DEAD_DEPTH:
-        judgements.append((UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"))
+        yield UNUSABLE, "taxels", f"channels {first} and {second} read the same throughout: tied together"
+    counts = episode.taxels.counts
+    if len(counts) > 1 and (counts == counts[:1]).all() and episode.press.depth >= DEAD_DEPTH:
+        yield UNUSABLE, "taxels", "no channel ever changes, not even under the press: the board is dead"
     delay = figures.document["cnc"]["contradiction"] / _rate_of_clock(figures)
     # Off its profile, the controller may have moved where it seems to stand still.
     if values["jumps"] and delay > LATE_MS:
         text = f"jumps while nothing moves are NOT ASSESSED: the controller moved up to {delay:.0f} ms off its profile"
-        judgements.append((WARNING, "taxels", text))
+        yield WARNING, "taxels", text
     else:
-        judgements += [(UNUSABLE, "taxels", text) for text in _jumps(values["jumps"], counts.shape[1], values["unit"])]
+        for text in _jumps(values["jumps"], counts.shape[1], values["unit"]):
+            yield UNUSABLE, "taxels", text
     if values["stuck"]:
-        judgements.append((UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"))
+        yield UNUSABLE, "taxels", f"channel {_list(values['stuck'])} stopped changing"
     if values["saturated"]:
-        judgements.append((UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"))
-    noise = np.array([np.nan if v is None else v for v in values["idle_noise"]])
-    response = np.array([np.nan if v is None else v for v in values["response"]])
+        yield UNUSABLE, "taxels", f"channel {_list(values['saturated'])} ran into a limit"
+    noise, response = (np.array([np.nan if v is None else v for v in values[n]]) for n in ("idle_noise", "response"))
     repeats = held_frames(counts, noise)
-    idle = counts[idle_rows(figures.recording.episode)]
+    idle = counts[idle_rows(episode)]
     if repeats >= HELD or (repeats > 1 and held_by_chance(counts, idle, repeats) < HELD_BY_CHANCE):
-        judgements.append((WARNING, "taxels", f"the board repeats one frame: no channel changes for {repeats} frames"))
-    begin_ns = figures.recording.episode.taxels.sample_ns[:1]
-    for spike in spikes(figures.recording.episode, noise, response):
-        at = (spike.time_ns - int(begin_ns[0])) * 1e-9
-        size = f"{spike.size:{'+.0f' if values['unit'] == COUNTS else '+.3g'}} {values['unit']}"
-        judgements.append(
-            (WARNING, "taxels", f"channel {spike.channel} has a spike of {size} at {at:.1f} s while still")
-        )
+        yield WARNING, "taxels", f"the board repeats one frame: no channel changes for {repeats} frames"
+    for spike in spikes(episode, noise, response):
+        at = (spike.time_ns - int(episode.taxels.sample_ns[0])) * 1e-9
+        size = _size(spike.size, values["unit"])
+        yield WARNING, "taxels", f"channel {spike.channel} has a spike of {size} at {at:.1f} s while still"
     if np.isnan(noise).all():
-        judgements.append((WARNING, "taxels", "no idle stretch to measure noise and baseline"))
-    else:
-        loud = np.flatnonzero(noise > NOISE_RATIO * max(float(np.nanmedian(noise)), 1e-9))
-        if len(loud):
-            text = f"channel {_list(loud.tolist())} is over {NOISE_RATIO:g} times as noisy as the others"
-            judgements.append((WARNING, "taxels", text))
-    return judgements
+        yield WARNING, "taxels", "no idle stretch to measure noise and baseline"
+        return
+    loud = np.flatnonzero(noise > NOISE_RATIO * max(float(np.nanmedian(noise)), 1e-9)).tolist()
+    if loud:
+        yield WARNING, "taxels", f"channel {_list(loud)} is over {NOISE_RATIO:g} times as noisy as the others"
 
 
-def _together(figures: RecordingFigures) -> list[Judgement]:
+def _together(figures: RecordingFigures) -> Iterator[Judgement]:
     """Judge whether readings, motion and label belong together."""
-    judgements, rate = [], _rate_of_clock(figures)
+    rate = _rate_of_clock(figures)
     if words := other_place(figures, PLACE_MM):
-        judgements.append((UNUSABLE, "label", words))
+        yield UNUSABLE, "label", words
     if still := stood_still(figures, rate):
         text = f"the controller may have stood still for {still:.0f} ms on its way in or out, and told nothing then"
-        judgements.append((UNUSABLE, "cnc", text))
+        yield UNUSABLE, "cnc", text
     start_gap, end_gap = missing_ends(figures)
     # A slow board may miss two and a half periods.
     allowed = max(GAP_MS * rate, 2500 / figures.document["taxels"]["nominal_rate"])
     if start_gap > allowed:
-        judgements.append((UNUSABLE, "taxels", f"they begin {start_gap:.0f} ms after the press does"))
+        yield UNUSABLE, "taxels", f"they begin {start_gap:.0f} ms after the press does"
     if end_gap > allowed:
-        judgements.append((UNUSABLE, "taxels", f"they end {end_gap:.0f} ms before the press does"))
-    elif (report_gap := ends_before_reports(figures)) > allowed:
-        text = (
-            f"they end {report_gap:.0f} ms before the controller's reports: the press is whole, the board fell silent"
-        )
-        judgements.append((WARNING, "taxels", text))
+        yield UNUSABLE, "taxels", f"they end {end_gap:.0f} ms before the press does"
+    elif (gap := ends_before_reports(figures)) > allowed:
+        text = f"they end {gap:.0f} ms before the controller's reports: the press is whole, the board fell silent"
+        yield WARNING, "taxels", text
     lag = reading_lag(figures)
     deviation = figures.document["cnc"]["hold_error"] or 0.0
     # Where the guide was not where it should be, its times cannot be judged.
     if lag is not None and deviation <= HOLD_MM and abs(lag) > max(LAG_MS * rate, LAG_SHARE * loading(figures)):
         text = f"they come {lag:+.0f} ms after the motion: measure the delay by a sync tap (record --sync-tap)"
-        judgements.append((WARNING, "taxels", text))
-    return judgements
+        yield WARNING, "taxels", text
 
 
-def _cnc(figures: RecordingFigures) -> list[Judgement]:
-    values, judgements = figures.document["cnc"], []
+def _cnc(figures: RecordingFigures) -> Iterator[Judgement]:
+    values = figures.document["cnc"]
     if not values["reports"]:
-        return [(UNUSABLE, "cnc", "no status report")]
+        yield UNUSABLE, "cnc", "no status report"
+        return
     # GRBL may append a code to a state, as in Door:1.
     alarms = [state for state in values["states"] if state.split(":")[0] in ("Alarm", "Door")]
     if alarms:
-        judgements.append((UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"))
+        yield UNUSABLE, "cnc", f"the controller was in state {', '.join(alarms)}"
     if values["longest_gap"] / _rate_of_clock(figures) > REPORT_GAP_MS:
-        judgements.append((WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"))
+        yield WARNING, "cnc", f"no status report for {values['longest_gap']:.0f} ms"
     if values["damaged"]:
         text = f"{values['damaged']} status reports could not be read: check the controller's cable and ground"
-        judgements.append((WARNING, "cnc", text))
+        yield WARNING, "cnc", text
     if figures.document["complete"] and values["depth_uncertainty"] > DEPTH_MM[0]:
-        severity = UNUSABLE if values["depth_uncertainty"] > DEPTH_MM[1] else WARNING
         text = f"the depth while pressing is uncertain by {values['depth_uncertainty']:.3f} mm"
         if values["contradiction"]:
             text += f": reports contradict the commanded profile by {values['contradiction']:.0f} ms"
-        judgements.append((severity, "cnc", text))
-    return [*judgements, *hold_judgements(figures)]
+        yield UNUSABLE if values["depth_uncertainty"] > DEPTH_MM[1] else WARNING, "cnc", text
+    yield from hold_judgements(figures)
 
 
 def hold_judgements(figures: RecordingFigures) -> list[Judgement]:
@@ -279,11 +264,14 @@ def _jumps(entries: list[dict], channels: int, unit: str) -> list[str]:
     if len(entries) > channels / 2:
         first = min(jump["at"] for jump in entries)
         return [f"{len(entries)} channels jump while nothing moves, from {first:.1f} s on"]
-    digits = "+.0f" if unit == COUNTS else "+.3g"
     return [
-        f"channel {jump['channel']} jumps by {jump['size']:{digits}} {unit} at {jump['at']:.1f} s while nothing moves"
+        f"channel {jump['channel']} jumps by {_size(jump['size'], unit)} at {jump['at']:.1f} s while nothing moves"
         for jump in entries
     ]
+
+
+def _size(change: float, unit: str) -> str:
+    return f"{change:{'+.0f' if unit == COUNTS else '+.3g'}} {unit}"
 
 
 def _list(channels: list[int]) -> str:
