@@ -234,27 +234,9 @@ def _number(value: object) -> bool:
 
 
 def _press(index: int, entry: dict[str, Any], indenter: Indenter, motion: MotionSettings) -> Press:
-    return Press(
-        index=index,
-        indenter=indenter,
-        indenter_name=entry["indenter"],
-        x=entry["x"],
-        y=entry["y"],
-        yaw=entry.get("yaw", 0.0),
-        depth=entry["depth"],
-        speed=entry.get("speed", motion.press_speed),
-        hold=entry.get("hold", motion.hold),
-        repeat=entry.get("repeat", 0),
-        rest=entry.get("rest"),
-        recovery=entry.get("recovery", 0.0),
-        approach_from=entry.get("approach_from", ""),
-        overshoot=entry.get("overshoot", 0.0),
-        strokes=entry.get("strokes", 0),
-        stroke=entry.get("stroke", 0.0),
-        purpose=entry.get("purpose", ""),
-        tilt_x=entry.get("tilt_x", 0.0),
-        tilt_y=entry.get("tilt_y", 0.0),
-    )
+    # The entries of a press bear the names of its fields (`schemas/plan.schema.json`).
+    values: dict[str, Any] = {"speed": motion.press_speed, "hold": motion.hold, **entry, "indenter": indenter}
+    return Press(index=index, indenter_name=entry["indenter"], **values)
 
 
 def read_plan(path: StrPath) -> Plan:

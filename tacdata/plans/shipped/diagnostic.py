@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, from_recipe, points
+from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, block, from_recipe, points
 from tacdata.plans.sites import half_box
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
@@ -36,6 +36,8 @@ IDLE = 60.0
 """Length of the idle stretch [s]."""
 HOLD, RECOVERY = 60.0, 60.0
 """Length of the long holds and of the recoveries after them [s]."""
+SIDES = ["+x", "-x", "+y", "-y"]
+"""Sides from which a place is approached."""
 ONSET_SPEED = 0.1
 """Speed of the slow first contacts [mm/s]."""
 CLEARANCE = 0.5
@@ -55,7 +57,9 @@ class Diagnostic(ShippedPlan):
         between = _nearest(sensor, 0.3 * half) + pitch / 2 * (np.array([sensor.taxels.columns, sensor.taxels.rows]) > 1)
         virgin = half * [-0.8, 0.8]
         corners = half * [[0, 0], [-1, -1], [1, -1], [1, 1]]  # the fourth is the virgin site's
-        reference = {"indenter": first, "at": points(on), "depths": [0.7], "purpose": "reference"}
+        reference = block(first, points(on), [0.7], "reference")
+        long_hold = {"purpose": "long hold and recovery", "holds": [HOLD], "recovery": RECOVERY}
+        gaps = {"kind": "between", "count": 8} if sensor.taxels.count > 1 else {"kind": "center"}
         recipe = {
             "name": f"diagnostic-{first}-{second}",
             "purpose": "presses that tell physical effects apart",
@@ -63,69 +67,24 @@ class Diagnostic(ShippedPlan):
             "motion": {**MOTION, "press_speed": 0.5, "run_up": 1.0},
             "grouped": False,
             "blocks": [
-                {
-                    "indenter": first,
-                    "at": points(on),
-                    "depths": [-MOTION["clearance"] / 2],
-                    "holds": [IDLE],
-                    "purpose": "idle stretch",
-                },
+                block(first, points(on), [-MOTION["clearance"] / 2], "idle stretch", holds=[IDLE]),
                 *_light(first, corners),
-                {"indenter": first, "at": points(virgin), "depths": [0.6], "repeats": 6, "purpose": "virgin site"},
-                {"indenter": first, "at": points(virgin), "depths": [0.9, 0.6], "purpose": "virgin site, then deeper"},
+                block(first, points(virgin), [0.6], "virgin site", repeats=6),
+                block(first, points(virgin), [0.9, 0.6], "virgin site, then deeper"),
                 reference,
-                *_rates(first, np.array([on, between])),
+                _rates(first, np.array([on, between])),
                 reference,
-                {
-                    "indenter": first,
-                    "at": points(between),
-                    "depths": [DEPTHS[0], DEPTHS[-1]],
-                    "holds": [HOLD],
-                    "recovery": RECOVERY,
-                    "purpose": "long hold and recovery",
-                },
+                block(first, points(between), [DEPTHS[0], DEPTHS[-1]], **long_hold),
                 reference,
-                {
-                    "indenter": first,
-                    "at": points(between),
-                    "depths": [0.7],
-                    "approach_from": ["+x", "-x", "+y", "-y"],
-                    "repeats": 2,
-                    "purpose": "approach direction",
-                },
-                {
-                    "indenter": first,
-                    "at": points(on),
-                    "depths": [0.7],
-                    "overshoot": 0.3,
-                    "repeats": 2,
-                    "purpose": "approach from below",
-                },
-                {
-                    "indenter": first,
-                    "at": {"kind": "taxels", "only": _every(sensor, 12)},
-                    "depths": [0.4],
-                    "order": "random",
-                    "purpose": "on taxels",
-                },
-                {
-                    "indenter": first,
-                    "at": {"kind": "between", "count": 8} if sensor.taxels.count > 1 else {"kind": "center"},
-                    "depths": [0.4],
-                    "purpose": "between taxels",
-                },
-                {"indenter": first, "at": points(virgin), "depths": [0.6], "purpose": "virgin site, after a rest"},
+                block(first, points(between), [0.7], "approach direction", approach_from=SIDES, repeats=2),
+                block(first, points(on), [0.7], "approach from below", overshoot=0.3, repeats=2),
+                block(first, {"kind": "taxels", "only": _every(sensor, 12)}, [0.4], "on taxels", order="random"),
+                block(first, gaps, [0.4], "between taxels"),
+                block(first, points(virgin), [0.6], "virgin site, after a rest"),
                 reference,
                 *_light(second, corners[:1]),
-                *_rates(second, np.array([on])),
-                {
-                    "indenter": second,
-                    "at": points(between),
-                    "depths": [DEPTHS[-1]],
-                    "holds": [HOLD],
-                    "recovery": RECOVERY,
-                    "purpose": "long hold and recovery",
-                },
+                _rates(second, np.array([on])),
+                block(second, points(between), [DEPTHS[-1]], **long_hold),
                 {**reference, "yaws": [180.0], "repeats": 2, "purpose": "turned indenter"},
             ],
         }
@@ -134,23 +93,13 @@ class Diagnostic(ShippedPlan):
 
 def _light(name: str, places: np.ndarray) -> list[dict[str, Any]]:
     return [
-        {"indenter": name, "at": points(places), "depths": [-0.2], "purpose": "fly-over"},
-        {"indenter": name, "at": points(places), "depths": [0.3], "speeds": [ONSET_SPEED], "purpose": "onset map"},
+        block(name, points(places), [-0.2], "fly-over"),
+        block(name, points(places), [0.3], "onset map", speeds=[ONSET_SPEED]),
     ]
 
 
-def _rates(name: str, places: np.ndarray) -> list[dict[str, Any]]:
-    return [
-        {
-            "indenter": name,
-            "at": points(places),
-            "depths": DEPTHS,
-            "speeds": SPEEDS,
-            "order": "random",
-            "rest": 3.0,
-            "purpose": "rates",
-        }
-    ]
+def _rates(name: str, places: np.ndarray) -> dict[str, Any]:
+    return block(name, points(places), DEPTHS, "rates", speeds=SPEEDS, order="random", rest=3.0)
 
 
 def _nearest(sensor: Sensor, place: np.ndarray) -> np.ndarray:
@@ -161,6 +110,5 @@ def _nearest(sensor: Sensor, place: np.ndarray) -> np.ndarray:
 
 def _every(sensor: Sensor, count: int) -> list[int]:
     """Return at most ``count`` taxels, spread over the array."""
-    return (
-        np.unique(np.linspace(0, sensor.taxels.count - 1, min(count, sensor.taxels.count)).round()).astype(int).tolist()
-    )
+    taxels = sensor.taxels.count
+    return np.unique(np.linspace(0, taxels - 1, min(count, taxels)).round()).astype(int).tolist()

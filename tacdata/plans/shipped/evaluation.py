@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, from_recipe, points
+from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, block, from_recipe, points
 from tacdata.plans.sites import half_box
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
@@ -44,26 +44,15 @@ class Evaluation(ShippedPlan):
         interior = np.vstack([[0.0, 0.0], _spread(INTERIOR - 1) * (half - _margin(half))])
         cut = np.array([[edge[0], 0.3 * half[1]], [-edge[0], -0.3 * half[1]], [0.3 * half[0], edge[1]]])[:EDGE]
         places = np.vstack([[0.0, 0.0], _spread(PLACES - 1) * (half - _margin(half))])
+        positions = points(np.vstack([interior, cut]))
         recipe = {
             "name": f"evaluation-{names[0]}",
             "purpose": "the paper's evaluation: 78 depth trials, 40 contact-position trials",
             "indenters": specimens(names),
             "motion": dict(MOTION),
             "blocks": [
-                {
-                    "indenter": names[0],
-                    "at": points(places),
-                    "depths": DEPTHS,
-                    "order": "random",
-                    "purpose": "depth trial",
-                },
-                {
-                    "indenter": names[0],
-                    "at": points(np.vstack([interior, cut])),
-                    "depths": [POSITION_DEPTH],
-                    "order": "random",
-                    "purpose": "position trial",
-                },
+                block(names[0], points(places), DEPTHS, "depth trial", order="random"),
+                block(names[0], positions, [POSITION_DEPTH], "position trial", order="random"),
             ],
         }
         return from_recipe(recipe, sensor, wishes.seed, CLEARANCE)

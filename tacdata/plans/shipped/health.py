@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, from_recipe, points
+from tacdata.plans.shipped.shipped_plan import MOTION, PlanOptions, ShippedPlan, block, from_recipe, points
 from tacdata.plans.specimens import specimens
 from tacdata.sensor import Sensor
 
@@ -40,11 +40,8 @@ class Health(ShippedPlan):
         """Return the plan; ``purpose`` of each press names its block."""
         names = self.specimen_names(wishes, 1, "one, the same at every visit")
         places = _sites(sensor)
-        reference = {
-            "indenter": names[0],
-            "at": points(places[np.argmin(np.linalg.norm(places, axis=1))]),
-            "depths": [DEPTH],
-        }
+        middle = points(places[np.argmin(np.linalg.norm(places, axis=1))])
+        reference = block(names[0], middle, [DEPTH], "reference")
         recipe = {
             "name": f"health-{names[0]}",
             "purpose": "how a unit is, compared with its other visits",
@@ -54,7 +51,7 @@ class Health(ShippedPlan):
             "blocks": [
                 {**reference, "rest": REST, "purpose": "rest stretch, then reference"},
                 {**reference, "at": points(places), "purpose": "sites"},
-                {**reference, "repeats": REPEATS, "purpose": "reference"},
+                {**reference, "repeats": REPEATS},
                 {**reference, "speeds": [SPEEDS[1]], "purpose": "slow reference"},
             ],
         }

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -90,6 +91,11 @@ def from_recipe(recipe: dict[str, Any], sensor: Sensor, seed: int, clearance: fl
     document = write_out({"version": "1.0", **recipe}, sensor, f"plan {recipe['name']}", seed)
     clear_of_rim(document["presses"], document["indenters"], sensor, clearance)
     return document
+
+
+def block(indenter: str, at: dict[str, Any], depths: Sequence[float], purpose: str, **others: Any) -> dict[str, Any]:
+    """Return a recipe's block; ``others`` are further entries of `schemas/plan_recipe.schema.json`."""
+    return {"indenter": indenter, "at": at, "depths": [*depths], "purpose": purpose, **others}
 
 
 def points(places: np.ndarray) -> dict[str, Any]:
