@@ -8,7 +8,14 @@ from tacdata.chain.memory import slipping
 from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values, Whole
 
 FEW = 4
-"""Most channels with a friction of their own size; more share the pattern of a load."""
+"""Most channels with a friction, or a drag, of their own size; more share the pattern of a load."""
+FRICTION = Parameter(
+    "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
+)
+
+
+def _of_stroke(name: str, meaning: str, typical: float, low: float, high: float, grid: tuple[float, ...]) -> Parameter:
+    return Parameter(name, "1", f"{meaning} over half the stroke", typical, low, high, 0.0, grid, of=Whole.HALF_STROKE)
 
 
 class DryFriction(Effect):
@@ -65,19 +72,8 @@ class SealFriction(DryFriction):
     equation = "s = s_e + F R z, w dz/du = |1 - z sgn u'|^p, u the depth; R: the range of the readings of a place"
     source = "p near 0: Jenkins, J. Appl. Mech. 29, 1962, 457; p = 1: Dahl, The Aerospace Corp. TOR-158 (1968)"
     parameters = (
-        Parameter(
-            "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
-        ),
-        Parameter(
-            "w",
-            "1",
-            "way by which it turns, over half the stroke",
-            0.02,
-            0.001,
-            0.3,
-            grid=(0.005, 0.02, 0.08),
-            of=Whole.HALF_STROKE,
-        ),
+        FRICTION,
+        _of_stroke("w", "way by which it turns,", 0.02, 0.001, 0.3, (0.005, 0.02, 0.08)),
         Parameter("p", "1", "power of the turn, from sudden to gradual", 0.5, 0.02, 1.5, grid=(0.5,)),
     )
 
@@ -99,7 +95,7 @@ class SealFriction(DryFriction):
         return slipping(state.depth, way, start, gap, float(values["p"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        return super().unjudgeable(course, response) or _many(course)
+        return super().unjudgeable(course, response) or many_channels(course)
 
 
 class FrictionClearance(SealFriction):
@@ -112,22 +108,9 @@ class FrictionClearance(SealFriction):
     source = "a gap in series with Dahl's element; Coble et al., Dataset Friction Damper with Backlash (2022)"
     experiment = "strokes to three depths: after each reversal the force is zero over the same way"
     parameters = (
-        Parameter(
-            "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
-        ),
-        Parameter(
-            "b", "1", "clearance over half the stroke", 0.1, 0.005, 1.0, grid=(0.05, 0.14, 0.35), of=Whole.HALF_STROKE
-        ),
-        Parameter(
-            "w",
-            "1",
-            "way by which it rises, over half the stroke",
-            0.03,
-            0.001,
-            0.3,
-            grid=(0.015, 0.05),
-            of=Whole.HALF_STROKE,
-        ),
+        FRICTION,
+        _of_stroke("b", "clearance", 0.1, 0.005, 1.0, (0.05, 0.14, 0.35)),
+        _of_stroke("w", "way by which it rises,", 0.03, 0.001, 0.3, (0.015, 0.05)),
         *SealFriction.parameters[2:],
     )
 
@@ -141,9 +124,7 @@ class EffortFriction(SealFriction):
     source = "Coulomb; the regulator of the position asks for the effort"
     experiment = "strokes at three rates with stops: the step at each start is the same, and over at each stop"
     parameters = (
-        Parameter(
-            "F", "1", "friction over the range of the readings", 0.1, -1.0, 1.0, per_channel=True, of=Whole.RANGE
-        ),
+        FRICTION,
         Parameter("c", "1", "rate by which it turns, over the largest", 0.05, 0.001, 1.0, grid=(0.02,)),
     )
 
@@ -155,10 +136,11 @@ class EffortFriction(SealFriction):
     def unjudgeable(self, course: Course, response: Response) -> str:
         if course.effort is False:
             return "channels are a response, in which friction stays at rest"
-        return _many(course) or ("" if np.any(course.speed) else "the tip never moves")
+        return many_channels(course) or ("" if np.any(course.speed) else "the tip never moves")
 
 
-def _many(course: Course) -> str:
+def many_channels(course: Course) -> str:
+    """Return the reason why so many channels show no force of their own size; empty for few."""
     return "many channels share the pattern of a load" if course.channels > FEW else ""
 
 

@@ -5,6 +5,13 @@ import numpy as np
 from tacdata.effects.effect import Course, Effect, Family, Parameter, Response, State, Values
 
 
+def same_temperature(self: Effect, course: Course, response: Response) -> str:
+    """Return the reason why recordings do not show an effect of temperature; empty if they may."""
+    if course.temperature is None:
+        return "no temperature was recorded"
+    return "the temperature hardly changed" if np.nanstd(course.temperature) < 0.2 else ""
+
+
 class TemperatureOffset(Effect):
     stage = "readout"
     moves = ("signal",)
@@ -21,7 +28,4 @@ class TemperatureOffset(Effect):
         scale = state.response.largest(state.signal)
         return state.with_signal(state.signal + scale * state.course.warmth[:, None] * values["k"])
 
-    def unjudgeable(self, course: Course, response: Response) -> str:
-        if course.temperature is None:
-            return "no temperature was recorded"
-        return "the temperature hardly changed" if np.nanstd(course.temperature) < 0.2 else ""
+    unjudgeable = same_temperature

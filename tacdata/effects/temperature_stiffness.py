@@ -1,8 +1,7 @@
 """Warmth stiffens the skin."""
 
-import numpy as np
-
-from tacdata.effects.effect import Course, Effect, Family, Parameter, Response, State, Values
+from tacdata.effects.effect import Effect, Family, Parameter, State, Values
+from tacdata.effects.temperature_offset import same_temperature
 
 
 class TemperatureStiffness(Effect):
@@ -18,7 +17,4 @@ class TemperatureStiffness(Effect):
     def apply(self, state: State, values: Values) -> State:
         return state.scaled(1 + values["k"] * state.course.warmth)
 
-    def unjudgeable(self, course: Course, response: Response) -> str:
-        if course.temperature is None:
-            return "no temperature was recorded"
-        return "the temperature hardly changed" if np.nanstd(course.temperature) < 0.2 else ""
+    unjudgeable = same_temperature

@@ -1,14 +1,14 @@
 """The skin resists faster presses more."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values, Whole
+from tacdata.effects.dry_friction import FRICTION, many_channels
+from tacdata.effects.effect import AtRest, Course, Effect, Family, Parameter, Response, State, Values
 
 UNIT_RATE = 1.0
 """Rate at which the share is given [mm/s]."""
-
-FEW = 4
-"""Most channels with a drag of their own size; more share the pattern of a load."""
 
 
 class Viscosity(Effect):
@@ -47,16 +47,7 @@ class Drag(Viscosity):
     source = "n = 1: a dashpot; n = 2: a fluid through an orifice"
     experiment = "strokes at three rates over a decade: the loop's height grows with the rate, and a stop ends it"
     parameters = (
-        Parameter(
-            "D",
-            "1",
-            "drag at full rate over the range of the readings",
-            0.1,
-            -1.0,
-            1.0,
-            per_channel=True,
-            of=Whole.RANGE,
-        ),
+        replace(FRICTION, name="D", meaning="drag at full rate over the range of the readings"),
         Parameter("n", "1", "power of the rate", 1.0, 0.5, 2.0, grid=(1.0, 2.0)),
     )
 
@@ -66,5 +57,4 @@ class Drag(Viscosity):
         return state.with_signal(state.signal + turn[:, None] * (values["D"] * state.response.swing(state.signal)))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
-        many = "many channels share the pattern of a load" if course.channels > FEW else ""
-        return super().unjudgeable(course, response) or many
+        return super().unjudgeable(course, response) or many_channels(course)
