@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, distribution, requires
 from types import TracebackType
 
 from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from tacdata.errors import PackageError
 
@@ -80,12 +81,16 @@ def require(extras: tuple[str, ...], asker: str) -> None:
 
 def packages_of(extra: str) -> tuple[str, ...]:
     """Return the packages that an extra brings on this platform."""
+    brought = [r for r in _requirements() if r.marker and r.marker.evaluate({"extra": extra})]
+    return tuple(r.name for r in brought if not _plain(r))
+
+
+def _requirements() -> list[Requirement]:
+    """Return the packages of all extras and of the plain install; none where tacdata is not installed."""
     try:
-        lines = requires("tacdata") or ()
+        return [Requirement(line) for line in requires("tacdata") or ()]
     except PackageNotFoundError:
-        return ()
-    requirements = map(Requirement, lines)
-    return tuple(r.name for r in requirements if r.marker and not _plain(r) and r.marker.evaluate({"extra": extra}))
+        return []
 
 
 def _plain(requirement: Requirement) -> bool:
@@ -118,22 +123,10 @@ def install_line(extra: str) -> str:
 
 def extras_of(package: str) -> tuple[str, ...]:
     """Return the extras that bring a package, sorted, without the one that brings everything."""
-    try:
-        lines = requires("tacdata") or ()
-    except PackageNotFoundError:
-        return ()
-    names = set()
-    for line in lines:
-        name = re.match(r"[A-Za-z0-9._-]+", line)
-        extra = re.search(r"extra == ['\"]([\w-]+)['\"]", line)
-        if name and extra and _same(name[0], package):
-            names.add(extra[1])
-    return tuple(sorted(names - {ALL}))
-
-
-def _same(first: str, second: str) -> bool:
-    first, second = (re.sub(r"[-_.]+", "-", name).lower() for name in (first, second))
-    return first == second
+    name = canonicalize_name(package)
+    markers = (str(r.marker) for r in _requirements() if canonicalize_name(r.name) == name)
+    found = (re.search(r"extra == ['\"]([\w-]+)['\"]", marker) for marker in markers)
+    return tuple(sorted({extra[1] for extra in found if extra} - {ALL}))
 
 
 def _askers(trace: TracebackType | None) -> list[str]:

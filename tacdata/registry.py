@@ -166,14 +166,7 @@ def load_module(room: str, base: str, name: str) -> ModuleType:
 def load[T](room: str, base: str, name: str, kind: type[T]) -> type[T]:
     """Import one member and return its only public class derived from ``kind``."""
     module = load_module(room, base, name)
-    classes = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type)
-        and issubclass(value, kind)
-        and value.__module__ == module.__name__
-        and not value.__name__.startswith("_")
-    ]
+    classes = public_classes(module, kind)
     if len(classes) != 1:
         raise UsageError(
             f"{module.__name__} defines {len(classes)} public classes derived from {kind.__name__}",
@@ -181,6 +174,12 @@ def load[T](room: str, base: str, name: str, kind: type[T]) -> type[T]:
             "keep one class per file; variants are parameters",
         )
     return classes[0]
+
+
+def public_classes[T](module: ModuleType, kind: type[T]) -> list[type[T]]:
+    """Return the public classes that a file defines and that are derived from ``kind``, in the order of the file."""
+    classes = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, kind)]
+    return [each for each in classes if each.__module__ == module.__name__ and not each.__name__.startswith("_")]
 
 
 def _kind(room: str) -> str:

@@ -22,6 +22,8 @@ moves, and more often in a ramp: it has 0 and more.
 """
 MIDDLE = 1.4826
 """Standard deviation over the median absolute deviation [1]."""
+BY_ROW = ("time", "episode", "tip", "tool", "readings", "averaged", "force", "tag", "temperature", "clipped")
+"""Fields of a course with a value for each row."""
 
 
 @dataclass(frozen=True)
@@ -116,22 +118,7 @@ class Course:
         rows = self.read
         if len(rows) == self.rows:
             return self
-        columns = {
-            name: value[rows]
-            for name in (
-                "time",
-                "episode",
-                "tip",
-                "tool",
-                "readings",
-                "averaged",
-                "force",
-                "tag",
-                "temperature",
-                "clipped",
-            )
-            if (value := getattr(self, name)) is not None
-        }
+        columns = {name: value[rows] for name in BY_ROW if (value := getattr(self, name)) is not None}
         return replace(self, **columns)
 
     @cached_property

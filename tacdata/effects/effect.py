@@ -34,10 +34,8 @@ import functools
 import re
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
@@ -234,7 +232,9 @@ class Effect(ABC):
         """Take names and title from the file."""
         file = cls.__module__.rsplit(".", 1)[-1]
         module = sys.modules[cls.__module__]
-        cls.name = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower() if _forms(module) else file
+        cls.name = (
+            re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower() if registry.public_classes(module, Effect) else file
+        )
         cls.mechanism = cls.mechanism or file
         cls.__doc__ = cls.__doc__ or module.__doc__ or ""
         cls.title = cls.__doc__.split("\n")[0].removesuffix(".")
@@ -327,7 +327,7 @@ def load(name: str) -> Effect:
         UsageError: If there is none.
     """
     try:
-        forms = _forms(registry.load_module(ROOM, BASE, name))
+        forms = registry.public_classes(registry.load_module(ROOM, BASE, name), Effect)
     except UsageError:
         # Forms have no file of their own: only the files know their names.
         for effect in library():
@@ -360,16 +360,5 @@ def library() -> tuple[Effect, ...]:
 def _library(folders: tuple[str, ...]) -> tuple[Effect, ...]:
     """Return the effects of some folders, read once."""
     files = (registry.load_module(ROOM, BASE, name) for name in registry.names(ROOM, BASE))
-    return tuple(sorted((form() for file in files for form in _forms(file)), key=lambda effect: effect.name))
-
-
-def _forms(module: ModuleType) -> Sequence[type[Effect]]:
-    """Return the public effects that a file defines, in the order of the file."""
-    return [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type)
-        and issubclass(value, Effect)
-        and value.__module__ == module.__name__
-        and not value.__name__.startswith("_")
-    ]
+    forms = (form() for file in files for form in registry.public_classes(file, Effect))
+    return tuple(sorted(forms, key=lambda effect: effect.name))

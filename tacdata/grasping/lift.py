@@ -128,33 +128,17 @@ def pressing(grip: Grip, force: float) -> Grip:
 
 
 def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
+    sizes = {**asdict(grip), "torsion": TORSION}
     fingers = "".join(
         FINGER.format(
-            name=name,
-            y=side * (grip.radius + grip.ridge),
-            inwards=-side,
-            ridge=grip.ridge,
-            half=grip.half,
-            mass=FINGER_MASS,
-            friction=grip.friction,
-            torsion=TORSION,
-            d=IMPEDANCE,
+            **{**sizes, "mass": FINGER_MASS}, name=name, y=side * (grip.radius + grip.ridge), inwards=-side, d=IMPEDANCE
         )
         for name, side in SIDES.items()
     )
     # Critically damped: swinging fingers would shake the orange.
     critical = 2 * np.sqrt(grip.stiffness * FINGER_MASS)
     springs = "".join(f'<position name="{n}" joint="{n}" kp="{grip.stiffness}" kv="{critical}"/>' for n in SIDES)
-    text = XML.format(
-        step=STEP,
-        table=vertical - grip.radius,
-        radius=grip.radius,
-        mass=grip.mass,
-        friction=grip.friction,
-        torsion=TORSION,
-        fingers=fingers,
-        springs=springs,
-    )
+    text = XML.format(**sizes, step=STEP, table=vertical - grip.radius, fingers=fingers, springs=springs)
     engine = mujoco()
     model = engine.MjModel.from_xml_string(text)
     for name in SIDES:

@@ -69,12 +69,8 @@ class PressSet:
         buffer, values = io.BytesIO(), {name: getattr(self, name) for name in FIELDS}
         values |= {name: values[name].astype(np.float32) for name in ("force", "closure", "area", "normal")}
         values["surface"] = np.round(self.surface / GRAIN).astype(np.int16)
-        np.savez_compressed(
-            buffer,
-            indenters=np.array(json.dumps(self.indenters)),
-            provenance=np.array(provenance.canonical(self.provenance)),
-            **values,
-        )
+        stamp, indenters = provenance.canonical(self.provenance), json.dumps(self.indenters)
+        np.savez_compressed(buffer, indenters=np.array(indenters), provenance=np.array(stamp), **values)
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacement(path) as stream:
             stream.write(buffer.getvalue())
@@ -132,22 +128,13 @@ def _collected(model: SkinModel, requests: Sequence[PressRequest], answers: dict
     sensor, n, states = model.sensor, len(requests), max(len(p.depths) for p in requests)
     load = (n, states, sensor.taxels.count)
     counts, depths, normal = np.zeros(n, dtype=int), np.zeros((n, states)), np.zeros((n, states))
-    surface, force, closure, area = np.zeros((n, states, *sensor.map.shape)), *(np.zeros(load) for _ in range(3))
+    surface, loads = np.zeros((n, states, *sensor.map.shape)), [np.zeros(load) for _ in range(3)]
     for k, answer in answers.items():
         q = counts[k] = len(answer.depth)
         depths[k, :q], surface[k, :q], normal[k, :q] = answer.depth, answer.surface, answer.force[:, 2]
-        force[k, :q], closure[k, :q], area[k, :q] = answer.taxel_force, answer.taxel_closure, answer.taxel_area
+        for values, solved in zip(loads, (answer.taxel_force, answer.taxel_closure, answer.taxel_area), strict=True):
+            values[k, :q] = solved
     place = np.array([(p.x, p.y, p.yaw) for p in requests])
     stamp = provenance.stamp("tacdata.grasping.pin_presses", dict(model.identity), {"presses": n})
-    return PressSet(
-        tuple(p.indenter.document for p in requests),
-        place,
-        counts,
-        depths,
-        surface,
-        force,
-        closure,
-        area,
-        normal,
-        stamp,
-    )
+    indenters = tuple(p.indenter.document for p in requests)
+    return PressSet(indenters, place, counts, depths, surface, *loads, normal, stamp)

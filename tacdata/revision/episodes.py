@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.chain import Course
+from tacdata.chain.course import BY_ROW
 from tacdata.discrepancy.verdict.sealed import DEEPER, chosen
 
 SHARE = 0.25
@@ -64,12 +65,11 @@ def part(course: Course, numbers: np.ndarray) -> Course:
     """Return the course of some episodes, on the same clock."""
     keep = np.sort(np.asarray(numbers))
     rows = np.flatnonzero(np.isin(course.episode, keep))
-    fields = ("time", "tip", "tool", "readings", "averaged", "force", "tag", "temperature")
-    values = {name: value[rows] for name in fields if (value := getattr(course, name)) is not None}
+    values = {name: value[rows] for name in BY_ROW if (value := getattr(course, name)) is not None}
+    values["episode"] = np.searchsorted(keep, values["episode"])
     return replace(
         course,
         **values,
-        episode=np.searchsorted(keep, course.episode[rows]),
         session=course.session[keep],  # ty: ignore[invalid-argument-type]
         recording=None if course.recording is None else np.unique(course.recording[keep], return_inverse=True)[1],  # ty: ignore[invalid-argument-type]
         # A clock that began with an episode left out begins with the next one.

@@ -97,7 +97,7 @@ class Work:
     @property
     def presses(self) -> int:
         """Presses of the table, and those left out of it."""
-        return len(self.requests) + len(self.probes)
+        return len(self._all)
 
     @cached_property
     def probes(self) -> list[tuple[int, PressRequest]]:
@@ -126,14 +126,16 @@ class Work:
     @property
     def missing(self) -> list[PressRequest]:
         """Presses that are not solved yet."""
-        presses = [press for _, _, press in self.requests] + [press for _, press in self.probes]
-        return [presses[k] for k in self.store.missing(presses)]
+        return [self._all[k] for k in self.store.missing(self._all)]
 
     @property
     def expected_seconds(self) -> float:
         """Expected duration [s]."""
-        presses = [press for _, _, press in self.requests] + [press for _, press in self.probes]
-        return self.store.expected_seconds(presses)
+        return self.store.expected_seconds(self._all)
+
+    @property
+    def _all(self) -> list[PressRequest]:
+        return [press for _, _, press in self.requests] + [press for _, press in self.probes]
 
     def done(self, progress: Progress = lambda *_: None) -> tuple[LoadTable, LeftOut | None]:
         """Solve missing presses and return the table with its error; after an interruption a second call continues.
@@ -142,9 +144,7 @@ class Work:
             SolveError: If a press that is possible was not solved.
         """
         requests, probes = self.requests, self.probes
-        answers = self.store.solve(
-            [p for _, _, p in requests] + [p for _, p in probes], self.settings.capacity, progress
-        )
+        answers = self.store.solve(self._all, self.settings.capacity, progress)
         presses: list[dict[tuple[int, int], Solved]] = [{} for _ in self.reaches]
         for (t, node, _), answer in zip(requests, answers[: len(requests)], strict=True):
             if isinstance(answer, SolveError):

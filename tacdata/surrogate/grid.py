@@ -116,14 +116,9 @@ def request(reach: Reach, x: float, y: float, depths: np.ndarray, sensor: Sensor
     """Return the press at one position, as deep as possible there; None if none is possible."""
     for count in range(len(depths), 1, -1):
         # Rounded, as stored and shipped presses are found by these very numbers.
-        press = PressRequest(
-            reach.indenter,
-            round(float(x), 6),
-            round(float(y), 6),
-            reach.yaw,
-            tuple(round(float(d), 6) for d in depths[:count]),
-            *reach.tilt,
-        )
+        place = (round(float(v), 6) for v in (x, y))
+        states = tuple(round(float(d), 6) for d in depths[:count])
+        press = PressRequest(reach.indenter, *place, reach.yaw, states, *reach.tilt)
         try:
             check_press(press, sensor)
         except SolveError:

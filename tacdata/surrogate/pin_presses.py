@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +62,7 @@ def _write(
         return result
 
     stamp = provenance.stamp("tacdata.surrogate.pin_presses", dict(model.identity), asdict(model.settings))
+    loads: Any = {n: padded([getattr(s.loads, n) for s in solutions]) for n in ("force", "closure", "area")}
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
@@ -68,9 +70,7 @@ def _write(
         counts=np.array([len(s.depths) for s in solutions]),
         ended=np.array([s.ended for s in solutions]),
         depths=depths,
-        force=padded([s.loads.force for s in solutions]),
-        closure=padded([s.loads.closure for s in solutions]),
-        area=padded([s.loads.area for s in solutions]),
+        **loads,
         normal=padded([s.normal for s in solutions]),
         provenance=np.array(provenance.canonical(stamp)),
     )

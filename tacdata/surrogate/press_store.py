@@ -76,17 +76,8 @@ class PressStore:
     def put(self, request: PressRequest, solved: Solved) -> None:
         """Store a press."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        buffer, loads = io.BytesIO(), solved.loads
-        np.savez_compressed(
-            buffer,
-            depths=solved.depths,
-            force=loads.force,
-            closure=loads.closure,
-            area=loads.area,
-            normal=solved.normal,
-            seconds=np.array(solved.seconds),
-            ended=np.array(solved.ended),
-        )
+        buffer, values = io.BytesIO(), {name: value for name, value in vars(solved).items() if name != "loads"}
+        np.savez_compressed(buffer, **values, **vars(solved.loads))
         with written(self.path(request)) as stream:
             stream.write(buffer.getvalue())
 
@@ -128,11 +119,9 @@ class PressStore:
                     continue
                 done += 1
                 passed = time.perf_counter() - begin
-                results[k] = (
-                    answer
-                    if isinstance(answer, SolveError)
-                    else self._kept(requests[k], answer, passed / done, attempt > 0)
-                )
+                if not isinstance(answer, SolveError):
+                    answer = self._kept(requests[k], answer, passed / done, attempt > 0)
+                results[k] = answer
                 progress(stored + done, len(requests), passed / done * (count - done))
             if not (missing := again):
                 break

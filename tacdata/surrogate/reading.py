@@ -50,18 +50,12 @@ def reading_of(sensor: Sensor, loads: Loads) -> ReadingCurve:
     transducer = Transducer.of(sensor)
     slopes = transducer.derivatives(loads)
     # Derivative times load is a change of capacitance, so that the three kinds compare.
-    weight = {
-        name: float(np.abs(getattr(slopes, name) * getattr(loads, name)).max()) for name in ("force", "closure", "area")
-    }
-    largest = max(weight.values())
-    dominant = [name for name, value in weight.items() if value > _NOTHING * largest]
+    weight = {name: float(np.abs(getattr(slopes, name) * load).max()) for name, load in vars(loads).items()}
+    dominant = [name for name, value in weight.items() if value > _NOTHING * max(weight.values())]
     # A parameter that differs from taxel to taxel leaves no common curve.
     numbers = [np.ptp(np.atleast_1d(v)) for v in vars(transducer.principle).values()]
-    by = (
-        dominant[0]
-        if len(dominant) == 1 and dominant[0] in ("force", "closure") and not any(numbers)
-        else "capacitance"
-    )
+    alone = len(dominant) == 1 and dominant[0] in ("force", "closure") and not any(numbers)
+    by = dominant[0] if alone else "capacitance"
     if by == "capacitance":
         top = float(np.abs(transducer.principle.capacitance(loads) - transducer.rest).max())
         at = np.array([0.0, max(top, 1e-9)])

@@ -33,7 +33,6 @@ class Solved:
         count = min(len(depths), len(self.depths)) if self.ended else len(depths)
         if len(self.depths) < count or not np.allclose(self.depths[:count], depths[:count], atol=1e-6):
             return None
-        loads = self.loads
-        cut = Loads(loads.force[:count], loads.closure[:count], loads.area[:count])
+        cut = Loads(*(values[:count] for values in vars(self.loads).values()))
         share = count / len(self.depths)
         return Solved(self.depths[:count], cut, self.normal[:count], self.seconds * share, self.ended)

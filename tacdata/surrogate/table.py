@@ -44,41 +44,22 @@ class LoadTable:
     @property
     def response(self) -> TableResponse:
         """The response of the table."""
+        return TableResponse(**self._arrays, tools=self.tools, error=self.error)
+
+    @property
+    def _arrays(self) -> dict[str, np.ndarray]:
         g, r = self.grid, self.reading
-        return TableResponse(
-            g.x,
-            g.y,
-            g.depth,
-            self.load,
-            self.normal,
-            r.curve_load,
-            r.curve_signal,
-            r.gain,
-            r.offset,
-            self.tools,
-            self.error,
-        )
+        curve = {name: getattr(r, name) for name in ("curve_load", "curve_signal", "gain", "offset")}
+        return {"x": g.x, "y": g.y, "depth": g.depth, "load": self.load, "force": self.normal, **curve}
 
     def write(self, path: Path, provenance: dict[str, Any]) -> None:
         """Write the table (.npz), with ``provenance`` as JSON text."""
-        g, r = self.grid, self.reading
+        # Single precision is far finer than the loads' error, and halves the file.
+        loads = {"load": self.load.astype(np.float32), "force": self.normal.astype(np.float32)}
+        values: dict[str, Any] = {**self._arrays, **loads, "tools": self.tools, "solved": self.solved}
+        stamp = np.array(json.dumps(provenance))
         with replacement(path) as stream:
-            np.savez_compressed(
-                stream,
-                x=g.x,
-                y=g.y,
-                depth=g.depth,
-                load=self.load.astype(np.float32),
-                force=self.normal.astype(np.float32),
-                curve_load=r.curve_load,
-                curve_signal=r.curve_signal,
-                gain=r.gain,
-                offset=r.offset,
-                tools=np.array(self.tools),
-                solved=self.solved,
-                error=self.error,
-                provenance=np.array(json.dumps(provenance)),
-            )
+            np.savez_compressed(stream, **values, error=self.error, provenance=stamp)
 
     def uncovered(self, places: Sequence[tuple[str, np.ndarray, float]]) -> list[tuple[str, np.ndarray, float]]:
         """Return the presses (tool, x and y [mm], depth [mm]) that are not covered by solved nodes."""

@@ -174,21 +174,11 @@ class _Stretch:
             return None
         x0, y0, slope = line
         delay, jitter, uncertainty = self._spread(line)
-        is_free = line == self._free_line()
-        # Either end of the line may be off by the uncertainty.
+        # Either end of the line may be off by the uncertainty; a nominal rate bounds it by the crystal's tolerance.
         drift = 2 * uncertainty / self.span_ns
-        return ClockModel(
-            x0,
-            y0,
-            slope,
-            self.frames,
-            self.origin[1],
-            max(delay, 0.0),
-            jitter,
-            uncertainty,
-            drift if is_free else min(drift, 2 * CRYSTAL),
-            axis,
-        )
+        drift = drift if line == self._free_line() else min(drift, 2 * CRYSTAL)
+        arrivals = self.frames, self.origin[1]
+        return ClockModel(x0, y0, slope, *arrivals, max(delay, 0.0), jitter, uncertainty, drift, axis)
 
     def _spread(self, line: tuple[int, int, float]) -> tuple[float, float, float]:
         """Return mean and standard deviation of the latencies above a line, and its uncertainty [ns]."""

@@ -62,20 +62,8 @@ def curves(comparison: Comparison, change: GapReduction, episodes: np.ndarray, c
         measured = course.readings[rows]
 
         # A constant per episode belongs to the calibration: both predictions are shifted to the measured median.
-        def level(predicted: np.ndarray, rows: np.ndarray = rows, measured: np.ndarray = measured) -> np.ndarray:
-            return predicted[rows] + np.nanmedian(measured - predicted[rows], axis=0)
-
-        time = course.time[rows] - course.time[rows[0]]
-        episode_curves.append(
-            EpisodeCurves(
-                course.names[e],
-                time,
-                course.tip[rows, 2],
-                measured,
-                level(initial),
-                level(revised),
-                scale,
-                course.channel_names,
-            )
-        )
+        levels = [p[rows] + np.nanmedian(measured - p[rows], axis=0) for p in (initial, revised)]
+        time, depth = course.time[rows] - course.time[rows[0]], course.tip[rows, 2]
+        name, channels = course.names[e], course.channel_names
+        episode_curves.append(EpisodeCurves(name, time, depth, measured, *levels, scale, channels))
     return episode_curves

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.fits import best_shapes, fitted
 from tacdata.discrepancy.search.gauss_newton import Refined, refine
 from tacdata.discrepancy.search.problem import prepare
@@ -54,13 +53,7 @@ def rivals(
     placed = placed_of(effects)
     remainder = [p for k, p in enumerate(placed) if k != at]
     answer = Rival(undecided["mechanism"], tuple(placed), refine(comparison.setting, placed, comparison.null))
-    setting = Setting(
-        comparison.course,
-        comparison.setting.response,
-        library_of,
-        comparison.setting.nuisance,
-        comparison.setting.given,
-    )
+    setting = replace(comparison.setting, effects=library_of)
     bare = prepare(setting, comparison.null, remainder)
     everything = np.arange(len(bare.folds))
     best: dict[str, Rival] = {}
