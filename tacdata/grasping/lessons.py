@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tacdata.grasping.press_set import PressSet
-from tacdata.grasping.touch import FingertipSpread
+from tacdata.grasping.touch import FingertipSpread, mirrored
 from tacdata.sensor import Sensor
-from tacdata.surrogate.symmetry import mirrored
 
 REST, HELD = 5, 8
 """Frames without contact at either end, and at full depth [count]."""

@@ -10,7 +10,6 @@ from scipy.interpolate import RegularGridInterpolator
 from tacdata.grasping.press_set import PressSet
 from tacdata.grasping.presses import orange_places
 from tacdata.sensor import Sensor
-from tacdata.surrogate.symmetry import mirrored
 
 
 class OrangeTouch:
@@ -47,6 +46,14 @@ class OrangeTouch:
         levels = self._signals((abs(x), abs(y)))
         readings = np.array([np.interp(depth, self._depths, levels[:, k]) for k in range(levels.shape[1])])
         return mirrored(readings, self.sensor, x < 0, y < 0)
+
+
+def mirrored(values: np.ndarray, sensor: Sensor, over_x: bool, over_y: bool) -> np.ndarray:
+    """Return readings (..., taxels) of the press mirrored along x, y or both."""
+    array = values.reshape(*values.shape[:-1], sensor.taxels.rows, sensor.taxels.columns)
+    array = array[..., ::-1] if over_x else array
+    array = array[..., ::-1, :] if over_y else array
+    return array.reshape(values.shape)
 
 
 @dataclass(frozen=True)
