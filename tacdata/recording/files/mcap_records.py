@@ -5,10 +5,10 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any
 from zlib import crc32
 
 import numpy as np
@@ -20,7 +20,6 @@ from mcap.records import Attachment, Channel, Chunk, Header, Message, Metadata, 
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 
 from tacdata.errors import FormatError, UsageError
-from tacdata.recording.files.message_table import ChunkContent, MessageTable, Topic
 
 PROFILE = "tacdata"
 """MCAP profile of our recordings."""
@@ -31,8 +30,8 @@ SEARCH = 1 << 20
 """Bytes read at a time while searching the next chunk behind damage [bytes]."""
 MESSAGE = struct.Struct("<HIQQ")
 """Channel, sequence, log and publish time before a message's data (MCAP specification, "Message")."""
-CHUNK = struct.Struct("<QQQII")
-"""First and last time, size and checksum of a chunk's content, length of its compression's name (same place)."""
+RECORD = struct.Struct("<BQ")
+"""Opcode and length of a record's body (same place, "Records")."""
 COMPRESSIONS = ("", "lz4", "zstd")
 """Compressions of chunks that MCAP names."""
 UNKNOWN = "is left out: zstd, lz4 and none are known"
@@ -40,6 +39,18 @@ UNKNOWN = "is left out: zstd, lz4 and none are known"
 KNOWN = frozenset(opcode.value for opcode in Opcode)
 PRIVATE = 0x80
 """Opcodes from here on are private to other programs."""
+
+
+@dataclass(frozen=True)
+class Topic:
+    """The messages of one topic, in the order of writing."""
+
+    sequence: np.ndarray
+    """Sequence numbers [1], shape (n,), int64."""
+    log_ns: np.ndarray
+    """Times of receipt [ns], shape (n,), int64."""
+    data: list[bytes]
+    """Content of each message, n entries."""
 
 
 @dataclass
@@ -50,28 +61,24 @@ class Records:
     profile: str = ""
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    table: MessageTable = field(default_factory=MessageTable)
-    """All messages by column."""
+    messages: list[Message] = field(default_factory=list)
     attachments: dict[str, Attachment] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
     """Damaged parts, as sentences; empty for a file that was closed properly."""
 
-    @property
-    def messages(self) -> list[Message]:
-        """All messages."""
-        return self.table.objects()
-
     def of_topic(self, topic: str) -> list[Message]:
         """Return the messages of one topic, in the order of writing."""
-        return self.table.objects(self._ids(topic))
+        numbers = {channel.id for channel in self.channels.values() if channel.topic == topic}
+        return [message for message in self.messages if message.channel_id in numbers]
 
     def columns_of(self, topic: str) -> Topic:
-        """Return the messages of one topic by column, in a fraction of the time."""
-        return self.table.topic(self._ids(topic))
-
-    def _ids(self, topic: str) -> set[int]:
-        return {channel.id for channel in self.channels.values() if channel.topic == topic}
+        """Return the messages of one topic by column."""
+        messages = self.of_topic(topic)
+        sequence = np.array([message.sequence for message in messages], np.int64)
+        # MCAP's times are unsigned; one beyond int64 is damage, and wraps.
+        log = np.array([message.log_time for message in messages], np.uint64).astype(np.int64)
+        return Topic(sequence, log, [message.data for message in messages])
 
 
 def read_records(
@@ -93,8 +100,8 @@ def read_records(
     if not path.is_file():
         raise UsageError(f"no file {path}", "an MCAP recording", "check the path")
     records = Records(path)
-    for block in _blocks(path, records.damage):
-        take(records, block, images, digests, seen)
+    for record in walk(path, records.damage):
+        take(records, record, images, digests, seen)
     if not records.profile and not records.channels and not records.attachments:
         raise FormatError(
             f"{path} is no MCAP file, or nothing of it can be read",
@@ -110,43 +117,9 @@ def counted(damage: list[str]) -> list[str]:
 
 
 def take(
-    records: Records, block: Any, images: bool, digests: bool, seen: Callable[[str, memoryview], None] | None
+    records: Records, record: Any, images: bool, digests: bool, seen: Callable[[str, memoryview], None] | None
 ) -> None:
-    """Add a record or an open chunk (`content`) to ``records``; other arguments as in `read_records`."""
-    if not isinstance(block, ChunkContent):
-        if isinstance(block, Message) and not images and block.channel_id in (cameras := _cameras(records, {})):
-            block = replace(block, data=_stand_in(cameras[block.channel_id], memoryview(block.data), digests, seen))
-        _take(records, block)
-        return
-    try:
-        entries = [_parsed(*block.record(k)) for k in block.others()]
-        named = {entry.id: entry.topic for entry in entries if isinstance(entry, Channel)}
-        cameras = {} if images else _cameras(records, named)
-        # Before anything of the chunk is taken: a chunk counts as a whole or not at all.
-        heads, data = block.messages(cameras)
-    except Exception as error:  # a record's own fields may be damaged in any way
-        records.damage.append(f"a damaged chunk is left out ({type(error).__name__})")
-        return
-    for entry in entries:
-        _take(records, entry)
-    for k in np.flatnonzero(np.isin(heads["channel"], list(cameras))).tolist() if cameras else ():
-        data[k] = _stand_in(cameras[int(heads["channel"][k])], data[k], digests, seen)
-    records.table.extend(heads, data)
-
-
-def _stand_in(topic: str, message: memoryview, digests: bool, seen: Callable[[str, memoryview], None] | None) -> bytes:
-    if seen is not None:
-        seen(topic, message)
-    return _digest(bytes(message)) if digests else b""
-
-
-def _cameras(records: Records, named: dict[int, str]) -> dict[int, str]:
-    """Return the camera channels: those known before and those that a chunk names."""
-    channels = {channel.id: channel.topic for channel in records.channels.values()} | named
-    return {number: topic for number, topic in channels.items() if topic.endswith("/image")}
-
-
-def _take(records: Records, record: Any) -> None:
+    """Add a record to ``records``; other arguments as in `read_records`."""
     match record:
         case Header():
             records.profile = record.profile
@@ -155,7 +128,12 @@ def _take(records: Records, record: Any) -> None:
         case Channel():
             records.channels[record.id] = record
         case Message():
-            records.table.add(record)
+            channel = records.channels.get(record.channel_id)
+            if not images and channel is not None and channel.topic.endswith("/image"):
+                if seen is not None:
+                    seen(channel.topic, memoryview(record.data))
+                record.data = _digest(record.data) if digests else b""
+            records.messages.append(record)
         case Attachment():
             records.attachments[record.name] = record
         case Metadata():
@@ -181,20 +159,6 @@ def walk(path: Path, damage: list[str]) -> Iterator[Any]:
     Raises:
         FormatError: If another recording follows the end of the first.
     """
-    for block in _blocks(path, damage):
-        if not isinstance(block, ChunkContent):
-            yield block
-            continue
-        try:
-            parsed = [_parsed(*block.record(k)) for k in range(len(block.starts))]
-        except Exception as error:  # a record's own fields may be damaged in any way
-            damage.append(f"a damaged chunk is left out ({type(error).__name__})")
-            continue
-        yield from (record for record in parsed if record is not None)
-
-
-def _blocks(path: Path, damage: list[str]) -> Iterator[Any]:
-    """Yield as `walk` does, but chunks as a whole, their checksums verified."""
     size = path.stat().st_size
     with path.open("rb") as stream:
         if stream.read(len(MAGIC)) != MAGIC:
@@ -236,7 +200,7 @@ def _plausible(opcode: int, length: int) -> bool:
 
 
 def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterator[Any]:
-    """Yield the content of one record; a chunk as a whole (`ChunkContent`), its checksum verified.
+    """Yield one record, or those of a chunk: all of them or none, its checksum verified.
 
     Raises:
         Exception: Any error of mcap's parser.
@@ -260,29 +224,33 @@ def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterato
                 yield Attachment.read(data)
         case Opcode.CHUNK:
             try:
-                chunk = _chunk(body)
+                chunk = Chunk.read(data)
                 if chunk.compression not in COMPRESSIONS:
                     damage.append(f"a chunk of the compression {chunk.compression!r} {UNKNOWN}")
                     return
                 stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-                opened = ChunkContent.split(stream.read(length))
+                records = _split(stream.read(length))
             except Exception as error:  # the errors of zstd, struct and mcap share no base class
                 damage.append(f"a damaged chunk is left out ({type(error).__name__})")
                 return
-            yield opened
+            yield from records
 
 
-def _chunk(body: bytes) -> Chunk:
-    """Return a chunk as `Chunk.read` does, without copying its records.
+def _split(content: bytes) -> list[Schema | Channel | Message]:
+    """Return the records of an open chunk.
 
     Raises:
-        struct.error: If it is too short.
+        ValueError: If one is longer than the remaining bytes.
     """
-    start, end, size, crc, length = CHUNK.unpack_from(body)
-    place = CHUNK.size + length
-    records = memoryview(body)[place + 8 : place + 8 + int.from_bytes(body[place : place + 8], "little")]
-    compression = body[CHUNK.size : place].decode()
-    return Chunk(compression, cast(bytes, records), end, start, crc, size)
+    records, place = [], 0
+    while place < len(content):
+        opcode, length = RECORD.unpack_from(content, place)
+        begin, place = place + RECORD.size, place + RECORD.size + length
+        if place > len(content):
+            raise ValueError("a record that is longer than its chunk")
+        if (record := _parsed(opcode, content[begin:place])) is not None:
+            records.append(record)
+    return records
 
 
 def _parsed(opcode: int, body: bytes) -> Schema | Channel | Message | None:

@@ -1,4 +1,4 @@
-"""Messages by column are those that mcap's own reader gives, chunked or not, and pictures need not be kept."""
+"""Messages are those that mcap's own reader gives, chunked or not, and pictures need not be kept."""
 
 from zlib import crc32
 
@@ -32,7 +32,7 @@ def file(request, tmp_path):
     return path
 
 
-def test_the_table_holds_what_mcap_reads(file):
+def test_records_hold_what_mcap_reads(file):
     records, damage = read_records(file), []
     for topic in ("/a", "/camera/b/image", "/late"):
         with file.open("rb") as stream:
