@@ -86,6 +86,7 @@ def _fields(kind: ast.ClassDef) -> list[tuple[str, str]]:
     if not any("dataclass" in ast.unparse(d) for d in kind.decorator_list):
         return []
     result = []
+    # A field's docstring is the statement behind it.
     for statement, following in zip(kind.body, [*kind.body[1:], ast.Pass()], strict=True):
         if isinstance(statement, ast.AnnAssign) and not ast.unparse(statement.target).startswith("_"):
             value = following.value if isinstance(following, ast.Expr) else None

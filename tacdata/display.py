@@ -69,6 +69,7 @@ class Displayed:
         except (TacdataError, ImportError) as error:
             return f"{text}<pre>no picture: {html.escape(str(error).splitlines()[0])}</pre>"
         stream = io.BytesIO()
+        # Into the page itself: a notebook that is sent by mail keeps its pictures.
         figure.savefig(stream, format="png", dpi=RESOLUTION)
         return f'{text}<img style="max-width:100%" src="data:image/png;base64,{b64encode(stream.getvalue()).decode()}">'
 
@@ -76,6 +77,7 @@ class Displayed:
 def _portrait(kind: type) -> Callable[[Any], Figure] | None:
     """Return the function that draws a class, or the nearest class that it is derived from; None without one."""
     for each in kind.__mro__:
+        # A class `PathSolution` is drawn by `path_solution.py`.
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", each.__name__).lower()
         if registry.has(ROOM, BASE, name):
             return registry.load_module(ROOM, BASE, name).portrait

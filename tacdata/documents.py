@@ -119,6 +119,7 @@ def _json_fault(text: str) -> str:
 
 def _not_finite(content: Any, place: str = "") -> str:
     """Return where a number is not finite, and which; "" if all are."""
+    # Any other value has nothing inside.
     inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
     for key, value in inner:
         location = f"{place}/{key}" if place else str(key)
@@ -181,6 +182,7 @@ def _refuse_growth(node: yaml.Node, origin: str) -> None:
         """Return the number of nodes that a node becomes with its aliases written out."""
         if isinstance(part, yaml.ScalarNode):
             return 1
+        # None marks a node whose inside is being counted: meeting it again is a circle.
         count = sizes.get(id(part), 0)
         line = part.start_mark.line + 1
         if count is None:
@@ -339,6 +341,7 @@ def check(document: Any, schema: str, origin: str) -> None:
                 f"version {definition['version']}",
                 "use the tacdata release that wrote it, or convert the file",
             )
+    # By place, so that the same file always reports the same fault first.
     errors = sorted(Draft202012Validator(definition).iter_errors(document), key=lambda e: list(e.absolute_path))
     if errors:
         first = errors[0]
@@ -380,5 +383,6 @@ def write(path: Path, document: dict[str, Any], schema: str) -> None:
     """Check a document and write it, as YAML or JSON by the file's ending."""
     check(document, schema, str(path))
     as_yaml = path.suffix in (".yaml", ".yml")
+    # Keys stay in the order in which a person reads them.
     text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True) if as_yaml else json.dumps(document, indent=1)
     write_text(path, text + ("" if text.endswith("\n") else "\n"))

@@ -118,5 +118,6 @@ def refused_by_system(error: OSError) -> DeviceError | None:
     if error.errno not in REFUSALS:
         return None
     allowed, remedy = REFUSALS[error.errno]
+    # A renaming names two files.
     paths = " to ".join(str(path) for path in (error.filename, error.filename2) if path is not None)
     return DeviceError(f"{paths or 'a file'}: {error.strerror}", allowed, remedy)

@@ -50,6 +50,7 @@ def missing_package(error: ImportError, feature: str, instead: str = "") -> Pack
     if not extras:
         return None
     rooms = (room for asker in _askers(error.__traceback__) for room in ROOMS if f"{asker}.".startswith(f"{room}."))
+    # The outermost room that the import came from knows what the person wanted.
     extra = next((ROOMS[room] for room in rooms if ROOMS[room] in extras), extras[0])
     name = package if package == module else f"{module.capitalize()} ({package})"
     line = install_line(extra)
@@ -117,6 +118,7 @@ def install_line(extra: str) -> str:
     origin = json.loads(record)
     if "dir_info" in origin:
         return f"pip install '.[{extra}]' in the clone"
+    # As pip takes it: git+https://...
     system = f"{origin['vcs_info']['vcs']}+" if "vcs_info" in origin else ""
     return f"pip install 'tacdata[{extra}] @ {system}{origin['url']}'"
 

@@ -24,6 +24,7 @@ class Condition(threading.Condition):
         try:
             super().__exit__(*raised)
         except RuntimeError:
+            # Without an error on its way, a lock that is not held is a fault of the program.
             if raised[0] is None:
                 raise
 

@@ -19,6 +19,7 @@ _quiet = False
 def silenced(quiet: bool) -> Iterator[None]:
     """Leave progress and hints out while the block runs, if ``quiet``."""
     global _quiet
+    # A verb within a quiet one stays quiet.
     previous, _quiet = _quiet, _quiet or quiet
     try:
         yield
@@ -46,6 +47,7 @@ def suggest(*words: object) -> None:
         >>> suggest("check", Path("my session"))
         next: tacdata check 'my session'
     """
+    # Only paths are quoted: options and their values are typed as they are.
     typed = [quote(str(word)) if isinstance(word, PurePath) else str(word) for word in words]
     say(" ".join(["next: tacdata", *filter(None, typed)]))
 

@@ -147,6 +147,7 @@ def code_version() -> str:
         release = version("tacdata")
     except PackageNotFoundError:
         release = "0+unknown"
+    # A wheel has no repository to ask.
     carried = Path(__file__).resolve().with_name("commit.txt")
     if carried.is_file():
         return f"{release}+g{carried.read_text().strip()}"
@@ -162,6 +163,7 @@ def code_version() -> str:
             check=True,
             timeout=10,
         ).stdout.strip()
+    # Without git, or in a damaged clone, the release alone is known.
     except (OSError, subprocess.SubprocessError):
         return release
     return f"{release}+g{described}"

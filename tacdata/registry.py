@@ -58,6 +58,7 @@ def add_folder(folder: StrPath) -> None:
 
 def _check_folder(folder: Path) -> None:
     """Refuse a plug-in folder that is not there, has no folder of a kind, or one under a name that means another."""
+    # A folder that is not there holds none, and is refused by the same words.
     inside = {each.name for each in folder.iterdir() if each.is_dir()} if folder.is_dir() else set()
     kinds = f"folders named {', '.join(sorted(KINDS))}"
     for name in sorted(inside & MISTAKEN.keys()):
@@ -102,6 +103,7 @@ def names(room: str, base: str) -> list[str]:
         >>> registry.names("tacdata.indenters", "indenter")[:3]
         ['cone', 'cylinder', 'ellipsoid']
     """
+    # By the names of files: no member is imported, as many need packages of an extra.
     files = {module.name for module in pkgutil.iter_modules(_search_path(room))} - {base, "__init__"}
     return sorted(files | _installed(room).keys())
 
@@ -130,6 +132,7 @@ def source(room: str, name: str) -> Path:
             if path.is_file():
                 return path
     spec = find_spec(_installed(room)[name].value) if name in _installed(room) else None
+    # A package without a file of its own (a namespace) has nothing to show.
     if spec is None or spec.origin is None:
         raise UsageError(f"no file of {name} in {room}", "a member with a source file", "install its package again")
     return Path(spec.origin)
@@ -159,6 +162,7 @@ def load_module(room: str, base: str, name: str) -> ModuleType:
             f"did you mean {close[0]!r}?" if close else f"choose one, or add {kind}/{name}.py as a plug-in ({HELP})",
         )
     if _has_file(room, name):
+        # As part of the room, whose package searches the plug-in folders too.
         return importlib.import_module(f"{room}.{name}")
     return _load_installed(_installed(room)[name])
 

@@ -24,6 +24,7 @@ def load(kind: str, key: str) -> Any | None:
         key: Hash of all that decides it (hex).
     """
     try:
+        # The checksum in the first line: a file that a crash cut short counts as none.
         checksum, _, text = _place(kind, key).read_text(encoding="utf-8").partition("\n")
         return json.loads(text) if checksum == _checksum(text) else None
     except (OSError, ValueError):

@@ -34,6 +34,7 @@ class StageError(TacdataError):
     """A stage ended with an error that the person has already read."""
 
     def __init__(self, number: int, line: str, code: int, remains: str) -> None:
+        # A stage that a signal ended has a negative code, which no shell knows.
         self.exit_code = code if 0 < code < 256 else 1
         super().__init__(
             f"stage {number} ended with exit code {code}: {line}", "exit code 0", f"see the message above; {remains}"
@@ -133,6 +134,7 @@ def follow() -> None:
     pipe = os.environ.pop(LIFELINE, None)
     if pipe is None:
         return
+    # Processes that this verb starts have a pipe of their own, or none.
     os.set_inheritable(int(pipe), False)
     # A shell's background job and all below it ignore Ctrl-C; a stage hears it from its parent alone.
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
@@ -192,6 +194,7 @@ class Background:
         """Show the last line of its log and all that comes, until it ends; return its exit code."""
         with self.log.open(errors="replace") as stream:
             output = stream.read()
+            # Of a verb that has ended more is shown: its error is among the last lines.
             for line in output.rstrip().splitlines()[-1 if self.process.poll() is None else -_TAIL :]:
                 print(line, flush=True)
             while True:

@@ -56,6 +56,7 @@ def start() -> None:
     if wp.is_cuda_available():
         return
     wp.config.max_unroll = UNROLLED
+    # The newest kind first: objects for an older one would waste its wide registers.
     for processor in processors():
         shipped = shipped_kernels() / wp.__version__ / processor
         if shipped.is_dir() and wp.config.cpu_compiler_flags:
@@ -169,6 +170,7 @@ def _start_quietly() -> None:
             os.close(descriptor)
             printed.seek(0)
             lines = [line for line in printed.read().splitlines(keepends=True) if NO_GPU not in line]
+            # All other words of the library are passed on.
             os.write(2, b"".join(lines))
 
 

@@ -102,6 +102,7 @@ class CapacitiveBoard(TaxelBoard):
         """Close the port; never raises."""
         self._stopped.set()
         if self._thread is not None:
+            # A read that hangs in the driver must not hang the program's end.
             self._thread.join(timeout=2.0)
             self._thread = None
         if self._line is not None:
@@ -161,6 +162,7 @@ class CapacitiveBoard(TaxelBoard):
         counts, allowance = self.counts, 4 * self.format.size if self.format.encoding == "binary" else 4096
         if counts.corrupt > 1 or counts.garbage_bytes > allowance:
             counts.notes.append(f"{counts.garbage_bytes} B, {counts.corrupt} frames were damaged at first")
+        # What follows is counted from the first good frame on.
         counts.garbage_bytes = counts.corrupt = 0
 
     def _break(self, error: Exception) -> None:

@@ -267,6 +267,7 @@ def create(settings: dict[str, Any], kind: type[Device], clock: Clock) -> Any:
     values = dict(settings)
     driver = values.pop("driver")
     maker = registry.load(ROOM, BASE, driver, kind)
+    # The constructor's arguments are the settings that a rig file may give.
     parameters = {name: setting for name, setting in inspect.signature(maker).parameters.items() if name != "clock"}
     allowed = list(parameters)
     unknown = sorted(set(values) - set(allowed))

@@ -26,6 +26,7 @@ class Bulge(Effect):
         if centers is None:
             return state
         distance = np.linalg.norm(centers[:, None] - centers, axis=-1)
+        # The distance of a channel from itself is no pitch.
         pitch = np.where(distance > 1e-9, distance, np.inf).min()
         ring = np.exp(-np.square((distance / pitch / values["l"] - 1) / 0.35))
         return replace(state, load=state.load - values["k"] * state.load @ ring)

@@ -31,6 +31,7 @@ class DepthNodes(Effect):
 
     def unjudgeable(self, course: Course, response: Response) -> str:
         spacing = response.spacing
+        # A response of another kind has no nodes.
         if spacing is not None and spacing < CLOSE * course.span:
             return f"depths were solved {spacing:.2g} mm apart or closer: errors of interpolation are far smaller"
         return super().unjudgeable(course, response)

@@ -17,6 +17,7 @@ def given_way(self: Effect, state: State, values: Values) -> State:
     tool, pose, power = state.course.tool, state.pose, 1 / float(values.get("m", 1.0))
     load = np.maximum(state.response.force(pose, tool), 0.0)
     for _ in range(STEPS):
+        # By the largest force, so that the compliance is a length and needs no unit of force.
         share = load / max(float(load.max()), 1e-12)
         pose = state.deeper(-values["c"] * share**power).pose
         # Half steps: where the frame is softer than the skin, whole ones swing.

@@ -38,6 +38,7 @@ class Poroelasticity(Effect):
     def apply(self, state: State, values: Values) -> State:
         course = state.course
         radii = np.array([tool.radius for tool in course.tools], dtype=float)
+        # A tool without a radius takes the time of a usual one.
         radii = np.where(np.isfinite(radii), radii, np.nanmedian(radii))
         loads = state.loads
         slow = np.zeros_like(loads)

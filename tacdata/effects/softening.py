@@ -61,6 +61,7 @@ class WearIn(Softening):
 
     def apply(self, state: State, values: Values) -> State:
         course = state.course
+        # Earlier episodes at the same place; the first press finds it as it was made.
         presses = np.array([np.sum(course.site[:k] == course.site[k]) for k in range(course.episodes)], dtype=float)
         return state.scaled((1 + values["a"] * np.expm1(-presses / values["n"]))[course.episode])
 

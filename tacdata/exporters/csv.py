@@ -27,7 +27,9 @@ class Csv(Exporter):
             text = io.StringIO()
             rows = csv.writer(text, lineterminator="\n")
             rows.writerow(columns)
+            # Python prints the fewest digits that give the same number back, so nothing is lost.
             rows.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+            # The description first: a table without one cannot be read.
             documents.write(directory / f"{stem}.json", targets.header(columns), "fingertip_targets")
             documents.write_text(directory / f"{stem}.csv", text.getvalue())
         return []

@@ -82,6 +82,7 @@ def exporter(name: str, robot: Path | None = None, recordings: Path | None = Non
     """
     kind: Any = registry.load(ROOM, BASE, name, Exporter)
     writer: Exporter = kind(robot, recordings)
+    # Here and not in `write`: a person should read it before minutes of work.
     if writer.needs_robot and robot is None:
         raise UsageError(f"format {name} without a robot", "--robot ROBOT.yaml", "describe the robot in a file")
     return writer

@@ -36,9 +36,11 @@ class Joints(Exporter):
         if self.robot is None:
             raise UsageError("no robot", "a robot file", "name it with --robot")
         robot, sentences = read_robot(self.robot), []
+        # Before the folder is made, as a robot file that fails should leave none.
         solved = [follow(robot, targets)[0] for targets in episodes]
         new_folder(directory)
         if solved:
+            # Unknown limits are the robot's, so the first path has them all.
             self.remarks += [*robot.remarks, *_unchecked(solved[0])]
         for targets, path in zip(episodes, solved, strict=True):
             self.tables.append(use_table(path, targets))
@@ -129,6 +131,7 @@ def use_table(path: JointPath, targets: FingertipTargets) -> str:
             if len(trajectory)
             else float("nan")
         )
+        # Rates next to an unreached target are NaN; they are left out.
         fastest, hardest = (_largest(values[:, k]) for values in (speed, acceleration))
         share = f"{fastest / joint.velocity:.0%}" if joint.velocity else "unknown"
         unit = joint.unit
@@ -160,6 +163,7 @@ def _unchecked(path: JointPath) -> list[str]:
 
 
 def _when(rows: tuple[int, ...], seconds: np.ndarray) -> str:
+    # Rows that follow each other are one stretch of time.
     parts = np.split(np.array(rows), 1 + np.flatnonzero(np.diff(rows) > 1))
     spans = [f"{seconds[part[0]]:.2f} to {seconds[part[-1]]:.2f} s" for part in parts[:3]]
     return ", ".join(spans) + (f" and {len(parts) - 3} more stretches" if len(parts) > 3 else "")
@@ -167,6 +171,7 @@ def _when(rows: tuple[int, ...], seconds: np.ndarray) -> str:
 
 def _header(targets: FingertipTargets, path: JointPath, robot: Robot, columns: dict[str, np.ndarray]) -> dict[str, Any]:
     good = np.isfinite(path.values).all(axis=1)
+    # JSON has no NaN: a path that is nowhere followed has no error.
     largest = [float(e[good].max()) if good.any() else None for e in (path.position_error, path.rotation_error)]
     parents = {"recording": targets.recording_hash, "urdf": robot.urdf_hash}
     return {
@@ -192,6 +197,7 @@ def _header(targets: FingertipTargets, path: JointPath, robot: Robot, columns: d
 def _read(path: Path) -> tuple[FingertipTargets, dict[str, np.ndarray], dict[str, Any]]:
     try:
         table = pq.read_table(path, page_checksum_verification=True)
+        # A Parquet file of another program has no such entry.
         header = json.loads((table.schema.metadata or {})[HEADER])
     except (pa.ArrowException, OSError, KeyError, ValueError) as error:
         reason = str(error).splitlines()[0]

@@ -47,13 +47,16 @@ class Lerobot(Exporter):
         """Write a new dataset."""
         rate = _same([targets.rate for targets in episodes], "rates")
         fingers = _same([targets.fingers for targets in episodes], "fingers")
+        # Predictions of two networks in one column would not compare.
         _same([json.dumps(targets.network) for targets in episodes], "networks")
         columns = [_columns(targets) for targets in episodes]
         features = _features(episodes[0], columns[0])
+        # LeRobot has one list of features for all episodes.
         if any(set(names) != set(columns[0]) for names in columns):
             raise UsageError("demonstrations with boards on other fingers", "the same in all", "export them separately")
         new_folder(directory)
         entries = [targets.header([*features, *INDEX_COLUMNS]) for targets in episodes]
+        # All descriptions are checked before anything is written.
         for entry in entries:
             documents.check(entry, "fingertip_targets", str(directory / META))
         documents.write_text(directory / META, json.dumps(entries, indent=1))
@@ -108,6 +111,7 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
             columns[f"{TACTILE}{name}"] = np.nan_to_num(track.signals[targets.rows])
             columns[f"{VALID}{name}"] = np.isfinite(track.signals[targets.rows])
         if track.depth is not None:
+            # LeRobot's depth images are in metres.
             maps = np.nan_to_num(track.depth[targets.rows]).astype(np.float32)
             columns[f"observation.predicted_depth.{name}"] = maps / tiff.MM_PER_METRE
         if track.novelty is not None:
@@ -119,6 +123,7 @@ def _features(targets: FingertipTargets, columns: dict[str, np.ndarray]) -> dict
     pose = [f"{name}.{part}" for name in targets.fingers for part in (*AXES, *TURNS)]
     features: dict[str, dict[str, Any]] = {}
     for key, values in columns.items():
+        # LeRobot states a number as a vector of length one.
         shape, names = list(values.shape[1:]) or [1], None
         info: dict[str, Any] = {}
         dtype = "bool" if values.dtype == bool else str(values.dtype)
@@ -152,10 +157,12 @@ def _read(directory: Path, row: folder.EpisodeRow, header: dict[str, Any]) -> Fi
 
     def column(key: str, *shape: int) -> np.ndarray:
         values = table[key].combine_chunks()
+        # Vectors are stored as lists; a hand of one finger has plain numbers.
         flat = values.flatten() if pa.types.is_nested(values.type) else values
         return flat.to_numpy(zero_copy_only=False).reshape(count, len(fingers), *shape)
 
     exact = column(EXACT, 11)
+    # The table has 0 where nothing was felt, as statistics of LeRobot allow no NaN.
     depth = np.where(column(FELT), exact[..., 10], np.nan)
     named = ("recording", "recording_hash", "task", "frame", "rate", "kind", "gains", "network", "provenance")
     return FingertipTargets(

@@ -57,6 +57,7 @@ class OpenXTactile(Exporter):
             raise UsageError("no demonstrations", "one or more", "track demonstrations first")
         tasks = {targets.task: [t for t in episodes if t.task == targets.task] for targets in episodes}
         for task, listed in tasks.items():
+            # A store has one set of arrays for all of its episodes.
             if any((t.fingers, _layout(t)) != (listed[0].fingers, _layout(listed[0])) for t in listed):
                 raise UsageError(
                     f"demonstrations of {task!r} with other fingers or boards", "the same in all", "export them apart"
@@ -66,6 +67,7 @@ class OpenXTactile(Exporter):
         for task, listed in tasks.items():
             name = re.sub(r"\W+", "_", task).strip("_") or "task"
             remarks += _store(directory / f"{name}.zarr", listed, self.recordings)
+        # Several stores may lack the same; one remark is enough.
         return list(dict.fromkeys(remarks))
 
     def read(self, directory: Path) -> list[FingertipTargets]:
@@ -87,6 +89,7 @@ def _store(store: Path, listed: list[FingertipTargets], recordings: Path | None)
     parts = [_columns(targets) for targets in listed]
     columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     ends = np.cumsum([len(targets.time_ns) for targets in listed])
+    # A folder counts as a group of Zarr by this file.
     for group in (".", "data", "meta", OWN):
         documents.write_text(store / group / ".zgroup", json.dumps({"zarr_format": 2}))
     for key, values in columns.items():
@@ -143,6 +146,7 @@ def _columns(targets: FingertipTargets) -> dict[str, np.ndarray]:
         turn = Rotation.from_quat(targets.quaternion[:, indices[0]]).as_rotvec()
         columns[f"{side}_wrist_pose"] = np.concatenate([place.mean(axis=1), turn], axis=1).astype(np.float32)
         if len(indices) > 1:
+            # The thumb, or whichever finger is named first, opposes all others.
             opening = np.linalg.norm(place[:, 0] - place[:, 1:].mean(axis=1), axis=1)
             columns[f"{side}_hand_joints"] = opening[:, None].astype(np.float32)
             columns[f"{side}_hand_joints_idx"] = np.full((count, 1), GRIPPER, np.int32)
@@ -200,6 +204,7 @@ def _pictures(targets: FingertipTargets, recordings: Path | None) -> list[bytes]
     times, images = stored_images(path) if path and path.is_file() else (np.array([]), [])
     if not images:
         return []
+    # Rows before the first image take the first.
     return [images[k] for k in np.clip(np.searchsorted(times, targets.time_ns, "right") - 1, 0, None)]
 
 
@@ -232,6 +237,7 @@ def _blocks(folder: Path, shape: tuple[int, ...], dtype: np.dtype, rows: Callabl
     }
     documents.write_text(folder / ".zarray", json.dumps(described))
     for number, begin in enumerate(range(0, shape[0], chunks[0])):
+        # Every chunk has the full size, the last one too.
         block = np.zeros(chunks, dtype)
         part = rows(begin, min(begin + chunks[0], shape[0]))
         block[: len(part)] = part
@@ -264,6 +270,7 @@ def _values(folder: Path) -> np.ndarray:
     described = json.loads((folder / ".zarray").read_text())
     chunks, shape = described["chunks"], described["shape"]
     end = ".0" * (len(shape) - 1)
+    # Rounded up: the last chunk is filled with zeros.
     count = -(-shape[0] // chunks[0])
     blocks = [zlib.decompress((folder / f"{k}{end}").read_bytes()) for k in range(count)]
     return np.frombuffer(b"".join(blocks), described["dtype"]).reshape(-1, *shape[1:])[: shape[0]]

@@ -27,6 +27,7 @@ class Parquet(Exporter):
         new_folder(directory)
         for targets in episodes:
             columns = to_columns(targets)
+            # In the file itself, so that the numbers never part from their meaning.
             header = {HEADER: json.dumps(targets.header(columns))}
             with replacement(directory / f"{Path(targets.recording).stem}.parquet") as stream:
                 table = pa.table(columns).replace_schema_metadata(header)

@@ -55,6 +55,7 @@ def _x(centre: np.ndarray | None) -> float | None:
 def _accepted(true: np.ndarray, values: list[float | None], band: float) -> float:
     """Return the farthest true position [mm] whose estimate is in the band, linear between grid points."""
     believed = np.array([np.nan if v is None else v for v in values])
+    # A strategy may believe several places to be within the band; the farthest counts.
     inside = np.flatnonzero(believed <= band)
     last = int(inside[-1]) if len(inside) else 0
     if last + 1 >= len(true) or not believed[last + 1] > believed[last]:

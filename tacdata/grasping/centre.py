@@ -25,6 +25,7 @@ def raw_centre(frames: np.ndarray, sensor: Sensor) -> np.ndarray | None:
     """Return the centroid of the averaged readings, each over the largest [mm], shape (2,); None without contact."""
     if not touched(frames):
         return None
+    # Below zero a taxel is unloaded, and would pull the centroid away from the contact.
     mean = np.maximum(frames.mean(axis=0), 0.0)
     share = mean / mean.max()
     return share @ sensor.taxels.centers / share.sum()

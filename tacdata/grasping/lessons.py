@@ -38,6 +38,7 @@ def lessons(presses: PressSet, sensor: Sensor, spread: FingertipSpread, seed: in
     The training fingertip has the sensor file's gains; those of the study differ.
     """
     rng, signals, examples = np.random.default_rng([seed, 33]), presses.signals(sensor), []
+    # A press without a second state has no depth to interpolate.
     for k in np.flatnonzero(presses.counts > 1).tolist():
         q = int(presses.counts[k])
         levels, document = presses.depths[k, :q], presses.indenters[k]

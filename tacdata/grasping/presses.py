@@ -59,6 +59,7 @@ def training_presses(sensor: Sensor, count: int) -> list[PressRequest]:
         count: Number of presses; the same at every call.
     """
     rng = np.random.default_rng([0, 31])
+    # Contacts reach over the edge, as they do in a gripper.
     half = np.array([sensor.skin.size_x, sensor.skin.size_y]) / 2 - BEYOND
     requests = []
     for _ in range(count):

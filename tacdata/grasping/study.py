@@ -147,6 +147,7 @@ def lifted(trial: GraspTrial, grip: Grip) -> bool:
 
 def configured(setup: Setup, force: float | None = None) -> Setup:
     """Return the setup whose lift presses a centred orange with a force [N]; by default the one it measures with."""
+    # The lift starts from a centred orange; off the middle the same squeeze presses less.
     return replace(setup, grip=pressing(setup.grip, setup.protocol.force if force is None else force))
 
 

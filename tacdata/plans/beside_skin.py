@@ -36,12 +36,14 @@ def check_touch(
     except UsageError:
         return  # of a session whose surface file is on another machine
     reach = indenter.extent
+    # The part of the shape's own square that lies over the skin.
     spans = [np.linspace(max(-s / 2 - c, -reach), min(s / 2 - c, reach), 129) for s, c in zip(size, place, strict=True)]
     x, y = (axis.ravel() for axis in np.meshgrid(*spans, indexing="ij"))
     c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
     if indenter.profile(c * x + s * y, c * y - s * x).min() <= depth:
         return
     x, y = np.meshgrid(*2 * [np.linspace(-reach, reach, 129)])
+    # How far from its axis the shape is that low anywhere: for the error.
     aside = np.hypot(x, y)[indenter.profile(x, y) <= depth].min(initial=reach)
     raise FormatError(
         f"{origin}: {indenter.shape} at ({place[0]:g}, {place[1]:g}) mm, {depth:g} mm deep, does not touch the skin of "

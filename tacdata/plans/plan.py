@@ -103,6 +103,7 @@ class Press:
     def document(self) -> dict[str, Any]:
         """The press as plain data (JSON types)."""
         left_out = {"indenter", *({"tilt_x", "tilt_y"} - self.angles.keys())}
+        # Presses without strokes keep the document, and the hash, that they had before strokes existed.
         left_out |= set() if self.strokes else {"strokes", "stroke"}
         values = {k: v for k, v in vars(self).items() if k not in left_out}
         return {**values, "indenter": self.indenter.document}
@@ -192,6 +193,7 @@ class Plan(Displayed):
                     ", ".join(indenters),
                     "name one of them or add it under indenters",
                 )
+            # A press above the skin must still be below the height of travel, or it is none.
             if -entry["depth"] >= motion.clearance:
                 raise FormatError(
                     f"{origin}: presses/{index}: depth {entry['depth']:g} mm flies no lower than the clearance, "
@@ -224,6 +226,7 @@ class Plan(Displayed):
                         f"-{size / 2:g} to {size / 2:g} mm",
                         f"move the press or enlarge skin/size_{axis}",
                     )
+            # `check_touch` knows upright shapes alone.
             if press.deepest > 0 and press.tilt_x == press.tilt_y == 0:
                 size = sensor.skin.size_x, sensor.skin.size_y
                 check_touch(press.indenter, size, (press.x, press.y), press.yaw, press.deepest, where)

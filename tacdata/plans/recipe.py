@@ -38,12 +38,14 @@ def write_out(recipe: dict[str, Any], sensor: Sensor, origin: str, seed: int = 0
         FormatError: If the recipe breaks its schema, or a press misses the skin or pierces it.
     """
     documents.check(recipe, "plan_recipe", origin)
+    # A stream of its own: random sites do not repeat the draws of other plans with this seed.
     rng = np.random.default_rng([seed, 11])
     presses: list[dict[str, Any]] = []
     for number, block in enumerate(recipe["blocks"]):
         presses += _block(block, sensor, rng, f"{origin}: blocks/{number}")
     if recipe.get("grouped", True):
         mountings = list(dict.fromkeys(_mounting(press) for press in presses))
+        # Python's sort is stable, so the order within a mounting stays.
         presses.sort(key=lambda press: mountings.index(_mounting(press)))
     document = {
         "version": schemas.version("plan"),

@@ -99,6 +99,7 @@ def _between(sensor: Sensor, rng: np.random.Generator, count: int | None = None)
     shift = np.array([taxels.pitch_x, taxels.pitch_y]) / 2
     middles = (taxels.centers[:, None] + shift * np.array([[1, 0], [0, 1], [1, 1]])).reshape(-1, 2)
     inside = middles[(np.abs(middles) <= half_box(sensor) + 1e-9).all(axis=1)]
+    # Drawn without repetition, then put back into the order of the taxels.
     return inside if count is None else inside[np.sort(rng.permutation(len(inside))[:count])]
 
 
@@ -111,6 +112,7 @@ def _edge(sensor: Sensor, rng: np.random.Generator, count: int, beyond: float = 
     """Equally spaced along the array's box, widened by ``beyond`` [mm]."""
     a, b = half_box(sensor) + beyond
     corners = np.array([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]])
+    # Distance along the outline at each corner.
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     place = np.arange(count) / count * arc[-1]
     return np.stack([np.interp(place, arc, corners[:, axis]) for axis in range(2)], axis=-1)

@@ -47,6 +47,7 @@ def chosen_registration(rig: Rig, rig_path: Path, path: Path | None, sensor: Sen
         FormatError: If it is damaged.
     """
     default_path = rig_path.with_name(FILE)
+    # A registration beside the rig file is that rig's, unless another is named.
     path = path or (default_path if default_path.is_file() else None)
     if path is None:
         return Chosen(rig, None, (_unmeasured(rig, rig_path),))

@@ -111,6 +111,7 @@ def touch_evidence(
     idle = probe.read(IDLE_FRAMES)
     # The standard deviation of rounding alone: a quiet channel may show one count throughout.
     noise = np.maximum(idle.spread, 0.3)
+    # A guide that already stands lower than that begins with fine steps.
     near = min(height, expected + NEAR)
     far, fine = np.arange(height - FAR, near, -FAR), np.arange(near, expected - limit - BELOW, -COARSE)
     heights = [*far.tolist(), *fine.tolist()]
@@ -126,6 +127,7 @@ def touch_evidence(
         raise _contradiction(f"no channel answers down to machine height {heights[-1]:.2f} mm", expected, limit)
     sigma = float(np.hypot(touch.onset.uncertainty, touch.onset.model))
     evidence = Evidence(expected, touch.onset.height, sigma, limit)
+    # The touch is uncertain too: only beyond both is it a contradiction.
     if abs(evidence.difference) > limit + 2.0 * sigma:
         observation = f"the skin is first touched at machine height {evidence.height:.3f} +- {sigma:.3f} mm"
         raise _contradiction(observation, expected, limit)

@@ -148,6 +148,7 @@ class GuardedProbe(Probe):
         x, y, z = self._position
         if np.hypot(position[0] - x, position[1] - y) < SIDEWAYS or abs(position[2] - z) < SIDEWAYS:
             return (Step("", position, speed),)
+        # Down last, or up first.
         corner = (position[0], position[1], z) if position[2] < z else (x, y, position[2])
         return Step("", corner, speed), Step("", position, speed)
 

@@ -87,6 +87,7 @@ def document_of(
         "sensor": sensor.name,
         "sensor_hash": sensor.content_hash,
         "indenter": indenter,
+        # The settings by which a later session judges whether machine zero is the same.
         "controller": {key: controller[key] for key in ("banner", "$20", "$22") if key in controller},
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in vars(measurement.settings).items()},
         "origin": [round(value, 5) for value in place.origin],

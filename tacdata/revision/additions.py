@@ -54,6 +54,7 @@ def additions(verdict: dict[str, Any]) -> list[Addition]:
 
 def suspects(verdict: dict[str, Any]) -> list[Addition]:
     """Return the effects that stay out of the model."""
+    # Each call builds its own objects; the entries are the verdict's.
     added = {id(a.entry) for a in additions(verdict)}
     return [a for a in of_verdict(verdict) if id(a.entry) not in added]
 

@@ -76,6 +76,7 @@ class Comparison:
         covered = self.covered(episodes)
         course = without_readings(self.course, episodes) if covered else part(self.course, remainder)
         setting = Comparison(course, self.spec).setting
+        # The noise is that of all rows; of these the fit keeps the others.
         rows = ~np.isin(self.course.reduced.episode, episodes)
         return refine(setting, placed, _frame_of(self.null, course, rows, None if covered else remainder), STEPS).placed
 
@@ -83,6 +84,7 @@ class Comparison:
     def _contexts(self) -> np.ndarray:
         course = self.course
         first = np.searchsorted(course.episode, np.arange(course.episodes))
+        # One number for each pair of place and tool.
         return course.site * len(course.tools) + course.tool[first]
 
     def predicted(self, response: Response, placed: Sequence[Placed]) -> np.ndarray:
@@ -97,6 +99,7 @@ class Comparison:
             scale: Noise of a reading [the source's unit], shape (channels,).
         """
         course = self.course.reduced
+        # The whole course is predicted, as memory needs every row; the read ones are compared.
         residual = (course.readings - self.predicted(model.response, model.placed)[self.course.read]) / scale
         for number in np.unique(course.episode):
             rows = course.episode == number

@@ -31,6 +31,7 @@ def write_corrected(comparison: Comparison, model: Refined, path: Path) -> dict[
     course, rows = comparison.course, comparison.course.read
     delay = sum(p.effect.delay(p.values) for p in model.placed)
     kinematic = [p for p in model.placed if p.stage == "kinematics"]
+    # A delay is an error of the times, not of the readings.
     delays = [p for p in model.placed if p.effect.delay(p.values) != 0]
     additive = [p for p in model.placed if p not in kinematic and p not in delays]
     prediction = predict(course, model.response, [*comparison.setting.given, *model.placed])
@@ -46,6 +47,7 @@ def write_corrected(comparison: Comparison, model: Refined, path: Path) -> dict[
         changed["path"] = f"{_names(kinematic)}: depth changed by up to {shift:.4g} mm"
     contribution = np.zeros((len(rows), course.channels))
     if additive:
+        # What the additive effects contribute is the difference of two predictions, as effects act on each other.
         bare = predict(course, model.response, [*comparison.setting.given, *kinematic, *delays])
         contribution = (prediction.signal - bare.signal)[rows]
         changed["readings"] = f"{_names(additive)}: up to {float(np.abs(contribution).max()):.4g} subtracted"
@@ -71,5 +73,6 @@ def _since_start(comparison: Comparison) -> np.ndarray:
     course = comparison.course
     recording = np.arange(course.episodes) if course.recording is None else course.recording
     of_row = recording[course.episode]
+    # Strokes of one recording share its clock.
     start = np.array([course.time[np.argmax(of_row == k)] for k in range(int(recording.max()) + 1)])
     return course.time - start[of_row]

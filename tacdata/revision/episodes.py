@@ -40,6 +40,7 @@ def sealed(course: Course, verdict: dict[str, Any]) -> Sealed:
     unseen = chosen(course)
     if len(unseen) and len(unseen) == verdict.get("sealed", {}).get("episodes"):
         return Sealed(unseen, True)
+    # By a hash, so that the choice follows neither the order nor the figures of the episodes.
     order = sorted(range(course.episodes), key=lambda k: hashlib.sha256(f"{k} {course.names[k]}".encode()).digest())
     count = max(int(np.ceil(SHARE * course.episodes)), 1)
     picked = _replaceable(course, order, count) or order[:count]
@@ -89,6 +90,7 @@ def groups(course: Course) -> list[tuple[str, np.ndarray]]:
     tool = np.array([course.tool[course.episode == e][0] for e in number])
     groups_of: list[tuple[str, np.ndarray]] = []
     for what, unit, values in (("rate", "mm/s", np.round(speed, 2)), ("depth", "mm", np.round(deepest, 2))):
+        # A quarter at either end, if the two ends differ enough to call it another rate or depth.
         low, high = np.quantile(values, [0.25, 0.75])
         if high > 1.2 * low > 0:
             groups_of.append((f"slowest {what}s" if what == "rate" else "shallowest", number[values <= low]))

@@ -119,6 +119,7 @@ def revise(
         )
     note("reading")
     added = of_verdict(verdict) if options.suspected else additions(verdict)
+    # Where nothing is added, the gap is shown for the effects that are only suspected.
     answer = placed_of(added or of_verdict(verdict))
     comparison = Comparison(course_of(recordings), spec, tuple(answer))
     target.mkdir(parents=True)
@@ -230,6 +231,7 @@ class _Steps:
 def _same(verdict: dict[str, Any], spec: Spec, judged: Path, recordings: list[Path]) -> None:
     parents = verdict["provenance"].get("parents", {})
     parent_digests = {name.removeprefix(KIND): digest for name, digest in parents.items() if name.startswith(KIND)}
+    # A path that is gone has no content to compare; `course_of` reports it.
     digests = {recording_hash(path): path for path in recordings if path.exists()}
     # By content: recordings may have been moved since.
     if parent_digests and set(parent_digests.values()) != set(digests):

@@ -37,6 +37,7 @@ class Selector:
         mask = np.ones(len(centers), dtype=bool)
         if self.normal is not None:
             direction = np.array(self.normal) / np.linalg.norm(self.normal)
+            # A face at exactly that angle counts, whatever the rounding.
             mask &= normals @ direction >= np.cos(np.radians(self.angle)) - 1e-9
         if self.low is not None:
             mask &= (centers >= self.low).all(axis=1)
@@ -45,6 +46,7 @@ class Selector:
         return mask
 
 
+# Beyond any skin, and just off the plane z = 0, on which undersides lie [mm].
 _FAR, _ON = 1e6, 1e-3
 USUAL: dict[str, tuple[Selector, ...]] = {
     "protrusions": (Selector(high=(_FAR, _FAR, -_ON)),),
@@ -94,6 +96,7 @@ class OwnSurface:
                 continue
             rules = self.rules.get(name, USUAL[name])
             mask = np.any([rule.chosen(centers, normals) for rule in rules], axis=0)
+            # The first part that selects a face keeps it.
             part[mask & (part < 0)] = number
         return part
 
@@ -107,6 +110,7 @@ def complete(document: dict[str, Any], origin: str, folder: Path | None) -> dict
     """
     entry = document["surface"]
     path = (folder or Path()) / entry["file"]
+    # A document in a recording names its surface by content; the store has it.
     if "sha256" in entry and not (folder and path.is_file()):
         return document
     mesh = read_closed(path, float(entry.get("scale", 1.0)), f"{origin}: skin")
@@ -127,6 +131,7 @@ def _check_sizes(bounds: np.ndarray, document: dict[str, Any], origin: str) -> N
     stated = np.array([[-x / 2, -y / 2, -tip], [x / 2, y / 2, top]])
     if np.abs(bounds - stated).max() <= _FIT * np.ptp(stated, axis=0).max():
         return
+    # A file in another unit is off by the same ratio along each axis: metres, inches, centimetres.
     ratio = float(np.median(np.ptp(stated, axis=0) / np.maximum(np.ptp(bounds, axis=0), 1e-12)))
     unit = next((f for f in (1000.0, 25.4, 10.0, 0.1, 1 / 25.4, 0.001) if abs(ratio / f - 1) < 0.05), None)
     spans = [" to ".join(f"{v:.4g}" for v in column) for column in bounds.T]

@@ -151,6 +151,7 @@ class Sensor(Displayed):
             del document["uncertainty"]
         if self.transduction:
             document["transduction"] = self.transduction.document
+        # These leave out what is at its default, so that hashes of older files stay valid.
         for name in ("skin", "contact", "map"):
             document[name] = getattr(self, name).document
         return document
@@ -169,6 +170,7 @@ class Sensor(Displayed):
     @cached_property
     def content_hash(self) -> str:
         """Hash of every value that can change a label; without names, remarks, uncertainties and transduction."""
+        # A surface counts by its content: a renamed file makes the same labels.
         document = {**self.document, "skin": self.skin.identity}
         return provenance.content_hash({k: document[k] for k in ("taxels", "skin", "material", "contact", "map")})
 
@@ -216,6 +218,7 @@ def _check_consistency(sensor: Sensor, origin: str) -> None:
         ("x", taxels.columns, taxels.pitch_x, skin.size_x),
         ("y", taxels.rows, taxels.pitch_y, skin.size_y),
     ):
+        # The outermost protrusions must stand whole on the skin.
         needed = (count - 1) * pitch + 2 * skin.protrusion_radius
         if needed > size:
             raise FormatError(
@@ -235,6 +238,7 @@ def _check_consistency(sensor: Sensor, origin: str) -> None:
 
 def _check_contact(sensor: Sensor, origin: str) -> None:
     contact = sensor.contact
+    # A free body has no equilibrium under a press.
     if not contact.bonded and not contact.board:
         raise FormatError(
             f"{origin}: nothing holds the skin (no bonded face, no board)",
@@ -282,6 +286,7 @@ def read_sensor(path: StrPath) -> Sensor:
         return default_sensor()
     document = documents.read(path, "sensor")
     if "plugins" in document:
+        # Before the sensor is built, as its material or principle may be a plug-in.
         registry.add_folder(path.parent / document["plugins"])
     return Sensor.from_document(document, str(path), path.parent)
 

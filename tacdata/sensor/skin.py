@@ -98,12 +98,14 @@ class Skin:
         lateral, radius = (x, rx) if rx else (y, ry)
         if not radius:
             return np.full(np.broadcast(x, y).shape, self.thickness)
+        # The zero gives the result the shape of both arguments.
         return self.thickness - radius + np.sqrt(radius**2 - lateral**2) + 0 * (x + y)
 
     def outer_normal(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the unit normal of the undeformed outer face [1], shape (n, 3), at (x, y) [mm], each (n,)."""
         rx, ry = self.curvature_radius_x, self.curvature_radius_y
         if rx and ry:
+            # The arc in the yz plane is swept along the one in the xz plane, so its radius changes with x.
             sine = y / self._tube(x)
             up = np.sqrt(rx**2 - x**2)
             return np.stack([x, up * sine, up * np.sqrt(1 - sine**2)], axis=-1) / rx
@@ -148,7 +150,9 @@ class Skin:
     def _check_bend(self, origin: str) -> None:
         rx, ry = self.curvature_radius_x, self.curvature_radius_y
         for axis, radius, half in (("x", rx, self.size_x / 2), ("y", ry, self.size_y / 2)):
+            # A flat underside is not bent, however thick the skin is.
             deepest = self.thickness + self.protrusion_tip if self.underside == "bent" else 0.0
+            # At half the width the rim would stand upright; at the depth the bent underside would fold.
             limit = max(1.05 * half, 1.25 * deepest)
             if radius and radius < limit:
                 raise FormatError(

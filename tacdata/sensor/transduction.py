@@ -33,6 +33,7 @@ class Transduction:
         document: dict[str, Any] = {"principle": self.principle}
         if self.parameters:
             document["parameters"] = dict(self.parameters)
+        # As they were given: one number stays one, so the hash of a file is that of its content.
         document |= {"gain": _plain(self.gain), "offset": _plain(self.offset)}
         if self.full_scale is not None:
             document["full_scale"] = self.full_scale
@@ -53,6 +54,7 @@ class Transduction:
         values = dict(document)
         listed = {"gain": values.get("gain"), "offset": values.get("offset"), **values.get("parameters", {})}
         for name, value in listed.items():
+            # A single number holds for all taxels, and has no length to compare.
             if isinstance(value, list) and len(value) != taxels:
                 raise FormatError(
                     f"{origin}: transduction: {name} has {len(value)} numbers for {taxels} taxels",

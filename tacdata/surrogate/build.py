@@ -148,6 +148,7 @@ class Work:
         presses: list[dict[tuple[int, int], Solved]] = [{} for _ in self.reaches]
         for (t, node, _), answer in zip(requests, answers[: len(requests)], strict=True):
             if isinstance(answer, SolveError):
+                # A filled node would pass for a solved one, so no possible press may be missing.
                 raise answer
             presses[t][node] = answer
         loads = [s.loads for solutions in presses for s in solutions.values()]

@@ -83,6 +83,7 @@ def covering(reaches: list[Reach], sensor: Sensor, spacing: float) -> Grid:
     """
     low, high = np.min([r.low for r in reaches], axis=0), np.max([r.high for r in reaches], axis=0)
     end = max(r.deepest for r in reaches) + DEEPER
+    # Depth k is the unit times k squared, so the number of states is a root.
     states = max(int(np.ceil(np.sqrt(end / UNIT) - 1e-9)) + 1, FEWEST)
     # The same depths whatever the session: a deeper one adds nodes and reuses the others.
     depth = UNIT * np.arange(states + EDGE) ** 2
@@ -93,6 +94,7 @@ def covering(reaches: list[Reach], sensor: Sensor, spacing: float) -> Grid:
     if all(r.tilt == (0.0, 0.0) and foldable(sensor, r.indenter, r.yaw) for r in reaches):
         x, y = (_axis(-max(abs(a), abs(b)), max(abs(a), abs(b)), spacing) for a, b in sides)
         grids.append(Grid(x, y, depth, True))
+    # The one with fewer presses.
     return min(grids, key=lambda g: sum(len(g.presses(r)) for r in reaches))
 
 

@@ -68,6 +68,7 @@ class PressStore:
             with np.load(self.path(request), allow_pickle=False) as data:
                 depths = data["depths"]
                 force, closure, area, normal, seconds, ended = (data[name] for name in FIELDS)
+        # It is solved again, and the file replaced.
         except (OSError, ValueError, KeyError, BadZipFile):
             return None
         solution = Solved(depths, Loads(force, closure, area), normal, float(seconds), bool(ended))
@@ -89,6 +90,7 @@ class PressStore:
         """Return the expected time for missing presses [s], from stored ones or from the mesh's size."""
         stored = [self.get(r) for r in requests]
         seconds = [s.seconds / len(s.normal) for s in stored if s is not None and s.seconds > 0]
+        # Presses of this mesh and machine tell best what the next one takes.
         each = float(np.median(seconds)) if seconds else SECONDS_EACH * len(self.model.mesh.nodes)
         return each * sum(len(r.depths) for r, s in zip(requests, stored, strict=True) if s is None)
 

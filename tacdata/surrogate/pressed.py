@@ -31,6 +31,7 @@ class Pressed:
 def unmodelled(episode: Episode) -> str:
     """Return why a recording's sensor has no finite-element model, as a sentence; empty if it has one."""
     stand_ins = [text.split(":")[0] for text in episode.rig.get("imported", {}).get("stand_ins", [])]
+    # A guessed rate or plan changes no press; a guessed shape does.
     made_up = [name for name in stand_ins if name.split("/")[0] in _DESCRIBED]
     if made_up:
         return f"imported without {', '.join(made_up)}"
@@ -63,6 +64,7 @@ def pressed(paths: list[Path]) -> Pressed:
         sensor = episode.sensor
         touching = episode.tip[episode.tip[:, 2] > 0]
         if len(touching):
+            # By the plan's name: two specimens of one shape stay apart.
             episodes_of.setdefault(episode.press.indenter_name, []).append((episode, touching))
     if sensor is None or not episodes_of:
         raise UsageError("no recording touches the sensor", "presses with a depth above 0", "record presses")

@@ -47,6 +47,7 @@ class Shipped:
 
     def get(self, request: PressRequest) -> Solved | None:
         """Return a press if it ships; only upright ones do."""
+        # The file of an indenter is indexed by place and yaw alone.
         if request.tilt_x or request.tilt_y:
             return None
         press = _read(self.path(request.indenter.document)).get((request.x, request.y, request.yaw))

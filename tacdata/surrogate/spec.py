@@ -26,6 +26,7 @@ def written_spec(folder: Path, work: Work, table: LoadTable, deviation: LeftOut 
     Raises:
         UsageError: If the folder holds a spec or a table already.
     """
+    # Other files may lie in the folder; these two are never overwritten.
     for name in (SPEC, TABLE):
         if (folder / name).exists():
             raise UsageError(f"{folder / name} exists", "a new folder; nothing is overwritten", "choose another --out")

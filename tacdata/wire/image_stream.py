@@ -47,6 +47,7 @@ class ImageStream:
             self._answer = urllib.request.urlopen(url, timeout=timeout)
         except (http.client.HTTPException, ValueError) as error:
             raise OSError(str(error)) from error
+        # Some servers put the boundary in quotes, or give its dashes with it.
         self._boundary = b"--" + str(self._answer.headers.get_param("boundary") or "").strip('"-').encode()
         # Whether images have time stamps is seen only in the first one.
         first = self._next() if self._answer.headers.get_content_type() == MULTIPART else None

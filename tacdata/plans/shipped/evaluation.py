@@ -40,6 +40,7 @@ class Evaluation(ShippedPlan):
         """Return the plan; each press's ``purpose`` names its kind of trial."""
         names = self.specimen_names(wishes, 1, "one; write one plan for each")
         half = half_box(sensor)
+        # Half a pitch, and a quarter, beyond the outermost centres: the sensing area cuts the contact.
         edge = half + np.array([sensor.taxels.pitch_x / 2, sensor.taxels.pitch_y / 4])
         interior = np.vstack([[0.0, 0.0], _spread(INTERIOR - 1) * (half - _margin(half))])
         cut = np.array([[edge[0], 0.3 * half[1]], [-edge[0], -0.3 * half[1]], [0.3 * half[0], edge[1]]])[:EDGE]

@@ -89,6 +89,7 @@ def training_plan(
                 "hold": round(float(rng.uniform(*HOLDS)), 2),
             }
         )
+    # Each mounting costs a person a minute.
     entries.sort(key=lambda entry: mountings.index((entry["indenter"], entry["yaw"])))  # ty: ignore[invalid-argument-type]
     used = [name for name in indenters if any(entry["indenter"] == name for entry in entries)]
     document = {
@@ -121,6 +122,7 @@ def _site(sensor: Sensor, kind: str, rng: np.random.Generator, footprint: tuple[
     else:
         site = rng.uniform(-half, half)
         axis = int(rng.integers(2))
+        # Up to 0.4 pitches beyond the outermost taxels, on either side.
         site[axis] = (half[axis] + rng.uniform(0.0, 0.4) * pitch[axis]) * rng.choice([-1.0, 1.0])
     x, y = np.clip(site, -rim, rim)
     return round(float(x), 3), round(float(y), 3)

@@ -82,6 +82,7 @@ def gap(
     fitted = tuple(placed) if sealed.unseen else comparison.fitted_without(placed, numbers)
     initial, revised = response_base.before, response_base.after(fitted)
     pair = np.array([comparison.mean_squares(model, numbers, scale) for model in (initial, revised)])
+    # The worst after, as the effects must not trade one episode for another.
     at = int(np.argmax(pair[1]))
     total = ResidualChange("sealed episodes", len(numbers), *(float(v) for v in pair.mean(axis=1)))
     worst = ResidualChange(comparison.course.names[numbers[at]], 1, *(float(v) for v in pair[:, at]))
@@ -113,6 +114,7 @@ def noise_of(verdict: dict[str, Any], comparison: Comparison) -> np.ndarray:
 
 def _interval(pair: np.ndarray) -> tuple[float, float]:
     rng = np.random.default_rng(0)
+    # The same episodes for both models: their differences count, not their scatter.
     draws = rng.integers(0, pair.shape[1], (DRAWS, pair.shape[1]))
     first, last = (values[draws].mean(axis=1) for values in pair)
     closed = (first - last) / np.where(np.abs(first - 1) > 1e-3, first - 1, np.nan)

@@ -93,10 +93,12 @@ def confirm(
     for r, press, answer in zip(rows, requests, answers, strict=True):
         name = course.tools[int(course.tool[r])].name
         at, depth = (float(revised[r, 0]), float(revised[r, 1])), float(press.depths[-1])
+        # A press that ended early was not solved at the depth that is compared.
         if isinstance(answer, SolveError) or len(answer.depths) < len(press.depths):
             confirmed.append(Confirmed(name, at, depth, float(change[r]), float("nan"), float("nan"), False))
             continue
         reading = reading_of(sensor, answer.loads)
+        # The last state: the depth of the row.
         true = reading.load(Loads(*(v[-1:] for v in vars(answer.loads).values())), Transducer.of(sensor))[0]
         wrong = np.abs(revised_loads[r] - true) / max(float(np.abs(true).max()), 1e-12)
         rms = float(np.sqrt(np.mean(wrong**2)))
@@ -132,6 +134,7 @@ def _spread(change: np.ndarray, site: np.ndarray, tool: np.ndarray, count: int) 
 def _press(reach: Reach, pose: np.ndarray) -> PressRequest:
     depth = max(float(pose[2]), SHALLOW)
     states = max(int(np.ceil(np.sqrt(depth / SHALLOW))), 3)
+    # Evenly spaced in the root of depth, where loads at first contact are smooth.
     depths = depth * (np.arange(states + 1) / states) ** 2
     x, y = (round(float(v), 4) for v in pose[:2])
     return PressRequest(reach.indenter, x, y, reach.yaw, tuple(round(float(d), 6) for d in depths), *reach.tilt)

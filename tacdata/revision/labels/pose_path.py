@@ -56,6 +56,7 @@ def _dense(episode: Episode) -> Episode:
     way = np.linalg.norm(np.diff(episode.tip, axis=0), axis=1)
     count = np.maximum(np.ceil(way / BETWEEN), 1).astype(int)
     first = np.repeat(np.arange(len(count)), count)
+    # Evenly between two points of the path.
     share = (np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)) / count[first]
     gap = np.diff(episode.tip_ns)
     time = np.append(episode.tip_ns[first] + np.round(share * gap[first]).astype(np.int64), episode.tip_ns[-1])

@@ -65,11 +65,13 @@ def tip_error(session: Path, placed: Sequence[Placed], truth: Path | None = None
         views, effects = _true_views(truth, old), [p for p in placed if p.stage == "kinematics"]
     else:
         views = {k: (view.time_ns, view.tip) for k, view in second_views(old).items()}
+        # Parts that give way below the tag are not seen by it.
         effects = [p for p in placed if p.stage == "kinematics" and p.seen_by_tag]
     if not effects:
         return None
     new = {e.number: e for e in moved_episodes(old, effects)}
     errors = [_apart(old[k], new[old[k].number], *view) for k, view in sorted(views.items())]
+    # A few points in contact give no root mean square.
     errors = [pair for pair in errors if len(pair[0]) >= FEWEST]
     if not errors:
         return None

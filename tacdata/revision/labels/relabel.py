@@ -65,6 +65,7 @@ def paths_moved(session: Path, placed: Sequence[Placed]) -> Moved:
         counterpart = new[episode.number]
         nominal = episode.tip_at(counterpart.tip_ns)
         way = np.linalg.norm(counterpart.tip - nominal, axis=1)[(nominal[:, 2] > 0) | (counterpart.tip[:, 2] > 0)]
+        # Each episode counts once, however finely its path is divided.
         squares.append(np.mean(way**2))
         largest = max(largest, float(way.max()))
         paths += bool(way.max() > LEAST)
@@ -114,6 +115,7 @@ def _compared(shift: Moved, old_folder: Path, new_folder: Path, summary: Labelli
         if not (old_folder / path.name).is_file():
             continue
         old, new = read_label(old_folder / path.name), read_label(path)
+        # Labels of other frames have no pixels to compare.
         if old.depth.shape != new.depth.shape:
             continue
         labels += 1

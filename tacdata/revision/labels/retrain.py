@@ -189,6 +189,7 @@ def _part(frames: Frames, numbers: tuple[int, ...]) -> Frames:
         at += len(indices)
     index = np.concatenate(rows)
     names = ("taxels", "depth", "tip", "phase", "time_ns", "valid")
+    # A part of a dataset is another dataset: scores on it must not pass for those of the whole.
     digest = hashlib.sha256(f"{frames.dataset_hash} {sorted(numbers)}".encode()).hexdigest()
     values = {name: np.asarray(getattr(frames, name))[index] for name in names}
     return replace(frames, **values, episodes=tuple(spans), dataset_hash=digest)

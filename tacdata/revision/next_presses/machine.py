@@ -61,6 +61,7 @@ def _pace(course: Course, episode: int) -> float:
         low, high = (bottom + share * (float(depth[top]) - bottom) for share in INNER)
         for way in (slice(0, top + 1), slice(top, None)):
             inside = np.flatnonzero((depth[way] >= low) & (depth[way] <= high))
+            # Two rows alone may be a jump of the path.
             if len(inside) > 2:
                 span = float(np.ptp(time[way][inside]))
                 pace = max(pace, float(np.ptp(depth[way][inside])) / max(span, 1e-9))

@@ -136,10 +136,12 @@ def plan_of(
     for turn in range(repeats):
         for c in choices:
             tool = comparison.course.tools[c.trial.tool].name
+            # A tool is mounted as in the session, so that nothing else changes.
             angles = next((p.angles for p in plan.presses if p.indenter_name == tool), {"yaw": 0.0})
             purpose = f"tells {c.best[0]} from {c.best[1]}"
             entries.append({**c.trial.entry(tool, angles["yaw"]), **angles, "repeat": turn, "purpose": purpose})
     tools = list(dict.fromkeys(e["indenter"] for e in entries))
+    # One mounting for each tool.
     entries.sort(key=lambda e: tools.index(e["indenter"]))
     mechanisms = list(dict.fromkeys(m for c in choices for pair in c.nats for m in pair))
     return {

@@ -47,6 +47,7 @@ def recommend(
     """
     # Without a plan the verdict's own words hold, but those that send one here.
     steps = [words for words in verdict["next"] if "`tacdata revise " not in words]
+    # Nothing is open, so no press is missing.
     if verdict["status"] in ("named", "none"):
         return {"plan": None, "presses": [], "remark": ""}
     try:
@@ -87,6 +88,7 @@ def _planned(
         raise NoPlan(f"no press at these places distinguishes {names} beyond the noise: another measurement is needed")
     if plan is not None and session is not None:
         file, document = PLAN, plan_of(choices, comparison, plan, f"{plan.name}, next")
+        # A plan that its own guide would refuse is no recommendation.
         Plan.from_document(document, PLAN).check_against(session.sensor)
         documents.write(target / PLAN, document, "plan")
     else:

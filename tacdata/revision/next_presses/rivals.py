@@ -44,6 +44,7 @@ def rivals(
     effects = of_verdict(verdict)
     if not effects:
         return []
+    # The first effect with alternatives; without any, the first of all.
     at = next((k for k, a in enumerate(effects) if a.entry["alternatives"]), 0)
     undecided = effects[at].entry
     names = (list(undecided["alternatives"]) or _nearest(undecided))[: count - 1]

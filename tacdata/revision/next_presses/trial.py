@@ -113,6 +113,7 @@ def trials(course: Course, machine: MachineLimits) -> list[CandidatePress]:
             deepest = float(at[2])
             if deepest <= 0:
                 continue
+            # Every combination: rates, holds and depths each separate other pairs of effects.
             for share, speed, hold in product(DEPTHS, machine.rates, HOLDS):
                 common = (tool, int(site), float(at[0]), float(at[1]))
                 presses.append(CandidatePress(*common, share * deepest, speed, hold, 0.0, 0.0))
@@ -158,6 +159,7 @@ def laid_out(course: Course, trial: CandidatePress, machine: MachineLimits) -> C
             f"{LONGEST:g} s or less",
             "record presses that move, then plan again",
         )
+    # Within episodes: between them a step is a pause.
     inside = course.reduced.step[~course.reduced.first]
     frame = float(np.clip(np.median(inside), 1e-3, 0.1)) if len(inside) else FRAME
     # Rounded alike, so that a corner that falls on a frame makes one row.
