@@ -212,9 +212,7 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
         episode: Episode of each row, shape (n,).
         delay: How long before [s], shape (n,); negative for later.
     """
-    from tacdata.chain.memory_kernels import between
-
-    instants = time - delay
+    values, instants = _wide(values), time - delay
     starts = np.searchsorted(episode, np.arange(episode[-1] + 1))
     ends = np.append(starts[1:], len(time))
     low, high = starts[episode], ends[episode] - 1
@@ -223,11 +221,12 @@ def delayed(values: np.ndarray, time: np.ndarray, episode: np.ndarray, delay: np
     right = np.maximum(right, 1)
     gap = np.maximum(time[right] - time[right - 1], 1e-12)
     share = np.clip((instants - time[right - 1]) / gap, 0.0, 1.0)
-    result = between(_wide(values), right, share)
+    lower = values.take(right - 1, axis=0)
+    result = lower + share[:, None] * (values.take(right, axis=0) - lower)
     step = np.diff(time, prepend=time[0])
     # No curvature across episodes: an infinite step counts as too uneven.
     step[starts] = np.inf
-    curved = bends(_wide(values), step).take(right, axis=0)
+    curved = bends(values, step).take(right, axis=0)
     # The distance of a parabola from its chord.
     curved *= (0.5 * share * (1 - share) * np.square(gap))[:, None]
     result -= curved

@@ -89,35 +89,6 @@ def _slip(
         result[i] = turn
 
 
-@wp.kernel(module="unique", enable_backward=False)
-def _between(
-    values: wp.array2d(dtype=wp.float64),
-    right: wp.array(dtype=wp.int64),
-    share: wp.array(dtype=wp.float64),
-    result: wp.array2d(dtype=wp.float64),
-):
-    i = wp.tid()
-    upper, by = right[i], share[i]
-    for j in range(values.shape[1]):
-        lower = values[upper - wp.int64(1), j]
-        result[i, j] = lower + by * (values[upper, j] - lower)
-
-
-def between(values: np.ndarray, right: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return values between rows, shape (m, k).
-
-    Args:
-        values: Shape (n, k), float64.
-        right: Row after each place, from 1, shape (m,), int64.
-        share: How far it is from the row before to that one [1], shape (m,), float64.
-    """
-    result = np.empty((len(right), values.shape[1]))
-    if len(right):
-        upper = wp.array(np.ascontiguousarray(right), dtype=wp.int64, device="cpu", copy=False)
-        wp.launch(_between, len(right), [_shared(values), upper, _shared(share), _shared(result)], device="cpu")
-    return result
-
-
 def filtered(values: np.ndarray, decay: np.ndarray, weight: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Return the sum of y_i = E_i y_{i-1} + (1 - w_i) u_i + (w_i - E_i) u_{i-1}, y_0 = 0, over filters, shape (n, k).
 

@@ -69,20 +69,10 @@ class SyncTap:
 
 def measure(recording: Recording) -> SyncTap:
     """Measure the latencies of all streams in the recording of a sync tap (`motion.sync_tap`)."""
-    latencies: dict[str, StreamLatency] = {}
-    remarks: list[str] = []
-    taxel_result = taxel_latency(recording)
-    if isinstance(taxel_result, StreamLatency):
-        latencies["taxels"] = taxel_result
-    else:
-        remarks.append(f"taxels: {taxel_result}")
-    for tags in recording.episode.tags:
-        camera_result = camera_latency(recording, tags)
-        if isinstance(camera_result, StreamLatency):
-            latencies[f"camera {tags.camera}"] = camera_result
-        else:
-            remarks.append(f"camera {tags.camera}: {camera_result}")
-    return SyncTap(latencies, tuple(remarks))
+    results = {"taxels": taxel_latency(recording)}
+    results |= {f"camera {tags.camera}": camera_latency(recording, tags) for tags in recording.episode.tags}
+    latencies = {name: result for name, result in results.items() if isinstance(result, StreamLatency)}
+    return SyncTap(latencies, tuple(f"{name}: {r}" for name, r in results.items() if isinstance(r, str)))
 
 
 @dataclass(frozen=True)
