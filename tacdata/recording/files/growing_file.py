@@ -47,7 +47,7 @@ class GrowingFile:
                 self._stream.seek(at)  # the rest has not reached the disk
                 return is_longer
             try:
-                for block in content(head[0], head, body, self.records.damage):
+                for block in content(head[0], body, self.records.damage):
                     take(self.records, block, images=False, digests=False, seen=self._seen)
             except Exception as error:  # damaged lengths raise any of the parser's errors
                 name = type(error).__name__

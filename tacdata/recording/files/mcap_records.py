@@ -176,7 +176,7 @@ def walk(path: Path, damage: list[str]) -> Iterator[Any]:
                 ended = not _skip_to_chunk(stream, at, size, damage)
                 continue
             try:
-                yield from content(head[0], head, stream.read(length), damage)
+                yield from content(head[0], stream.read(length), damage)
             except Exception as error:  # damaged lengths raise any of the parser's errors
                 damage.append(f"an unreadable record at byte {at} is left out ({type(error).__name__})")
             ended = head[0] == Opcode.FOOTER
@@ -199,7 +199,7 @@ def _plausible(opcode: int, length: int) -> bool:
     return opcode >= PRIVATE or (opcode in KNOWN and (opcode != Opcode.FOOTER or length == 20))
 
 
-def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterator[Any]:
+def content(opcode: int, body: bytes, damage: list[str]) -> Iterator[Any]:
     """Yield one record, or those of a chunk: all of them or none, its checksum verified.
 
     Raises:
@@ -209,12 +209,6 @@ def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterato
     match opcode:
         case Opcode.HEADER:
             yield Header.read(data)
-        case Opcode.SCHEMA:
-            yield Schema.read(data)
-        case Opcode.CHANNEL:
-            yield Channel.read(data)
-        case Opcode.MESSAGE:
-            yield Message.read(data, len(body))
         case Opcode.METADATA:
             yield Metadata.read(data)
         case Opcode.ATTACHMENT:
@@ -234,6 +228,8 @@ def content(opcode: int, head: bytes, body: bytes, damage: list[str]) -> Iterato
                 damage.append(f"a damaged chunk is left out ({type(error).__name__})")
                 return
             yield from records
+        case _:
+            yield from _parsed(opcode, body)
 
 
 def _split(content: bytes) -> list[Schema | Channel | Message]:
@@ -248,21 +244,21 @@ def _split(content: bytes) -> list[Schema | Channel | Message]:
         begin, place = place + RECORD.size, place + RECORD.size + length
         if place > len(content):
             raise ValueError("a record that is longer than its chunk")
-        if (record := _parsed(opcode, content[begin:place])) is not None:
-            records.append(record)
+        records += _parsed(opcode, content[begin:place])
     return records
 
 
-def _parsed(opcode: int, body: bytes) -> Schema | Channel | Message | None:
+def _parsed(opcode: int, body: bytes) -> tuple[Schema | Channel | Message, ...]:
+    """Return the schema, channel or message that a record is; none of another kind."""
     match opcode:
         case Opcode.SCHEMA:
-            return Schema.read(ReadDataStream(BytesIO(body)))
+            return (Schema.read(ReadDataStream(BytesIO(body))),)
         case Opcode.CHANNEL:
-            return Channel.read(ReadDataStream(BytesIO(body)))
+            return (Channel.read(ReadDataStream(BytesIO(body))),)
         case Opcode.MESSAGE:
             channel, sequence, log_time, publish_time = MESSAGE.unpack_from(body)
-            return Message(channel, log_time, body[MESSAGE.size :], publish_time, sequence)
-    return None
+            return (Message(channel, log_time, body[MESSAGE.size :], publish_time, sequence),)
+    return ()
 
 
 def _intact_attachment(body: bytes) -> bool:
