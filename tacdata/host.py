@@ -41,6 +41,9 @@ class Host:
         >>> COMPUTER.sleep(0.001)
     """
 
+    longest_wait = 0.0
+    """Longest time for which its time may stop, to wait for an emulated device [s, real time]."""
+
     def monotonic(self) -> float:
         """Return a time that never steps [s, real time]."""
         return time.monotonic()
@@ -56,6 +59,9 @@ class Host:
     def sleep(self, seconds: float) -> None:
         """Wait [s, real time]."""
         time.sleep(seconds)
+
+    def serve(self, device: str, due_ns: int | None) -> None:
+        """Take that an emulated device has nothing to do before ``due_ns`` [ns]. This computer waits for none."""
 
     def thread(self, target: Callable[..., None], name: str, args: tuple[Any, ...] = ()) -> threading.Thread:
         """Return a thread that is not started yet and does not keep the process alive."""

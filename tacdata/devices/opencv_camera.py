@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -146,7 +145,7 @@ class OpencvCamera(Camera):
         self._images.clear()
         self._fault, self._ended, self._sequence, self.dropped, self.damaged = None, False, 0, 0, 0
         self._stopped.clear()
-        self._last_at = time.monotonic()
+        self._last_at = self.clock.host.monotonic()
         self._thread = threading.Thread(target=self._run, args=(grab, release), name="camera", daemon=True)
         self._thread.start()
         with self._changed:
@@ -178,7 +177,7 @@ class OpencvCamera(Camera):
             self._images.clear()
         if not images and self._fault:
             raise DeviceError(self._fault.given, self._fault.allowed, self._fault.remedy)
-        silent = time.monotonic() - self._last_at
+        silent = self.clock.host.monotonic() - self._last_at
         if not images and self._live and silent > max(STALL / self.clock.rate, 2.0):
             raise self._error(
                 f"has stalled: no image for {silent * self.clock.rate:.1f} s", "check cable, power, network"
@@ -221,7 +220,7 @@ class OpencvCamera(Camera):
         frame = ImageFrame(arrival_ns, self._sequence, grabbed.image, grabbed.jpeg, grabbed.device_ns)
         self._images.append(frame)
         self._sequence += 1
-        self._last_at = time.monotonic()
+        self._last_at = self.clock.host.monotonic()
         if len(self._images) > WAITING:
             self._images.popleft()
             self.dropped += 1
@@ -280,7 +279,9 @@ class OpencvCamera(Camera):
 
     def _open_stamped(self) -> tuple[Grab, Callable[[], None]] | None:
         """Open a stream over HTTP whose images carry the time of their exposure; None for any other source."""
-        stream = stamped_stream(str(self.source), FIRST_IMAGE) if str(self.source).startswith("http") else None
+        # Longer than `STALL`, whose words are better; a virtual rig may take its time.
+        limit = FIRST_IMAGE + self.clock.host.longest_wait
+        stream = stamped_stream(str(self.source), limit) if str(self.source).startswith("http") else None
         if stream is None:
             return None
 

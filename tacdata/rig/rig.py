@@ -182,7 +182,7 @@ def from_document(document: dict[str, Any], origin: str) -> Rig:
             "min below max on every axis",
             "correct the envelope",
         )
-    clock = Clock(**document["clock"]) if "clock" in document else Clock.start()
+    clock = Clock.from_document(document["clock"]) if "clock" in document else Clock.start()
     return Rig(
         document["name"],
         document["cnc"],

@@ -103,7 +103,9 @@ class VirtualBoard:
             if self.port.waiting:
                 self.port.write(b"")
             due = min(following, self._packets[0][0]) if self._packets else following
+            self.clock.serve(self.port.path, due)
             self._stopped.wait(max((due - self.clock.now_ns()) / NS / self.clock.rate, 0.0002))
+        self.clock.serve(self.port.path, None)
 
     def _sample(self, sampled: int) -> None:
         frame = self._encoder.encode(self._read(sampled), self._counter, round(sampled / 1000))

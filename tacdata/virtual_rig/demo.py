@@ -13,13 +13,14 @@ from tacdata import documents, provenance, schemas
 from tacdata.clock import Clock
 from tacdata.errors import UsageError
 from tacdata.indenters.sphere import Sphere
+from tacdata.paced_host import PacedHost
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import VirtualBoard, draw_timing
 from tacdata.virtual_rig.optics.camera import VirtualCamera
 from tacdata.virtual_rig.optics.noise_stretch import NoiseStretch
 from tacdata.virtual_rig.optics.scene import looking_at
-from tacdata.virtual_rig.rig import BAUDS, board_format
+from tacdata.virtual_rig.rig import BAUDS, PACE, board_format
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, RADIUS, TASKS, THINGS, draw_hand
 from tacdata.virtual_rig.world.world import World, draw
 
@@ -105,7 +106,8 @@ class VirtualDemo:
             raise UsageError(f"nubs of {nub:g} mm", f"{NUBS[0]:g} to {NUBS[1]:g} mm", "choose another radius")
         self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
         self.hand = replace(draw_hand(seed, task, thing), nub=nub)
-        self.clock, self.sensors = Clock.start(speed), _worn(sensor)
+        self._host = PacedHost(directory / PACE, new=True)
+        self.clock, self.sensors = Clock.start(speed, self._host), _worn(sensor)
         self.start_ns = self.clock.now_ns()
         self.layouts = {name: board_format(skin) for name, skin in self.sensors.items()}
         self.boards = {name: self._board(name, k) for k, name in enumerate(DIRECTIONS)}
@@ -167,6 +169,11 @@ class VirtualDemo:
         """Return the hand's time [s] at a time of the clock [ns]."""
         return (time_ns - self.start_ns) * 1e-9
 
+    @property
+    def waited(self) -> float:
+        """Sum of the times for which its clock waited for a late device [s, real time]."""
+        return self._host.waited
+
     def start(self) -> None:
         """Switch everything on; the rig file comes last.
 
@@ -176,6 +183,7 @@ class VirtualDemo:
         if self.path.exists():
             raise UsageError(f"{self.path} exists", "a directory without a demo rig", "choose another directory")
         self.directory.mkdir(parents=True, exist_ok=True)
+        self._host.publish()
         truth = {
             "version": schemas.version("virtual_demo_truth"),
             "start_ns": self.start_ns,
@@ -191,6 +199,7 @@ class VirtualDemo:
     def stop(self) -> None:
         """Switch everything off and delete the rig file, whose ports are gone."""
         self.path.unlink(missing_ok=True)
+        self._host.path.unlink(missing_ok=True)
         for device in (*self.cameras.values(), *self.boards.values()):
             device.stop()
 

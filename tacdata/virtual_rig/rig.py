@@ -16,6 +16,7 @@ import numpy as np
 from tacdata import documents, schemas
 from tacdata.clock import Clock
 from tacdata.errors import UsageError
+from tacdata.paced_host import PacedHost
 from tacdata.rig import Registration
 from tacdata.sensor import Sensor, default_sensor
 from tacdata.virtual_rig.board import VirtualBoard, draw_timing
@@ -38,6 +39,8 @@ STATE = "machine_state"
 """Folder of the file that states where the machine was left."""
 IMAGES = 30.0
 """Largest number of images rendered per real second."""
+PACE = "pace"
+"""File by which the clock waits for late devices."""
 BAUDS = (115200, 230400, 460800, 921600, 2000000, 4000000)
 
 
@@ -77,7 +80,8 @@ class VirtualRig:
             raise UsageError(f"speed {speed:g}", "above 0, at most 100", "choose another speed (8 suits two cores)")
         self.directory, self.path = directory, directory / "rig.yaml"
         self._lock: IO[str] | None = None
-        self.clock = Clock.start(speed)
+        self._host = PacedHost(directory / PACE, new=True)
+        self.clock = Clock.start(speed, self._host)
         self.sensor = sensor or default_sensor()
         self.truth = draw(seed, self.sensor, NOMINAL, rough)
         self._rough = rough
@@ -154,6 +158,11 @@ class VirtualRig:
             lines.append(f"camera             {self.camera.url}  {self.camera.rate:g} Hz")
         return [*lines, f"clock              {self.clock.rate:g} times real time"]
 
+    @property
+    def waited(self) -> float:
+        """Sum of the times for which its clock waited for a late device [s, real time]."""
+        return self._host.waited
+
     def start(self) -> None:
         """Switch everything on. The rig file is written last, so that its readers find the devices too.
 
@@ -161,6 +170,7 @@ class VirtualRig:
             UsageError: If another rig runs in the directory or another rig's file is there.
         """
         self._lock = _claim(self.directory, self.path)
+        self._host.publish()
         camera = (
             {"rate": self.camera.rate, "start_ns": self.camera.start_ns, **self.scene.document} if self.camera else None
         )
@@ -182,6 +192,7 @@ class VirtualRig:
         """Switch everything off and delete the rig file, whose ports are gone."""
         if self._lock:
             self.path.unlink(missing_ok=True)
+            self._host.path.unlink(missing_ok=True)
         for device in (self.camera, self.board, self.controller):
             if device:
                 device.stop()

@@ -81,7 +81,7 @@ def demo_rig_of(document: dict[str, Any], origin: str) -> DemoRig:
     document_with_files = {**document, "fingers": fingers, "cameras": cameras}
     document_with_files["sensors"] = {name: sensor.document for name, sensor in sensors.items()}
     _agree(document, named_fingers, worlds, origin)
-    clock = Clock(**document["clock"]) if "clock" in document else Clock.start()
+    clock = Clock.from_document(document["clock"]) if "clock" in document else Clock.start()
     # Drivers know nothing of worlds.
     devices = {name: {k: v for k, v in entry.items() if k != "world"} for name, entry in cameras.items()}
     delays = {name: StreamLatency.from_document(entry) for name, entry in document.get("latencies", {}).items()}

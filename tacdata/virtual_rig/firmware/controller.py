@@ -168,7 +168,9 @@ class Controller:
 
     def _run(self) -> None:
         while not self._stopped.is_set():
-            data = self.port.read(self._pause())
+            pause = self._pause()
+            self.clock.serve(self.port.path, self.clock.now_ns() + round(pause * self.clock.rate * NS))
+            data = self.port.read(pause)
             now_ns = self.clock.now_ns()
             while not self._faults.empty():
                 self._faults.get()(now_ns)
@@ -177,6 +179,7 @@ class Controller:
             self.machine.serve(now_ns)
             self._serve_lines(now_ns)
             self._serve_output(self.clock.now_ns())
+        self.clock.serve(self.port.path, None)
 
     def _pause(self) -> float:
         """Return how long nothing will happen unless a byte arrives [s, real time]."""

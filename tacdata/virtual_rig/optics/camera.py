@@ -84,12 +84,13 @@ class VirtualCamera:
     def _expose(self) -> None:
         number, data = 0, b""
         while not self._stopped.is_set():
+            due = self.exposure_ns(number) + int((self.delay + self._rng.uniform(0, 0.01)) * NS)
+            self.clock.serve(self.url, due)
             drawn = self._ahead and self._watchers and not self._stalled
             if drawn:
                 data = self._encoded(number)
-            due = self.exposure_ns(number) + int((self.delay + self._rng.uniform(0, 0.01)) * NS)
             if self._stopped.wait(max((due - self.clock.now_ns()) / NS / self.clock.rate, 0.0)):
-                return
+                break
             if self._watchers and not self._stalled:
                 data = data if drawn else self._encoded(number)
                 with self._changed:
@@ -98,6 +99,7 @@ class VirtualCamera:
             # A camera that cannot keep up skips exposures; it does not fall behind.
             lag = int((self.clock.now_ns() - self.exposure_ns(number)) / NS * self.rate)
             number += max(1, lag)
+        self.clock.serve(self.url, None)
 
     def _next(self, number: int) -> tuple[int, bytes] | None:
         with self._changed:
