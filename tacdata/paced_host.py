@@ -17,6 +17,8 @@ LONGEST_NS = 20_000_000_000
 """Longest single wait [ns, real time]. A rig that hangs for longer counts as silent, like a real one."""
 NUMBER, PAIR = struct.Struct("q"), struct.Struct("qq")
 NEVER = 2**62
+EMPTY = NUMBER.pack(0) + PAIR.pack(0, NEVER) * 2
+"""A number, and two places for the pair; the number's lowest bit names the valid one."""
 
 
 class PacedHost(Host):
@@ -42,7 +44,7 @@ class PacedHost(Host):
     def __init__(self, path: Path, new: bool = False) -> None:
         """Read the time of the rig that wrote ``path``, from the first question on; ``new``: of a rig to begin."""
         self.path = path
-        self._memory: mmap.mmap | bytearray | None = bytearray(NUMBER.pack(0) + PAIR.pack(0, NEVER) * 2) if new else None
+        self._memory: mmap.mmap | bytearray | None = bytearray(EMPTY) if new else None
         self._due: dict[str, int] = {}
         self._lock = threading.Lock()
 
@@ -97,11 +99,10 @@ class PacedHost(Host):
         if self._memory is None:
             try:
                 with self.path.open("r+b") as file:
-                    self._memory = mmap.mmap(file.fileno(), NUMBER.size + 2 * PAIR.size)
+                    self._memory = mmap.mmap(file.fileno(), len(EMPTY))
             except FileNotFoundError:
-                raise UsageError(
-                    f"no clock at {self.path}: its virtual rig has ended", "a rig that runs", "start tacdata virtual-rig"
-                ) from None
+                given = f"no clock at {self.path}: its virtual rig has ended"
+                raise UsageError(given, "a rig that runs", "start tacdata virtual-rig again") from None
         return self._memory
 
 

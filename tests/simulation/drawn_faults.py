@@ -17,8 +17,8 @@ SILENT = 3.0
 """Time after which a silent camera or controller is a fault [s]."""
 OVERRIDDEN = 6.0
 """Time within which a report must have stated a foreign override [s]: one in 20 states overrides, of 8 a second."""
-COURSE = 19.0
-"""About how long a run without faults takes [s]."""
+PRESS_SECONDS = 9.5
+"""About how long a press without faults takes [s]."""
 
 
 class Faults:
@@ -27,6 +27,7 @@ class Faults:
     def __init__(self, world, seed, only=()):
         """Draw and plan them; ``only`` names kinds to draw from."""
         self.world, self.random = world, random.Random(f"faults {seed}")
+        course = PRESS_SECONDS * len(world.plan.presses)
         self.fatal, self.stalls = [], []
         """(time of a fault [s], time [s] within which it must have ended the run, if it goes on until then)."""
         self.names, self.visible, self.over = [], [], False
@@ -40,22 +41,22 @@ class Faults:
         for _ in range(number):
             name = self.random.choice(kinds)
             self.names.append(name)
-            self.at(self.random.uniform(0.0, COURSE), lambda act={**KINDS, **MORE, **LATEST, **NEWEST}[name]: act(self))
+            self.at(self.random.uniform(0.0, course), lambda act=ALL[name]: act(self))
         later = random.Random(f"more faults {seed}")  # of its own, so that seeds keep what they drew before
         if not only and later.random() < 0.25:
             name = later.choice(tuple(MORE))
             self.names.append(name)
-            self.at(later.uniform(0.0, COURSE), lambda: MORE[name](self))
+            self.at(later.uniform(0.0, course), lambda: MORE[name](self))
         latest = random.Random(f"latest faults {seed}")
         if not only and latest.random() < 0.1:
             newest = latest.choice(tuple(LATEST))
             self.names.append(newest)
-            self.at(latest.uniform(0.0, COURSE), lambda: LATEST[newest](self))
+            self.at(latest.uniform(0.0, course), lambda: LATEST[newest](self))
         last = random.Random(f"newest faults {seed}")
         if not only and last.random() < 0.15:
             kind = last.choice(tuple(NEWEST))
             self.names.append(kind)
-            self.at(last.uniform(0.0, COURSE), lambda: NEWEST[kind](self))
+            self.at(last.uniform(0.0, course), lambda: NEWEST[kind](self))
         if self.random.random() < 0.3:
             world.computer.lateness = ((0.02, self.random.choice((0.02, 0.1, 0.4))),)
             self.names.append(f"busy computer {world.computer.lateness}")
@@ -485,3 +486,5 @@ NEWEST = {"camera_freezes": camera_freezes, "reader_starves": reader_starves}
 """Kinds that came last, drawn by numbers of their own."""
 LATEST = {"damaged_lift": damaged_lift, "damaged_press": damaged_press}
 """Kinds that came later still."""
+ALL = {**KINDS, **MORE, **LATEST, **NEWEST}
+"""Every kind."""

@@ -37,7 +37,7 @@ SPREAD = 3.0
 WATCHED = 0.01
 """How often the true position is noted [s]."""
 LIMIT = 180.0
-"""Time after which a run counts as hung [s]; one without faults takes about 25 s."""
+"""Time after which a run counts as hung [s]; two presses without faults take about 25 s."""
 
 
 def plan(presses, tools=False, **entries):
@@ -60,7 +60,7 @@ def plan(presses, tools=False, **entries):
                 "rest": 1.0,
             },
             "presses": [
-                {"indenter": spheres[k % len(spheres)], "x": x, "y": y, "depth": 0.8 + 0.1 * k}
+                {"indenter": spheres[k % len(spheres)], "x": x, "y": y, "depth": 0.8 + 0.1 * (k % 4)}
                 for k, (x, y) in enumerate((SITES * presses)[:presses])
             ],
             **entries,
@@ -105,7 +105,8 @@ class World:
         self.envelope = {**ENVELOPE, "max": [1.0, 1.0, 1.0]} if zero else ENVELOPE
         self.tools = tools
         self.seed, self.folder, self.plan = seed, folder, plan(presses, tools, **entries)
-        self.schedule = Schedule(seed, LIMIT)
+        self.limit = max(LIMIT, LIMIT / 6 * presses)
+        self.schedule = Schedule(seed, self.limit)
         self.bench = SimulatedHost(self.schedule)
         self.clock = Clock(EPOCH + START, START, speed, self.bench)
         self.computer = self._boot()
@@ -139,14 +140,14 @@ class World:
         host.disk = SimulatedDisk(host)
         return host
 
-    def reboot(self, seconds=LIMIT):
+    def reboot(self):
         """Start the computer's process anew, after it ended or was killed."""
         self.computer.kill()
         before, self.computer = self.computer, self._boot()
         self.computer.preempt, self.computer.lateness = before.preempt, before.lateness
         for line in (self.cnc_line, self.board_line):
             line.attach(self.computer)
-        self.schedule.extend(seconds)
+        self.schedule.extend(self.limit)
 
     def register(self):
         """Register the sensor as `tacdata register` does; return what was found, or raise what it raises."""

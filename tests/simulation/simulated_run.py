@@ -1,5 +1,6 @@
 """One seed: a recording with faults, what must hold of it, then the person repairs the rig and resumes."""
 
+import bisect
 import random
 import re
 import sys
@@ -93,9 +94,14 @@ class Run:
     @property
     def path(self):
         """Times [s], true positions [mm], and whether it moves, while this ran."""
-        rows = [row for row in self.world.path if self.begin <= row[0] <= self.end]
-        table = np.array(rows, float).reshape(-1, 6)
+        table = between(self.world.path, self.begin, self.end)
         return table[:, 0], table[:, 1:4], table[:, 4] > 0
+
+
+def between(path, begin, end):
+    """Return the rows of `World.path` from one time to another [s], shape (rows, 6)."""
+    first, last = bisect.bisect_left(path, (begin,)), bisect.bisect_right(path, (end, np.inf))
+    return np.array(path[first:last], float).reshape(-1, 6)
 
 
 def broken(run, faults):
@@ -270,7 +276,7 @@ def _true_path(run, episode):
     if not episode.phases or episode.press.index < 0:
         return
     begin, end = ((t - EPOCH - START) * 1e-9 for t in (episode.phases[0].start_ns, episode.phases[-1].end_ns))
-    rows = np.array([row for row in run.world.path if begin <= row[0] <= end], float).reshape(-1, 6)
+    rows = between(run.world.path, begin, end)
     if not len(rows):
         return
     press = run.world.plan.presses[episode.press.index]
@@ -280,8 +286,8 @@ def _true_path(run, episode):
         yield f"{episode.path.name} is complete, and the tip went to {deepest}, not to {np.round(wanted, 3)}"
 
 
-def play(seed, only=()):
-    """Play one seed; return (names of its faults, what did not hold, simulated seconds)."""
+def play(seed, only=(), presses=2):
+    """Play one seed of so many presses; return (names of its faults, what did not hold, simulated seconds)."""
     with tempfile.TemporaryDirectory() as folder:
         draw = random.Random(f"rig {seed}")
         firmware = draw.choice(("Grbl", "Grbl", "grblHAL"))
@@ -292,7 +298,8 @@ def play(seed, only=()):
         more["zero"] = later.random() < 0.5
         course = random.Random(f"course {seed}").choice(COURSES)
         tools = course == "tools"
-        world = World(seed, Path(folder) / "session", firmware=firmware, settings=settings, tools=tools, **more)
+        machine = {"firmware": firmware, "settings": settings}
+        world = World(seed, Path(folder) / "session", presses, tools=tools, **machine, **more)
         if course in ("sync tap", "registration"):
             world.schedule.extend(LONG)
         faults = Faults(world, seed, only)

@@ -184,7 +184,8 @@ class GuardedMotion:
                 origin, phase = position, step.phase
                 if step.target is None:
                     done = self._cnc.dwell(step.seconds)
-                    self._allowed.rested(done.acknowledged_ns)
+                    if missed := self._allowed.rested(done.acknowledged_ns, step.seconds):
+                        raise missed
                 else:
                     # Entered before it is sent, as another thread may read a report of it at once.
                     self._allowed.move(step.target, step.speed, self._clock.now_ns())

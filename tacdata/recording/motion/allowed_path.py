@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ LATE = (1.3, 1.0)
 the jerk take longer than a trapezoid, and one that is simulated waits for its computer."""
 LEAST_WAY = 1.0
 """Distance that a guide may always have moved since a report [mm]."""
+PAUSED = 0.8
+"""Share of a pause, before its answer, in which the guide surely stands: firmwares round a pause to 50 ms."""
 KEPT = 256
 """Moves that are remembered [count]: a busy host reads a report after several moves of a fast clock have ended."""
 
@@ -64,6 +67,7 @@ class AllowedPath:
         self._legs: list[_Leg] = []
         self._since_ns = self._asked_ns = 0
         self._seen: CncStatus | None = None  # the latest report that lay on the path
+        self._latest: deque[tuple[int, CncStatus]] = deque(maxlen=2)  # the latest reports, and when each was asked for
         self._lock = threading.Lock()
 
     def stand(self, position: tuple[float, float, float], now_ns: int) -> None:
@@ -105,21 +109,33 @@ class AllowedPath:
             leg.chain = leg.profile.duration + (previous.chain if waits and previous else 0.0)
             leg.expected_ns = (begins or now_ns) + round(leg.profile.duration * 1e9)
 
-    def rested(self, now_ns: int) -> None:
-        """Take that every move so far has ended where it should."""
+    def rested(self, now_ns: int, pause: float = 0.0) -> DeviceError | None:
+        """Take that every move so far has ended where it should, as the answer to a ``pause`` [s] after them says.
+
+        Returns the fault of a pause that passed elsewhere: the moves before it were not carried out. One report may be
+        damaged, so two have to agree.
+        """
         with self._lock:
+            begun_ns = now_ns - round(PAUSED * pause * 1e9)
+            within = [status for asked_ns, status in self._latest if asked_ns >= begun_ns]
+            leg = self._legs[-1] if self._legs else None
+            if leg and len(within) == 2 and all(self._is_elsewhere(leg, status) for status in within):
+                stands = np.linalg.norm(within[1].position - within[0].position) <= self._tolerance
+                return _dropped(leg, within[1]) if stands else _answered_too_early(leg, within[1])
             for leg in self._legs:
                 leg.ended_ns = leg.ended_ns or now_ns
             # Without the older moves, reports from their time cannot be judged.
             for leg in self._legs[:-KEPT]:
                 self._since_ns = max(self._since_ns, leg.ended_ns or now_ns)
             self._legs = self._legs[-KEPT:]
+        return None
 
     def off(self, status: CncStatus) -> DeviceError | None:
         """Return the fault of a reported position, or None."""
         with self._lock:
             # An answer may belong to the query before, so the earlier of the two bounds the report's age.
             asked_ns, self._asked_ns = min(self._asked_ns, status.sent_ns), status.sent_ns
+            self._latest.append((asked_ns, status))
             sent = [leg for leg in self._legs if leg.sent_ns <= status.arrival_ns] or self._legs[:1]
         if not sent or asked_ns < self._since_ns:
             return None
@@ -193,8 +209,10 @@ class AllowedPath:
         )
 
     def _is_behind(self, leg: _Leg, asked_ns: int, status: CncStatus) -> bool:
-        deviation = float(np.linalg.norm(status.position - leg.profile.target))
-        return leg.due_ns is not None and leg.due_ns < asked_ns and deviation > self._tolerance
+        return leg.due_ns is not None and leg.due_ns < asked_ns and self._is_elsewhere(leg, status)
+
+    def _is_elsewhere(self, leg: _Leg, status: CncStatus) -> bool:
+        return float(np.linalg.norm(status.position - leg.profile.target)) > self._tolerance
 
     def _distance(self, leg: _Leg, asked_ns: int, status: CncStatus) -> tuple[float, bool]:
         """Return the distance of a report from the move [mm], and whether it is farther along than time allows."""

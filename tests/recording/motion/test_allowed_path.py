@@ -143,3 +143,28 @@ def test_a_place_that_cannot_have_been_reached_is_none(path):
     assert second(path, 1.0, *HIGH) is None
     assert path.out_of_reach(LOW, T + 2 * S) == ""
     assert "farther than it can have moved" in path.out_of_reach((-300.0, 0.0, 0.0), T + 2 * S)
+
+
+@pytest.mark.parametrize(("z", "words"), [(-20.0, "dropped the move"), (-25.0, None)])
+def test_a_pause_passes_where_the_move_before_it_ends(path, z, words):
+    path.move(LOW, 5.0, T + S)
+    path.taken(T + S)
+    for seconds in (2.5, 2.6, 2.7):
+        assert path.off(report(seconds, 10.0, 20.0, z)) is None
+    fault = path.rested(T + round(2.8 * S), pause=0.6)
+    assert (fault is None) if words is None else words in fault.given
+
+
+def test_one_damaged_report_of_a_pause_accuses_no_move(path):
+    path.move(LOW, 5.0, T + S)
+    path.off(report(2.6, *LOW))
+    path.off(report(2.7, 10.0, 20.0, -22.0))
+    assert path.rested(T + round(2.8 * S), pause=0.6) is None
+
+
+def test_reports_of_the_way_accuse_no_pause_after_it(path):
+    path.move(LOW, 5.0, T + S)
+    for seconds, z in ((1.9, -23.0), (2.0, -23.5)):
+        path.off(report(seconds, 10.0, 20.0, z))
+    assert path.rested(T + round(2.8 * S), pause=0.6) is None
+    assert path.rested(T + round(2.8 * S)) is None

@@ -57,6 +57,23 @@ def test_a_queue_that_was_dropped_is_no_override(tmp_path, firmware, at):
     assert run.here[2] > ORIGIN[2] + CLEARANCE - 0.02, "it was lifted"
 
 
+@pytest.mark.parametrize("firmware", ["Grbl", "grblHAL"])
+def test_a_press_that_was_not_carried_out_is_no_complete_file(tmp_path, firmware):
+    world = World(5, tmp_path / "session", presses=1, firmware=firmware)
+    depth = f"Z{ORIGIN[2] - 0.8:.3f}"
+
+    def stays(line):
+        """A line whose letters were damaged on their way, so that it moves nothing, and is answered."""
+        return "G4P0" if depth in line or "Z-38.0" in line else line
+
+    world.controller.inject_wire(to_controller=stays)
+    run = Run(world)
+    world.end()
+    assert "the controller dropped the move" in str(run.error), run.words
+    assert "data:   0 of 1 presses are complete" in run.words
+    assert run.here[2] > ORIGIN[2] + CLEARANCE - 0.02
+
+
 def test_a_stuck_line_is_told_within_seconds(world):
     def stick():
         for way in (world.cnc_line.to_host, world.cnc_line.to_device):
