@@ -11,6 +11,7 @@ from tacdata.wire.serial_port import bytes_waiting
 
 SILENCE = 3.0
 """Time without an answer after which the controller counts as gone [s of the clock, and of real time]."""
+EMULATOR = "see whether the virtual rig still runs; end other programs on this computer, or lower its --speed"
 READ = 0.05
 """Timeout of one read [s, real time]."""
 
@@ -25,7 +26,7 @@ class Silence:
 
     def __init__(self, port: serial.SerialBase, clock: Clock, poll_rate: float) -> None:
         """Begin; `ending` is asked ``poll_rate`` times a second of ``clock``."""
-        self._port, self._is_emulated = port, clock.rate > 1.0
+        self._port, self._is_emulated = port, clock.rate > 1.0 or clock.host.longest_wait > 0
         self.seconds = EMULATED if self._is_emulated else SILENCE
         """Time without an answer that is a fault [s]."""
         # Gaps of two polls are normal; only time beyond them counts.
@@ -74,5 +75,6 @@ class Silence:
             remedy = "check cable, ground and baud rate, then start again"
             return DeviceError(cause, "reports with a position in numbers", remedy), False
         cause = f"{controller} is silent: no answer to ? for {self.seconds:g} s{busy}"
-        remedy = "check power and cable; the position is unknown, home or touch off again"
+        look = EMULATOR if self._is_emulated else "check power and cable"
+        remedy = f"{look}; the position is unknown, home or touch off again"
         return DeviceError(cause, f"an answer to ? within {self.seconds:g} s", remedy), True
