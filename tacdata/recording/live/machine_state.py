@@ -64,6 +64,7 @@ class MachineState:
         self._driver = rig.cnc["driver"]
         self._document: dict[str, Any] | None = None
         self._identity: dict[str, str] | None = None
+        self._unnamed: list[Path] = []
         self._trusted = False  # whether the reported position was accepted since the opening
 
     @property
@@ -131,19 +132,33 @@ class MachineState:
         self._document = {key: value for key, value in self._read().items() if key != "lost"}
         self._trusted = True
         self.rest()
+        for path in self._unnamed:
+            path.unlink(missing_ok=True)
 
     def _read(self) -> dict[str, Any]:
         if self._document is None:
             self._identity = self._identify()
-            records = [record for record in map(_record, self._directory.glob("*.json")) if self._is_ours(record)]
+            records = {path: _record(path) for path in self._directory.glob("*.json")}
+            ours = [record for record in records.values() if self._is_ours(record)]
             # A change of port leaves several records of one machine; the latest counts.
-            self._document = max(records, key=lambda record: record["number"], default={})
+            self._document = dict(max(ours, key=lambda record: record["number"], default={}))
+            # A line that broke at opening: the loss was recorded before the controller stated who it is.
+            self._unnamed = [
+                path for path, record in records.items() if self._identity["firmware"] and self._nobodys(record)
+            ]
+            for path in self._unnamed:
+                self._document.setdefault("lost", records[path].get("lost"))
         return self._document
 
     def _identify(self) -> dict[str, str]:
         answers = self._cnc.settings()
         firmware = " ".join(answers[tag] for tag in FIRMWARE if tag in answers)
         return {"driver": self._driver, "firmware": firmware, "usb": usb_identity(self._port)}
+
+    def _is_nobodys(self, record: dict[str, Any]) -> bool:
+        """Whether a record states a loss at this port, of a controller that was not identified."""
+        here = record.get("port") == self._port or record.get("name") == self._name
+        return here and "lost" in record and not record["controller"]["firmware"]
 
     def _is_ours(self, record: dict[str, Any]) -> bool:
         if not record or record["controller"] != self._identity:

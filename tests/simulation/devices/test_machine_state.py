@@ -12,6 +12,8 @@ from tacdata.recording.live import machine_state
 
 PRESSING = 7_000_000_000
 """Time at which the tip is in the skin [ns]."""
+BANNER = 288_000_000
+"""Time at which a controller was reset and has not stated yet who it is [ns]."""
 NO_HOMING = {"$20": "0", "$22": "0"}
 
 
@@ -70,6 +72,25 @@ def test_a_new_session_asks_after_a_power_cycle_in_mid_press(world):
     assert len(world.asked) == 1
     refused(world)
     assert len(world.asked) == 2, "asking does not clear it"
+
+
+def test_a_line_that_breaks_while_it_is_opened_leaves_its_loss_beside_the_rig(tmp_path):
+    world = World(1, tmp_path / "session", firmware="grblHAL")
+    try:
+        world.schedule.at(BANNER, world.cnc_line.close)
+        with pytest.raises(DeviceError, match="broke"):
+            world.record()
+        world.cnc_line.plug_in()
+        world.reboot()
+        error = refused(world)
+        assert "the position is not known: the line to the controller" in error.given
+        world.answer = lambda question: True
+        world.record()
+        world.folder, count = world.folder.with_name("session2"), len(world.asked)
+        world.record()
+        assert len(world.asked) == count, "a yes clears it"
+    finally:
+        world.end()
 
 
 def test_a_yes_clears_it_for_every_session(world):
