@@ -32,7 +32,9 @@ class PacedHost(Host):
 
     Example:
         >>> import tempfile
+        >>> from pathlib import Path
         >>> from tacdata.clock import Clock
+        >>> from tacdata.paced_host import PacedHost
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     clock = Clock.start(8.0, PacedHost(Path(folder) / "pace", new=True))
         ...     clock.host.publish()
