@@ -143,9 +143,8 @@ class MachineState:
             # A change of port leaves several records of one machine; the latest counts.
             self._document = dict(max(ours, key=lambda record: record["number"], default={}))
             # A line that broke at opening: the loss was recorded before the controller stated who it is.
-            self._unnamed = [
-                path for path, record in records.items() if self._identity["firmware"] and self._nobodys(record)
-            ]
+            named = self._identity["firmware"]
+            self._unnamed = [path for path, record in records.items() if named and self._is_nobodys(record)]
             for path in self._unnamed:
                 self._document.setdefault("lost", records[path].get("lost"))
         return self._document
