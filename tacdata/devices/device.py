@@ -91,7 +91,7 @@ class Device(ABC):
 
     @property
     def late(self) -> float:
-        """Lateness in reading what the device sent [s, real time]; 0 if nothing waits."""
+        """Lateness in reading the device's bytes [s, real time]; 0 if nothing waits."""
         return 0.0
 
     @abstractmethod

@@ -168,7 +168,7 @@ class Grbl(MotionController):
 
     @property
     def late(self) -> float:
-        """Lateness in reading what the controller sent [s, real time]."""
+        """Lateness in reading the controller's bytes [s, real time]."""
         return self._link.silence.late if self._link is not None else 0.0
 
     @property

@@ -224,7 +224,7 @@ def _is_whole(path: Path, final: Path) -> bool:
 def linked_session(session: Session, folder: Path) -> Session:
     """Make a folder with links to the recordings of a session that may not be written; copies on a drive without links.
 
-    Labels, checks and datasets then lie beside the links. A folder that was made so before is completed.
+    Labels, checks and datasets are then next to the links. A folder that was made so before is completed.
 
     Raises:
         UsageError: If the folder holds recordings of another session.

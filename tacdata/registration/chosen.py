@@ -60,7 +60,7 @@ def chosen_registration(rig: Rig, rig_path: Path, path: Path | None, sensor: Sen
         raise FormatError(f"{path}: date {document['date']!r}", "ISO 8601 with a time zone", "register again") from None
     if age.days > OLD_DAYS:
         warnings.append(f"WARNING: the registration is {age.days} days old; register again if anything moved")
-    # Without homing, machine coordinates begin anew at every power-on.
+    # Without homing, machine coordinates begin at a new zero after every power-on.
     if document["controller"].get("$22") == "0":
         warnings.append("WARNING: it was measured without homing ($22=0): valid only if the controller kept its power")
     return Chosen(registered, path, tuple(warnings))

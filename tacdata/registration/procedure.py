@@ -177,7 +177,7 @@ def _check_plane(plane: Plane, touches: list[Touch], settings: RegistrationSetti
             f"at most {1000 * settings.flatness:g} um",
             "look for dirt, a lifted skin or a loose mount; a curved sensor cannot be registered to a plane",
         )
-    # The error of the common power moves all touches alike: it does not average out.
+    # The error of the common power moves all touches equally: it does not average out.
     model = float(np.mean([touch.onset.model for touch in touches]))
     uncertainty = float(np.hypot(np.sqrt(plane.covariance[0, 0]), model))
     if uncertainty > settings.tolerance:

@@ -71,7 +71,7 @@ class VirtualRig:
         """Set up a rig whose clock runs ``speed`` times as fast as real time; ``seed`` decides its world.
 
         With ``rough`` the sensor was put down by eye, up to a millimetre and some degrees off, and the rig file is not
-        marked as registered. ``hidden``: kind -> size of effects that stand in no file but truth.yaml (`hidden.KINDS`).
+        marked as registered. ``hidden``: kind -> size of effects that only truth.yaml names (`hidden.KINDS`).
 
         Raises:
             UsageError: If ``speed`` is not positive or too fast.
@@ -93,6 +93,7 @@ class VirtualRig:
         parked = (NOMINAL.origin[0], NOMINAL.origin[1], NOMINAL.origin[2] + PARKED)
         self.controller = Controller(self.clock, seed, parked)
         layout = board_format(self.sensor)
+        # Ten bits a byte, on a line that is busy for at most 0.8 of the time.
         needed = layout.size * 10 * layout.rate / 0.8
         baud = next((b for b in BAUDS if b >= needed), BAUDS[-1])
         timing = draw_timing(seed, self.clock.now_ns(), layout.rate)
@@ -100,6 +101,7 @@ class VirtualRig:
         self.board = VirtualBoard(self.clock, layout, timing, self._readings, baud, seed)
         self.scene = draw_scene(seed, NOMINAL.to_machine(0.0, 0.0, 0.0))
         self._noise = NoiseStretch(np.random.default_rng([seed, 7]))
+        # Rendering takes real time, whatever the speed.
         rate = min(30.0, IMAGES / speed)
         self.camera = VirtualCamera(self.clock, rate, self._picture, seed=seed) if camera else None
 
@@ -190,6 +192,7 @@ class VirtualRig:
 
     def stop(self) -> None:
         """Switch everything off and delete the rig file, whose ports are gone."""
+        # Without the lock the files are those of another rig.
         if self._lock:
             self.path.unlink(missing_ok=True)
             self._host.path.unlink(missing_ok=True)
@@ -201,7 +204,7 @@ class VirtualRig:
             self._lock.close()
 
     def _state_place(self) -> None:
-        """Write where its machine stands, as a recorder that has homed it would: nobody need be asked."""
+        """Write the position of its machine, as a recorder that has homed it would: then nobody is asked."""
         shutil.rmtree(self.directory / STATE, ignore_errors=True)
         port = self.controller.port.path
         document = {

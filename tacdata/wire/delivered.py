@@ -65,6 +65,6 @@ class StandsStill(DeviceError):
     """A machine that has come to rest, and whose motion cannot be abandoned."""
 
     def __init__(self, given: str, allowed: str, remedy: str, at: tuple[float, float, float] | None = None) -> None:
-        """Say why; ``at`` is its position [mm, machine], if that is known."""
+        """Give the reason; ``at`` is its position [mm, machine], if that is known."""
         super().__init__(given, allowed, remedy)
         self.at = at

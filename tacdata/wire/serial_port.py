@@ -106,7 +106,7 @@ def write_all(line: serial.SerialBase, data: bytes) -> None:
     if not isinstance(handle, int) or termios is None:
         line.write(data)
         return
-    # pyserial's own timeout counts anew after each part; a controller that takes one byte at a time would hold the
+    # pyserial's own timeout starts again after each part; a controller that takes one byte at a time would hold the
     # caller.
     patience = Patience(WRITE, floor=WRITE)
     while data:

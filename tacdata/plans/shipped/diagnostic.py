@@ -1,4 +1,4 @@
-"""A short plan whose presses tell physical effects apart.
+"""A short plan whose presses separate physical effects.
 
 Each block separates one group of effects that are collinear in ordinary presses:
 

@@ -1,4 +1,4 @@
-"""Some ten presses that say how a unit is: the same at each visit, so that visits can be compared press by press.
+"""Some ten presses that show the state of a unit, the same at each visit: visits are compared press by press.
 
 - rest stretch: noise of every channel, and drift without contact;
 - sites: one press for each two by two taxels, off centre, so that no two channels give the same answers to all of them;

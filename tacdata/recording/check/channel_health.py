@@ -267,7 +267,7 @@ def held_by_chance(counts: np.ndarray, idle: np.ndarray, frames: int) -> float:
 
 def _lasting(counts: np.ndarray, threshold: np.ndarray) -> list[tuple[int, int, float]]:
     change = np.diff(counts, axis=0)
-    # Relaxation changes all neighbouring differences alike: their running median is subtracted.
+    # Relaxation changes all neighbouring differences equally: their running median is subtracted.
     padded = np.pad(change, ((2, 2), (0, 0)), mode="edge")
     trend = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
     sudden = np.argwhere(np.abs(change - trend) > threshold)

@@ -236,7 +236,7 @@ def _common(sample: Answers, ratio: np.ndarray) -> np.ndarray:
             use = np.isfinite(ratio) & rows[:, None]
             if use.sum() < 12:
                 continue
-            # A cubic in distance stands for how an indenter's answer deviates from the Gaussian.
+            # A cubic in distance describes how an indenter's answer deviates from the Gaussian.
             terms = np.stack([np.ones_like(distance), distance, distance**2, distance**3], axis=-1)
             target = (ratio - offsets)[use]
             weight = np.ones(len(target))

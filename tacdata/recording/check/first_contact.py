@@ -24,7 +24,7 @@ FEW = 8
 ABOVE = 12
 """Readings before contact that are fitted [count]."""
 DRIFT_PRESSES = 12
-"""Presses needed to tell a drift of first contact [count]."""
+"""Presses needed to judge a drift of first contact [count]."""
 DRIFT_MM = 0.05
 """Warning threshold: drift of first contact over a session [mm]."""
 CONFIDENCE = 0.99
@@ -46,7 +46,7 @@ class FirstContact:
 
 
 def first_contact(figures: RecordingFigures) -> FirstContact | None:
-    """Return the first contact of a press; None where the readings cannot tell.
+    """Return the first contact of a press; None where the readings do not show it.
 
     The mean of going in and coming out, in which a delay of the readings cancels.
     """

@@ -160,7 +160,7 @@ def _not_assessed(entries: list[RecordingFigures]) -> list[str]:
 
 
 def _sync_words(entries: tuple[RecordingFigures, ...]) -> list[str]:
-    """Say how far every pair of streams may be off in time, or that it was not measured."""
+    """State how far every pair of streams may be off in time, or that it was not measured."""
     pairs: dict[str, list[dict[str, Any]]] = {}
     for entry in entries:
         for pair in entry.document["sync"]:

@@ -95,7 +95,7 @@ def depth_findings(entries: list[RecordingFigures]) -> list[Finding]:
 
 
 def session_not_assessed(entries: list[RecordingFigures]) -> list[str]:
-    """Say which changes within the session its presses cannot tell, and why."""
+    """Name the changes within the session that its presses cannot show, and why."""
     sample = answers(entries)
     presses = 0 if sample is None else len(sample.response)
     if sample is None or presses < STEP_PRESSES:
@@ -156,7 +156,7 @@ def _lean(entry: RecordingFigures) -> np.ndarray:
     """Return by how much the middle of the latencies leans against the clock's line below them [ppm], shape (2,).
 
     In a recording of seconds a few early frames lead the line astray; they do not lead the middle. The two lie one
-    standard deviation apart from it: a slow board has too few frames to tell.
+    standard deviation apart from it: a slow board has too few frames for a judgement.
     """
     stride = max(len(entry.lag) // LEANING, 1)
     time_ms = entry.recording.episode.taxels.sample_ns[::stride] / 1e6

@@ -31,7 +31,7 @@ HIGHER = 0.06
 INSIDE = 0.5
 """Distance of a press from the outermost taxels' centres, inwards, from which its centre of answer is used [mm]."""
 TELLING = (0.7, 0.4)
-"""Step of the logarithm of all answers [1], and of the height [mm], that a session should be able to tell."""
+"""Step of the logarithm of all answers [1], and of the height [mm], that a session should be able to show."""
 
 
 @dataclass(frozen=True)

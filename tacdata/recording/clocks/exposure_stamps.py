@@ -39,7 +39,7 @@ class ExposureStamps:
 
 
 def exposure_stamps(arrival_ns: np.ndarray, device_ns: np.ndarray, rate: float | None) -> ExposureStamps | None:
-    """Return what stamps tell; None if they are not of exposures.
+    """Return the evidence of stamps; None if they are not of exposures.
 
     Args:
         arrival_ns: Host times of receipt [ns], shape (n,), int64, in the order of arrival.
@@ -86,7 +86,7 @@ def _steps(stamps: np.ndarray, arrivals: np.ndarray) -> tuple[np.ndarray, np.nda
     turns = np.rint(stamps / period)
     off = np.abs(stamps - period * np.maximum(turns, 1))
     if (off < REGULAR * period).mean() < REGULAR_SHARE:
-        # Without a steady period only a clock that was set back can be told.
+        # Without a steady period only a clock that was set back shows.
         return stamps < 0, doubt
     steps = off > max(LEAST_STEP_NS, SCATTER * float(np.median(off)))
     # Set forward by a multiple of the period, a clock looks as if lateness had ended just as images were lost. The

@@ -4,7 +4,7 @@ An image arrives after a latency of at least the camera's minimum. On a busy com
 lost. With a time stamp of the camera the two are distinguished: the line under arrival against stamp gives every
 exposure. Stamps are believed only where they can be of exposures (`exposure_stamps`).
 
-Numbers given on arrival do not tell a late image from one after a lost one. Against a clock of constant period P, the
+A number given on arrival is no evidence between a late and a lost image. Against a clock of constant period P, the
 excess E = arrival - P number rises with both and falls only when lateness ends. So the lateness of an image is at
 least E less the smallest later E, and at most that of the image before plus the rise of E. The time is taken from the
 lower bound, and half the distance of the bounds is its standard uncertainty.

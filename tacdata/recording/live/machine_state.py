@@ -20,7 +20,7 @@ from tacdata.wire.serial_port import usb_identity
 
 SCHEMA = "machine_state"
 FIRMWARE = ("FIRMWARE", "VER", "OPT")
-"""Answers of `MotionController.settings` that tell one controller from another."""
+"""Answers of `MotionController.settings` that identify a controller."""
 UNKNOWN = "there is no record of where the machine was left"
 
 

@@ -141,7 +141,7 @@ class Controller:
         self._faults.put(lay)
 
     def inject_pendant(self) -> None:
-        """Fault: a pendant takes control; lines of the host are ignored and reports say so (grblHAL's ``MPG``)."""
+        """Fault: a pendant takes control; lines of the host are ignored and reports show it (grblHAL's ``MPG``)."""
         self.inject_wire(lambda line: None, lambda text: text.replace(">", "|MPG:1>") if text[:1] == "<" else text)
 
     def inject_door(self, is_open: bool) -> None:

@@ -37,6 +37,7 @@ class Interpreter(Machine):
 
     def _dollar(self, line: str, now_ns: int) -> None:
         state = self.state(now_ns).split(":")[0]
+        # After a limit alarm grblHAL answers these questions, and refuses all else until a reset.
         if self.critical and line not in ("$G", "$#", "$$", "$I", "$N"):
             raise gcode.Refused(79)
         if line.startswith("$J="):
@@ -95,6 +96,7 @@ class Interpreter(Machine):
         number, _, text = line[2:].partition("=")
         if number not in ("0", "1"):
             raise gcode.Refused(3)
+        # A start-up line is carried out when it is stored: one that is refused is not kept.
         if text:
             self._act(text, now_ns)
         self.startup[int(number)] = text
@@ -125,6 +127,7 @@ class Interpreter(Machine):
             raise gcode.Refused(9)
         if self.state(now_ns) not in ("Idle", "Jog"):
             raise gcode.Refused(8)
+        # A jog leaves the modal state as it was.
         scratch = gcode.Modal(dict(self.modal.words), 0.0)
         action = gcode.interpret(line, scratch, self.planner.target - self.error, self.offset, jog=True)
         if action.target is None:

@@ -81,7 +81,7 @@ class Mounted:
 
     def start(self) -> None:
         """Watch the file in a thread and confirm the mounted indenter; reading a solid takes seconds."""
-        # What an earlier run had mounted is not on this rig.
+        # The indenter of an earlier run is not on this rig.
         self.path.unlink(missing_ok=True)
         taken(self.path).write_text("nothing")
         self._thread.start()

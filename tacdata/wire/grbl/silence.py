@@ -17,7 +17,7 @@ READ = 0.05
 
 
 class Silence:
-    """The time since a controller's latest report, and what arrived meanwhile.
+    """The time since a controller's latest report, and the unreadable line since then.
 
     Example:
         ``silence = Silence(port, clock, 8.0)``; in the reader's loop ``silence.look()``, after each report

@@ -72,7 +72,7 @@ class Statuses:
             self.offset, self.unplaced = None, "Idle"
 
     def place(self, offset: np.ndarray | None) -> None:
-        """Take the offset [report units], shape (3,), unless reports tell it."""
+        """Take the offset [report units], shape (3,), unless reports state it."""
         if offset is not None and not self._tells_offset:
             self.offset, self.unplaced = offset, ""
 
