@@ -24,15 +24,8 @@ STALL = 3.0
 WAITING = 120
 """Images kept until they are read; if there are more, the oldest are dropped and counted."""
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-BACKENDS = {
-    "any": "CAP_ANY",
-    "v4l2": "CAP_V4L2",
-    "dshow": "CAP_DSHOW",
-    "msmf": "CAP_MSMF",
-    "avfoundation": "CAP_AVFOUNDATION",
-    "ffmpeg": "CAP_FFMPEG",
-}
-"""Name in a rig file -> OpenCV's name of the back-end."""
+BACKENDS = ("any", "v4l2", "dshow", "msmf", "avfoundation", "ffmpeg")
+"""Names in a rig file; OpenCV's are ``CAP_ANY``, ``CAP_V4L2`` and so on."""
 MANUAL_AUTOMATIC = {"V4L2": (1, 3)}
 """A back-end's values of manual and automatic exposure; the others use 0.25 and 0.75."""
 BAD_IN_A_ROW = 10
@@ -294,7 +287,7 @@ class OpencvCamera(Camera):
     def _capture(self) -> Any:
         import cv2
 
-        backend = getattr(cv2, BACKENDS[self.backend])
+        backend = getattr(cv2, f"CAP_{self.backend.upper()}")
         if isinstance(self.source, str) and self._live:
             limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, 5000, cv2.CAP_PROP_READ_TIMEOUT_MSEC, 5000]
             return cv2.VideoCapture(self.source, cv2.CAP_FFMPEG if backend == cv2.CAP_ANY else backend, limits)
