@@ -19,4 +19,5 @@ class AirGap(Effect):
     def apply(self, state: State, values: Values) -> State:
         rise = state.rise
         lost = values["g"] * np.abs(rise).max(axis=0)
+        # Readings of some sensors fall under load: the sign of the rise is kept.
         return state.with_rise(np.sign(rise) * np.maximum(np.abs(rise) - lost, 0.0))

@@ -19,6 +19,7 @@ class BaselineTracking(Effect):
         if rate <= 0.0:
             return state
         rise = state.rise
+        # A baseline that follows at rate r is the first-order mean of the rise; what is read is the rest.
         return state.with_signal(state.idle + rise - low_pass(rise, state.course.step, 1 / rate))
 
     def time_constant(self, values: Values) -> float:

@@ -17,4 +17,5 @@ class ChannelGain(Effect):
     by_channel = True
 
     def apply(self, state: State, values: Values) -> State:
+        # Above idle alone: calibration takes the offset off before a gain counts.
         return state.with_rise(state.rise * (1 + values["e"]))

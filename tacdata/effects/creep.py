@@ -25,6 +25,7 @@ class Creep(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         lag = state.load - low_pass(state.load, state.course.step, float(values["tau"]))
+        # Readings alone: the force of a path in depth does not creep with them.
         return replace(state, load=state.load - values["f"] * lag)
 
     def unjudgeable(self, course: Course, response: Response) -> str:

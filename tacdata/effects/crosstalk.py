@@ -43,6 +43,7 @@ class CrosstalkEitherWay(Crosstalk):
     def apply(self, state: State, values: Values) -> State:
         rise = state.rise
         more = np.zeros_like(rise)
+        # The outermost channels have one neighbour.
         more[:, 1:] += values["b"] * rise[:, :-1]
         more[:, :-1] += values["n"] * rise[:, 1:]
         return state.with_signal(state.signal + more)

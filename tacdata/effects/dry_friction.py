@@ -53,6 +53,7 @@ class DryFriction(Effect):
     def apply(self, state: State, values: Values) -> State:
         course = state.course
         way = max(float(values["w"]) * course.span, 1e-9)
+        # Above the skin nothing rubs.
         depth = np.maximum(state.depth, 0.0)
         start = np.where(course.first | (state.depth <= 0), -1.0, np.nan)
         turn = 0.5 * float(values["a"]) * (1 + slipping(depth, way, start))
@@ -83,6 +84,7 @@ class SealFriction(DryFriction):
     def turn(self, state: State, values: Values) -> np.ndarray:
         """Return the friction over its largest value [1], shape (n,)."""
         course, half = state.course, 0.5 * state.course.stroke
+        # A form without a clearance has no parameter b.
         way, gap = max(float(values["w"]) * half, 1e-9), float(values.get("b", 0.0)) * half
         # Strokes of one recording follow each other. One that begins at the top came from below, and so on.
         first = course.first
@@ -131,6 +133,7 @@ class EffortFriction(SealFriction):
     def turn(self, state: State, values: Values) -> np.ndarray:
         """Return the friction over its largest value [1], shape (n,)."""
         rate = state.course.speed
+        # Smooth about zero, so that noise of a path at rest is no friction.
         return rate / (np.abs(rate) + float(values["c"]) * max(float(np.abs(rate).max()), 1e-9))
 
     def unjudgeable(self, course: Course, response: Response) -> str:

@@ -18,6 +18,7 @@ class GainDrift(Effect):
     grows_with = Growth.TIME
 
     def apply(self, state: State, values: Values) -> State:
+        # About the middle of the recordings: from their start it would resemble a gain.
         return state.with_rise(state.rise * (1 + values["k"] * (state.course.clock - 0.5))[:, None])
 
 
@@ -51,6 +52,7 @@ class GainDriftWhole(GainDrift):
 
     def apply(self, state: State, values: Values) -> State:
         more = -np.expm1(-state.course.time / values["tau"])
+        # Less its mean, as a constant factor is a gain.
         return state.with_signal(state.signal * (1 + values["k"] * (more - more.mean()))[:, None])
 
     def unjudgeable(self, course: Course, response: Response) -> str:

@@ -15,4 +15,5 @@ class GantrySag(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         square = (state.pose[:, :2] ** 2).sum(axis=1)
+        # Over the largest distance pressed, so that k is a height that was reached.
         return state.deeper(values["k"] * square / max(float(square.max()), 1e-9))

@@ -49,6 +49,7 @@ class BoucWen(Hysteresis):
 
     def apply(self, state: State, values: Values) -> State:
         course = state.course
+        # Over the deepest press: a turning way has no unit that all skins share.
         width = max(float(values["w"]) * course.span, 1e-9)
         start = np.where(course.first | (state.depth <= 0), -1.0, np.nan)
         z = slipping(np.maximum(state.depth, 0.0), width, start)
@@ -68,6 +69,7 @@ class ProportionalHysteresis(Hysteresis):
     def apply(self, state: State, values: Values) -> State:
         force = np.maximum(state.force, 0.0)
         width = max(float(values["w"]) * float(force.max()), 1e-12)
+        # The output of a play lies its half width below a rising input, and as much above a falling one.
         reversal = np.clip((play(force, width, state.depth <= 0) + width - force) / (2 * width), 0.0, 1.0)
         return state.scaled(1 - values["a"] * reversal)
 
@@ -88,6 +90,7 @@ class HysteresisRead(Hysteresis):
 
     def apply(self, state: State, values: Values) -> State:
         force, power = np.maximum(state.force, 0.0), float(values["m"])
+        # A reading that is a power of the load is taken back to the load first.
         load = (force / max(float(force.max()), 1e-12)) ** (1 / power)
         unloaded, width = state.depth <= 0, float(values["w"])
         lag = slip_lags(load, width * np.array(READ_THRESHOLDS), unloaded).mean(axis=0)

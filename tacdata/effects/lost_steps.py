@@ -22,6 +22,7 @@ class LostSteps(Effect):
     seen_by_tag = True
 
     def apply(self, state: State, values: Values) -> State:
+        # From one episode on, all later ones: nothing brings lost steps back.
         loss = state.course.episode >= values["s"] * state.course.episodes
         return state.deeper(values["dz"] * loss)
 

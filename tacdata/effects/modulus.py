@@ -16,4 +16,5 @@ class Modulus(Effect):
     like_gain = LikeGain.EQUAL
 
     def apply(self, state: State, values: Values) -> State:
+        # Depths are prescribed, so strains stay and loads scale.
         return state.scaled(1 + values["e"])

@@ -16,9 +16,11 @@ class NominalPose(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         course = state.course
+        # Where no tag was seen the command is all that is known.
         tag = course.tip if course.tag is None else np.where(np.isfinite(course.tag), course.tag, course.tip)
         pose = state.pose + values["k"] * (tag - course.tip)
         load = state.response.load(pose, course.tool) - state.response.load(state.pose, course.tool)
+        # As a change of readings: the simulation is off, whatever other effects do.
         change = state.response.signal(state.load + load) - state.response.signal(state.load)
         return state.with_signal(state.signal + change)
 

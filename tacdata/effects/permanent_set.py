@@ -26,6 +26,7 @@ class PermanentSet(Effect):
         np.maximum.at(deepest, course.episode, depth)
         dent = np.zeros(course.episodes)
         for k in range(course.episodes):
+            # Only presses before this one have left a dent.
             same = np.flatnonzero(course.site[:k] == course.site[k])
             if len(same):
                 dent[k] = -np.expm1(-len(same) / values["n"]) * deepest[same].max() / course.span

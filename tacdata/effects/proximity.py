@@ -23,6 +23,7 @@ class Proximity(Effect):
         pose = state.pose.copy()
         pose[:, 2] = 0.1 * state.course.span
         pattern = state.response.signal(state.response.load(pose, state.course.tool)) - state.idle
+        # In contact it stays at its value of the touch.
         near = np.exp(np.minimum(state.depth, 0.0) / values["l"])
         return state.with_signal(state.signal + values["a"] * near[:, None] * pattern)
 

@@ -31,6 +31,7 @@ class Relaxation(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         loads = state.loads
+        # The force with the loads: it is the skin that relaxes, not its taxels.
         return state.with_loads(loads - values["f"] * low_pass(loads, state.course.step, float(values["tau"])))
 
     def unjudgeable(self, course: Course, response: Response) -> str:
@@ -69,6 +70,7 @@ class RelaxationRead(Relaxation):
         # Loads only push: the sign of a channel is the sign of its largest reading.
         largest = loads[np.abs(loads).argmax(axis=0), np.arange(loads.shape[1])]
         scale = np.where(size > 0, np.copysign(size, largest), 1.0)
+        # From 0 to 1, as a power of a number with a unit has no meaning.
         share = loads / scale
         load = np.copysign(np.abs(share) ** (1 / power), share)
         net = load - values["f"] * self.late(load, state.course.step, values)

@@ -17,4 +17,5 @@ class Saturation(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         rise = state.rise
+        # To zero loss at small readings, so that it is no gain.
         return state.with_rise(rise / (1 + values["k"] * np.abs(rise) / max(np.abs(rise).max(), 1e-12)))

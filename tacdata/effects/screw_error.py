@@ -23,4 +23,5 @@ class ScrewError(Effect):
     def apply(self, state: State, values: Values) -> State:
         # Less than a period is no more a screw's than any other curve.
         angle = 2 * np.pi * state.depth / np.minimum(values["p"], state.course.stroke)
+        # The cosine less 1, so that the zero of depth stays where it was touched off.
         return state.deeper(values["s"] * np.sin(angle) + values["c"] * (np.cos(angle) - 1))

@@ -27,6 +27,7 @@ class Softening(Effect):
         # Hertz: the force under a sphere grows as d^1.5, its work as d^2.5.
         work = np.maximum(state.depth, 0.0) ** 2.5
         largest = running_max(work, state.course.row_site)
+        # While the work grows beyond its largest, the skin is on its virgin curve.
         return state.scaled(1 - values["a"] * erf((largest - work) / (values["m"] * max(float(work.max()), 1e-9))))
 
 

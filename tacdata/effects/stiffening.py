@@ -19,5 +19,6 @@ class Stiffening(Effect):
     parameters = (Parameter("k", "1", "stiffer at the deepest depth", 0.1, -0.9, 3.0),)
 
     def apply(self, state: State, values: Values) -> State:
+        # Over the deepest depth, so that k is a share that was reached.
         more = 1 + values["k"] * np.maximum(state.depth, 0.0) / state.course.span
         return state.scaled(more)

@@ -26,6 +26,7 @@ class TemperatureOffset(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         scale = state.response.largest(state.signal)
+        # About the mean temperature: a constant part is an offset.
         return state.with_signal(state.signal + scale * state.course.warmth[:, None] * values["k"])
 
     unjudgeable = same_temperature

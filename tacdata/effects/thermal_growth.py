@@ -19,4 +19,5 @@ class ThermalGrowth(Effect):
     follows_clock = True
 
     def apply(self, state: State, values: Values) -> State:
+        # None at the first row, where the zero was touched off.
         return state.deeper(values["dz"] * -np.expm1(-state.course.time / values["tau"]))

@@ -21,4 +21,5 @@ class Tilt(Effect):
 
     def apply(self, state: State, values: Values) -> State:
         x, y, depth = state.pose.T
+        # To first order: at slopes of a few per cent x and y move by far less than a taxel.
         return state.with_pose(np.stack([x, y, depth + values["a"] * x + values["b"] * y], axis=-1))

@@ -18,6 +18,7 @@ class ViewScale(Effect):
     scale = Scale.OBSERVER
 
     def apply(self, state: State, values: Values) -> State:
+        # The view alone: the tip is where it was.
         return replace(state, view=state.view * (1 + values["s"]))
 
     def unjudgeable(self, course: Course, response: Response) -> str:

@@ -19,6 +19,7 @@ class WarmUpDrift(Effect):
     follows_clock = True
 
     def apply(self, state: State, values: Values) -> State:
+        # By the largest rise, so that a is a share whatever the unit of the readings.
         scale = state.response.largest(state.signal)
         settling = values["a"] * np.exp(-state.course.time / values["tau"])
         return state.with_signal(state.signal + scale * settling[:, None])

@@ -108,6 +108,7 @@ def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
     data.qpos[:3] = lateral, 0.0, vertical
     orange, engine = model.body("orange").id, mujoco()
     end = CLOSE + RISE + HOLD
+    # Five steps at a time: the path is drawn, not differentiated.
     moments = np.arange(0.0, end, STEP * 5)
     path, hand = np.empty((len(moments), 3)), np.empty(len(moments))
     for k, moment in enumerate(moments):
@@ -118,6 +119,7 @@ def lift(grip: Grip, lateral: float, vertical: float = 0.0) -> Lift:
         data.ctrl[:] = hand[k], closing, closing
         engine.mj_step(model, data, 5)
         path[k] = data.xpos[orange]
+    # During the hold alone: a slip on the way up that is caught again counts as held.
     lowest = float((path[moments > end - HOLD, 2] - vertical).min())
     return Lift(lowest > STAYS * HEIGHT, lowest, moments, path, hand)
 
@@ -142,5 +144,6 @@ def _built(grip: Grip, vertical: float) -> tuple[Any, Any]:
     engine = mujoco()
     model = engine.MjModel.from_xml_string(text)
     for name in SIDES:
+        # MuJoCo's usual contact is far stiffer than the skin.
         soften(model, model.geom(name).id, grip.skin, grip.mass)
     return model, engine.MjData(model)

@@ -45,6 +45,7 @@ def _success(ax: Any, study: dict[str, Any]) -> None:
             rate, x = share["held"] / share["of"], at + shift
             low, high = share["wilson_95"]
             ax.bar(x, rate, 0.9 * width, color=colors[name], label=name.replace("_", " ") if at == 0 else None)
+            # An interval never begins above the rate, but rounding may say so.
             ax.errorbar(x, rate, [[max(rate - low, 0)], [max(high - rate, 0)]], color="black", capsize=3)
             if published:
                 successes, of = published
@@ -71,6 +72,7 @@ def _positions(ax: Any, study: dict[str, Any]) -> None:
 def _bias(ax: Any, study: dict[str, Any]) -> None:
     bias, band = study["bias"], study["setup"]["protocol"]["band"]
     for name in bias["accepted_to"]:
+        # Where a strategy sees no contact, it believes nothing.
         points = [(x, y) for x, y in zip(bias["true"], bias[name], strict=True) if y is not None]
         line = "--" if name == "solved_map" else "-"
         ax.plot(*zip(*points, strict=True), color=_colors(study)[name], ls=line, label=name.replace("_", " "))

@@ -67,6 +67,7 @@ class PressSet:
     def write(self, path: Path) -> None:
         """Write the file (.npz)."""
         buffer, values = io.BytesIO(), {name: getattr(self, name) for name in FIELDS}
+        # Single precision is finer than the solver's own error.
         values |= {name: values[name].astype(np.float32) for name in ("force", "closure", "area", "normal")}
         values["surface"] = np.round(self.surface / GRAIN).astype(np.int16)
         stamp, indenters = provenance.canonical(self.provenance), json.dumps(self.indenters)
@@ -90,6 +91,7 @@ def read_presses(path: StrPath, sensor: Sensor) -> PressSet:
     except (OSError, ValueError, KeyError, BadZipFile) as error:
         remedy = "install tacdata again, or run python -m tacdata.grasping.pin_presses"
         raise FormatError(f"{path}: {error}", "presses that pin_presses wrote", remedy) from None
+    # Presses of another sensor would give readings without a warning.
     if stamp["parents"].get("sensor") != sensor.content_hash:
         raise FormatError(
             f"{path}: presses of another sensor",
@@ -118,6 +120,7 @@ def solved_presses(model: SkinModel, requests: Sequence[PressRequest], capacity:
             k = numbers[index]
             if not isinstance(answer, SolveError):
                 answers[k] = answer
+            # One depth less each time, until there is an equilibrium.
             elif len(todo[k].depths) > LEAST:
                 again[k] = replace(todo[k], depths=todo[k].depths[:-1])
         todo = again

@@ -47,6 +47,7 @@ def result(
     variants = []
     for force in OTHER_FORCES:
         variant = configured(setup, force)
+        # The approach does not depend on the lift, so it is not run again.
         again = [replace(trial, held=lifted(trial, variant.grip)) for trial in outcomes]
         variants.append({"force": force, **_lifting(variant.grip), "rates": rates(again)})
     parents = {
@@ -106,6 +107,7 @@ def _gap_lines(study: dict[str, Any]) -> list[str]:
         for name in GAP
     }
     raw, dense = (outcomes[name] for name in GAP)
+    # Trials are compared in pairs: the same orange, fingertips and noise.
     if set(raw) != set(dense) or not raw:
         return []
     sentences = []
@@ -115,6 +117,7 @@ def _gap_lines(study: dict[str, Any]) -> list[str]:
         low, high = difference.interval
         (raw_held, of), (dense_held, of_dense) = (study["published"][where][name] for name in GAP)
         paper = dense_held / of_dense - raw_held / of
+        # The sign must be sure, and the paper's difference within the interval.
         verdict = "reproduced" if low > 0 and low <= paper <= high else "not reproduced"
         sentences.append(
             f"dense depth less raw taxels, {where}: {difference.text}; the paper's {paper:+.0%} is {verdict}"

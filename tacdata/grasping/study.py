@@ -126,6 +126,7 @@ def trials(
                 aside, up = world.uniform(-setup.disorder.place, setup.disorder.place, 2).tolist()
                 friction = setup.grip.friction * float(1 + setup.disorder.friction * world.standard_normal())
                 mass = setup.grip.mass * float(1 + setup.disorder.mass * world.standard_normal())
+                # Two fingertips differ by their own draws, the same for every strategy.
                 fingers = [
                     Fingertip(touch, setup.spread, side, np.random.default_rng([setup.seed, position, repeat, k]))
                     for k, side in enumerate((1, -1))

@@ -28,6 +28,7 @@ def specimens(names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
     Raises:
         UsageError: If one is unknown, or none is named.
     """
+    # A shape whose file was taken out of the folder is no longer offered.
     available = [name for name, shape in STANDARD.items() if shape["shape"] in registry.names(ROOM, BASE)]
     unknown = [name for name in names if name not in available]
     if unknown or not names:

@@ -58,6 +58,7 @@ class Diagnostic(ShippedPlan):
         virgin = half * [-0.8, 0.8]
         corners = half * [[0, 0], [-1, -1], [1, -1], [1, 1]]  # the fourth is the virgin site's
         reference = block(first, points(on), [0.7], "reference")
+        # Both lengths are several time constants of a usual skin, so that a plateau shows.
         long_hold = {"purpose": "long hold and recovery", "holds": [HOLD], "recovery": RECOVERY}
         gaps = {"kind": "between", "count": 8} if sensor.taxels.count > 1 else {"kind": "center"}
         recipe = {

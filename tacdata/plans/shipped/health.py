@@ -63,6 +63,7 @@ def _sites(sensor: Sensor) -> np.ndarray:
     taxels = sensor.taxels
     x, y = np.meshgrid(_middles(taxels.columns), _middles(taxels.rows), indexing="xy")
     side = (-1.0) ** np.add.outer(np.arange(x.shape[0]), np.arange(x.shape[1]))
+    # Along an axis with one taxel there is no neighbour to press between.
     offset = np.array(OFF_CENTRE) * (np.array([taxels.columns, taxels.rows]) > 1)
     pitch = np.array([taxels.pitch_x, taxels.pitch_y])
     return ((np.stack([x, y], axis=-1) + side[..., None] * offset) * pitch).reshape(-1, 2)

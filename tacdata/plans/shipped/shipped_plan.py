@@ -89,6 +89,7 @@ def from_recipe(recipe: dict[str, Any], sensor: Sensor, seed: int, clearance: fl
         clearance: Minimum distance of the indenter at full depth from the rim [mm].
     """
     document = write_out({"version": "1.0", **recipe}, sensor, f"plan {recipe['name']}", seed)
+    # After the expansion, as each press has an indenter and a depth of its own.
     clear_of_rim(document["presses"], document["indenters"], sensor, clearance)
     return document
 
