@@ -304,7 +304,7 @@ def _restarted(restarts: np.ndarray) -> list[str]:
     """Return in words how many presses begin on a clock of their own."""
     if not restarts.any():
         return []
-    return [f"{restarts.sum()} presses begin clocks of their own: the rest before each is not known and taken as long"]
+    return [f"{restarts.sum()} presses have clocks of their own: the pause before each is unknown, and taken as long"]
 
 
 def _sites(parts: list[_Stroke], channels: int) -> tuple[np.ndarray, list[str]]:

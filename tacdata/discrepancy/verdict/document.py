@@ -224,11 +224,13 @@ def following(decision: Decision, course: Course, watched: bool = False, fitted:
         words = ["nothing: below the limits in verdict.json an effect shows only in more or deeper presses"]
         return words + ["for stiffness, gain and compliance: judge again with a model (--fem or --spec)"] * fitted
     if decision.status == "named":
-        return [f"give it to the model, and see what that changes: {REVISE}"]
+        return [f"add it to the model, and show the change: {REVISE}"]
     answer = [e.finding for e in decision.effects]
     words = [f"{f.placed.effect.spoken}: {f.placed.effect.experiment}" for f in answer if f.rivals or f.at_bound]
     if any(f.placed.effect.at_rest is not None and f.rivals for f in answer) and one_rate(course):
-        words.insert(0, "the same presses at three rates over a decade: one rate splits no delay from play or memory")
+        words.insert(
+            0, "the same presses at three rates over a decade: one rate does not split delay, play and memory"
+        )
     if decision.status == "ambiguous":
         words.append(f"the presses that settle it soonest: {REVISE} writes them as next.yaml")
     if (lone := decision.lone) is not None:

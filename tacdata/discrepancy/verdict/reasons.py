@@ -55,8 +55,8 @@ def reason_in_words(decision: Decision, findings: Findings, checks: DataChecks, 
         case Reason.CONTRADICTION:
             return "; ".join(checks.contradictions)
         case Reason.TOO_FEW:
-            best = f"; so far {_best(decision.effects)}" if answer else ""
-            return f"{checks.episodes} presses cannot carry a verdict{best}"
+            best = f"; the best fit so far: {_best(decision.effects)}" if answer else ""
+            return f"{checks.episodes} presses are too few for a verdict{best}"
         case Reason.STOPPED:
             fits = f"; {names} {'fits' if len(answer) == 1 else 'fit'} best, rivals were not tried" if answer else ""
             return f"stopped after {findings.until}: {'a gap' if findings.gap else 'no gap'}{fits}"
@@ -204,7 +204,7 @@ def _nameless(findings: Findings, share_limit: float) -> str:
     if findings.left.t < LEFT_T or findings.share_left < share_limit:
         return ""
     part = f"{100 * findings.share_left:.0f} %" if findings.share_left >= SPEAKS_FROM else "less than 1 %"
-    return f"; {part} of what could be explained has no name yet"
+    return f"; {part} of the explainable part has no name yet"
 
 
 def _undecided(decision: Decision, gap: Gap | None) -> str:
@@ -255,8 +255,8 @@ def _closest(answer: list[FoundEffect], share: float, gap: Gap | None) -> str:
     """Return a clause on the best answer that is no name: the share it leaves, and its failure on sealed episodes."""
     names = list(dict.fromkeys(m.placed.effect.spoken for m in answer))
     single, words = len(names) == 1, _listed(names, "and")
-    words += " comes closest and leaves" if single else " together come closest and leave"
-    words += f" {100 * share:.0f} % of what could be explained"
+    words += " fits best and leaves" if single else " together fit best and leave"
+    words += f" {100 * share:.0f} % of the explainable part"
     it, name = ("it", "it is not the name") if single else ("them", "they are not the names")
     if gap is not None and len(gap.before):
         base, final = float(gap.before.mean()), float(gap.after.mean())
@@ -268,7 +268,7 @@ def _closest(answer: list[FoundEffect], share: float, gap: Gap | None) -> str:
             )
     if instead := list(dict.fromkeys(load(r).spoken for m in answer for r in m.rivals)):
         substitutes = _listed(instead, "or") if len(instead) <= MOST_STAND_INS else f"{len(instead)} others"
-        return f"{words}, and {substitutes} may stand in for {it}"
+        return f"{words}, and {substitutes} may explain {it} as well"
     return f"{words}, so {name}, or not all of it"
 
 
@@ -285,8 +285,11 @@ def _best(effects: Sequence[Decided]) -> str:
     if not words:
         return _listed(clear, "and")
     are = "is" if len(clear) == 1 else "are"
-    begins = f"{_listed(clear, 'and')} {are} there. Something else is, too, and " if clear else ""
-    return f"{begins}these recordings do not say which effect it is: {words}"
+    if clear:
+        return (
+            f"{_listed(clear, 'and')} {are} there. Another effect is, too. These recordings do not show which: {words}"
+        )
+    return f"these recordings do not show which effect it is: {words}"
 
 
 def _open(group: list[FoundEffect]) -> str:
@@ -300,8 +303,8 @@ def _open(group: list[FoundEffect]) -> str:
         instead = _listed([load(name).spoken for name in rivals], "or")
         if len(rivals) > MOST_STAND_INS:
             instead = f"{len(rivals)} others ({_listed(families, 'or')})"
-        return f"{words}, but {instead} may stand in for {'it' if len(names) == 1 else 'any of them'}"
-    return f"{words}, but one may stand in for another"
+        return f"{words}, but {instead} may explain {'it' if len(names) == 1 else 'any of them'} as well"
+    return f"{words}, but each may explain the others' part"
 
 
 def _listed(names: list[str], last: str) -> str:

@@ -48,7 +48,7 @@ def in_text(verdict: dict[str, Any]) -> str:
         lines += [f"where the residual is largest, {MEAN_SQUARE}:", *(f"  {words}" for words in verdict["located"])]
     if verdict.get("located_after") not in (None, [], verdict["located"]):
         lines += [
-            f"where what has no name lives, {MEAN_SQUARE}:",
+            f"where the unexplained part is largest, {MEAN_SQUARE}:",
             *(f"  {words}" for words in verdict["located_after"]),
         ]
     if remarks := unsaid(verdict):
@@ -83,7 +83,7 @@ def _folded(verdict: dict[str, Any]) -> list[str]:
         (len(verdict.get("limitations", ())), "limitations of the recordings"),
     ]
     parts = [f"{count} {words}" for count, words in counts if count]
-    return [f"folded away in verdict.html: {', '.join(parts)}"] if parts else []
+    return [f"listed in verdict.html: {', '.join(parts)}"] if parts else []
 
 
 def unsaid(verdict: dict[str, Any]) -> list[str]:
@@ -140,7 +140,7 @@ def _effect(entry: dict[str, Any]) -> list[str]:
         lines.append(f"    {' and '.join(vague)} {they} as well")
     if entry["alternatives"]:
         spoken_rivals = ", ".join(load(name).spoken for name in entry["alternatives"])
-        lines.append(f"    these presses leave open whether it is: {spoken_rivals}")
+        lines.append(f"    these presses do not rule out: {spoken_rivals}")
     unphysical = entry.get("unphysical", [])
     if unphysical:
         spoken_rivals = ", ".join(load(name).spoken for name in unphysical)
@@ -198,10 +198,10 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
             )
         lines += [] if none or sealed["certain"] else _borne_out(sealed.get("ratio"))
     if not none and remainder["after"] < remainder["before"]:
-        clear = f"{remainder['t']:.1f} standard errors from none"
-        beyond = clear if remainder["t"] >= WITHIN_NOISE else "chance alone may leave as much"
-        part = f"{_percent(remainder['share'])} of what could be explained ({beyond})"
-        lines.append(f"left without an explanation: {part}")
+        clear = f"{remainder['t']:.1f} standard errors above zero"
+        beyond = clear if remainder["t"] >= WITHIN_NOISE else "no more than chance"
+        part = f"{_percent(remainder['share'])} of the explainable part ({beyond})"
+        lines.append(f"unexplained: {part}")
     return lines
 
 

@@ -55,7 +55,7 @@ def test_nothing_is_remembered_from_one_clock_to_the_next(tapes):
     course = course_of(tapes)
     assert course.restarts is not None and course.restarts.tolist() == [False, *[True] * 11]
     assert (course.step[course.first][1:] > 1e6).all() and np.ptp(course.time) < 1000
-    assert any("11 presses begin clocks of their own" in note for note in course.notes)
+    assert any("11 presses have clocks of their own" in note for note in course.notes)
 
 
 def test_a_clock_begins_with_the_next_press_where_its_first_is_left_out(tapes):

@@ -118,7 +118,7 @@ def test_where_no_name_holds_what_shows_of_another_family_is_told(t):
     effects = (Decided(found.effects[0], "suspected", {}, None),)
     lacking = {Family.KINEMATICS: Lack(90.0, t, 95.0)}
     words = reason_in_words(Decision("unknown", Reason.LEFTOVERS, effects, lacking=lacking), found, DataChecks(8))
-    assert words.startswith("something is missing that has no name yet; relaxation comes closest")
+    assert words.startswith("something is missing that has no name yet; relaxation fits best")
     said = "; something of kinematics shows, too, in depths and places that go with place, side, order or direction"
     assert words.endswith(said) is (t > 2), words
 

@@ -37,17 +37,17 @@ def test_effects_that_cannot_be_told_apart_are_listed_once_and_plainly():
     rates = ("relaxation", "backlash", "hysteresis", "latency", "creep")
     answer = [finding(n, *(r for r in rates if r != load(n).called)) for n in ("power_creep", "backlash", "bouc_wen")]
     assert said("ambiguous", answer) == (
-        "these recordings do not say which effect it is: relaxation, backlash and hysteresis together fit best, but "
-        "latency or creep may stand in for any of them"
+        "these recordings do not show which effect it is: relaxation, backlash and hysteresis together fit best, but "
+        "latency or creep may explain any of them as well"
     )
     assert said("ambiguous", [finding("low_pass_filter", "latency", "creep")]).endswith(
-        "low-pass filter fits best, but latency or creep may stand in for it"
+        "low-pass filter fits best, but latency or creep may explain it as well"
     )
     assert said("ambiguous", [finding("drift"), finding("backlash", "creep")]).startswith(
-        "drift is there. Something else is, too, and these recordings do not say which effect it is: backlash fits best"
+        "drift is there. Another effect is, too. These recordings do not show which: backlash fits best"
     )
     pair = [finding("backlash", "hysteresis"), finding("bouc_wen", "backlash")]
-    assert said("ambiguous", pair).endswith("and hysteresis together fit best, but one may stand in for another")
+    assert said("ambiguous", pair).endswith("and hysteresis together fit best, but each may explain the others' part")
 
 
 def quiet():
@@ -86,18 +86,18 @@ def test_an_alarm_is_no_reassurance_and_no_name():
 
 def test_what_comes_closest_says_so_if_sealed_episodes_fit_worse():
     assert said("unknown", [finding("power_creep")], 18.489, 20.374) == (
-        "something is missing that has no name yet; relaxation comes closest and leaves 10 % of what could be "
-        "explained, but sealed presses fit worse by 10 % with it (mean square over the noise 18.5 without, 20.4 "
+        "something is missing that has no name yet; relaxation fits best and leaves 10 % of the "
+        "explainable part, but sealed presses fit worse by 10 % with it (mean square over the noise 18.5 without, 20.4 "
         "with): it is not the name"
     )
     assert "fit no better" in said("unknown", [finding("power_creep")], 20.128, 20.130)
     both = said("unknown", [finding("latency"), finding("power_creep")], 95.0, 6.0)
     assert both == (
-        "something is missing that has no name yet; latency and relaxation together come closest and leave 10 % of "
-        "what could be explained, so they are not the names, or not all of it"
+        "something is missing that has no name yet; latency and relaxation together fit best and leave 10 % of "
+        "the explainable part, so they are not the names, or not all of it"
     )
     assert said("unknown", [finding("thermal_growth", "lost_steps")]).endswith(
-        "thermal growth comes closest and leaves 10 % of what could be explained, and lost steps may stand in for it"
+        "thermal growth fits best and leaves 10 % of the explainable part, and lost steps may explain it as well"
     )
 
 
@@ -130,7 +130,7 @@ def test_what_stays_named_is_told_from_what_stands_in():
     assert [e.status for e in swapped.surest_first] == ["named", "suspected"]
     assert reason_in_words(decision, found, DataChecks(8), shown) == (
         "relaxation is there and closes 79 % of the gap on sealed presses; hysteresis may be there, too; "
-        "1 % of what could be explained has no name yet"
+        "1 % of the explainable part has no name yet"
     )
 
 
@@ -172,6 +172,6 @@ def test_an_effect_without_a_rival_is_open_for_a_reason():
 def test_many_that_may_stand_in_are_told_by_family():
     rates = ("low_pass_filter", "viscosity", "backlash", "hysteresis", "creep")
     assert said("ambiguous", [finding("latency", *rates)]).endswith(
-        "latency fits best, but 5 others (delay and filtering, memory of the skin or friction and play) may stand in "
-        "for it"
+        "latency fits best, but 5 others (delay and filtering, memory of the skin or friction and play) may explain "
+        "it as well"
     )

@@ -79,13 +79,13 @@ def test_where_nothing_is_missing_no_share_of_it_is_left_and_each_number_says_wh
 
 
 def test_an_effect_that_is_named_is_not_one_that_would_hardly_be_seen():
-    """Nor are other forms of it, or what may stand in for it; what is judged is not called unjudgeable either."""
+    """Nor are other forms of it, or what may explain it as well; what is judged is not called unjudgeable either."""
     limits = {"power_creep": None, "relaxation": 9.0, "bouc_wen": 9.0, "drift": 9.0, "tilt": 1.0}
     told = in_text(document(effects=[effect("power_creep", ("hysteresis",))], limits=limits))
-    assert "1 that show only beyond three times their usual size" in line(told, "folded away")
+    assert "1 that show only beyond three times their usual size" in line(told, "listed in verdict.html")
     assert "that show only" not in in_text(document(effects=[effect("softening")], limits={"softening": None}))
     judged = in_text(document(effects=[effect("carriage_compliance")]))
-    assert line(judged, "folded away") == "folded away in verdict.html: 1 effects that cannot be judged here"
+    assert line(judged, "listed in verdict.html") == "listed in verdict.html: 1 effects that cannot be judged here"
 
 
 def test_the_head_has_size_interval_session_and_date():
@@ -153,8 +153,8 @@ def finding(name, *rivals):
 def test_many_that_may_stand_in_are_told_by_family_and_listed_below():
     rates = ("low_pass_filter", "viscosity", "backlash", "hysteresis", "creep")
     text = in_text(document("ambiguous", [effect("latency", rates) | {"parameters": {}}]))
-    assert line(text, "these presses leave open") == (
-        "    these presses leave open whether it is: low-pass filter, viscosity, backlash, hysteresis, creep"
+    assert line(text, "these presses do not rule out") == (
+        "    these presses do not rule out: low-pass filter, viscosity, backlash, hysteresis, creep"
     )
 
 
@@ -169,7 +169,7 @@ def test_what_may_stand_in_is_not_called_worse_in_the_same_breath():
 @pytest.mark.parametrize(
     ("status", "reason", "begins"),
     [
-        ("named", Reason.NAMED, "give it to the model"),
+        ("named", Reason.NAMED, "add it to the model"),
         ("none", Reason.QUIET, "nothing: below the limits"),
         ("unknown", Reason.TOO_FEW, "the diagnostic plan"),
         ("unknown", Reason.UNEXPLAINED, "the diagnostic plan"),
