@@ -9,6 +9,7 @@ from typing import Any
 from tacdata.chain import Course
 from tacdata.discrepancy.alarms.all_alarms import alarms
 from tacdata.discrepancy.data.checks import DataChecks, check
+from tacdata.discrepancy.levels.corners import corner
 from tacdata.discrepancy.levels.lack_of_fit import lack_of_fit, with_families
 from tacdata.discrepancy.levels.margins import beside_remainder
 from tacdata.discrepancy.levels.several_names import form_error
@@ -56,7 +57,7 @@ def judge(
     2. Check the data: wiring, units, gaps.
     3. Find: regressors, noise, gate, race, elimination, rivals, leftovers (`tacdata.discrepancy.search.find`).
     4. Compare the answer with the saturated model of each family: does another law explain more?
-    5. Test the residual for patterns outside the library: alarms.
+    5. Test the residual for patterns outside the library, and for effects of one corner: alarms.
     6. Open the sealed episodes: how much smaller is their gap?
     7. Decide: named (all of it, or some with a remainder left), ambiguous, unknown or none. Sealed episodes can take a
        name away; they never give one.
@@ -84,10 +85,14 @@ def judge(
     evidence = () if adequate(findings, answer_of(findings)) else beside_remainder(findings)
     note("the gap on sealed presses")
     sealed_gap = gap(course, findings, sealed)
+    confined = corner(findings.given, findings.explained) if until == STEPS[-1] else None
     raised = alarms(findings.final, form_error(findings)) if until == STEPS[-1] else ()
+    if confined is not None and not findings.effects:
+        raised = (confined.alarm, *raised)
     decision = decide(findings, checks, evidence, sealed_gap, lacking, raised)
     slices_before, slices_after = ([], []) if until == "gate" else (slices(findings.problem), slices(findings.final))
-    written = document(decision, findings, checks, (slices_before, slices_after), parents or {}, sealed_gap)
+    sliced = slices_before, slices_after
+    written = document(decision, findings, checks, sliced, parents or {}, sealed_gap, confined)
     return Verdict(written, checks, findings, decision, slices_before, slices_after)
 
 

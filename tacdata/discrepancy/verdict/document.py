@@ -12,6 +12,7 @@ from tacdata import provenance, schemas
 from tacdata.chain import Course, predict
 from tacdata.discrepancy.data.checks import DataChecks
 from tacdata.discrepancy.data.sufficiency import one_rate
+from tacdata.discrepancy.levels.corners import Corner
 from tacdata.discrepancy.model.series_compliance import series_compliance
 from tacdata.discrepancy.model.setting import Setting
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
@@ -37,6 +38,7 @@ def document(
     sliced: tuple[list[Slice], list[Slice]],
     parents: dict[str, str],
     gap: Gap | None = None,
+    confined: Corner | None = None,
 ) -> dict[str, Any]:
     """Return the verdict (`schemas/verdict.schema.json`).
 
@@ -47,6 +49,7 @@ def document(
         sliced: Slices of the residual before and after; empty if they were not computed.
         parents: Name of each input to its content hash.
         gap: Gap on the sealed episodes.
+        confined: Where the gap lives, if it is confined to a corner.
     """
     course, placed = findings.problem.setting.course, [e.finding.placed for e in decision.effects]
     remarks_on_effects = [p.effect.remark(p.values) for p in placed]
@@ -90,7 +93,7 @@ def document(
             "floor": 1.0,
             "families": _families(decision),
         },
-        "located": located(sliced[0], findings) if sliced[0] else [],
+        "located": located(sliced[0], findings, confined) if sliced[0] else [],
         "slices": beside(*sliced),
         "located_after": in_words(sliced[1]) if decision.status == INCOMPLETE else [],
         "path": _path(findings),
@@ -128,11 +131,11 @@ def _path(findings: Findings) -> list[dict[str, Any]]:
     ]
 
 
-def located(parts: list[Slice], findings: Findings) -> list[str]:
-    """Return sentences on where the residual is large: single episodes, then slices of all."""
+def located(parts: list[Slice], findings: Findings, confined: Corner | None = None) -> list[str]:
+    """Return sentences on where the residual is large: a corner, single episodes, then slices of all."""
     outliers = outstanding(findings.problem.setting.course.names, findings.energy[1], findings.values)
     mean_square = 2 * float(findings.energy[0].sum()) / max(float(findings.values.sum()), 1.0)
-    return in_words(parts, outliers, mean_square)
+    return in_words(parts, [*([confined.seen] if confined else []), *outliers], mean_square)
 
 
 def _effect(decided: Decided, setting: Setting) -> dict[str, Any]:
@@ -228,9 +231,7 @@ def following(decision: Decision, course: Course, watched: bool = False, fitted:
     answer = [e.finding for e in decision.effects]
     words = [f"{f.placed.effect.spoken}: {f.placed.effect.experiment}" for f in answer if f.rivals or f.at_bound]
     if any(f.placed.effect.at_rest is not None and f.rivals for f in answer) and one_rate(course):
-        words.insert(
-            0, "the same presses at three rates over a decade: one rate does not split delay, play and memory"
-        )
+        words.insert(0, "the same presses at three rates over a decade: one rate does not split delay, play and memory")
     if decision.status == "ambiguous":
         words.append(f"the presses that settle it soonest: {REVISE} writes them as next.yaml")
     if (lone := decision.lone) is not None:

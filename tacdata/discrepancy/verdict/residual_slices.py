@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.chain import Course
+from tacdata.discrepancy.levels.corners import places
 from tacdata.discrepancy.search.problem import Problem
 from tacdata.discrepancy.statistics.gram_fit import t_value
 
@@ -16,8 +17,6 @@ NOTABLE = 1.3
 """A slice is notable from this mean square on [noise floor]..."""
 NOTABLE_T = 3.0
 """...and from so many standard errors over episodes on [1]."""
-MOST_PLACES = 12
-"""Places that are listed, at most."""
 NOWHERE = "the residual stands out from the noise nowhere"
 SPREAD = "no part stands out in most presses; over all of them it is {:.2f}"
 
@@ -72,28 +71,13 @@ def slices(problem: Problem) -> list[Slice]:
     parts += [
         ("clock", n, (clock >= k / 3) & (clock <= (k + 1) / 3)) for k, n in enumerate(("first", "second", "last"))
     ]
-    parts += _places(course)
+    parts += [("place", name, presses[course.episode]) for name, presses in places(course)]
     parts += [("indenter", t.name, course.tool == k) for k, t in enumerate(course.tools) if len(course.tools) > 1]
     parts_of_residual = [_slice(by, name, each, course.episode, rows) for by, name, rows in parts if rows.sum() > 10]
     kinds = [*course.channel_names, *["force"] * (course.force is not None)]
     for k, name in enumerate(kinds[: square.shape[1]]):
         parts_of_residual.append(_slice("stream", name, square[:, k], course.episode, np.ones(len(each), dtype=bool)))
     return parts_of_residual
-
-
-def _places(course: Course) -> list[tuple[str, str, np.ndarray]]:
-    """Return the rows of each place by its specimen or coordinates; none of a single place, or of many."""
-    numbers = np.unique(course.row_site)
-    if not 1 < len(numbers) <= MOST_PLACES:
-        return []
-    parts = []
-    for number in numbers:
-        rows = np.flatnonzero(course.row_site == number)
-        deepest = rows[np.argmax(course.tip[rows, 2])]
-        x, y = course.tip[deepest, :2]
-        specimen = course.specimens[course.episode[deepest]] if course.specimens else ""
-        parts.append(("place", specimen or f"({x:.2g}, {y:.2g}) mm", course.row_site == number))
-    return parts
 
 
 def figure(value: float) -> str:
