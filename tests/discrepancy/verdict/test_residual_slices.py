@@ -40,7 +40,7 @@ def test_clocks_that_were_not_one_are_told_of_with_what_to_do():
 
 def test_one_press_alone_is_answered_in_words():
     made = judge(course(episodes=1), read_spec(None))
-    assert made.document["status"] == "unknown" and "1 presses cannot carry" in made.document["why"]
+    assert made.document["status"] == "unknown" and "1 presses are too few" in made.document["why"]
 
 
 def test_a_unit_that_was_stated_is_believed():
