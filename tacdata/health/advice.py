@@ -93,7 +93,7 @@ def _wiring(history: History, faults: Wiring) -> list[Advice]:
             Advice(REPLACE, tuple(faulty), f"{len(faulty)} of {count} channels give no readings of their own")
         )
     elif faults.dead:
-        why = f"{named(faults.dead)} {'do' if len(faults.dead) > 1 else 'does'} not answer to presses close by"
+        why = f"{named(faults.dead)} {'do' if len(faults.dead) > 1 else 'does'} not respond to presses close by"
         number = len(history.visits) - 2
         previous = history.wiring_at(number).dead if number >= 0 else ()
         if old := sorted(set(previous) & set(faults.dead)):
@@ -101,7 +101,7 @@ def _wiring(history: History, faults: Wiring) -> list[Advice]:
             why += f", {again} as at {history.visits[number].name}: if the wires are sound, replace the unit"
         advices.append(Advice(WIRING, faults.dead, why))
     if faults.swapped:
-        pairs = ", ".join(f"channel {channel} answers like taxel {taxel}" for channel, taxel in faults.swapped)
+        pairs = ", ".join(f"channel {channel} responds like taxel {taxel}" for channel, taxel in faults.swapped)
         advices.append(Advice(WIRING, tuple(channel for channel, _ in faults.swapped), pairs))
     if not advices or advices[0].do != REPLACE:
         for pair in faults.tied:

@@ -21,7 +21,7 @@ LEVEL = 0.01
 COMMON, OWN = 0.04, 0.05
 """Tolerance of the gain that all channels share, and of a channel's own relative to it [1]."""
 ZERO, DRIFT = 0.05, 0.02
-"""Tolerance of a channel's zero, and of its drift in a minute: shares of its strongest answer [1]."""
+"""Tolerance of a channel's zero, and of its drift in a minute: shares of its strongest response [1]."""
 NOISE = 1.5
 """Tolerance of noise, as a ratio [1]."""
 LOOP = 0.03
@@ -141,7 +141,7 @@ def corrected(comparisons: Sequence[VisitComparison]) -> tuple[VisitComparison, 
 
 
 def _order(faults: Wiring, count: int) -> np.ndarray:
-    """Return which channel answers for each taxel, shape (taxels,)."""
+    """Return the channel of each taxel, shape (taxels,)."""
     order = np.arange(count)
     for channel, taxel in faults.swapped:
         order[taxel] = channel

@@ -17,7 +17,7 @@ from tacdata.health.history import History
 DECIDING = ("tacdata.health", "tacdata.recording.check")
 """Code that decides the findings."""
 MISMATCH = 1.5
-"""Ratio of answers to predictions, or its inverse, beyond which the prediction is not of this unit [1]."""
+"""Ratio of responses to predictions, or its inverse, beyond which the prediction is not of this unit [1]."""
 
 
 def document(history: History) -> dict[str, Any]:
@@ -136,7 +136,7 @@ def remarks(history: History) -> list[str]:
     for visit, model in zip(history.visits, history.model, strict=True):
         if model and not 1 / MISMATCH < model.common.value < MISMATCH:
             lines.append(
-                f"{visit.name}: it answers {model.common.value:.3g} times as strongly as its labels predict: the "
+                f"{visit.name}: it responds {model.common.value:.3g} times as strongly as its labels predict: the "
                 "sensor file's transduction is not that of this unit (a nominal one, or not calibrated). The size of "
                 "this gain is no fault; compare visits with each other"
             )
@@ -192,7 +192,7 @@ def summary(history: History) -> list[tuple[str, str]]:
     if model:
         tiles.append(("gain of model", f"{_percent(model.common)} of what labels predict, all channels (median)"))
     tiles.append(("noise", f"{noise:.1f} {last.unit} (median of the channels)"))
-    tiles.append(("loop", f"{_percent(last.loop)} of depth times answer"))
+    tiles.append(("loop", f"{_percent(last.loop)} of depth times response"))
     if repeated := last.repeatability:
         low, high = (100 * bound for bound in repeated.interval)
         tiles.append(("repeatability", f"{100 * repeated.value:.1f} % ({low:.1f} to {high:.1f})"))

@@ -1,4 +1,4 @@
-"""How answers fall off with the distance from the tip: the effect of a displaced tip, level by level."""
+"""How responses fall off with the distance from the tip: the effect of a displaced tip, level by level."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from tacdata.health.response import LEVELS, PressResponse
 
 DEGREE = 2
-"""Degree, in the squared distance, of the logarithm of an answer."""
+"""Degree, in the squared distance, of the logarithm of a response."""
 HELD = 2.0
 """How strongly a channel's own gain is held to 1 in the fit [1]: spread of the fit over that of gains."""
 STEEPEST = 1.0
-"""Largest logarithm of an answer's ratio under a shift [1]; beyond it the polynomial is not to be trusted."""
+"""Largest logarithm of a response's ratio under a shift [1]; beyond it the polynomial is not to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -27,14 +27,14 @@ class FallOff:
     """Coefficients of its powers from the first on [1], shape (levels, `DEGREE`)."""
 
     def shifted(self, away: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the effect of a shift of the tip on answers, and its derivative by the shift.
+        """Return the effect of a shift of the tip on responses, and its derivative by the shift.
 
         Args:
             away: Taxels less the tip's place [mm], shape (taxels, 2).
             shift: Displacement of the tip [mm], shape (2,).
 
         Returns:
-            Factor of each answer [1], shape (levels, taxels); its derivatives over itself [1/mm], shape (levels,
+            Factor of each response [1], shape (levels, taxels); its derivatives over itself [1/mm], shape (levels,
             taxels, 2).
         """
         powers, relative = np.arange(1, DEGREE + 1), away - shift
@@ -45,10 +45,10 @@ class FallOff:
 
 
 def fall_off(presses: Sequence[PressResponse], near: Sequence[Sequence[int]], centers: np.ndarray) -> FallOff:
-    """Fit the logarithms of answers: strength of each press, gain of each channel, a polynomial that all share.
+    """Fit the logarithms of responses: strength of each press, gain of each channel, a polynomial that all share.
 
     Args:
-        presses: Answers of the channels.
+        presses: Responses of the channels.
         near: Channels that each press excites.
         centers: Places of the taxels [mm], shape (taxels, 2).
     """
@@ -63,7 +63,7 @@ def fall_off(presses: Sequence[PressResponse], near: Sequence[Sequence[int]], ce
     for level in range(len(LEVELS) + 1):
         rows, heights = [prior], [0.0] * taxels
         for k, (press, channels, distances) in enumerate(zip(presses, near, squared, strict=True)):
-            # A logarithm needs the sign of the hold, which noise may turn in a faint answer.
+            # A logarithm needs the sign of the hold, which noise may turn in a faint response.
             use = [c for c in channels if press.levels[level, c] * press.hold[c] > 0]
             row = np.zeros((len(use), prior.shape[1]))
             row[:, :DEGREE] = (distances[use, None] / unit) ** powers

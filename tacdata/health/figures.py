@@ -126,7 +126,7 @@ def _loop(history: History) -> list[Plot]:
     """Return the loop's area, and the network's error where it is known."""
     places, names = np.arange(len(history.visits)), _names(history)
     loop = _interval_series("loop", [visit.loop for visit in history.visits], "blue", 100.0)
-    label = "area [% of depth times answer]"
+    label = "area [% of depth times response]"
     plots = [Plot("hysteresis loop", "visit", label, [loop], places, names=names, least=0.0)]
     if history.network:
         errors = [history.network[k].mean if k in history.network else None for k in range(len(names))]

@@ -1,6 +1,6 @@
-"""Gains of the channels, from answers relative to those to the same presses at another visit, or to predicted ones.
+"""Gains of the channels, from responses relative to those to the same presses at another visit, or to predicted ones.
 
-    answer = gain * (reference at a tip displaced by dx, dy, dz) + error
+    response = gain * (reference at a tip displaced by dx, dy, dz) + error
 
 over presses, channels and levels, by generalized least squares, made linear about the shift (dx, dy, dz) in rounds.
 The shift of the whole visit is the error of a registration. It has the sensor file's spread as its prior. Errors are
@@ -25,9 +25,9 @@ from tacdata.sensor import Sensor
 FEWEST = 3
 """Sites that a comparison needs [count]."""
 NEAR, CLEAR = 0.05, 10.0
-"""Answer from which a channel counts as pressed: share of the press's strongest [1], and times the noise [1]."""
+"""Response from which a channel counts as pressed: share of the press's strongest [1], and times the noise [1]."""
 FAINT = 0.05
-"""Part of the press's strongest answer that relative errors are taken of, besides the channel's own answer [1]."""
+"""Part of the press's strongest response that relative errors are taken of, besides the channel's own response [1]."""
 TIMING = 0.005
 """Error of the time between motion and readings in one recording [s]; it shifts the depth of the way in."""
 LEVEL = 0.003
@@ -63,7 +63,7 @@ class GainFit:
 
 @dataclass(frozen=True)
 class _Pair:
-    """Mean answers at one site, before and now."""
+    """Mean responses at one site, before and now."""
 
     before: PressResponse
     after: PressResponse
@@ -79,11 +79,11 @@ def fit_gains(
     left_out: frozenset[int] = frozenset(),
     predicted: bool = False,
 ) -> GainFit | None:
-    """Return the gains; None with fewer than `FEWEST` sites or where no channel answers.
+    """Return the gains; None with fewer than `FEWEST` sites or where no channel responds.
 
     Args:
-        reference: Answers that the presses had then, or are predicted to have.
-        measured: Answers to the same presses, in the same order.
+        reference: Responses that the presses had then, or are predicted to have.
+        measured: Responses to the same presses, in the same order.
         noise: Noise of each channel [counts], shape (taxels,).
         sensor: The sensor: places of its taxels, spreads of its registration.
         left_out: Channels that are not fitted: dead or undefined ones.
@@ -116,7 +116,7 @@ def fit_gains(
 
 
 def _averaged(presses: list[PressResponse]) -> PressResponse:
-    """Return the mean answers to presses at one site."""
+    """Return the mean responses to presses at one site."""
     levels, slope, spread = (np.mean([getattr(p, n) for p in presses], axis=0) for n in ("levels", "slope", "spread"))
     return replace(presses[0], levels=levels, slope=slope, spread=spread / len(presses))
 
@@ -128,7 +128,7 @@ def pressed(press: PressResponse, noise: np.ndarray) -> list[int]:
 
 
 def _scale(pairs: list[_Pair]) -> float:
-    """Return about how much stronger all answers are than the reference [1]."""
+    """Return about how much stronger all responses are than the reference [1]."""
     ratios = [pair.after.hold[k] / pair.before.hold[k] for pair in pairs for k in pair.channels]
     return max(float(np.median(ratios)), 1e-6)
 
@@ -145,7 +145,7 @@ def _rows(
     """Return the observations of a site, linear about gains and shift as they are known."""
     members, count, levels = pair.channels, len(pair.channels), len(pair.before.spread)
     place, shift = [channels.index(k) for k in members], value[-2:]
-    # Answers of a gain near 0 would have no relative error, and so all the weight.
+    # Responses of a gain near 0 would have no relative error, and so all the weight.
     gain = np.maximum(value[place], WEAKEST * float(np.median(value[: len(channels)])))[:, None]
     away = sensor.taxels.centers - (pair.before.press.x, pair.before.press.y)
     factor, sides = (np.moveaxis(part[:, members], 0, 1) for part in fall.shifted(away, shift))
@@ -156,7 +156,7 @@ def _rows(
     design[np.arange(count), :, place] = predicted
     design[:, :, -3] = slope
     design[:, :, -2:] = (gain * predicted)[:, :, None] * sides
-    answer = pair.after.levels[:, members].T + design[:, :, -2:] @ shift
+    response = pair.after.levels[:, members].T + design[:, :, -2:] @ shift
     felt, faint = gain * predicted, FAINT * gain * np.abs(pair.before.hold).max() * np.ones_like(predicted)
     timing = TIMING * pair.before.press.speed * slope
     timing[:, -1] = 0.0  # a hold does not depend on when it began
@@ -166,14 +166,14 @@ def _rows(
     covariance += _each(MISFIT * design[:, :, -2:] @ shift)
     # A relative error is like another gain, at all levels; else the levels of one press would tell gains.
     loading = _each(felt) + _each(faint)
-    return SiteRows(design.reshape(count * levels, -1), answer.ravel(), covariance, loading, np.outer(felt, felt))
+    return SiteRows(design.reshape(count * levels, -1), response.ravel(), covariance, loading, np.outer(felt, felt))
 
 
 def _each(size: np.ndarray) -> np.ndarray:
     """Return the covariance of an error that each channel has by itself, the same at all its levels, shape (n, n).
 
     Args:
-        size: Effect of the error on the answer [counts], shape (channels, levels).
+        size: Effect of the error on the response [counts], shape (channels, levels).
     """
     return np.asarray(block_diag(*(np.outer(errors, errors) for errors in size)))
 

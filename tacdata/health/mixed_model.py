@@ -23,7 +23,7 @@ class SiteRows:
 
     design: np.ndarray
     """Contribution of a parameter for each of its units [counts], shape (n, parameters)."""
-    answer: np.ndarray
+    response: np.ndarray
     """Measured values [counts], shape (n,)."""
     known: np.ndarray
     """Covariance by noise, time and shift [counts^2], shape (n, n)."""
@@ -64,8 +64,8 @@ def _sums(rows: Sequence[SiteRows], precision: np.ndarray, errors: np.ndarray) -
     information, score, loss = np.diag(precision), np.zeros(len(precision)), 0.0
     for row in rows:
         factor = cho_factor(row.known + errors[0] ** 2 * row.own + errors[1] ** 2 * row.shared, lower=True)
-        whitened = cho_solve(factor, np.column_stack([row.design, row.answer]))
+        whitened = cho_solve(factor, np.column_stack([row.design, row.response]))
         information = information + row.design.T @ whitened[:, :-1]
         score = score + row.design.T @ whitened[:, -1]
-        loss += 2 * float(np.log(np.diag(factor[0])).sum()) + float(row.answer @ whitened[:, -1])
+        loss += 2 * float(np.log(np.diag(factor[0])).sum()) + float(row.response @ whitened[:, -1])
     return information, score, loss

@@ -1,4 +1,4 @@
-"""Answers of the channels to one press: at shares of its depth on the way in, and at the end of the hold."""
+"""Responses of the channels to one press: at shares of its depth on the way in, and at the end of the hold."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SHALLOWEST = 0.15
 
 @dataclass(frozen=True)
 class PressResponse:
-    """Answers to one press, above the reading at rest."""
+    """Responses to one press, above the reading at rest."""
 
     press: Press
     file: str
@@ -35,13 +35,13 @@ class PressResponse:
     start_ns: int
     """Time of its first reading [ns]."""
     levels: np.ndarray
-    """Answers at `LEVELS` and in the hold [counts], shape (levels + 1, taxels)."""
+    """Responses at `LEVELS` and in the hold [counts], shape (levels + 1, taxels)."""
     slope: np.ndarray
     """Derivatives of these by depth [counts/mm], same shape."""
     spread: np.ndarray
     """Variances of these in units of one reading's [1], shape (levels + 1,)."""
     loop: float
-    """Area between the way in and the way out, over depth times greatest answer, all channels together [1]."""
+    """Area between the way in and the way out, over depth times greatest response, all channels together [1]."""
 
     @property
     def hold(self) -> np.ndarray:
@@ -73,7 +73,7 @@ def unusable(figures: RecordingFigures) -> str:
 
 
 def press_response(episode: Episode, counts: np.ndarray | None = None) -> PressResponse:
-    """Return the answers to a press.
+    """Return the responses to a press.
 
     Args:
         episode: A recording that `unusable` has no words for.

@@ -30,7 +30,7 @@ BATCHES = 6
 WHITE = 2 / 3
 """Efficiency of a variance from neighbouring differences [1] (von Neumann)."""
 STRONG = 0.3
-"""Share of a press's strongest answer from which a channel counts for its strength [1]: weak ones tell of creep."""
+"""Share of a press's strongest response from which a channel counts for its strength [1]: weak ones tell of creep."""
 MINUTE_NS = 60e9
 
 
@@ -44,7 +44,7 @@ class Visit:
     entries: tuple[RecordingFigures, ...]
     """Figures of the recordings that are used, in the plan's order."""
     responses: tuple[PressResponse, ...]
-    """Answers of the channels, in the same order."""
+    """Responses of the channels, in the same order."""
     predicted: tuple[PressResponse, ...]
     """Predictions of labels, in the same order; empty unless every one has a label with readings."""
     left_out: tuple[tuple[str, str], ...]
@@ -106,12 +106,12 @@ class Visit:
 
     @property
     def loop(self) -> UncertainValue:
-        """Area between the way in and the way out, over depth times answer [1]."""
+        """Area between the way in and the way out, over depth times response [1]."""
         return mean(np.array([press.loop for press in self.responses]))
 
     @property
     def repeatability(self) -> Spread | None:
-        """Relative standard deviation of the answer to one press repeated [1]; None without a repeat."""
+        """Relative standard deviation of the response to one press repeated [1]; None without a repeat."""
         groups: dict[Any, list[np.ndarray]] = defaultdict(list)
         for press in self.responses:
             groups[press.key].append(np.abs(press.hold))

@@ -21,9 +21,9 @@ from tacdata.recording.check.channel_order import (
 from tacdata.recording.check.figures import RecordingFigures
 
 EXPECTED = 30.0
-"""Answer that must be expected of a channel before its silence counts [times the noise]."""
+"""Response that must be expected of a channel before its silence counts [times the noise]."""
 SHARE = 0.05
-"""Part of the expected answer that a dead channel does not reach [1]: a neighbour's crosstalk may."""
+"""Part of the expected response that a dead channel does not reach [1]: a neighbour's crosstalk may."""
 MOST = 0.5
 """Share of the recordings that must show a fault of the wiring [1]: it lasts."""
 
@@ -33,9 +33,9 @@ class Wiring:
     """Faults of the channels at a visit."""
 
     dead: tuple[int, ...] = ()
-    """Channels that do not answer where they should, or stand still."""
+    """Channels that do not respond where they should, or do not change."""
     swapped: tuple[tuple[int, int], ...] = ()
-    """Channel, and the taxel that it answers like."""
+    """Channel, and the taxel whose pattern it has."""
     tied: tuple[tuple[int, int], ...] = ()
     """Pairs of channels that read the same."""
     undefined: tuple[int, ...] = ()
@@ -56,8 +56,8 @@ def wiring(
 
     Args:
         entries: Figures of the recordings that are used.
-        measured: Answers of the channels to each.
-        reference: Their earlier or predicted answers; None to compare with a round pattern alone.
+        measured: Responses of the channels to each.
+        reference: Their earlier or predicted responses; None to compare with a round pattern alone.
     """
     sample = answers(entries)
     if sample is None:
@@ -82,7 +82,7 @@ def _lasting(entries: list[RecordingFigures], name: str) -> tuple[int, ...]:
 
 
 def _scaled(reference: Sequence[PressResponse], sample: Answers) -> np.ndarray:
-    """Return the reference's answers [counts], shape (presses, taxels), as strong as those found."""
+    """Return the reference's responses [counts], shape (presses, taxels), as strong as those found."""
     expected = np.array([press.hold for press in reference])
     strong = expected > 0.2 * expected.max(axis=1, keepdims=True)
     ratio = sample.response[strong] / expected[strong]
@@ -92,7 +92,7 @@ def _scaled(reference: Sequence[PressResponse], sample: Answers) -> np.ndarray:
 
 
 def _silent(sample: Answers, expected: np.ndarray) -> list[int]:
-    """Return the channels that answer nowhere, although plain answers are expected; a swapped one answers elsewhere."""
-    due, answer = expected.max(axis=0), np.abs(sample.response).max(axis=0)
-    silent = (due > EXPECTED * sample.noise) & (answer < np.maximum(SILENT * sample.noise, SHARE * due))
+    """Return the channels without a response where a clear one is expected; a swapped one responds elsewhere."""
+    due, response = expected.max(axis=0), np.abs(sample.response).max(axis=0)
+    silent = (due > EXPECTED * sample.noise) & (response < np.maximum(SILENT * sample.noise, SHARE * due))
     return np.flatnonzero(silent).tolist()

@@ -96,7 +96,7 @@ def test_labels_tell_gains_beside_the_model(copied, monday):
     assert "labels of monday" in document(found)["provenance"]["parents"]
     assert "200" in text(found)
     (remark,) = remarks(found)
-    assert remark.startswith("monday: it answers 2 times as strongly as its labels predict: the sensor file")
+    assert remark.startswith("monday: it responds 2 times as strongly as its labels predict: the sensor file")
 
 
 def test_predictions_of_about_the_measured_size_are_not_remarked_on(copied):
