@@ -5,7 +5,7 @@ Hands grasp a ball, a can and a box, and wipe to and fro twice with an eraser. T
 contacts that it had not learnt (`docs/how_to/hands.md`): each finger's is too shallow by 0 to 0.23 mm, and scatters by
 0.04 mm. The gain is found on one hand and tried on others, in other scenes.
 
-    python benchmarks/replay_success.py [--hands N] [--scenes N] [--cases ball,can,box,eraser] [--json FILE]
+    python benchmarks/replay_success.py [--first N] [--hands N] [--scenes N] [--cases ball,can,box,eraser] [--json FILE]
         [--arms sweep|challenges] [--robot FILE] [--on-arm URDF]
 
 With `--arms`, control arms without depth run in the same scenes, over stiffnesses or in scenes unlike the
@@ -36,6 +36,7 @@ from tacdata.demonstrations.paths.motion_density import choose
 from tacdata.demonstrations.paths.sightings import sightings_of
 from tacdata.replay.comparison.gain_search import GripDemand
 from tacdata.replay.comparison.trials import Trials, challenged, like_published, rate, sweep
+from tacdata.replay.grasp import ObjectPlace
 from tacdata.replay.robot import read_robot
 from tacdata.replay.scene import scene_of
 from tacdata.virtual_rig.world.hand import DIRECTIONS, PERIOD, draw_hand
@@ -54,7 +55,7 @@ ARM_STIFFNESS = 10000.0
 
 
 def demonstration(seed, thing):
-    """Return one grasp or wipe as `tacdata track` would make it."""
+    """Return one grasp or wipe as `tacdata track` would make it, and the object's true place."""
     task, rng = CASES[thing], np.random.default_rng([seed, 17])
     hand, (rig, eyes) = draw_hand(seed, task, thing), rig_of(seed)
     seconds = np.arange(int(PERIOD * FRAMES)) / FRAMES
@@ -84,8 +85,12 @@ def demonstration(seed, thing):
             * np.ones((1, 24), np.float32),
             depth=np.maximum(felt, 0).astype(np.float32)[:, None, None] * np.ones((1, 4, 4), np.float32),
         )
+    # Within the press, at a tenth of the depth: from there on the hand has the object.
+    first = next(t for t in seconds if hand.press("thumb", t)[2] > 0.1 * hand.depth["thumb"])
+    place = ObjectPlace(hand.centre(first), np.zeros(3), "the emulated hand")
     identity = {"hash": f"{seed:064x}", "network": "errors as measured", "epoch": 0, "lookahead": 0, "sensor": ""}
-    return Demonstration(f"hand-{seed}", f"{seed:064x}", task, "table", FRAMES, times, tracks, {}, {}, identity)
+    made = Demonstration(f"hand-{seed}", f"{seed:064x}", task, "table", FRAMES, times, tracks, {}, {}, identity)
+    return made, place
 
 
 def on_arm(hand, urdf, folder):
@@ -111,24 +116,28 @@ def on_arm(hand, urdf, folder):
     return folder / "robot.yaml"
 
 
+def tried(seed, thing, gains, robot):
+    """Return one hand's trials, with the object at its true place."""
+    made, place = demonstration(seed, thing)
+    return Trials(made, gains, scene_of(CASES[thing], thing), robot, place)
+
+
 def judged(thing, hands, scenes, robot):
     """Return the found gain and all trials of one object."""
-    scene, task = scene_of(CASES[thing], thing), CASES[thing]
-    found = Trials(demonstration(TRAINING, thing), {}, scene, robot).find_gain(GripDemand())
+    task = CASES[thing]
+    found = tried(TRAINING, thing, {}, robot).find_gain(GripDemand())
     print(f"{thing}: {found.text}", flush=True)
     gains = {"compensated": read_gains().of(task), "chosen": dict.fromkeys(DIRECTIONS, found.gain)}
-    trials = [
-        t for seed in range(hands) for t in Trials(demonstration(seed, thing), gains, scene, robot).trials(scenes)
-    ]
+    trials = [t for seed in hands for t in tried(seed, thing, gains, robot).trials(scenes)]
     return {"found": found.document, "trials": trials}
 
 
 def compared(thing, hands, scenes, table, robot):
     """Print and return how often every arm held, a row for each stiffness or challenge."""
     scene, gains = scene_of(CASES[thing], thing), {"compensated": read_gains().of(CASES[thing])}
-    tried = [Trials(demonstration(seed, thing), gains, scene, robot) for seed in range(hands)]
-    rows = sweep(tried, scene, scenes) if table == "sweep" else challenged(tried, scene, scenes)
-    print(f"{thing}: held of {hands * scenes}: " + ", ".join(rows[0]["rates"]), flush=True)
+    each = [tried(seed, thing, gains, robot) for seed in hands]
+    rows = sweep(each, scene, scenes) if table == "sweep" else challenged(each, scene, scenes)
+    print(f"{thing}: held of {len(hands) * scenes}: " + ", ".join(rows[0]["rates"]), flush=True)
     for row in rows:
         name = row.get("challenge") or f"{row['stiffness']:g} N/m"
         mark = " *" if "stiffness" in row and like_published(row, CASES[thing]) else ""
@@ -141,6 +150,7 @@ def compared(thing, hands, scenes, table, robot):
 def main():
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first hand")
     parser.add_argument("--hands", type=int, default=5)
     parser.add_argument("--scenes", type=int, default=8)
     parser.add_argument("--cases", default=",".join(CASES))
@@ -149,18 +159,18 @@ def main():
     parser.add_argument("--robot", type=Path, help="robot file, in place of pads without links")
     parser.add_argument("--on-arm", type=Path, help="URDF of an arm that carries the fingers of --robot")
     chosen = parser.parse_args()
-    robot, whole = None, {}
+    robot, whole, hands = None, {}, range(chosen.first, chosen.first + chosen.hands)
     with tempfile.TemporaryDirectory() as folder:
         if chosen.robot:
             path = on_arm(chosen.robot, chosen.on_arm, Path(folder)) if chosen.on_arm else chosen.robot
             robot = read_robot(path)
     for thing in chosen.cases.split(","):
         if chosen.arms:
-            whole[thing] = compared(thing, chosen.hands, chosen.scenes, chosen.arms, robot)
+            whole[thing] = compared(thing, hands, chosen.scenes, chosen.arms, robot)
             if chosen.json:
                 chosen.json.write_text(json.dumps(whole, indent=1) + "\n")
             continue
-        whole[thing] = judged(thing, chosen.hands, chosen.scenes, robot)
+        whole[thing] = judged(thing, hands, chosen.scenes, robot)
         for kind in ("direct", "compensated", "chosen"):
             own = [trial for trial in whole[thing]["trials"] if trial["kind"] == kind]
             low, high = (found := rate([t["held"] for t in own]))["wilson_95"]

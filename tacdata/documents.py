@@ -30,7 +30,7 @@ BYTE_ORDER_MARKS = {
 """First bytes of a text and its encoding; the longer ones first."""
 WRITTEN_BY_PEOPLE = frozenset(
     "calibration_board case demo_rig fingers frame_format gains import_mapping model_spec mounting plan "
-    "plan_recipe rig robot sensor simulation_plan".split()
+    "plan_recipe replay_object rig robot sensor simulation_plan".split()
 )
 """Documents in which a number that is not finite is a mistake; ours may state one."""
 

@@ -29,7 +29,10 @@ def run(
     gains: Annotated[Path | None, typer.Option(help="Gains file (YAML); default: the paper's.")] = None,
     seeds: Annotated[int, typer.Option(min=1, max=10000, help="Trials of each kind, a world of its own each.")] = 40,
     thing: Annotated[
-        str | None, typer.Option("--object", help="ball, can, box or eraser; default: an eraser to wipe, else a ball.")
+        str | None,
+        typer.Option(
+            "--object", help="ball, can, box, eraser, or an object file (.yaml); default: eraser to wipe, else ball."
+        ),
     ] = None,
     radius: Annotated[
         float | None, typer.Option(help="Half the object's width between the fingers, a ball's radius [mm].")
@@ -75,7 +78,7 @@ def run(
     from tacdata.replay.comparison.gain_search import GripDemand
     from tacdata.replay.comparison.trials import Trials, challenged, result, sweep
     from tacdata.replay.robot import read_robot
-    from tacdata.replay.scene import scene_of
+    from tacdata.replay.scene import read_object, scene_of
     from tacdata.replay.targets import check_guesses, doubts
 
     for file in (out, view, video):
@@ -103,15 +106,20 @@ def run(
     }:
         raise UsageError(f"{gain_from} among those tried", "other recordings than that", "try others")
     name = names.pop()
-    weight = {} if mass is None else {"mass": mass}
-    scene = scene_of(name, thing, None if radius is None else radius / 1000, stiffness=stiffness, **weight)
+    own: dict[str, Any] = {"name": thing}
+    place = None
+    if thing is not None and Path(thing).suffix in (".yaml", ".yml", ".json"):
+        own, place = read_object(Path(thing), {demonstration.frame for demonstration in (source, *demonstrations)})
+    own |= {"stiffness": stiffness} if mass is None else {"stiffness": stiffness, "mass": mass}
+    scene = scene_of(name, width=None if radius is None else radius / 1000, **own)
     hand = None if robot is None else read_robot(robot)
     gain_sets, gain = {"compensated": read_gains(gains).of(name)}, None
     # Before the search: these remarks may explain its failure.
     for demonstration in {
         demonstration.recording_hash: demonstration for demonstration in (source, *demonstrations)
     }.values():
-        original = Trials(demonstration, {}, scene, hand).seen
+        untouched = Trials(demonstration, {}, scene, hand, place)
+        original = untouched.seen
         if not with_guesses:
             check_guesses(original)
         for words in (
@@ -120,13 +128,14 @@ def run(
             *(_other_network(source, demonstration) if find_gain else ()),
         ):
             print(f"note: {demonstration.recording}: {words}")
+        print(f"{demonstration.recording}: {untouched.place.text}")
     if find_gain:
-        search = Trials(source, {}, scene, hand).find_gain(
+        search = Trials(source, {}, scene, hand, place).find_gain(
             GripDemand(preliminary, most_slip / 1000, most_force, least_grip)
         )
         print(f"found on {source.recording}: {search.text}")
         gain, gain_sets["chosen"] = (source, search), dict.fromkeys(source.tracks, search.gain)
-    tried = [Trials(demonstration, gain_sets, scene, hand) for demonstration in demonstrations]
+    tried = [Trials(demonstration, gain_sets, scene, hand, place) for demonstration in demonstrations]
     if view is not None or video is not None:
         _save(view, video, tried[0], scene)
     document = result(tried, seeds, scene, gain)

@@ -76,22 +76,6 @@ class ReplayOutcome:
         return f"lost at {self.decided:.1f} s, though {how}: {slid}"
 
 
-def object_centre(targets: FingertipTargets, touch: int, reach: float) -> np.ndarray:
-    """Return an object's centre in a row in which all fingers touch it [m], shape (3,).
-
-    Each pad touches the object, so the centre is ``reach`` [m] along its normal, less the depth that it felt.
-    """
-    distance = (reach - np.nan_to_num(targets.depth[touch]) / 1000)[:, None]
-    return (targets.seen[touch] + distance * normals(targets)[touch]).mean(axis=0)
-
-
-def normals(targets: FingertipTargets) -> np.ndarray:
-    """Return the normals out of the pads [1], shape (n, f, 3)."""
-    x, y, z, w = np.moveaxis(targets.quaternion, -1, 0)
-    # Third column of the rotation matrix: z points out of the pad.
-    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
-
-
 def replay_targets(
     targets: FingertipTargets,
     scene: ReplayScene,
@@ -110,7 +94,7 @@ def replay_targets(
     Raises:
         UsageError: If the targets do not lift, or wipe.
     """
-    pads = targets.position - PAD * normals(targets)
+    pads = targets.position - PAD * targets.normals
     wiped, touch = scene.task == "wipe", touching(targets)
     high = _wiping(pads, touch) if wiped else _high(pads)
     if scene.bias:

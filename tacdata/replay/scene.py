@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tacdata.errors import UsageError
+from tacdata import documents
+from tacdata.errors import FormatError, UsageError
+from tacdata.replay.grasp import ObjectPlace
 
 GRAVITY = 9.81
 """[m/s^2]"""
@@ -33,6 +36,8 @@ class ReplayObject:
     """[kg]"""
     pull: float = 0.0
     """Force that pulls it onto its support, in addition to its weight [N]."""
+    strength: float = 4.5
+    """Largest force of a pad that it withstands where it is fragile [N]: 1.5 times that of the emulated hands."""
 
     @property
     def height(self) -> float:
@@ -47,6 +52,8 @@ OBJECTS = {
     "eraser": ReplayObject("box", (0.025, 0.055, 0.015), 0.12, pull=2.0),
 }
 """A small apple, a can that is half empty, a carton, and an eraser that a magnet holds to its board."""
+SIZES = {"sphere": 1, "cylinder": 2, "box": 3}
+"""Shape -> number of its sizes."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +106,7 @@ def scene_of(task: str, name: str | None = None, width: float | None = None, **v
 
     Args:
         task: A demonstration's task; all but "wipe" are grasps.
-        name: One of `OBJECTS`; by default an eraser to wipe with, and else a ball.
+        name: One of `OBJECTS`, or a name for a ``body``; by default an eraser to wipe with, and else a ball.
         width: Half its width between the fingers, a ball's radius [m]; by default the object's own.
         values: Fields that differ from the usual ones.
 
@@ -108,29 +115,53 @@ def scene_of(task: str, name: str | None = None, width: float | None = None, **v
     """
     wiped = task == "wipe"
     item = name or ("eraser" if wiped else "ball")
-    if item not in OBJECTS:
-        raise UsageError(f"object {item!r}", ", ".join(OBJECTS), "name one of them")
-    body = OBJECTS[item]
+    body = values.pop("body", OBJECTS.get(item))
+    if body is None:
+        raise UsageError(f"object {item!r}", ", ".join(OBJECTS), "name one of them, or an object file (.yaml)")
     if width is not None:
         body = replace(body, sizes=(width, *body.sizes[1:]))
     usual: dict[str, Any] = {"mass": body.mass, "task": "wipe" if wiped else "grasp"}
     return ReplayScene(item, body, **usual | values)
 
 
-def drawn(scene: ReplayScene, fingers: int, seed: int) -> ReplayScene:
-    """Return the scene of a seed, with the spreads of `SPREADS`."""
+def read_object(path: Path, frames: set[str]) -> tuple[dict[str, Any], ObjectPlace | None]:
+    """Read an object file (`schemas/replay_object.schema.json`).
+
+    Args:
+        path: The file.
+        frames: Frames of the demonstrations.
+
+    Returns:
+        Fields of a `ReplayScene`, and the object's place if the file states one.
+
+    Raises:
+        UsageError: If it does not exist.
+        FormatError: If it breaks its schema, has another number of sizes than its shape, or is in another frame.
+    """
+    document = documents.read(path, "replay_object")
+    shape, sizes = document["geometry"], tuple(map(float, document["sizes"]))
+    if len(sizes) != SIZES[shape]:
+        raise FormatError(f"{path}: {len(sizes)} sizes of a {shape}", f"{SIZES[shape]}", "correct sizes [m]")
+    values: dict[str, Any] = {name: float(document[name]) for name in ("mass", "friction") if name in document}
+    own = {name: float(document[name]) for name in ("pull", "strength") if name in document}
+    values |= {"name": document["name"], "body": ReplayObject(shape, sizes, values["mass"], **own)}
+    if (stated := document.get("place")) is None:
+        return values, None
+    if {stated["frame"]} != frames:
+        fault = f"{path}: a place in frame {stated['frame']!r}"
+        raise FormatError(fault, f"the demonstrations' frame, {', '.join(sorted(frames))}", "state it in that frame")
+    return values, ObjectPlace(np.array(stated["position"], float), np.full(3, float(stated["spread"])), str(path))
+
+
+def drawn(scene: ReplayScene, fingers: int, seed: int, spread: np.ndarray | None = None) -> ReplayScene:
+    """Return the scene of a seed, with the spreads of `SPREADS`, and that of the object's place [m], shape (3,)."""
     rng = np.random.default_rng([seed, 21])
 
     def off(name: str) -> float:
         return float(rng.uniform(-SPREADS[name]["half_width"], SPREADS[name]["half_width"]))
 
     # The order of the draws decides the scene of a seed: a further spread is drawn last.
-    place, bias = (off("place"), off("place"), 0.0), rng.normal(0, SPREADS["bias"]["sd"], (fingers, 3))
-    return replace(
-        scene,
-        mass=scene.mass * (1 + off("mass")),
-        stiffness=scene.stiffness * (1 + off("stiffness")),
-        friction=scene.friction * (1 + off("friction")),
-        place=place,
-        bias=tuple((a, b, c) for a, b, c in bias.tolist()),
-    )
+    place, bias = np.array([off("place"), off("place"), 0.0]), rng.normal(0, SPREADS["bias"]["sd"], (fingers, 3))
+    shares = {name: getattr(scene, name) * (1 + off(name)) for name in ("mass", "stiffness", "friction")}
+    x, y, z = (place + rng.normal(0, 0.0 if spread is None else spread, 3)).tolist()
+    return replace(scene, **shares, place=(x, y, z), bias=tuple((a, b, c) for a, b, c in bias.tolist()))

@@ -58,6 +58,14 @@ class FingertipTargets:
     """The demonstration; None for targets read from a file."""
     rows: slice = slice(None)
     """Rows of the source at these times."""
+    readings: np.ndarray | None = None
+    """Sum of each finger's tared readings [counts], shape (n, f); None where a finger has no board."""
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Normals out of the pads [1], shape (n, f, 3): the fingertip frame's z."""
+        x, y, z, w = np.moveaxis(self.quaternion, -1, 0)
+        return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
 
     def header(self, columns: Iterable[str]) -> dict[str, Any]:
         """Return the header of a file (`schemas/fingertip_targets.schema.json`)."""
@@ -147,6 +155,7 @@ def targets_of(
         provenance.stamp("tacdata export", parents, {"kind": kind, "gains": used}),
         demonstration,
         rows,
+        _readings([track.signals for track in tracks], rows),
     )
 
 
@@ -218,6 +227,11 @@ def _bridged(targets: FingertipTargets) -> list[tuple[str, np.ndarray, np.ndarra
         spread = np.sqrt(np.max(np.diagonal(covariance[:, 3:, 3:], axis1=1, axis2=2), axis=1))
         bridges.append((name, targets.gap[:, k], spread))
     return bridges
+
+
+def _readings(signals: list[np.ndarray | None], rows: slice) -> np.ndarray | None:
+    found = [np.nansum(values[rows], axis=1) for values in signals if values is not None]
+    return np.stack(found, axis=1) if len(found) == len(signals) else None
 
 
 def _depth(maps: np.ndarray | None, count: int) -> np.ndarray:

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from tacdata.demonstrations.compensation import read_gains
 from tacdata.errors import UsageError
 from tacdata.replay.comparison.linked_hand import LinkedHand
-from tacdata.replay.grasp import cut, first_grasp
-from tacdata.replay.outcome import object_centre, replay_targets
+from tacdata.replay.grasp import cut, felt_place, first_grasp
+from tacdata.replay.outcome import replay_targets
 from tacdata.replay.robot import read_robot
 from tacdata.replay.scene import scene_of
 from tacdata.replay.targets import FingertipTargets
@@ -36,9 +36,10 @@ def grasp(gain=0.0):
     whole = FingertipTargets(
         *("x.mcap", "0", "grasp", "table", RATE, FINGERS, "direct", {}, stamps),
         *(moved, turns, poses[..., :3, 3], depth, np.zeros(depth.shape, bool)),
+        readings=2400.0 * depth,
     )
     begin, touch, end = first_grasp(whole)
-    return cut(whole, begin, end), object_centre(whole, touch, SCENE.reach)
+    return cut(whole, begin, end), felt_place(whole, touch, SCENE.reach).centre
 
 
 def robot(folder, urdf=str, **entries):

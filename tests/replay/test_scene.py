@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from tacdata.demonstrations.compensation import read_gains
 from tacdata.errors import UsageError
-from tacdata.replay.grasp import cut, first_grasp, touching
-from tacdata.replay.outcome import object_centre, replay_targets
+from tacdata.replay.grasp import cut, felt_place, first_grasp, touching
+from tacdata.replay.outcome import replay_targets
 from tacdata.replay.scene import OBJECTS, ReplayObject, ReplayScene, drawn, scene_of
 from tacdata.replay.targets import FingertipTargets
 from tacdata.virtual_rig.world.hand import DIRECTIONS, HEIGHT, RADIUS, draw_hand
@@ -40,13 +40,14 @@ def targets(gain=0.0, begin=0.0, seconds=8.4):
         poses[..., :3, 3],
         depth,
         np.zeros(depth.shape, bool),
+        readings=2400.0 * depth,
     )
 
 
 def grasp(gain=0.0):
     whole = targets(gain)
     begin, touch, end = first_grasp(whole)
-    return cut(whole, begin, end), object_centre(whole, touch, RADIUS / 1000)
+    return cut(whole, begin, end), felt_place(whole, touch, RADIUS / 1000).centre
 
 
 def test_the_ball_is_found_where_the_hand_held_it():
@@ -127,7 +128,9 @@ def test_a_recording_that_begins_in_the_middle_of_a_grasp_gives_the_next_one():
 def test_what_is_no_grasp_is_refused():
     never = targets()
     with pytest.raises(UsageError, match="open fingers"):
-        first_grasp(replace(never, depth=np.full_like(never.depth, np.nan)))
+        first_grasp(replace(never, readings=np.full_like(never.depth, np.nan)))
+    with pytest.raises(UsageError, match="no readings of all of thumb, index, middle"):
+        first_grasp(replace(never, readings=None))
     flat = targets(seconds=2.4)
     with pytest.raises(UsageError, match="rise by"):
         rows = np.zeros(len(flat.position), int)

@@ -9,6 +9,8 @@ from tacdata.sensor import default_sensor
 from tacdata.virtual_rig.world.hand import DIRECTIONS
 
 RATE = 30.0
+COUNTS = 100.0
+"""Reading of each taxel [counts per mm]."""
 
 
 def tracks(folder, hand, task, digest, number=0):
@@ -28,7 +30,7 @@ def tracks(folder, hand, task, digest, number=0):
             np.zeros(count, bool),
             count,
             0,
-            np.zeros((count, 24), np.float32),
+            np.repeat(COUNTS * depth, 24).reshape(count, 24),
             np.repeat(depth, 35 * 26).reshape(count, 35, 26),
         )
     network = {"hash": "f" * 64, "network": "none", "epoch": 0, "lookahead": 0, "sensor": "0"}

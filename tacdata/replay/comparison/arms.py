@@ -8,10 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from tacdata.replay.grasp import LEAST_DEPTH
-from tacdata.replay.outcome import normals
+from tacdata.replay.grasp import touched
 from tacdata.replay.targets import FingertipTargets
 
 CLOSING = 0.001
@@ -29,25 +26,22 @@ CONTROLS = CLOSE, CONSTANT, TAXELS
 """Arms that use touch but no depth."""
 
 
-def control_arms(
-    direct: FingertipTargets, compensated: FingertipTargets, readings: np.ndarray | None
-) -> dict[str, FingertipTargets]:
-    """Return the arms of `CONTROLS`, the one by readings only where there are some.
+def control_arms(direct: FingertipTargets, compensated: FingertipTargets) -> dict[str, FingertipTargets]:
+    """Return the arms of `CONTROLS`.
 
     Args:
-        direct: Targets as seen, with the predicted depth.
+        direct: Targets as seen, with readings.
         compensated: The same, moved by depth.
-        readings: Sum of each finger's tared readings [counts], shape (n, f); None without.
+
+    Raises:
+        UsageError: If a finger has no readings.
     """
-    outward, touch = normals(direct), np.nan_to_num(direct.depth) > LEAST_DEPTH
+    # Touch is judged by readings: these arms know nothing of depth but its mean.
+    outward, (level, touch) = direct.normals, touched(direct)
     shift = ((compensated.position - direct.position) * outward).sum(axis=-1)
     mean = float(shift[touch].mean()) if touch.any() else 0.0
-    displacements = {CLOSE: CLOSING * touch, CONSTANT: mean * touch}
-    if readings is not None:
-        level = np.maximum(np.nan_to_num(readings), 0.0)
-        usual = float(level[touch].mean()) if touch.any() else 0.0
-        if usual > 0:
-            displacements[TAXELS] = mean * level / usual
+    usual = float(level[touch].mean()) if touch.any() else 1.0
+    displacements = {CLOSE: CLOSING * touch, CONSTANT: mean * touch, TAXELS: mean * level / usual}
     return {
         name: replace(direct, position=direct.position + by[..., None] * outward) for name, by in displacements.items()
     }

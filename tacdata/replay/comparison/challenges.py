@@ -16,8 +16,8 @@ class Challenge:
 
     change: Callable[[ReplayScene, np.random.Generator], ReplayScene]
     """Scene of a seed, and random numbers of that seed -> the scene that is replayed in."""
-    force: float | None = None
-    """Largest force on a pad that the object withstands, over the force of the demonstration [1]; None: any."""
+    fragile: bool = False
+    """Whether the object breaks above its strength."""
 
 
 def _wider(by: float) -> Callable[[ReplayScene, np.random.Generator], ReplayScene]:
@@ -52,8 +52,8 @@ CHALLENGES = {
     "3 mm larger": Challenge(_wider(0.003)),
     "1.5 times the mass": Challenge(lambda scene, rng: replace(scene, mass=1.5 * scene.mass)),
     "0.6 times the friction": Challenge(lambda scene, rng: replace(scene, friction=0.6 * scene.friction)),
-    "fragile": Challenge(lambda scene, rng: scene, force=1.5),
-    "fragile, 3 mm larger": Challenge(_wider(0.003), force=1.5),
+    "fragile": Challenge(lambda scene, rng: scene, fragile=True),
+    "fragile, 3 mm larger": Challenge(_wider(0.003), fragile=True),
     "shifted by 3 mm": Challenge(_shifted(0.003)),
     "cameras off by 4 mm": Challenge(_cameras(0.004)),
 }

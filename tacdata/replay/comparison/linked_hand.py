@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from tacdata.errors import UsageError
 from tacdata.replay.engine import mujoco
+from tacdata.replay.grasp import touched
 from tacdata.replay.inverse_kinematics import follow
-from tacdata.replay.outcome import normals
 from tacdata.replay.robot import Robot
 from tacdata.replay.scene import ReplayScene
 from tacdata.replay.scene_model import PAD, add_actuator, add_pad, interpolated
@@ -65,8 +65,8 @@ class LinkedHand:
                 "add it to the robot file under stiffness",
             )
         self._coupling = _coupling(kinematics.model, len(names))[:, self._driven]
-        outward, touch = normals(targets), np.nan_to_num(targets.depth).min(axis=1).argmax()
-        self.stiffness = self._stiffness_along(kinematics, path.values[touch], outward[touch])
+        touch = touched(targets)[0].min(axis=1).argmax()
+        self.stiffness = self._stiffness_along(kinematics, path.values[touch], targets.normals[touch])
 
     def _stiffness_along(self, kinematics: Any, values: np.ndarray, outward: np.ndarray) -> float:
         """Return the mean stiffness of fingertips along their normals [N/m] in a posture."""

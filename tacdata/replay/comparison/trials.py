@@ -17,8 +17,8 @@ from tacdata.replay.comparison.depth_feedback import DepthFeedback
 from tacdata.replay.comparison.gain_search import FoundGain, GripDemand, GripSearch
 from tacdata.replay.comparison.linked_hand import LinkedHand
 from tacdata.replay.comparison.paired import worth
-from tacdata.replay.grasp import cut, first_grasp
-from tacdata.replay.outcome import ReplayOutcome, normals, object_centre, replay_targets
+from tacdata.replay.grasp import ObjectPlace, cut, felt_place, first_grasp, touched
+from tacdata.replay.outcome import ReplayOutcome, replay_targets
 from tacdata.replay.robot import Robot
 from tacdata.replay.scene import SPREADS, ReplayScene, drawn
 from tacdata.replay.targets import FingertipTargets, targets_of
@@ -42,17 +42,19 @@ class Trials:
         gains: dict[str, dict[str, float]],
         scene: ReplayScene,
         robot: Robot | None = None,
+        place: ObjectPlace | None = None,
     ) -> None:
-        """Cut it out and find where the object was.
+        """Cut it out and place the object.
 
         Args:
             demonstration: A demonstration with predicted depth.
             gains: Kind of replay ("compensated", "chosen") -> finger -> gain [m/mm]; "direct" is added.
             scene: The undisturbed scene.
             robot: Replays through its joints, with the fingers that it has; by default pads without links.
+            place: Where the object is known to be; by default from the readings' first touch.
 
         Raises:
-            UsageError: If it holds no grasp, or fingers lack predicted depth or gains.
+            UsageError: If it holds no grasp, or fingers lack readings, predicted depth or gains.
         """
         self.made, self._scene, self.robot = demonstration, scene, robot
         self._names = tuple(name for name in demonstration.tracks if robot is None or name in robot.tips)
@@ -61,11 +63,11 @@ class Trials:
         targets = targets_of(demonstration, usual, self._names)
         self._span = first_grasp(targets)
         self.seen = cut(targets, self._span[0], self._span[2])
-        self._centre = object_centre(targets, self._span[1], scene.reach)
+        self.place = place or felt_place(targets, self._span[1], scene.reach)
         self.paths = {DIRECT: self._cut(None)}
         if DEPTH in gains:
             depth_targets = self._cut(gains[DEPTH])
-            self.paths |= {**control_arms(self.paths[DIRECT], depth_targets, self._readings()), DEPTH: depth_targets}
+            self.paths |= {**control_arms(self.paths[DIRECT], depth_targets), DEPTH: depth_targets}
         self.paths |= {kind: self._cut(values) for kind, values in gains.items() if kind != DEPTH}
 
     def one(self, kind: str, scene: ReplayScene, seed: int = 0) -> ReplayOutcome:
@@ -73,16 +75,17 @@ class Trials:
         followed = {CLOSED: DEPTH, CLOSED_RAW: TAXELS}.get(kind, kind)
         path, hand = self.paths[followed], self._hand(followed)
         if kind == followed:
-            return replay_targets(path, scene, self._centre, hand=hand)
+            return replay_targets(path, scene, self.place.centre, hand=hand)
         goal = np.clip(np.nan_to_num(path.depth), 0, None) / 1000
-        if kind == CLOSED_RAW and (level := self._readings()) is not None:
-            # One gain for all units: what a reading says without a network of its own.
-            goal = np.clip(np.nan_to_num(level), 0, None) * (goal.sum() / max(float(np.nansum(level)), 1e-9))
+        if kind == CLOSED_RAW:
+            # One gain for all units: the information of a reading without a network of its own.
+            level, _ = touched(path)
+            goal = level * (goal.sum() / max(float(level.sum()), 1e-9))
         seconds = (path.time_ns - path.time_ns[0]) * 1e-9
         # Of the undisturbed scene: the controller does not know the drawn one.
         softness = 1 + self._scene.skin / (self._scene.stiffness if hand is None else hand.stiffness)
-        controller = DepthFeedback(goal, seconds, normals(path), softness, seed, kind == CLOSED_RAW)
-        return replay_targets(path, scene, self._centre, controller.shift, hand)
+        controller = DepthFeedback(goal, seconds, path.normals, softness, seed, kind == CLOSED_RAW)
+        return replay_targets(path, scene, self.place.centre, controller.shift, hand)
 
     def held_in(
         self, scene: ReplayScene, kinds: Sequence[str], seeds: int, challenge: str = ""
@@ -96,26 +99,17 @@ class Trials:
             challenge: One of `CHALLENGES`, which changes each scene; none for the scenes as drawn.
         """
         outcomes: dict[str, list[bool]] = {kind: [] for kind in kinds}
-        felt = self.paths[DIRECT].depth
-        stands = CHALLENGES[challenge].force if challenge else None
-        # The force of the demonstration is the felt depth times the stiffness of the skin.
-        limit = np.inf if stands is None else stands * scene.skin * float(np.nanmax(felt)) / 1000
+        limit = scene.body.strength if challenge and CHALLENGES[challenge].fragile else np.inf
         for seed in range(seeds):
-            world = drawn(scene, len(self.paths[DIRECT].fingers), seed)
+            world = self._drawn(scene, seed)
             world = changed(challenge, world, seed) if challenge else world
             for kind in kinds:
                 end = self.one(kind, world, seed)
                 outcomes[kind].append(bool(end.held) and end.hardest <= limit)
         return outcomes
 
-    def _readings(self) -> np.ndarray | None:
-        """Return the sum of each finger's tared readings [counts], shape (n, f); None if a finger has none."""
-        path = self.paths[DIRECT]
-        signals = [self.made.tracks[name].signals for name in path.fingers]
-        series = [values for values in signals if values is not None]
-        if len(series) < len(signals):
-            return None
-        return np.stack([np.nansum(values[path.rows], axis=1) for values in series], axis=1)
+    def _drawn(self, scene: ReplayScene, seed: int) -> ReplayScene:
+        return drawn(scene, len(self.seen.fingers), seed, self.place.spread)
 
     def find_gain(self, demand: GripDemand) -> FoundGain:
         """Return the smallest common gain that meets a demand in scenes of its own, which no trial below has.
@@ -130,7 +124,7 @@ class Trials:
             path = self._cut(dict.fromkeys(fingers, gain))
             if self.robot is not None and gain not in hands:
                 hands[gain] = LinkedHand(self.robot, path, self._scene)
-            return replay_targets(path, drawn(self._scene, len(fingers), seed), self._centre, hand=hands.get(gain))
+            return replay_targets(path, self._drawn(self._scene, seed), self.place.centre, hand=hands.get(gain))
 
         return GripSearch(outcome, demand).find()
 
@@ -138,7 +132,7 @@ class Trials:
         """Run all trials of seeds 0, 1, ...; return them as plain data."""
         records = []
         for seed in range(seeds):
-            world = drawn(self._scene, len(self.paths[DIRECT].fingers), seed)
+            world = self._drawn(self._scene, seed)
             for kind in self.paths:
                 end = self.one(kind, world, seed)
                 records.append(
@@ -199,6 +193,7 @@ def result(
             {
                 "name": recording.made.recording,
                 "hash": recording.made.recording_hash,
+                "object": recording.place.document,
                 "rates": {kind: rate([t["held"] for t in trials if t["kind"] == kind]) for kind in kinds},
             }
             for k, recording in enumerate(tried)
@@ -240,7 +235,7 @@ def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[
 def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
     """Return the outcomes of each arm and of the closed loop in each of `CHALLENGES`, as plain data."""
     kinds = [kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)]
-    kinds += [CLOSED_RAW, CLOSED] if TAXELS in kinds else [CLOSED]
+    kinds += [CLOSED_RAW, CLOSED]
     return [
         _row({"challenge": name}, [recording.held_in(scene, kinds, seeds, name) for recording in tried])
         for name in CHALLENGES

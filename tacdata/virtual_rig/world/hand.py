@@ -78,21 +78,31 @@ class Hand:
         # Fingers point down, as far as the pad's normal allows.
         axis = np.array([0.0, 0.0, -1.0]) - (-normal[2]) * normal
         axis /= np.linalg.norm(axis)
-        # The whole hand sways a little, so that no pose is ever at rest.
-        phase = 2 * np.pi * (seconds + 0.37 * self.seed)
-        freedom = 1.0 if self.task == "grasp" else 0.1  # an eraser is flat on its board, and the hand with it
-        sway = 4.0 * freedom * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
-        shake = self.tremor * np.array([np.sin(8 * phase), np.sin(8 * phase + 1), np.sin(8 * phase + 2)])
         matrix = np.eye(4)
         matrix[:3, :3] = np.stack([axis, np.cross(normal, axis), normal], axis=-1)
         x, y, depth = self.press(finger, seconds)
         touch = self._middle(finger, t) + outward * (THINGS[self.thing] + away - depth)
         # The pad's origin is the array's centre; the contact is offset from it by the skew.
         place = touch - matrix[:3, 0] * x - matrix[:3, 1] * y
-        turn = _turn(0.06 * freedom * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)]))
+        turn, away_from_rest = self._sway(seconds)
         matrix[:3, :3] = turn @ matrix[:3, :3]
-        matrix[:3, 3] = (turn @ place + sway + shake) / 1000
+        matrix[:3, 3] = (turn @ place + away_from_rest) / 1000
         return matrix
+
+    def centre(self, seconds: float) -> np.ndarray:
+        """Return the place that the fingers grasp or close about, in the world [m], shape (3,), at a time [s]."""
+        turn, away_from_rest = self._sway(seconds)
+        # The thumb presses the middle of every object.
+        return (turn @ self._middle("thumb", seconds % PERIOD) + away_from_rest) / 1000
+
+    def _sway(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return how the whole hand turns, shape (3, 3), and moves [mm], so that no pose is ever at rest."""
+        phase = 2 * np.pi * (seconds + 0.37 * self.seed)
+        freedom = 1.0 if self.task == "grasp" else 0.1  # an eraser is flat on its board, and the hand with it
+        sway = 4.0 * freedom * np.array([np.sin(phase / 5.1), np.cos(phase / 6.3), 0.3 * np.sin(phase / 4.3)])
+        shake = self.tremor * np.array([np.sin(8 * phase), np.sin(8 * phase + 1), np.sin(8 * phase + 2)])
+        turn = 0.06 * freedom * np.array([np.sin(phase / 3.7), np.sin(phase / 4.9), np.cos(phase / 6.1)])
+        return _turn(turn), sway + shake
 
     def _out(self, finger: str) -> np.ndarray:
         """Return the direction from the object to a finger [1]."""
