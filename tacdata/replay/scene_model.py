@@ -61,6 +61,11 @@ class Rollout:
     velocity over the time of contact, so that to and fro cancel.
     """
 
+    links: np.ndarray
+    """Ends of each link of a robot [m], shape (n, links, 2, 3); no links without a robot."""
+    pads: np.ndarray
+    """Shape of each pad, shape (n, f, 3, 3) [m^2]: x of its surface, from its centre, has x^T pads^-1 x = 1."""
+
     @property
     def slip(self) -> np.ndarray:
         """Distance that it has slid along each pad [m], shape (n, f)."""
@@ -182,6 +187,9 @@ class SceneModel:
         self._pads.sort(key=lambda k: int(self._model.geom(k).name.rpartition("tip")[2]))
         self._pad_of = np.full(self._model.ngeom, -1)
         self._pad_of[self._pads] = range(len(self._pads))
+        # From each joint to the next, and from the last to the pad; nothing where a pad has no link.
+        parent = self._model.body_parentid
+        self._links = [(int(parent[k]), k) for k in range(self._model.nbody) if parent[k] > 0]
         for pad in self._pads:
             soften(self._model, pad, scene.skin, scene.mass)
         hand.begin(self._model, self._data)
@@ -205,7 +213,10 @@ class SceneModel:
             np.zeros((rows, count)),
             np.zeros((rows, count)),
             np.zeros((rows, count, 3)),
+            np.empty((rows, len(self._links) + count if self._links else 0, 2, 3)),
+            np.empty((rows, count, 3, 3)),
         )
+        sizes, carriers = self._model.geom_size[self._pads], self._model.geom_bodyid[self._pads]
         row, slid, data = 0, np.zeros((count, 3)), self._data
         depth, correction = np.zeros(count), np.zeros((count, 3))
         for moment, command in zip(moments, self._hand.commands(pads, seconds, moments), strict=True):
@@ -222,6 +233,11 @@ class SceneModel:
                 rollout.centre[row], rollout.tips[row] = data.xpos[self._object], data.geom_xpos[self._pads]
                 self._press(contacts, touching, rollout.force[row], rollout.depth[row])
                 rollout.slid[row] = slid
+                turn = data.geom_xmat[self._pads].reshape(-1, 3, 3)
+                rollout.pads[row] = turn * sizes[:, None, :] ** 2 @ turn.transpose(0, 2, 1)
+                if self._links:
+                    rollout.links[row, : len(self._links)] = data.xpos[self._links]
+                    rollout.links[row, len(self._links) :] = np.stack([data.xpos[carriers], rollout.tips[row]], axis=1)
                 row += 1
         return rollout
 

@@ -117,3 +117,16 @@ def test_what_a_robot_cannot_follow_is_refused(tmp_path):
     away = robot(tmp_path, base={"position": [1.5, 0, 0.15], "quaternion": [0, 0, 0, 1]})
     with pytest.raises(UsageError, match=r"does not follow \d+ of \d+ targets"):
         LinkedHand(away, targets, SCENE)
+
+
+def test_a_replay_holds_the_links_and_the_shapes_of_the_pads():
+    hand = read_robot(EXAMPLE / "robot.yaml")
+    path = held(hand, ALPHA).path
+    # From each joint to the next, then to each pad.
+    assert path.links[:, -2:, 1] == pytest.approx(path.tips)
+    lengths = np.linalg.norm(np.diff(path.links, axis=2)[:, :, 0], axis=-1)
+    assert np.ptp(lengths[:, -2:], axis=0).max() < 1e-6 < lengths[:, -2:].min()
+    for k, name in enumerate(FINGERS):
+        assert np.sqrt(np.linalg.eigvalsh(path.pads[0, k])) == pytest.approx(sorted(hand.pads[name]))
+    targets, centre = grasp(ALPHA)
+    assert replay_targets(targets, SCENE, centre).path.links.shape[1] == 0

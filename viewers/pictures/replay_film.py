@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Ellipse
 from matplotlib.patheffects import withStroke
 
 from tacdata.replay.outcome import ReplayOutcome
@@ -31,8 +32,8 @@ RESOLUTION = 80
 """Dots an inch."""
 MARGIN = 25.0
 """Around all that moves [mm]."""
-PAD = 9.0
-"""Radius at which pads are drawn [mm]."""
+LINK: dict[str, Any] = {"colors": "0.45", "linewidths": 3.0, "capstyle": "round", "zorder": 1.5}
+"""Drawing of a robot's links."""
 MOST_SLIP = 5.0
 """Upper end of the slip's axis [mm]; an object that is lost slides farther."""
 NAME = 0.46, 0.14
@@ -76,7 +77,8 @@ class ReplayPage:
         heights = [*(np.ptp(ends[:, up]) / np.ptp(ends[:, 0]) * 3.0 for up in (2, 1)), 1.2, 1.2]
         self._axes = parts[0].subplots(4, count, squeeze=False, height_ratios=heights)
         self._objects: dict[tuple[str, int], ReplayObjectShape] = {}
-        self._pads: dict[tuple[str, int], list[tuple[Circle, Any]]] = {}
+        self._pads: dict[tuple[str, int], list[tuple[Ellipse, Any]]] = {}
+        self._links: dict[tuple[str, int], LineCollection] = {}
         self._curves: list[ReplayCurves] = []
         force_limit = 1.3 * max(_strongest(replay) for replay in replays.values()) + 0.1
         for column, (kind, replay) in enumerate(replays.items()):
@@ -85,6 +87,7 @@ class ReplayPage:
                 axes.set(xlim=ends[:, 0], ylim=ends[:, up], aspect="equal")
                 axes.set_ylabel(("side: z" if up == 2 else "above: y") + " [mm]", fontsize=8)
                 self._objects[kind, up] = ReplayObjectShape(axes, replay, up)
+                self._links[kind, up] = axes.add_collection(LineCollection([], **LINK), autolim=False)
                 self._pads[kind, up] = [_pad(axes, name, k) for k, name in enumerate(replay.fingers)]
             self._axes[1, column].set_xlabel("x [mm]", fontsize=8)
             for row, name, values, top in (
@@ -109,11 +112,13 @@ class ReplayPage:
             row = min(int(np.searchsorted(replay.time, time)), len(replay.time) - 1)
             for up in (2, 1):
                 self._objects[kind, up].show(row)
+                self._links[kind, up].set_segments(list(1000 * replay.path.links[row][..., [0, up]]))
                 places = 1000 * replay.path.tips[row][:, [0, up]]
-                names = apart(places + np.array([0.0, 0.5 * PAD]), *self._letters)
-                for k, (circle, name) in enumerate(self._pads[kind, up]):
-                    circle.center = tuple(places[k])
-                    circle.set_fill(not self._gap[row, k])
+                shapes = 1e6 * replay.path.pads[row][:, [0, up]][..., [0, up]]
+                names = apart(places + np.sqrt(shapes[:, 1, 1])[:, None] * (0.0, 0.5), *self._letters)
+                for k, (pad, name) in enumerate(self._pads[kind, up]):
+                    _place(pad, places[k], shapes[k])
+                    pad.set_fill(not self._gap[row, k])
                     name.set_position(tuple(names[k]))
             verdict = replay.reason if time >= replay.decided else ""
             title = f"{NAMES.get(kind, kind)}\n{time:.1f} s, {_moved(replay, row)}\n"
@@ -144,14 +149,22 @@ def _two_lines(words: str) -> str:
     return "\n".join([*lines, *[" "] * (2 - len(lines))])
 
 
-def _pad(axes: Axes, finger: str, number: int) -> tuple[Circle, Any]:
+def _place(pad: Ellipse, place: np.ndarray, shape: np.ndarray) -> None:
+    """Draw the outline of a pad [mm] whose shape, seen along an axis, is [mm^2], shape (2, 2)."""
+    squares, axes = np.linalg.eigh(shape)
+    pad.set_center(tuple(place))
+    pad.width, pad.height = 2 * np.sqrt(squares)
+    pad.angle = float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0])))
+
+
+def _pad(axes: Axes, finger: str, number: int) -> tuple[Ellipse, Any]:
     color = tuple(channel / 255 for channel in HUES[number % len(HUES)])
-    circle = Circle((0, 0), PAD, facecolor=color, edgecolor=color, alpha=0.8)
-    axes.add_patch(circle)
+    pad = Ellipse((0, 0), 1, 1, facecolor=color, edgecolor=color, alpha=0.8, zorder=2)
+    axes.add_patch(pad)
     # A white rim keeps a name readable on top of the object or of another pad.
     rim = [withStroke(linewidth=2.0, foreground="white")]
     name = axes.text(0, 0, finger, fontsize=7, ha="center", va="bottom", color=color, path_effects=rim)
-    return circle, name
+    return pad, name
 
 
 def _moved(replay: ReplayOutcome, row: int) -> str:
