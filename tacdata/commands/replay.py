@@ -178,7 +178,7 @@ def _print_rows(rows: list[dict[str, Any]], first: str, task: str) -> None:
 
 
 def _other_network(source: Demonstration, demonstration: Demonstration) -> tuple[str, ...]:
-    """Say that a gain was found with another network than the one that predicted a demonstration's depth."""
+    """Note that a gain was found with another network than the one that predicted a demonstration's depth."""
     theirs, ours = ((entry.network or {}).get("hash", "") for entry in (source, demonstration))
     if theirs == ours:
         return ()
@@ -195,7 +195,7 @@ def _tracks(path: Path) -> Path:
 
 
 def _save(view: Path | None, video: Path | None, tried: Trials, scene: ReplayScene) -> None:
-    """Write the undisturbed replays of one recording, and say how they ended."""
+    """Write the undisturbed replays of one recording, and print their verdicts."""
     from tacdata.viewers.pictures.replay_film import film_replays
     from tacdata.viewers.rerun.replay import save_replays
 

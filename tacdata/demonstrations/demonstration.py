@@ -77,7 +77,7 @@ class Demonstration:
     """Settings of the smoother and the process noise that it chose, by finger."""
     network: dict[str, Any] | None = None
     """Network behind the predicted depth: hash, network, epoch, lookahead [frames], sensor; None without. Where each
-    finger has its own, their identities stand under ``fingers``, and the hash is of all hashes.
+    finger has its own, their identities are under ``fingers``, and the hash is of all hashes.
     """
     remarks: tuple[str, ...] = ()
     """Remarks for a person, as sentences."""

@@ -37,7 +37,7 @@ class Lerobot(Exporter):
     - ``action``: fingertip targets, x y z [m] and qx qy qz qw per finger;
     - ``observation.state``: fingertips as seen, in the same form;
     - ``observation.tactile.FINGER``: readings [counts]; ``info`` has the place of each channel on the skin [mm];
-    - ``tacdata.valid.FINGER``: whether each channel has a reading; 0 stands where it has none;
+    - ``tacdata.valid.FINGER``: whether each channel has a reading; 0 where it has none;
     - ``observation.predicted_depth.FINGER``: a network's estimate as a float32 depth image, metres in the file and
       millimetres in lerobot; the feature's ``info`` holds the checkpoint's hash;
     - ``tacdata.predicted_novelty.FINGER``: above 1 the readings are unlike all training readings.

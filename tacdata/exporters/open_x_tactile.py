@@ -185,7 +185,7 @@ def _readings(targets: FingertipTargets, name: str) -> np.ndarray | None:
         return None
     taxels = demonstration.sensors[name].taxels
     shape = (taxels.rows, taxels.columns) if taxels.rows * taxels.columns == signals.shape[1] else signals.shape[1:]
-    # The layout knows no missing value; `valid_` arrays of the exact targets say which these are.
+    # The layout knows no missing value; `valid_` arrays of the exact targets mark them.
     return np.nan_to_num(signals[targets.rows]).astype(np.float32).reshape(-1, *shape)
 
 

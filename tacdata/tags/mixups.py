@@ -1,8 +1,8 @@
 """Notices tags and cubes that were mixed up: a finger with another's cube, one hand with the other's.
 
 A tag's number alone never shows that; the poses do. Two cubes cannot be in one place. A cube's tags are where the cube
-is. A finger does not change places with another between two images. Index and middle finger of a right hand stand in
-the other order than those of a left one.
+is. Two fingers do not change places between two images. Index and middle finger of a right hand are in
+the reverse order of those of a left one.
 """
 
 from __future__ import annotations

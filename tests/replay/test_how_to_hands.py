@@ -67,8 +67,9 @@ def test_the_pages_files_are_what_the_commands_take():
     from tacdata.plans.recipe import write_out
     from tacdata.sensor import default_sensor
 
-    pairs, block = blocks(PAGES[0], "yaml")
+    pairs, block, item = blocks(PAGES[0], "yaml")
     documents.check(yaml.safe_load(pairs), "hand_eye_pairs", "hands.md")
+    documents.check(yaml.safe_load(item), "replay_object", "hands.md")
     plan = Plan.from_document(write_out(yaml.safe_load(block), default_sensor(), "hands.md"), "hands.md")
     assert len(plan.presses) == 28 and {press.indenter_name for press in plan.presses} >= {"ball_35", "plate", "punch"}
 

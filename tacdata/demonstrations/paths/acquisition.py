@@ -64,7 +64,7 @@ def acquire(sightings: Sightings, times_ns: np.ndarray, wander: ProcessNoise) ->
 
 
 def _runs(accepted: np.ndarray) -> list[tuple[int, int]]:
-    """Return first and end of every run of at least `LEAST_RUN` rejected sightings; accepted ones may stand between.
+    """Return first and end of every run of at least `LEAST_RUN` rejected sightings; accepted ones may lie between.
 
     If only one of two cameras is accepted, accepted and rejected sightings alternate. So a run continues over single
     accepted sightings.

@@ -83,7 +83,7 @@ def jumps(sightings: Mapping[str, Sightings], begin_ns: int) -> list[Bump]:
     for reference, partner in combinations(cameras, 2):
         steps = _steps(_apart(sightings, reference, partner))
         for k, (moment, size) in enumerate(steps):
-            # Another bump close by must not stand for this one.
+            # Another bump close by must not count as this one.
             first = max([_before(sightings, (reference, partner), moment), *(t for t, _ in steps[:k])])
             last = min([moment + WINDOW * 1e9, *(t for t, _ in steps[k + 1 :])])
             which, at, gain = _which(sightings, (reference, partner), moment, (first, last))
@@ -127,12 +127,12 @@ def split(sightings: Mapping[str, Sightings], bumps: Sequence[Bump]) -> dict[str
 
 
 def unmoved(sightings: Sightings) -> np.ndarray:
-    """Return which sightings are of cameras that stand where their files say, shape (p,), bool."""
+    """Return which sightings are of cameras at the places in their files, shape (p,), bool."""
     return np.array([" (moved" not in camera for camera in sightings.camera], bool)
 
 
 def _before(sightings: Mapping[str, Sightings], cameras: tuple[str, str], moment: int) -> float:
-    """Return from when on sightings before a moment tell the place before it [ns]: earlier if fingers were hidden."""
+    """Return since when sightings determine the place before a moment [ns]: earlier if fingers were hidden."""
     first = [moment - WINDOW * 1e9]
     for camera in cameras:
         times = np.sort(np.concatenate([series.time_ns[_of(series, camera)] for series in sightings.values()]))

@@ -191,7 +191,7 @@ def repeats(views: Iterable[TagStream], begin_ns: int) -> list[str]:
 
 
 def contradictions(sightings: Sightings, path: Smoothed, begin_ns: int) -> list[str]:
-    """Say how many sightings contradict the path, and of which camera, where they are more than `CONTRADICTING`."""
+    """Count the sightings that contradict the path, by camera, where they are more than `CONTRADICTING`."""
     # An image at a wrong time contradicts the others, whatever camera and tags do.
     left_out = ~path.accepted & (sightings.timing <= TIMELY)
     if left_out.mean() <= CONTRADICTING:

@@ -33,7 +33,7 @@ def look_again(recording: DemoRecording, progress: Callable[[int], None] = lambd
 
     Raises:
         UsageError: If the file is gone.
-        FormatError: If an image has another size than the camera's intrinsics say.
+        FormatError: If an image has another size than in the camera's intrinsics.
     """
     trackers = {
         name: FingerTracker(entry["intrinsics"], recording.rig.fingers)

@@ -1,9 +1,9 @@
-"""Whether images and touch tell the same time: a skin is pressed deeper as two fingers close, and never else.
+"""Lag between images and touch: a skin is pressed deeper as two fingers close, and never else.
 
 Images that are late by the same time from beginning to end look right by themselves, and so do two such cameras. Touch
 shows it. The reading of a finger falls with its distance from the opposite finger, whatever the law. So the lag is the
 one at which a falling function of distance explains the readings best (isotonic regression). Only the closing and the
-opening of a hand tell it.
+opening of a hand determine it.
 """
 
 from __future__ import annotations

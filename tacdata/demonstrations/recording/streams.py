@@ -91,7 +91,7 @@ class DemoStreams(DeviceStreams):
             words = self._health[stream].take(frame.arrival_ns, frame.counts)
             if not words:
                 continue
-            # Begun anew, so that a fault that lasts is found again.
+            # Restarted, so that a fault that lasts is found again.
             self._health[stream] = _health_of(self._boards[stream])
             if frame.arrival_ns >= self._quiet_until_ns[stream]:
                 self._quiet_until_ns[stream] = frame.arrival_ns + AGAIN_NS

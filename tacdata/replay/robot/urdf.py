@@ -1,6 +1,6 @@
 """A robot's URDF without shapes and masses, checked against the format and a robot's possibilities.
 
-MuJoCo takes much in silence. A joint whose limits lack or stand the wrong way round turns freely; degrees count as
+MuJoCo takes much in silence. A joint whose limits are missing or exchanged turns freely; degrees count as
 radians; a mimic joint without its leader is free. So the file is checked before it gets there.
 """
 

@@ -78,7 +78,7 @@ def suspects(grey: np.ndarray) -> list[Suspect]:
     widths, heights = boxes[:, cv2.CC_STAT_WIDTH], boxes[:, cv2.CC_STAT_HEIGHT]
     short, long = np.minimum(widths, heights), np.maximum(widths, heights)
     likely = (short >= LEAST_SIDE) & (long <= SLENDER * short)
-    # A quadrilateral that stands on its corner covers half of its box.
+    # A quadrilateral turned by 45 degrees covers half of its box.
     likely &= boxes[:, cv2.CC_STAT_AREA] >= 0.5 * DARK * widths * heights
     likely[0] = False  # bright cells
     places, quads = [], []
