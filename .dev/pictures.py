@@ -32,7 +32,7 @@ PACKAGES = {
 """Picture -> the packages that draw it."""
 OTHERS = tuple(
     f"tacdata.viewers.pictures.{name}"
-    for name in ("hand_film", "replay_film", "replay_object", "felt_maps", "check", "plan", "tracks")
+    for name in ("hand_film", "replay_film", "replay_object", "felt_maps", "page_frames", "check", "plan", "tracks")
 )
 """Modules of these packages that draw other pictures."""
 FILES = {

@@ -85,27 +85,20 @@ def in_words(path: JointPath, targets: FingertipTargets, oriented: bool = True) 
         share = f"{len(rows)} of {len(seconds)} targets ({_when(rows, seconds)})"
         error_words = f"{worst[0]:.1f} mm" + (f", {worst[1]:.0f} deg" if oriented else "")
         sentences.append(f"{name} does not reach {share}, off by up to {error_words}")
-    if path.uncoupled:
-        share = f"{len(path.uncoupled)} of {len(seconds)} targets ({_when(path.uncoupled, seconds)})"
-        sentences.append(
-            f"{share} would need mimic joints ({', '.join(path.mimics)}) to part from those that they follow"
-        )
-    if path.other_posture:
-        share = f"{len(path.other_posture)} of {len(seconds)} targets ({_when(path.other_posture, seconds)})"
-        sentences.append(
-            f"{share} are left out: only another posture reaches them, which the joints cannot take up in time"
-        )
-    for name, rows in path.outside_workspace.items():
-        sentences.append(f"{name}: {len(rows)} targets lie outside the workspace ({_when(rows, seconds)})")
-    for name, rows in path.too_fast.items():
-        when = _when(rows, seconds)
-        sentences.append(f"joint {name} would have to be faster than its limit at {len(rows)} times ({when})")
-    for (first, second), rows in path.collisions.pairs.items():
-        when = _when(rows, seconds)
-        sentences.append(f"links {first} and {second} run into each other at {len(rows)} times ({when})")
-    for name, rows in path.too_abrupt.items():
-        when = _when(rows, seconds)
-        sentences.append(f"joint {name} would have to accelerate more than its limit at {len(rows)} times ({when})")
+    for rows, words in (
+        (path.uncoupled, f"would need mimic joints ({', '.join(path.mimics)}) to part from those that they follow"),
+        (path.other_posture, "are left out: only another posture reaches them, which joints cannot take up in time"),
+    ):
+        if rows:
+            sentences.append(f"{len(rows)} of {len(seconds)} targets ({_when(rows, seconds)}) {words}")
+    links = {" and ".join(pair): rows for pair, rows in path.collisions.pairs.items()}
+    for named, words in (
+        (path.outside_workspace, "{}: {} targets lie outside the workspace"),
+        (path.too_fast, "joint {} would have to be faster than its limit at {} times"),
+        (links, "links {} run into each other at {} times"),
+        (path.too_abrupt, "joint {} would have to accelerate more than its limit at {} times"),
+    ):
+        sentences += [f"{words.format(n, len(rows))} ({_when(rows, seconds)})" for n, rows in named.items()]
     return sentences
 
 
@@ -125,6 +118,7 @@ def use_table(path: JointPath, targets: FingertipTargets) -> str:
     rows.append(f"{'joint':<24} {'to its limit':>12} {'speed':>13} {'of its limit':>13} {'acceleration':>13}")
     for k, joint in enumerate(path.joints):
         trajectory = path.values[followed, k]
+        # A joint that turns without end has no limit to come near.
         ends = [end for end in (joint.lower, joint.upper) if end is not None]
         room = (
             min((float(np.abs(trajectory - end).min()) for end in ends), default=float("inf"))

@@ -21,8 +21,8 @@ def bias(touch: OrangeTouch, presses: PressSet, maps: Maps, force: float, band: 
     """Return true and estimated lateral positions of the orange, middle first.
 
     Args:
-        touch: Readings of a skin pressed by the orange.
-        presses: The orange's presses, whose solved maps are those of a perfect network.
+        touch: The skin's answer to the orange.
+        presses: The orange's presses, whose solved maps stand for a perfect network.
         maps: The trained network.
         force: Normal force [N].
         band: Half width within which a contact is accepted [mm].

@@ -110,7 +110,7 @@ def trials(
 
     Args:
         setup: The study; its grip is the lifting configuration.
-        touch: Readings of a skin pressed by the orange.
+        touch: The skin's answer to the orange.
         maps: The trained network.
         progress: Called with the number of trials done and in total.
     """

@@ -77,7 +77,7 @@ class Fingertip:
         """Draw it.
 
         Args:
-            touch: Readings of a pressed skin.
+            touch: The skin's answer.
             spread: Standard deviations of its differences.
             side: +1 if the sensor's x runs with the gripper's lateral direction, -1 if against it.
             rng: Random generator of everything, noise too.

@@ -102,6 +102,7 @@ def replay_targets(
     ground = np.array(centre) + scene.place
     seconds = (targets.time_ns - targets.time_ns[0]) * 1e-9
     path = SceneModel(scene, hand or FreePads(pads[0]), ground).run(pads, seconds, feedback)
+    # The verdict falls once the lift or the wipe has ended: letting go is no loss.
     first, last = int(np.argmax(touch)), int(np.flatnonzero(high)[-1])
     lag = _behind(path.tips.mean(axis=1), path.centre, first, high if wiped else None)
     lowest = float((path.centre[high, 2] - ground[2]).min())
@@ -112,6 +113,7 @@ def replay_targets(
     failures = np.flatnonzero(lag[: last + 1] > BEHIND)
     end = last if success or not len(failures) else int(failures[0])
     rows = slice(min(first, end), end + 1)
+    # The grip counts while the person holds the object; a loss may come before all fingers touch.
     pressing = path.force[rows].sum(axis=1)[touch[rows]] if touch[rows].any() else path.force[rows].sum(axis=1)
     names = targets.fingers
     return ReplayOutcome(

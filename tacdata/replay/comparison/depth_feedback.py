@@ -73,6 +73,7 @@ class DepthFeedback:
         self._waiting.append(
             (moment + LATENCY, np.clip(self._gain * depth - self._shallow * (depth > 0) + noise, 0, None))
         )
+        # Estimates arrive in order, each after its latency.
         while self._waiting and self._waiting[0][0] <= moment:
             self._estimate = self._waiting.popleft()[1]
         row = min(int(np.searchsorted(self.seconds, moment)), len(self.seconds) - 1)

@@ -116,6 +116,7 @@ class GripSearch:
             peak = max(end.force.values())
             demand = self.demand
             if not end.held or end.slip > demand.slip or peak > demand.force or end.grip < demand.grip:
+                # A scene that defeats one gain is likely to defeat the next, so it comes first.
                 self._seeds.remove(seed)
                 self._seeds.insert(0, seed)
                 self._reasons[gain] = f"{end.reason}, and a pad pressed with {peak:.1f} N"

@@ -102,6 +102,7 @@ class LinkedHand:
         for k in self._driven:
             stiffness = robot.stiffness[self._names[k]] * scene.stiffness / self._usual
             joint = spec.joint(PREFIX + self._names[k])
+            # Without weight of its own a stiff joint would need shorter time steps.
             joint.armature = stiffness / FASTEST**2
             add_actuator(spec, joint.name, stiffness, 2 * stiffness / FASTEST)
         self._bias = np.array(scene.bias) if scene.bias else np.zeros((len(self._fingers), 3))
@@ -130,6 +131,7 @@ class LinkedHand:
             engine.mj_jacGeom(model, data, jacobian[k], None, pad)
         whole = jacobian.reshape(-1, model.nv)[:, self._columns] @ self._coupling
         square = whole @ whole.T
+        # Damped least squares.
         square += (DAMPED**2 * np.trace(square)) * np.eye(len(square))
         return whole.T @ np.linalg.solve(square, away)
 

@@ -222,7 +222,7 @@ def rate(outcomes: Sequence[bool]) -> dict[str, Any]:
 
 def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
     """Return the outcomes of each arm at each of `STIFFNESSES`, as plain data, with the benefit of depth there."""
-    kinds = [kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)]
+    kinds = list(tried[0].paths)
     return [
         _row(
             {"stiffness": value},
@@ -234,8 +234,7 @@ def sweep(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[
 
 def challenged(tried: Sequence[Trials], scene: ReplayScene, seeds: int) -> list[dict[str, Any]]:
     """Return the outcomes of each arm and of the closed loop in each of `CHALLENGES`, as plain data."""
-    kinds = [kind for kind in tried[0].paths if all(kind in recording.paths for recording in tried)]
-    kinds += [CLOSED_RAW, CLOSED]
+    kinds = [*tried[0].paths, CLOSED_RAW, CLOSED]
     return [
         _row({"challenge": name}, [recording.held_in(scene, kinds, seeds, name) for recording in tried])
         for name in CHALLENGES
