@@ -74,7 +74,7 @@ class Corner:
     @property
     def alarm(self) -> Alarm:
         """The alarm that it raises where no effect of all presses is found."""
-        return Alarm(f"in one corner alone, {self.seen}", f"press there again ({self.words}), and next to it")
+        return Alarm(f"in one corner alone, {self.seen}", "press there again, and next to it, at the same rates")
 
 
 @dataclass(frozen=True)
