@@ -46,6 +46,10 @@ Stored labels and solutions of the older release then stay current. An entry end
 changes its version."""
 
 
+_MOVED = re.compile(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)")
+"""The package before names of rooms that were packages of their own."""
+
+
 def canonical(document: Any) -> str:
     """Return the one JSON text of a document: sorted keys, no spaces, exact floats."""
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
@@ -126,7 +130,7 @@ def _syntax(node: Any) -> Any:
         return [_syntax(each) for each in node if not _stands_alone(each)]
     if isinstance(node, str):
         # Their versions are those of releases that had these packages outside tacdata.
-        return re.sub(r"\btacdata\.(?=(?:schemas|label_farm|training|viewers)\b)", "", node)
+        return _MOVED.sub("", node) if "tacdata." in node else node
     if not isinstance(node, ast.AST):
         return node
     # Which fields of a kind there are grows with Python's releases; their new ones are empty.

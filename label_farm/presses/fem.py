@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from tacdata import provenance
@@ -17,6 +19,7 @@ from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
 
 if TYPE_CHECKING:
+    from tacdata.skin.model import SkinModel
     from tacdata.skin.press import PressRequest
     from tacdata.skin.validity.coarse_press import CoarsePress
 
@@ -42,7 +45,7 @@ class FemModel:
     """The skin model of one sensor, kept by a worker for all its jobs."""
 
     def __init__(self, sensor: Sensor, alone: bool = False) -> None:
-        """Mesh the skin, or take its mesh from the cache; costs seconds.
+        """Mesh the skin, or take its mesh from the cache; the solver's libraries are loaded for the first press.
 
         Args:
             sensor: Whose skin.
@@ -53,25 +56,44 @@ class FemModel:
             UsageError: If its file states spreads of unknown parameters.
         """
         from tacdata.indenters.sphere import Sphere
-        from tacdata.skin.derivatives.path_uncertainty import check_spreads
-        from tacdata.skin.model import ModelSettings, SkinModel
+        from tacdata.skin.adhesions import load_adhesion_law
+        from tacdata.skin.derivatives.parameter_names import check_spreads
+        from tacdata.skin.mesh.build import build_mesh
+        from tacdata.skin.mesh.coarser import companion_mesh
+        from tacdata.skin.solve.settings import ModelSettings
+        from tacdata.skin.validity.stable_strain import StableStrain
 
+        if find_spec("torch") is None:
+            raise ModuleNotFoundError("No module named 'torch'", name="torch")
         check_spreads(sensor, Sphere(1.0))
-        device = os.environ.get(environment.DEVICE, "cpu")
-        self._model = SkinModel(sensor, ModelSettings(alone=alone), device)
-        self.batch = 1 if alone else _AT_A_TIME[device.split(":")[0]]
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
+        if sensor.contact.adhesion:
+            load_adhesion_law(sensor.contact.adhesion.law)
+        self._sensor, self._settings = sensor, ModelSettings(alone=alone)
+        self._device = os.environ.get(environment.DEVICE, "cpu")
+        self._settings.check(self._device)
+        self._mesh = build_mesh(sensor, self._settings.mesh)
+        # Refused here, whoever only asks for the version is told so.
+        self._mesh.fixed(sensor.contact.bonded, sensor.contact.rim_width)
+        self._coarser = companion_mesh(sensor, self._settings.mesh, self._mesh)
+        self.remarks = StableStrain(self._mesh, sensor.material).remarks
         """Remarks on this skin for the user."""
-        return self._model.remarks
+        self.batch = 1 if alone else _AT_A_TIME[self._device.split(":")[0]]
+
+    @cached_property
+    def _model(self) -> SkinModel:
+        from tacdata.skin.model import SkinModel
+
+        return SkinModel(self._sensor, self._settings, self._device, self._mesh, self._coarser)
 
     @property
     def content_hash(self) -> str:
         """Hash of everything in the model that decides a result, the spreads that its uncertainty comes from too."""
-        spreads = self._model.sensor.uncertainty
+        from tacdata.skin.code_version import model_identity
+
+        spreads = self._sensor.uncertainty
         code = provenance.code_hash(*_DECIDING, *([_SPREADS] if spreads else []))
-        return provenance.content_hash([self._model.content_hash, spreads, code])
+        identity = model_identity(self._sensor, self._settings, self._mesh, self._coarser)
+        return provenance.content_hash([provenance.content_hash(identity), spreads, code])
 
     def solve(self, job: Job) -> PathSolution:
         """Solve one path, with more states where the job's tolerance needs them.

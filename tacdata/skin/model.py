@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from tacdata import provenance
-from tacdata.errors import SolveError, UsageError
+from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
-from tacdata.skin.code_version import code_versions
+from tacdata.skin.code_version import model_identity
 from tacdata.skin.contact.first_touch import reach, rise, rotation, touch
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.mesh.coarser import blind_spot, companion_mesh, edge_ratio
@@ -81,12 +81,7 @@ class SkinModel:
             UsageError: If presses are to be solved alone, on a GPU.
         """
         self.sensor, self.settings, self.device = sensor, settings or ModelSettings(), device
-        if self.settings.alone and device != "cpu":
-            raise UsageError(
-                f"results on {device} that are the same to the last bit in every batch",
-                "device cpu: sums on a GPU have no fixed order",
-                "choose device cpu, or results within the solver's tolerance",
-            )
+        self.settings.check(device)
         self.skin = MeshedSkin(sensor, self.settings, device, mesh)
         self.mesh = self.skin.mesh
         self._companion_mesh = companion
@@ -106,21 +101,9 @@ class SkinModel:
 
     @cached_property
     def identity(self) -> dict[str, str]:
-        """Everything that decides a result: hashes of sensor, mesh and code, and the settings."""
-        estimated = self.settings.error_estimate
-        # The companion decides the stated error, and starts of loading: another one gives other bits.
-        coarse = {"companion": self.companion.mesh.content_hash} if estimated and self.companion else {}
-        settings = asdict(self.settings)
-        if not self.settings.alone:
-            # Results without it are those of releases that did not have it.
-            del settings["alone"]
-        return {
-            "sensor": self.sensor.content_hash,
-            "mesh": self.mesh.content_hash,
-            **coarse,
-            "settings": provenance.content_hash(settings),
-            **code_versions(),
-        }
+        """Everything that decides a result (`model_identity`)."""
+        companion = self.companion.mesh if self.settings.error_estimate and self.companion else None
+        return model_identity(self.sensor, self.settings, self.mesh, companion)
 
     @property
     def content_hash(self) -> str:
@@ -326,7 +309,7 @@ class SkinModel:
         else:
             error = NumericalError.none(fine)
         parameters["numerical"] = error.remark
-        if blunt := fineness.remark(self.mesh, self.sensor, request):
+        if blunt := fineness.remark(self.mesh, self.sensor, request, reach(self.sensor, request)):
             parameters["remarks"] = [blunt]
         return PathSolution(
             depth=fine.depth,

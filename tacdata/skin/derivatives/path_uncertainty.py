@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tacdata.errors import SolveError, UsageError
+from tacdata.errors import SolveError
 from tacdata.labels import PathSolution
 from tacdata.sensor import Sensor
-from tacdata.skin.derivatives.parameters import UNITS, known
+from tacdata.skin.derivatives.parameter_names import UNITS, known
 from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.derivatives.uncertainty import Uncertainty, propagate, sampled_spread
 from tacdata.skin.press import PressRequest
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 _Found = list[tuple[float, Uncertainty]]
 """Depths [mm] and the standard deviations there."""
-
-_INDENTER = "indenter/"
 
 _STEEPER = 2.0
 """How many times steeper than the map itself, or than a slope of 0.5, a derivative by place may be [1]. Derivatives by
@@ -66,22 +64,6 @@ def spreads_of(sensor: Sensor, indenter: Indenter) -> dict[str, float]:
     """
     has = set(known(sensor, indenter)) - (set() if sensor.contact.friction else {"friction"})
     return {name: value for name, value in sensor.uncertainty.items() if value > 0 and name in has}
-
-
-def check_spreads(sensor: Sensor, indenter: Indenter) -> None:
-    """Refuse spreads of parameters that no press on this skin has; sizes of indenters are ignored.
-
-    Raises:
-        UsageError: Naming them.
-    """
-    has = known(sensor, indenter)
-    unknown = [name for name in sensor.uncertainty if name not in has and not name.startswith(_INDENTER)]
-    if unknown:
-        raise UsageError(
-            f"sensor {sensor.name}: uncertainty of {', '.join(unknown)}",
-            ", ".join(name for name in has if not name.startswith(_INDENTER)) + ", indenter/NAME",
-            "correct the names under uncertainty in the sensor file",
-        )
 
 
 def with_uncertainty(

@@ -13,7 +13,8 @@ from tacdata.errors import SolveError
 from tacdata.skin.derivatives.bonding import Bonding
 from tacdata.skin.derivatives.contact import ConditionsChange
 from tacdata.skin.derivatives.equilibria import TOLERANCE, PathDerivatives, Slack
-from tacdata.skin.derivatives.parameters import check, directions, known
+from tacdata.skin.derivatives.parameter_names import check, known
+from tacdata.skin.derivatives.parameters import directions
 from tacdata.skin.member.pose import Pose
 from tacdata.skin.press import PressRequest
 from tacdata.skin.solve.equilibrium import Equilibrium
@@ -33,7 +34,7 @@ class Sensitivity:
     """Derivatives of one state by p parameters; units are those of the quantity over the parameter's."""
 
     parameters: tuple[str, ...]
-    """Names of the parameters, as `tacdata.skin.derivatives.parameters.known` gives them."""
+    """Names of the parameters, as `tacdata.skin.derivatives.parameter_names.known` gives them."""
     units: tuple[str, ...]
     """Their units."""
     surface: np.ndarray
@@ -68,7 +69,7 @@ def sensitivities(
     Args:
         model: The skin.
         request: The press.
-        parameters: Names of parameters (`tacdata.skin.derivatives.parameters.known`).
+        parameters: Names of parameters (`tacdata.skin.derivatives.parameter_names.known`).
         tolerance: Relative error of the linear solves [1].
         passages: The states of the press, if the model has solved them before; solved here if not given.
         spreads: Standard deviations of the parameters: errors are then over the largest change that one of them makes.

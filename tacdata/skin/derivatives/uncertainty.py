@@ -1,6 +1,6 @@
 """Standard deviations of map and forces from the spreads of uncertain parameters.
 
-Spreads are standard deviations of parameters (`tacdata.skin.derivatives.parameters.known`), independent of each
+Spreads are standard deviations of parameters (`tacdata.skin.derivatives.parameter_names.known`), independent of each
 other, from the
 sensor file's ``uncertainty``. To first order var(f) = sum_p (df/dp)^2 sigma_p^2 (JCGM 100:2008, eq. 10);
 `sampled_spread` tests the range of validity by whole presses. It ends where the derivative vanishes or jumps within the
@@ -18,7 +18,8 @@ import numpy as np
 import torch
 
 from tacdata.errors import SolveError, UsageError
-from tacdata.skin.derivatives.parameters import check, directions
+from tacdata.skin.derivatives.parameter_names import check
+from tacdata.skin.derivatives.parameters import directions
 from tacdata.skin.derivatives.press import Sensitivity, sensitivities
 from tacdata.skin.member.conditions import Conditions
 from tacdata.skin.member.pose import Pose

@@ -196,13 +196,12 @@ class SparseRest:
         unit[part, torch.arange(len(part))] = 1.0
         loads = self.spread(unit)
         if self._halves:
-            moved = torch.zeros(loads.shape)
-            moved[self._free] = self._halves.add(part, loads[self._free])
+            columns = self._halves.add(part, loads[self._free])
         else:
-            moved = self.apply(loads)
-        columns = self.rows(moved)
-        columns[part] = (columns[part] + columns[part].T) / 2
-        return columns[self._order]
+            columns = self.rows(self.apply(loads))[self._order]
+        # The present rows are the last in order; their part is symmetric but for rounding.
+        columns[-len(part) :] = (columns[-len(part) :] + columns[-len(part) :].T) / 2
+        return columns
 
     def held(self, residual: torch.Tensor, used: torch.Tensor, forces: Forces) -> torch.Tensor:
         """Return K0^-1 (r - M^T f), as `RestSolver`: by PARDISO one solve, else two."""

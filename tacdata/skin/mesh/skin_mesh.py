@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from tacdata.errors import SolveError
 from tacdata.skin.mesh import elements
@@ -62,14 +61,23 @@ class SkinMesh:
         Args:
             bonded: Among "sides", "bottom" and "rim".
             rim_width: Width of the underside's border that "rim" holds [mm].
+
+        Raises:
+            SolveError: If none is.
         """
         held = np.zeros(len(self.nodes), dtype=bool)
         for face in bonded:
             held |= self.rim(rim_width) if face == "rim" else getattr(self, face)
+        if not held.any():
+            raise SolveError(
+                "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
+            )
         return held
 
     def rim(self, width: float) -> np.ndarray:
         """Return True for nodes of the underside within ``width`` [mm] of its border with the sides, shape (n,)."""
+        from scipy.spatial import KDTree  # here: few skins have a rim, and every start would wait for it
+
         border = self.nodes[self.sides & self.bottom]
         bonded = self.bottom.copy()
         if len(border):

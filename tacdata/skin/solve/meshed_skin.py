@@ -11,7 +11,6 @@ import numpy as np
 import scipy.sparse as sp
 import torch
 
-from tacdata.errors import SolveError
 from tacdata.sensor import Sensor
 from tacdata.skin.adhesions import load_adhesion_law
 from tacdata.skin.contact.adhesion import AdhesiveSurface
@@ -72,10 +71,6 @@ class MeshedSkin:
         self.mesh = mesh or build_mesh(sensor, settings.mesh)
         self.fixed = self.mesh.fixed(sensor.contact.bonded, sensor.contact.rim_width)
         """Nodes that are held, shape (n,), bool."""
-        if not self.fixed.any():
-            raise SolveError(
-                "no bonded face holds the skin", "sides or bottom bonded", "set contact/bonded in the sensor file"
-            )
         # Far from incompressible, quadratic elements do not lock, and averages cost time.
         near = sensor.material.poisson_ratio >= settings.averaged_from
         self.averaged = near and load_law(sensor.material.law).splits_volume

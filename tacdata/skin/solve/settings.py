@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tacdata.errors import UsageError
 from tacdata.sensor import Material
 from tacdata.skin.mesh.generation.settings import MeshSettings
 
@@ -66,3 +67,16 @@ class ModelSettings:
     alone: bool = False
     """Whether each press is solved by itself, as by a new model: then its result does not depend, to the last bit, on
     the presses that are asked for with it or before it. Only on a CPU."""
+
+    def check(self, device: str) -> None:
+        """Refuse a device, "cpu" or a GPU such as "cuda:0", on which they cannot be kept.
+
+        Raises:
+            UsageError: If presses are to be solved alone, on a GPU.
+        """
+        if self.alone and device != "cpu":
+            raise UsageError(
+                f"results on {device} that are the same to the last bit in every batch",
+                "device cpu: sums on a GPU have no fixed order",
+                "choose device cpu, or results within the solver's tolerance",
+            )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from tacdata.sensor import Sensor
-from tacdata.skin.contact.first_touch import reach
 from tacdata.skin.mesh.skin_mesh import SkinMesh
 from tacdata.skin.press import PressRequest
 
@@ -13,22 +12,28 @@ _SPACING = 1 / 2
 """Distance of the nodes, whose hats close a gap in the mean, over the edge of their triangle [1]."""
 
 
-def edge_under(mesh: SkinMesh, sensor: Sensor, request: PressRequest) -> float:
-    """Return the median edge of the outer face's triangles that a press may touch, or of the nearest [mm]."""
+def edge_under(mesh: SkinMesh, request: PressRequest, reach: tuple[float, float]) -> float:
+    """Return the median edge of the outer face's triangles that a press may touch, or of the nearest [mm].
+
+    Args:
+        mesh: The mesh.
+        request: The press.
+        reach: Half widths of its contact at the deepest state [mm].
+    """
     corners = mesh.nodes[mesh.outer[:, :3]]
     offset = np.abs(corners.mean(axis=1)[:, :2] - [request.x, request.y])
-    near = np.all(offset <= reach(sensor, request), axis=1)
+    near = np.all(offset <= reach, axis=1)
     if not near.any():
         near = np.arange(len(offset)) == np.hypot(*offset.T).argmin()
     sides = corners[near] - np.roll(corners[near], 1, axis=1)
     return float(np.median(np.linalg.norm(sides, axis=-1)))
 
 
-def remark(mesh: SkinMesh, sensor: Sensor, request: PressRequest) -> str:
-    """Return a remark on shapes finer than the mesh resolves; empty if there are none."""
+def remark(mesh: SkinMesh, sensor: Sensor, request: PressRequest, reach: tuple[float, float]) -> str:
+    """Return a remark on shapes finer than the mesh resolves, empty if there are none; ``reach`` as of `edge_under`."""
     if not max(request.depths) > 0:
         return ""
-    edge = edge_under(mesh, sensor, request)
+    edge = edge_under(mesh, request, reach)
     return "; ".join(filter(None, (_edge_remark(edge, request), _adhesion_remark(edge, sensor))))
 
 

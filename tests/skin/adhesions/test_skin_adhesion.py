@@ -150,6 +150,6 @@ def test_what_cannot_be_is_said():
 def test_a_mesh_too_coarse_for_the_law_is_named():
     coarse, request = Adhesion("linear", 0.1, 0.002), PressRequest(Sphere(2.0), 0.0, 0.0, 0.0, (0.0, 0.1))
     skin = model(sticky(coarse), cells=6, layers=2)
-    assert "falls over 0.015 mm" in fineness.remark(skin.mesh, skin.sensor, request)
+    assert "falls over 0.015 mm" in fineness.remark(skin.mesh, skin.sensor, request, (0.6, 0.6))
     wide = sticky(Adhesion("linear", 0.1, 0.05))
-    assert fineness.remark(skin.mesh, wide, request) == ""
+    assert fineness.remark(skin.mesh, wide, request, (0.6, 0.6)) == ""

@@ -10,7 +10,8 @@ from tacdata.errors import SolveError, UsageError
 from tacdata.indenters.sphere import Sphere
 from tacdata.sensor import default_sensor
 from tacdata.skin.derivatives import path_uncertainty
-from tacdata.skin.derivatives.path_uncertainty import check_spreads, spreads_of, with_uncertainty
+from tacdata.skin.derivatives.parameter_names import check_spreads
+from tacdata.skin.derivatives.path_uncertainty import spreads_of, with_uncertainty
 from tacdata.skin.derivatives.uncertainty import uncertainties
 from tacdata.skin.model import ModelSettings, SkinModel
 from tacdata.skin.press import PressRequest

@@ -9,7 +9,7 @@ from skin_examples import box_mesh, bumps_sensor, slab_sensor
 
 from tacdata.indenters.sphere import Sphere
 from tacdata.skin.derivatives.bonding import Bonding, held_faces
-from tacdata.skin.derivatives.parameters import known
+from tacdata.skin.derivatives.parameter_names import known
 from tacdata.skin.derivatives.path_uncertainty import with_uncertainty
 from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.derivatives.uncertainty import sampled_spread, uncertainties

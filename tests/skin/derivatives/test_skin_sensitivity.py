@@ -13,7 +13,7 @@ from skin_examples import box_mesh, slab_sensor
 from tacdata.errors import FormatError, UsageError
 from tacdata.indenters.ellipsoid import Ellipsoid
 from tacdata.indenters.sphere import Sphere
-from tacdata.skin.derivatives.parameters import known
+from tacdata.skin.derivatives.parameter_names import known
 from tacdata.skin.derivatives.press import sensitivities
 from tacdata.skin.member.conditions import conditions
 from tacdata.skin.member.pose import turned
