@@ -49,11 +49,17 @@ PROCESSORS = {
 Objects for a kind serve every machine of that kind. Those for Warp's default, the machine's own processor, do not.
 """
 
+GPUS = "gpus"
+"""Folder of modules for GPUs, among those of kinds of processors."""
+UNROLLED_ON_GPU = wp.config.max_unroll
+"""Passes up to which a kernel's loop is written out for a GPU: Warp's own number."""
+
 
 def start() -> None:
     """Start Warp; all other output of its native library is passed on."""
     _start_quietly()
     if wp.is_cuda_available():
+        copy_to_cache(shipped_kernels() / wp.__version__ / GPUS)
         return
     wp.config.max_unroll = UNROLLED
     # The newest kind first: objects for an older one would waste its wide registers.
@@ -118,7 +124,7 @@ class _ModuleCount:
 def shipped_kernels() -> Path:
     """Return the folder of shipped kernels (`tacdata.label_farm.presses.kernels`), which need not exist.
 
-    In it there is a folder for each release of Warp, and in that one for each kind of processor.
+    In it there is a folder for each release of Warp, and in that one for each kind of processor, and for GPUs.
     """
     return Path(os.environ.get(KERNELS) or Path(__file__).with_name("kernels"))
 

@@ -78,7 +78,9 @@ class Branch:
         if not inner:
             return np.repeat(np.abs(self.values[-1:] - self.values[:1]), len(self.depth), axis=0)
         without = [Branch(np.delete(self.depth, k), np.delete(self.values, k, axis=0)) for k in inner]
-        missed = [np.abs(branch.at(self.depth[[k]])[0] - self.values[k]) for k, branch in zip(inner, without, strict=True)]
+        missed = [
+            np.abs(branch.at(self.depth[[k]])[0] - self.values[k]) for k, branch in zip(inner, without, strict=True)
+        ]
         return np.stack([np.max(missed[:2], axis=0), *missed, np.max(missed[-2:], axis=0)])
 
     def left_out_beside(self, depth: np.ndarray) -> np.ndarray:

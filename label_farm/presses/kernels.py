@@ -2,7 +2,7 @@
 
 Each shape is pressed once into the default skin, with an empty cache. The compiled modules go into a folder, by default
 the one that a wheel ships (`tacdata.warp_runtime`). Every kind of processor that this machine is gets its own: some
-minutes each.
+minutes each. Warp compiles for GPUs without one, so nothing is pressed there.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from tacdata import registry
@@ -23,25 +24,30 @@ from tacdata.sensor import default_sensor
 _DEPTHS = (0.0, 0.05, 0.0)
 """Depths of the presses [mm]: down and up, as kernels care for no more."""
 
-_KEPT = ("*.o", "*.meta")
+_KEPT = ("*.o", "*.cubin", "*.meta")
 """Files of a module that Warp reads."""
 
+ARCHITECTURES = (80, 86, 89, 90, 100)
+"""GPUs that get modules, by compute capability times ten: those of laboratories since 2020."""
+
 _PRESS = "from tacdata.label_farm.presses.kernels import press_all; press_all()"
+_COMPILE = "from tacdata.label_farm.presses.kernels import compile_all; compile_all({folder!r})"
 
 
 def build(folder: Path) -> None:
     """Replace the modules of Warp's release in a folder by those of all shapes."""
-    from tacdata.warp_runtime import KERNELS, processors, wp
+    from tacdata.warp_runtime import GPUS, KERNELS, processors, wp
 
     shutil.rmtree(folder / wp.__version__, ignore_errors=True)
-    for processor in processors():
+    for kind in (*processors(), GPUS):
         with tempfile.TemporaryDirectory() as empty:
-            # An empty folder of the processor makes Warp compile for it.
-            (Path(empty) / "kernels" / wp.__version__ / processor).mkdir(parents=True)
+            # An empty folder of a kind of processor makes Warp compile for it.
+            (Path(empty) / "kernels" / wp.__version__ / kind).mkdir(parents=True)
             places = {"WARP_CACHE_PATH": f"{empty}/cache", KERNELS: f"{empty}/kernels"}
-            subprocess.run([sys.executable, "-c", _PRESS], env={**os.environ, **places}, check=True)
-            for module in sorted(Path(empty, "cache").glob("*/wp_*")):
-                place = folder / wp.__version__ / processor / module.name
+            code = _COMPILE.format(folder=f"{empty}/cache/{GPUS}") if kind == GPUS else _PRESS
+            subprocess.run([sys.executable, "-c", code], env={**os.environ, **places}, check=True)
+            for module in sorted(Path(empty, "cache").glob(f"{GPUS}/wp_*" if kind == GPUS else "*/wp_*")):
+                place = folder / wp.__version__ / kind / module.name
                 place.mkdir(parents=True)
                 for file in (file for pattern in _KEPT for file in module.glob(pattern)):
                     shutil.copy(file, place)
@@ -54,6 +60,29 @@ def press_all() -> None:
     jobs = [Job(sensor.content_hash, solver.content_hash, s.document, 0.0, 0.0, 0.0, _DEPTHS) for s in _shapes()]
     for job, outcome in model.solve_each(solver, jobs):
         print(job.indenter["shape"], outcome if isinstance(outcome, Exception) else "pressed")
+
+
+def compile_all(folder: str, shapes: Sequence[Indenter] = (), architectures: Sequence[int] = ARCHITECTURES) -> None:
+    """Compile for GPUs what a batch of presses needs, by default of every shape that ships; a process of its own.
+
+    Args:
+        folder: Receives a folder for each module.
+        shapes: The shapes.
+        architectures: The GPUs, as `ARCHITECTURES`.
+    """
+    from tacdata.warp_runtime import UNROLLED_ON_GPU, wp
+
+    # Before any kernel is declared: modules then have the names that a machine with a GPU asks for.
+    wp.config.max_unroll = UNROLLED_ON_GPU
+    from tacdata.skin.press import PressRequest
+    from tacdata.skin.solve.compilation import batch_kernels
+    from tacdata.skin.solve.meshed_skin import MeshedSkin
+    from tacdata.skin.solve.settings import ModelSettings
+
+    skin = MeshedSkin(default_sensor(), ModelSettings())
+    surfaces = skin.surfaces([PressRequest(shape, 0.0, 0.0, 0.0, _DEPTHS) for shape in shapes or _shapes()])
+    for module in {kernel.module for kernel in batch_kernels(skin.body, surfaces)}:
+        wp.compile_aot_module(module, arch=architectures, module_dir=Path(folder, module.get_module_identifier()))
 
 
 def _shapes() -> list[Indenter]:

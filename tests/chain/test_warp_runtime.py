@@ -91,3 +91,30 @@ def test_a_shipped_kernel_is_not_compiled(tmp_path):
     shutil.copytree(tmp_path / "first" / wp.__version__, built, dirs_exist_ok=True)
     second = compiled(tmp_path / "second", tmp_path / "kernels")
     assert (second == first) == bool(kinds)
+
+
+ASKED = """
+import warp
+warp.is_cuda_available = lambda: True
+import tacdata.warp_runtime
+"""
+BUILT = """
+from tacdata.warp_runtime import UNROLLED_ON_GPU, wp
+wp.config.max_unroll = UNROLLED_ON_GPU
+"""
+NAME = """
+import sys, warp as wp
+from tacdata.chain.memory_kernels import _filter
+[built] = wp.compile_aot_module(_filter.module, arch=90, module_dir=sys.argv[1])
+print(built.name)
+"""
+
+
+def test_a_module_made_without_a_card_has_the_name_that_a_machine_with_one_asks_for(tmp_path):
+    names = []
+    for number, code in enumerate((ASKED, BUILT)):
+        command = [sys.executable, "-c", code + NAME, str(tmp_path / str(number))]
+        places = {"WARP_CACHE_PATH": str(tmp_path / "cache"), "TACDATA_KERNELS": str(tmp_path / "none")}
+        done = subprocess.run(command, env={**os.environ, **places}, capture_output=True, text=True, check=True)
+        names.append(done.stdout.strip())
+    assert names[0] == names[1] and names[0].endswith(".sm90.cubin")

@@ -23,10 +23,11 @@ _WORK, _EXACT = wp.float32, wp.float64
 
 def compile_kernels(body: Elasticity, surfaces: Sequence[ContactSurface], device: str) -> None:
     """Compile or load what a batch of this body and these contacts needs; what is loaded costs nothing."""
-    load_modules({kernel.module for kernel in _kernels(body, surfaces)}, device)
+    load_modules({kernel.module for kernel in batch_kernels(body, surfaces)}, device)
 
 
-def _kernels(body: Elasticity, surfaces: Sequence[ContactSurface]) -> Iterator[wp.Kernel]:
+def batch_kernels(body: Elasticity, surfaces: Sequence[ContactSurface]) -> Iterator[wp.Kernel]:
+    """Yield the kernels that a batch of this body and these contacts needs on a GPU."""
     if body.averages:
         work, exact = (averaged_kernels(body.law, real) for real in (_WORK, _EXACT))
         yield from (exact.force, exact.dilatation, work.dilatation, work.dilatation_change, work.product)
