@@ -18,28 +18,7 @@ from typing import Any
 
 from tacdata import result_cache
 
-_ALIKE = "2 presses, the labels of the shipped recording: equal to the last bit"
-EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {
-    # tacdata.skin
-    "2f4a19704c3ccbd198a77518f1c47c7232691f7b1e80e947697f15b4ff41be67": (
-        "f23772acf8b39cdd19b4780337d9e5a2523b487f548bd051922c447147eb2f07",
-        _ALIKE,
-    ),
-    # label_farm.presses: without spreads, with them
-    "051f5b9933daad0b962055d58ac9e8855a9e607e1e486b551632a410a928f75b": (
-        "cbf0faaaa3b9390957921be38ed39bc9957a17a068cc93017a69fda72a74a1e0",
-        _ALIKE,
-    ),
-    "83782b9e8182f3d9555181e76e71948ec942cdd60f4fd4b5c789cf346070c9db": (
-        "d63d0c49618d2cc98608e2a8e37f4d89fcf7e57c32d026cd4492131b959b1c8b",
-        _ALIKE,
-    ),
-    # label_farm.labels
-    "2cf6dc557bf0ff68910c1b2a0634745db8bfabeddfc88168e9c5a2ad017d55a4": (
-        "d37b1eca805f7c5638198ad65610037a5e3e31c5c3c85cf011505b8d43bf48a0",
-        _ALIKE,
-    ),
-}
+EQUAL_VERSIONS: dict[str, tuple[Any, str]] = {}
 """Version of code -> (its name in an older release, how it was shown that their results are identical).
 
 Stored labels and solutions of the older release then stay current. An entry ends by itself: whoever changes the code
