@@ -49,6 +49,7 @@ class DatasetFlow:
         if out.exists() and not ((out / folder.INFO).exists() or (out / metadata.MAIN).exists()):
             raise UsageError(f"{out} is no dataset of tacdata", "a dataset, or a new folder", "name another folder")
         self._out, self._sensor, self._labels = out, sensor, labels or file_names.folder(session)
+        # Recordings end in their number of six digits.
         self._recordings = {int(path.stem[-6:]): path for path in recordings}
         self._state = label_states.LabelledSession(session.name, tuple(path.name for path in recordings))
         self._writer: DatasetWriter | None = None
@@ -88,6 +89,7 @@ class DatasetFlow:
         header = table.read_header(label_path)["provenance"]["parents"]
         writer = self._current_writer(header["sensor"])
         self._models[header["sensor"]] = header["model"]
+        # Packed by a run that was stopped before it noted so.
         if writer is not None and header["recording"] in writer.recordings:
             return ""
         episode, label = read_episode(path), read_label(label_path)

@@ -49,6 +49,7 @@ class Recall:
                 sensor = self._sensors[skin] = Sensor.from_document(document, "label index")
                 self._made[skin, from_recording] = version_of(sensor)
             except FormatError:
+                # A skin that this release cannot read has no current label.
                 continue
 
     def prefetch(self, recordings: Sequence[Path]) -> None:
@@ -60,6 +61,7 @@ class Recall:
         row = self._row(recording.name)
         if row is None or row.made != self._made.get((row.skin, bool(row.own))):
             return None
+        # An empty stamp, or another one: the recording changed since.
         return (row, self._sensors[row.skin]) if row.source and row.source == stamp(recording) else None
 
     def note(self, row: Known, skin: Sensor) -> None:

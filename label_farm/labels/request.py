@@ -90,6 +90,7 @@ def request(episode: Episode, sensor: Sensor, model: str, ladder: Ladder) -> Lab
         )
     _check_known(episode, sensor)
     depth = episode.tip[:, 2]
+    # The first frame at full depth: a hold belongs to the way up.
     peak = int(np.argmax(depth >= depth.max() - 1e-6))
     job = None
     if _settled_depth(episode) > 0:
@@ -137,6 +138,7 @@ def _settled_depth(episode: Episode) -> float:
     deepest, nominal = float(episode.tip[:, 2].max()), float(episode.press.depth)
     if abs(deepest - nominal) <= SAME_DEPTH:
         return round(nominal, 6)
+    # Rounded up, so that no frame lies beyond the deepest state.
     return round(float(np.ceil(deepest / DEPTH_GRID - 1e-6)) * DEPTH_GRID, 6)
 
 

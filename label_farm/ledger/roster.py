@@ -74,6 +74,7 @@ class Roster:
             " (SELECT count(*) FROM job WHERE state = 1 AND job.owner = worker.owner) FROM worker ORDER BY owner"
         )
         for owner, device, done, failed, busy, began, last_sign, note, its_boot, holds in rows:
+            # Clocks of two starts of a machine cannot be compared.
             if its_boot != boot or clock - last_sign > forget or is_dead(owner):
                 self.leave(owner)
             else:

@@ -50,6 +50,7 @@ class Job:
             "x": self.x,
             "y": self.y,
             "yaw": self.yaw,
+            # Only if there are any: keys of upright presses stay those of releases without tilts.
             **{name: tilt for name in ("tilt_x", "tilt_y") if (tilt := getattr(self, name))},
             "depths": list(self.depths),
             **({"tolerance": asdict(self.tolerance)} if self.tolerance else {}),

@@ -64,6 +64,7 @@ class Guard:
                 "localhost, as no token is set",
                 ("start `tacdata farm up` with --token to be reached under other names"),
             )
+        # Browsers name the page that asks: a stranger's page must not command a service without a token.
         origin = headers.get("origin", "")
         if origin and not LOOPBACK.fullmatch(origin.partition("://")[2]):
             return 403, f"a request from the page {origin[:100]!r}", "this service's own page", "open the page itself"
@@ -74,6 +75,7 @@ async def _body(receive: Receive, limit: int) -> bytes | None:
     parts, size = [], 0
     while True:
         message = await receive()
+        # The application learns of it when it asks for more.
         if message["type"] == "http.disconnect":
             return b"".join(parts)
         parts.append(message.get("body", b""))

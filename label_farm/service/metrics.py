@@ -52,6 +52,7 @@ def exposition(farm: Mapping[str, Any], states: Iterable[str]) -> str:
         ("processor_seconds", "counter", "processor_seconds_total", "Processor time of a worker [s]."),
         ("memory", "gauge", "memory_bytes", "Memory that a worker holds [bytes]."),
     ):
+        # None until a worker has first reported it.
         rows = (row for row in workers if row[key] is not None)
         named = (({"worker": row["owner"], "device": row["device"]}, row[key]) for row in rows)
         tell(f"worker_{name}", kind, meaning, named)

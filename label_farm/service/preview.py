@@ -73,6 +73,7 @@ def picture(path: Path) -> tuple[bytes, float]:
     depth = label.depth[deepest_frame(label)]
     top = float(depth.max())
     share = depth / top if top > 0 else depth
+    # Rows of a picture run from the top: y points up, as in the sensor's frame.
     place = share.T[::-1] * (len(STOPS) - 1)
     channels = [np.interp(place, np.arange(len(STOPS)), STOPS[:, k]) for k in range(3)]
     values = np.stack(channels, axis=-1).astype(np.uint8)

@@ -72,6 +72,7 @@ def _take(foreman: Foreman, piece: _Piece) -> dict[str, Any]:
             "a new folder, or the very session that was sent before",
             "send it under another name with --to",
         )
+    # With its hash in the name: pieces of another file of this name never mix with it.
     unfinished = path.with_name(f".{piece.name}.{piece.sha256[:16]}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -119,6 +120,7 @@ def _place(foreman: Foreman, piece: _Piece) -> Path:
 
 def _append(unfinished: Path, piece: _Piece) -> int:
     have = unfinished.stat().st_size if unfinished.exists() else 0
+    # Sent twice, or after a lost piece: the answer states where to go on.
     if piece.offset != have or not piece.body:
         return have
     if have + len(piece.body) > piece.size:
@@ -134,5 +136,6 @@ def _append(unfinished: Path, piece: _Piece) -> int:
     with unfinished.open("ab") as stream:
         stream.write(piece.body)
         stream.flush()
+        # On the disk before the answer: the sender counts it as kept.
         os.fsync(stream.fileno())
     return have + len(piece.body)

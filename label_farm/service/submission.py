@@ -70,6 +70,7 @@ class Submission:
             FormatError: If it breaks the schema.
         """
         documents.check(document, "submission", origin)
+        # Fields of a later minor version are passed over.
         names = {entry.name for entry in fields(cls)}
         return cls(**{key: value for key, value in document.items() if key in names})
 
@@ -88,10 +89,12 @@ class Submissions:
                 submission = Submission.from_document(json.loads(path.read_text()), str(path))
                 self._all[submission.id] = submission
             except (ValueError, FormatError) as error:
+                # One damaged file must not keep the service from starting.
                 self.damaged.append(f"{path}: {str(error).splitlines()[0]}")
 
     def add(self, wish: Submission) -> Submission:
         """Store a submission under the next number; it is on the disk when this returns."""
+        # Numbers of files, damaged ones too: none is given twice.
         numbers = [int(p.stem) for p in self.folder.glob("*.json") if re.fullmatch("[0-9]{6}", p.stem)]
         filed = replace(wish, id=f"{max(numbers, default=0) + 1:06d}", submitted_at=now())
         self.keep(filed)

@@ -28,6 +28,7 @@ def draw_press(plan: SimulationPlan, sensor: Sensor, seed: int, number: int) -> 
     Raises:
         FormatError: If the plan's ranges hold no press that this skin can take.
     """
+    # A stream for each press: a longer dataset begins with the shorter one.
     rng = np.random.default_rng([seed, _STREAM, number])
     weights = np.array([shape.weight for shape in plan.shapes])
     reason = ""

@@ -56,6 +56,7 @@ class Shard:
         }
         for name in _GRAINED:
             grains = _joined([np.round(getattr(s, name) / GRAIN) for s in solutions], np.int32)
+            # Half the size, where all numbers fit.
             arrays[name] = grains.astype(np.int16) if np.abs(grains).max(initial=0) < 2**15 else grains
         for name in _SINGLE:
             arrays[name] = _joined([getattr(s, name) for s in solutions], np.float32)
@@ -125,6 +126,7 @@ class StoredSolutions(Mapping[int, PathSolution]):
             identity: Everything that decided the solutions.
         """
         self._identity = identity
+        # States of all presses lie one after another.
         stops = np.cumsum(arrays["states"]).tolist()
         parts = zip([0, *stops], stops, strict=False)
         self._places = {n: slice(*part) for n, part in zip(arrays["number"].tolist(), parts, strict=True)}

@@ -86,6 +86,7 @@ class LocalDesk:
 
     def offers(self) -> list[str]:
         """Return the model versions with waiting jobs, the most urgent first."""
+        # A pool's workers serve its run alone; others serve whoever asks.
         if self._versions is not None:
             return [version for version in self._versions if self.ledger.has_work(version)]
         return self.ledger.offered()
@@ -109,6 +110,7 @@ class LocalDesk:
 
     def has(self, job: Job) -> bool:
         """Return whether a job's complete result exists already."""
+        # A damaged file counts as none, so that its press is solved again.
         return self.store.intact(job)
 
     def put(self, job: Job, solution: PathSolution) -> None:
@@ -125,6 +127,7 @@ class LocalDesk:
 
     def fail(self, job: Job, failure: Failure, seconds: float = 0.0) -> None:
         """Mark a job failed, with its reason."""
+        # The reason before the mark: whoever sees the mark reads the reason.
         self.store.put_failure(job, failure)
         self.ledger.fail(job.key, self.owner, failure.reason, seconds)
 
