@@ -108,8 +108,10 @@ def run(
             pass
     finally:
         rig.stop()
-    slow = f"; this computer was too busy for --speed {rig.clock.rate:g}: the clock waited {rig.waited:.1f} s in all"
-    print("stopped" + slow * (rig.waited > NAMED), flush=True)
+    slow = (
+        f"; this computer was too busy for --speed {rig.clock.rate:g}: the clock waited {rig.host.waited:.1f} s in all"
+    )
+    print("stopped" + slow * (rig.host.waited > NAMED), flush=True)
 
 
 def _skins(options: list[str], demo: bool) -> dict[str, Sensor]:

@@ -106,8 +106,9 @@ class VirtualDemo:
             raise UsageError(f"nubs of {nub:g} mm", f"{NUBS[0]:g} to {NUBS[1]:g} mm", "choose another radius")
         self.directory, self.path, self.fault, self.seed = directory, directory / "demo_rig.yaml", fault, seed
         self.hand = replace(draw_hand(seed, task, thing), nub=nub)
-        self._host = PacedHost(directory / PACE, new=True)
-        self.clock, self.sensors = Clock.start(speed, self._host), _worn(sensor)
+        self.host = PacedHost(directory / PACE, new=True)
+        """Its computer, whose time waits for late devices."""
+        self.clock, self.sensors = Clock.start(speed, self.host), _worn(sensor)
         self.start_ns = self.clock.now_ns()
         self.layouts = {name: board_format(skin) for name, skin in self.sensors.items()}
         self.boards = {name: self._board(name, k) for k, name in enumerate(DIRECTIONS)}
@@ -169,11 +170,6 @@ class VirtualDemo:
         """Return the hand's time [s] at a time of the clock [ns]."""
         return (time_ns - self.start_ns) * 1e-9
 
-    @property
-    def waited(self) -> float:
-        """Sum of the times for which its clock waited for a late device [s, real time]."""
-        return self._host.waited
-
     def start(self) -> None:
         """Switch everything on; the rig file comes last.
 
@@ -183,7 +179,7 @@ class VirtualDemo:
         if self.path.exists():
             raise UsageError(f"{self.path} exists", "a directory without a demo rig", "choose another directory")
         self.directory.mkdir(parents=True, exist_ok=True)
-        self._host.publish()
+        self.host.publish()
         truth = {
             "version": schemas.version("virtual_demo_truth"),
             "start_ns": self.start_ns,
@@ -199,7 +195,7 @@ class VirtualDemo:
     def stop(self) -> None:
         """Switch everything off and delete the rig file, whose ports are gone."""
         self.path.unlink(missing_ok=True)
-        self._host.path.unlink(missing_ok=True)
+        self.host.path.unlink(missing_ok=True)
         for device in (*self.cameras.values(), *self.boards.values()):
             device.stop()
 

@@ -80,8 +80,9 @@ class VirtualRig:
             raise UsageError(f"speed {speed:g}", "above 0, at most 100", "choose another speed (8 suits two cores)")
         self.directory, self.path = directory, directory / "rig.yaml"
         self._lock: IO[str] | None = None
-        self._host = PacedHost(directory / PACE, new=True)
-        self.clock = Clock.start(speed, self._host)
+        self.host = PacedHost(directory / PACE, new=True)
+        """Its computer, whose time waits for late devices."""
+        self.clock = Clock.start(speed, self.host)
         self.sensor = sensor or default_sensor()
         self.truth = draw(seed, self.sensor, NOMINAL, rough)
         self._rough = rough
@@ -160,11 +161,6 @@ class VirtualRig:
             lines.append(f"camera             {self.camera.url}  {self.camera.rate:g} Hz")
         return [*lines, f"clock              {self.clock.rate:g} times real time"]
 
-    @property
-    def waited(self) -> float:
-        """Sum of the times for which its clock waited for a late device [s, real time]."""
-        return self._host.waited
-
     def start(self) -> None:
         """Switch everything on. The rig file is written last, so that its readers find the devices too.
 
@@ -172,7 +168,7 @@ class VirtualRig:
             UsageError: If another rig runs in the directory or another rig's file is there.
         """
         self._lock = _claim(self.directory, self.path)
-        self._host.publish()
+        self.host.publish()
         camera = (
             {"rate": self.camera.rate, "start_ns": self.camera.start_ns, **self.scene.document} if self.camera else None
         )
@@ -195,7 +191,7 @@ class VirtualRig:
         # Without the lock the files are those of another rig.
         if self._lock:
             self.path.unlink(missing_ok=True)
-            self._host.path.unlink(missing_ok=True)
+            self.host.path.unlink(missing_ok=True)
         for device in (self.camera, self.board, self.controller):
             if device:
                 device.stop()
