@@ -61,6 +61,11 @@ class Network(nn.Module, ABC):
         self.peak: Correction | None = None
         """Correction of each map's maximum (`training.frames.peak_process`); None without."""
 
+    @classmethod
+    def geometry(cls, sensor: Sensor) -> dict[str, Any]:
+        """Return the arguments that follow from the sensor's geometry; none by default."""
+        return {}
+
     @property
     def name(self) -> str:
         """The network's name: its file's name."""
@@ -152,7 +157,9 @@ def create(name: str, sensor: Sensor, arguments: dict[str, Any] | None = None) -
     """
     kind = registry.load(ROOM, BASE, name, Network)
     try:
-        return kind(taxels=sensor.taxels.count, map_shape=sensor.map.shape, **(arguments or {}))
+        return kind(
+            taxels=sensor.taxels.count, map_shape=sensor.map.shape, **{**kind.geometry(sensor), **(arguments or {})}
+        )
     except TypeError as error:
         raise FormatError(
             f"network {name} with arguments {arguments}: {error}",

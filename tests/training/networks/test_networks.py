@@ -73,3 +73,21 @@ def test_unknown_names_and_arguments_are_refused():
         create("papers", default_sensor())
     with pytest.raises(FormatError, match="layers"):
         create("paper", default_sensor(), {"layers": 3})
+
+
+def test_a_dent_lies_where_the_readings_are():
+    sensor = other_sensor()
+    network = create("dent", sensor)
+    with torch.no_grad():
+        network.depths.weight.zero_()
+        network.depths.bias.fill_(1.0)
+    places = torch.tensor(network.arguments["places"])
+    readings = torch.zeros(4, len(network.offsets), 15)
+    readings[0, :, 7] = readings[1, :, 3] = readings[2, :, 6] = readings[2, :, 7] = -50.0
+    maps = network(readings)
+    assert maps[3].abs().max() == 0.0
+    for number, expected in ((0, places[7]), (1, places[3]), (2, (places[6] + places[7]) / 2)):
+        pixel = torch.tensor(divmod(int(maps[number].argmax()), sensor.map.pixels_y))
+        # The outermost taxels of this grid lie outside of its map.
+        inside = torch.minimum(expected.clamp(min=0.0), torch.tensor(sensor.map.shape) - 1.0)
+        assert (pixel - inside).abs().max() <= 1.0
