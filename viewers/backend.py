@@ -1,7 +1,5 @@
 """The content of a backend's file: one class that draws a scene."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 from tacdata.viewers.scene.scene import Scene

@@ -1,7 +1,5 @@
 """Compares two folders' labels or predictions of one episode."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A layout for Foxglove, which shows a recording without our code."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

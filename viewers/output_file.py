@@ -1,7 +1,5 @@
 """Writes a new file that is whole or not there at all."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Shows a scene as a person asked: a window, a browser, or files that need no display."""
 
-from __future__ import annotations
-
 import tempfile
 import webbrowser
 from contextlib import suppress

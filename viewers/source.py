@@ -1,7 +1,5 @@
 """Makes the scene of a path of any kind."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

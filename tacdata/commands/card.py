@@ -1,7 +1,5 @@
 """Write a dataset's data card."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -14,8 +14,6 @@ verb has ``--quiet``: it prints results with ``print``, progress and the next co
 A verb joins rooms and prints; if it grows logic, a room is missing a function.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Find which physical effect a model of a sensor lacks."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Annotated

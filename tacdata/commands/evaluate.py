@@ -1,7 +1,5 @@
 """Score a trained network."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """A first look, without a rig."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Fetch a set of data by name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

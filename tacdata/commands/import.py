@@ -1,7 +1,5 @@
 """Bring foreign recordings in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

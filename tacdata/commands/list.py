@@ -1,7 +1,5 @@
 """List members of registries by name, with their parameters."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Annotated, Any
 

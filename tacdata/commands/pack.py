@@ -1,7 +1,5 @@
 """Write the labelled recordings of a session as a LeRobot dataset."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Draw the pictures of README and tutorial."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

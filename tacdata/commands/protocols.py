@@ -1,7 +1,5 @@
 """Recreate the paper's configuration-referenced evaluations on a dataset of trials."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Put the scores of training runs on one HTML page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

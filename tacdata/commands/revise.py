@@ -1,7 +1,5 @@
 """Revise a model by a verdict: add the effect, relabel, show the gap, plan presses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Solve one press with the skin model, from a case file."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """List everything that a lab has, on one page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

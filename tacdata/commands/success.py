@@ -1,7 +1,5 @@
 """Success rates of trials with their 95 % Wilson intervals."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Solve a session's presses by finite elements into a table that answers at once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

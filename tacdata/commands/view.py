@@ -1,7 +1,5 @@
 """Look at an episode."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -4,8 +4,6 @@ They lie in ``$TACDATA_CACHE`` (else ``$XDG_CACHE_HOME/tacdata``, else ``~/.cach
 dataset, and may be deleted at any time.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The data card: content, origin and gaps of a dataset, as Markdown."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Where and how deep a dataset was pressed, as a picture."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO

@@ -3,8 +3,6 @@
 A new dataset is written to a temporary folder and renamed when complete. Sources stay as they are.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import tempfile

@@ -4,8 +4,6 @@ A flag names the recording by its hash, so that it stays true when a dataset is 
 `tacdata browse` sets flags; whatever learns from a dataset leaves out `flagged_episodes`.
 """
 
-from __future__ import annotations
-
 import getpass
 import socket
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Makes the columns of a dataset from an episode and its label."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """States of a dataset's labels: which episodes are complete, failed, waiting or stale."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path

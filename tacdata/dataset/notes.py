@@ -3,8 +3,6 @@
 Like a flag, a note names the recording by its hash. Unlike a flag it takes nothing out of training.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path

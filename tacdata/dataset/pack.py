@@ -1,7 +1,5 @@
 """Packs recordings and labels into a dataset."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

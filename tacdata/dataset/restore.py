@@ -1,7 +1,5 @@
 """Restores sensors and records of a dataset that lerobot edited."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

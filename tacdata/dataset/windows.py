@@ -1,7 +1,5 @@
 """Windows of neighbouring frames for torch, from memory maps, under LeRobotDataset's keys."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 

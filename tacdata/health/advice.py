@@ -1,7 +1,5 @@
 """Advice on a unit: nothing, tare, register, check the machine, recalibrate, check wiring, replace."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

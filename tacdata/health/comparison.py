@@ -1,7 +1,5 @@
 """Comparison of two visits: changes beyond their tolerance, tested one by one and corrected for all tests."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The health of a unit as document (`schemas/health.schema.json`) and text."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

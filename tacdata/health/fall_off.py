@@ -1,7 +1,5 @@
 """How responses fall off with the distance from the tip: the effect of a displaced tip, level by level."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Figures of a unit's visits: gains over time, gains over the array, noise, zero and loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -7,8 +7,6 @@ The shift of the whole visit is the error of a registration. It has the sensor f
 noise of readings, of time, of the shift's own effect, and two relative ones (`mixed_model`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The visits of one unit in the order of time, each compared with the one before it and with the first."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Generalized least squares with two relative errors, estimated by restricted maximum likelihood (REML)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

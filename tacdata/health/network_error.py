@@ -1,7 +1,5 @@
 """Errors of a network's depth maps at a visit, press by press, and by how much they have grown."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

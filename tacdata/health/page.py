@@ -1,7 +1,5 @@
 """The health of a unit as one self-contained page of HTML."""
 
-from __future__ import annotations
-
 from shlex import quote
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Responses of the channels to one press: at shares of its depth on the way in, and at the end of the hold."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Quantities of a unit from one session alone: noise, zero, drift, loop, repeatability."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path

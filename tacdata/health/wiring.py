@@ -1,7 +1,5 @@
 """Channels that are dead, swapped, tied, stuck or no numbers, seen over all presses of a visit."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Arithmetic on columns, as a mapping writes it: ``set_point - position_error``. Only the operators below, no code."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable

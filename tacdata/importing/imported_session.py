@@ -1,7 +1,5 @@
 """Imports foreign files into a session folder, by a mapping."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import suppress

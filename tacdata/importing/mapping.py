@@ -1,7 +1,5 @@
 """A mapping as a value: names of columns, units and clocks, with every default filled in."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self

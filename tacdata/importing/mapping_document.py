@@ -1,7 +1,5 @@
 """A mapping as the document of its file: what differs from the defaults."""
 
-from __future__ import annotations
-
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 

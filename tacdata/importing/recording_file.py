@@ -1,7 +1,5 @@
 """An imported press as an MCAP file like those of `tacdata record`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Finds the files of each trial: paths with {parts} that differ from trial to trial."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A file's columns, selected as a mapping names them, as numbers in our units."""
 
-from __future__ import annotations
-
 import fnmatch
 import re
 from collections.abc import Iterable

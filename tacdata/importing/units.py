@@ -1,7 +1,5 @@
 """Units of foreign files and their conversion to mm, N, s. Taxel readings keep their unit."""
 
-from __future__ import annotations
-
 import re
 
 from tacdata.errors import FormatError

@@ -1,7 +1,5 @@
 """Estimates depth maps at the sensor's rate, by a network over a sliding window of frames."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Measures the age of estimates when they are sent."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Reads a board, estimates, and passes the estimates on: to a socket, a viewer, a person."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any

@@ -3,8 +3,6 @@
 A reader may write a line `tare`, which repeats the tare.
 """
 
-from __future__ import annotations
-
 import json
 import socket
 import threading

@@ -1,7 +1,5 @@
 """Finds the board to read: the only one of a rig, or that of one finger of a demo rig."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Blocks of words: paragraphs, lists, large figures, shares, pictures."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

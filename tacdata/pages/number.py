@@ -1,7 +1,5 @@
 """Numbers in print and in data."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

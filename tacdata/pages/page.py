@@ -1,7 +1,5 @@
 """A page: header, sections, and everything that it needs inside."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache

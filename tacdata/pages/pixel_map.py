@@ -1,7 +1,5 @@
 """Maps of values over a plane, drawn pixel by pixel; the data are in the page as JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal

@@ -1,7 +1,5 @@
 """Figures of curves and points; the data are in the page as JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal

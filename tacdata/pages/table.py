@@ -1,7 +1,5 @@
 """Tables that a reader sorts and filters."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Whether a recording or session is fit to be labelled."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata.paths import StrPath

@@ -1,7 +1,5 @@
 """Scores of a network on a dataset."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from tacdata.dataset.reader import Dataset, read_dataset

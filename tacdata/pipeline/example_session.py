@@ -1,7 +1,5 @@
 """A small recorded session that ships with tacdata."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata.example import copy_session

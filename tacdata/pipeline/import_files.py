@@ -1,7 +1,5 @@
 """Recordings from measured files of another rig."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

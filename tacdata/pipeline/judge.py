@@ -1,7 +1,5 @@
 """Which physical effect a model of a sensor lacks."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterable
 from os import PathLike

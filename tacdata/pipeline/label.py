@@ -1,7 +1,5 @@
 """Labels of a session by the finite-element model of the skin."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from functools import partial

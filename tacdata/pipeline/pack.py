@@ -1,7 +1,5 @@
 """A session with its labels as a dataset."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One press of a sensor's skin, solved by finite elements."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 

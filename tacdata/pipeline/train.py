@@ -1,7 +1,5 @@
 """A network trained on a dataset."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

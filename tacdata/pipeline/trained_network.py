@@ -1,7 +1,5 @@
 """A trained network that predicts the depth maps of an episode."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How a machine differs from a healthy one: mechanisms with their sizes, the unnamed remainder, and a control."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

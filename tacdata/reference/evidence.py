@@ -6,8 +6,6 @@ bootstrap samples of presses (BayesBag; Huggins and Miller, Bayesian Analysis 20
 loses.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations, product
 

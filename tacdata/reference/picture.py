@@ -1,7 +1,5 @@
 """The picture of a difference: both machines, their difference with the named effects, and the sizes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, BinaryIO
 

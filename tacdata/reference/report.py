@@ -1,7 +1,5 @@
 """A difference in words and as a document."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """From two machines' sessions to a folder with their difference."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Sessions of a healthy machine and of another, read together so that their channels and clocks agree."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

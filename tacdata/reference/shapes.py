@@ -1,7 +1,5 @@
 """Shapes by which a faulty machine differs from a healthy one, each a curve over the press in the readings' unit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

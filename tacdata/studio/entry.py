@@ -1,7 +1,5 @@
 """One row of the page: a session, dataset, network, verdict, revision, health page or farm."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """A label farm as an entry, by the files of its store; nothing is asked of it."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Everything that a lab has under a folder, read anew where a file has changed."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Latest readings, tip and phase of a recording that is being written."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

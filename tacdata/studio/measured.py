@@ -1,7 +1,5 @@
 """Measured files of another rig as an entry, for the import wizard."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

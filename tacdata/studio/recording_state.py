@@ -1,7 +1,5 @@
 """State of a session's recording, by its files: presses done, time left, latest fault."""
 
-from __future__ import annotations
-
 import statistics
 import time
 from dataclasses import dataclass

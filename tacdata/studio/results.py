@@ -1,7 +1,5 @@
 """What the verbs made, as entries: datasets, networks, verdicts, revisions, health pages, and others."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The page of a lab's folder, served on this computer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """A session as an entry: check's sentence, presses, labels, state of its recording."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from pathlib import Path
 

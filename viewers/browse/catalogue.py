@@ -1,7 +1,5 @@
 """The episodes of a list as a dataset of Rerun's own catalogue server, for its table of recordings and its queries."""
 
-from __future__ import annotations
-
 import socket
 import tempfile
 import time

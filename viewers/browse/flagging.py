@@ -1,7 +1,5 @@
 """Sets episodes of a list aside, or takes them back."""
 
-from __future__ import annotations
-
 from tacdata import provenance
 from tacdata.dataset.flags import clear_flag, set_flag
 from tacdata.viewers.browse.episode_list import Entry, EpisodeList

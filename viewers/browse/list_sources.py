@@ -1,7 +1,5 @@
 """Lists the episodes of a session (plan, labels, check) or of a dataset (its records)."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, replace
 from pathlib import Path
 

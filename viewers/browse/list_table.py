@@ -1,7 +1,5 @@
 """A list of episodes as lines of text."""
 
-from __future__ import annotations
-
 from tacdata.viewers.browse.episode_list import SHOWN, UNITS, Entry, EpisodeList
 
 

@@ -1,7 +1,5 @@
 """Serves an application on the loopback, to whoever knows its address."""
 
-from __future__ import annotations
-
 import secrets
 import socket
 from collections.abc import Awaitable, Callable, Iterator

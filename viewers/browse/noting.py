@@ -1,7 +1,5 @@
 """Notes on stretches of the episodes of a list."""
 
-from __future__ import annotations
-
 from tacdata.dataset.notes import Note, add_note, read_notes, remove_note
 from tacdata.errors import UsageError
 from tacdata.viewers.browse.episode_list import EpisodeList

@@ -1,7 +1,5 @@
 """A dataset folder."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@
 `ORDER`, the narrowest first.
 """
 
-from __future__ import annotations
-
 import os
 from abc import ABC, abstractmethod
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Predictions of a network, without its input data."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata.errors import TacdataError, UsageError

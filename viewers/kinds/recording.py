@@ -1,7 +1,5 @@
 """A recorded press, finished, broken off or still being written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata.viewers.kinds.kind import Kind, refuse

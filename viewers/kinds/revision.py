@@ -1,7 +1,5 @@
 """Result of `tacdata revise` on a verdict."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata.viewers.kinds.kind import Kind, refuse

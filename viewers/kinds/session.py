@@ -1,7 +1,5 @@
 """A session folder."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Fingertip targets that `tacdata export` wrote for a robot, in any of its formats."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata.errors import UsageError

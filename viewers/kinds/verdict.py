@@ -1,7 +1,5 @@
 """A verdict of `tacdata discrepancy`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata.viewers.kinds.kind import Kind, refuse

@@ -1,7 +1,5 @@
 """A running Rerun viewer that shows logged data: a window, or the web viewer on the loopback."""
 
-from __future__ import annotations
-
 import socket
 import subprocess
 import time

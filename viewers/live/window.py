@@ -1,7 +1,5 @@
 """A live view of a recording in progress, in a process of its own. It drops frames that it cannot show in time."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """Cameras of an episode: images, pinhole and the cube's pose."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Summary of a demonstration or of targets, as Markdown."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tacdata.demonstrations.compensation import contact_depth

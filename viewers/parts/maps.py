@@ -3,8 +3,6 @@
 Pressure is shown twice: that of the indenter on the skin, and that of the protrusions on the board.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of a predicted depth map that a lab reads first: peak depth and place of the contact."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Find a network's prediction for an episode."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The camera images of a recording, as many as can be looked at."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Residuals of a verdict as curves over the time of the sessions, the stream with most to see first."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tacdata.discrepancy.verdict.residual_table import Residuals

@@ -1,7 +1,5 @@
 """Curves of an episode: taxels, tip, cube, clock, force."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The skin's outer face as it deforms, and the indenter that presses it."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

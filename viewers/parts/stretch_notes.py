@@ -1,7 +1,5 @@
 """Notes of people on intervals of a recording, as intervals of its scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

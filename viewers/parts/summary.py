@@ -1,7 +1,5 @@
 """Summary of an episode, as Markdown."""
 
-from __future__ import annotations
-
 from textwrap import wrap
 
 import numpy as np

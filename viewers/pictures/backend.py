@@ -1,7 +1,5 @@
 """Draws a scene as one page (PNG) with matplotlib, without a display."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The picture of `tacdata check`: channels, timing of the stream, places of the presses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Each finger's predicted depth map in a film, below each other."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Draws a scene as a film (MP4 or GIF), without a display: skin, maps and signals as time goes by."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

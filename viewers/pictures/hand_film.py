@@ -1,7 +1,5 @@
 """A tracked hand as a film: images of the cameras, fingertips in space, maps of each fingertip."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A page as the frames of a film: all that stays is drawn once, all that moves in every frame."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, Protocol
 

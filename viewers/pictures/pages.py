@@ -1,7 +1,5 @@
 """Pages of scenes that are no episode: demonstrations, targets, verdicts, comparisons."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from textwrap import fill
 from typing import Any

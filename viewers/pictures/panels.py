@@ -1,7 +1,5 @@
 """The panels of a page."""
 
-from __future__ import annotations
-
 from itertools import groupby
 
 import numpy as np

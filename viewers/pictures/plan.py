@@ -1,7 +1,5 @@
 """The picture of `tacdata plan`: where and how deep each indenter presses, and when."""
 
-from __future__ import annotations
-
 from itertools import accumulate
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Replays of a grasp or wipe as a film: replays side by side, with the felt maps, forces and slip."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from textwrap import fill

@@ -1,7 +1,5 @@
 """The object of a replay, and its support, from the side or from above."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Rectangle

@@ -1,7 +1,5 @@
 """The skin and the indenter in three dimensions, as a panel of a page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures small enough for a repository, replacing those of before."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A demonstration on one page: each finger's path, its uncertainty, and its readings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

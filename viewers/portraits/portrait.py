@@ -3,8 +3,6 @@
 A file ``viewers/portraits/my_noun.py`` draws the class ``MyNoun``, which derives from `tacdata.display.Displayed`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence, Set
 
 import numpy as np

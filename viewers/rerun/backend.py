@@ -1,7 +1,5 @@
 """Draws scenes with Rerun, into a file that `viewers.rerun.window` or any Rerun viewer shows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import rerun as rr

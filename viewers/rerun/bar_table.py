@@ -1,7 +1,5 @@
 """Bars as a Markdown table, for viewers whose bars carry no names."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tacdata.viewers.scene.scene import Bars

@@ -1,7 +1,5 @@
 """How an episode is laid out in Rerun."""
 
-from __future__ import annotations
-
 import rerun.blueprint as rrb
 
 from tacdata.viewers.rerun.columns import entity, marks_of

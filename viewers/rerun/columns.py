@@ -4,8 +4,6 @@ Two timelines: `host_time` (estimated sample time on the host's clock) and `devi
 counter).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 

@@ -1,7 +1,5 @@
 """How a comparison is laid out in Rerun: both sides, then their difference, one timeline."""
 
-from __future__ import annotations
-
 import rerun.blueprint as rrb
 
 from tacdata.viewers.rerun.blueprint import skin_view

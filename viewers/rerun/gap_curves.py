@@ -1,7 +1,5 @@
 """The readings that `viewers.rerun.gap_recording` wrote, read back as curves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Readings measured and predicted, before and after a revision, as a Rerun file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol

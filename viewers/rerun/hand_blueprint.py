@@ -1,7 +1,5 @@
 """How a demonstration, or a robot's targets, are laid out in Rerun."""
 
-from __future__ import annotations
-
 import numpy as np
 import rerun.blueprint as rrb
 

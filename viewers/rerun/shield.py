@@ -4,8 +4,6 @@
 statistics, and load fonts and examples. A content security policy forbids it whatever it tries.
 """
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Iterator

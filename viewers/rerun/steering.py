@@ -5,8 +5,6 @@ to its page. The script takes the moment from the address (``at=TIMELINE@NANOSEC
 It sends that page the moment to show.
 """
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from dataclasses import dataclass

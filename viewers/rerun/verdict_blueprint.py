@@ -1,7 +1,5 @@
 """How a verdict or a revision is laid out in Rerun."""
 
-from __future__ import annotations
-
 import rerun.blueprint as rrb
 
 from tacdata.viewers.parts.residual_curves import READINGS, RESIDUALS

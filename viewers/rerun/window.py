@@ -1,7 +1,5 @@
 """Opens a Rerun file in a window or a browser, on this machine only and without usage statistics."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -1,7 +1,5 @@
 """From a value to a colour, the same in every backend and readable with any colour vision."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which moments of a scene a still picture shows."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tacdata.viewers.scene.scene import DepthMaps, Scene

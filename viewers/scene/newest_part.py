@@ -1,7 +1,5 @@
 """The newest part of a scene, for a live viewer that has shown the rest."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The options of a person who wants to see a path."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Normals and axes that backends need to draw a scene in three dimensions."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -1,7 +1,5 @@
 """Objects of a scene in space, as plain arrays: skins, bodies, paths, clouds of points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which rows of a long recording are drawn: few enough to stay light, chosen so that peaks stay in sight."""
 
-from __future__ import annotations
-
 import numpy as np
 
 MAPS, CURVES, ARRAYS, IMAGES = 600, 6000, 3000, 900

@@ -1,7 +1,5 @@
 """The scene of a comparison: two sides of the same frames and their difference."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

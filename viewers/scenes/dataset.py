@@ -1,7 +1,5 @@
 """The scene of an episode of a dataset, with a network's prediction."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tacdata.dataset.format import features

@@ -1,7 +1,5 @@
 """The scene of a recording, its label and a prediction. The summary lists missing parts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 

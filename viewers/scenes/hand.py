@@ -1,7 +1,5 @@
 """The scene of a demonstration or of a robot's targets: fingers in the world, in mm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

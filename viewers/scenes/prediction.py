@@ -1,7 +1,5 @@
 """The scene of a prediction alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tacdata.sensor import Sensor

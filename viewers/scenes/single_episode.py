@@ -1,7 +1,5 @@
 """One episode of a dataset, read without its neighbours."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The scene of a discrepancy verdict or of a revision."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Shared by the verbs of ``tacdata dataset``: numbers of episodes as typed, and printed lines."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Sequence
 

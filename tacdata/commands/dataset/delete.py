@@ -1,7 +1,5 @@
 """Leave episodes out of a dataset."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

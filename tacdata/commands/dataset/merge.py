@@ -1,7 +1,5 @@
 """Write datasets below each other as one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Restore fields that lerobot's edit tools dropped."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Write parts of a dataset as datasets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Take a submission back."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

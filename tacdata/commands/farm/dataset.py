@@ -1,7 +1,5 @@
 """Say which episodes of a dataset are labelled by the current model."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Bring finished labels from a label service to this computer."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Change a submission's priority."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

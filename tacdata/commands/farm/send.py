@@ -1,7 +1,5 @@
 """Bring a session of this computer to a label service that cannot see its folder."""
 
-from __future__ import annotations
-
 from pathlib import Path, PurePath
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Say how far a label service is."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import typer

@@ -1,7 +1,5 @@
 """Ask a label service for the labels of a session."""
 
-from __future__ import annotations
-
 import getpass
 import socket
 from typing import Annotated

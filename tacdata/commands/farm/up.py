@@ -1,7 +1,5 @@
 """Start the label service."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Work for a label service from this computer."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

@@ -1,7 +1,5 @@
 """Names, shapes and units of a dataset's columns, in LeRobot's terms."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The files of a LeRobot v3.0 folder: their names, columns and metadata."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Statistics of an episode and of a dataset, in the shapes that LeRobot expects."""
 
-from __future__ import annotations
-
 import numpy as np
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}

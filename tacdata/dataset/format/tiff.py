@@ -1,7 +1,5 @@
 """Depth maps as float32 TIFF 6.0 images, a whole episode at a time: one strip, no compression."""
 
-from __future__ import annotations
-
 import io
 import struct
 

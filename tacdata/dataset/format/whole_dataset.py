@@ -1,7 +1,5 @@
 """A LeRobot v3.0 folder of any features, written at once."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

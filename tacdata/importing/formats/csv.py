@@ -1,7 +1,5 @@
 """Text files of columns: CSV, TSV, semicolons, blanks; with or without a header; point or comma as decimal sign."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import re

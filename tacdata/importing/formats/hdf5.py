@@ -1,7 +1,5 @@
 """HDF5 files, and MATLAB files of version 7.3, which are HDF5: groups of arrays of one length are tables."""
 
-from __future__ import annotations
-
 import math
 import os
 import posixpath

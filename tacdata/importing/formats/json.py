@@ -1,7 +1,5 @@
 """JSON: columns by name, rows by name, or rows alone; JSON Lines with a row a line."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """MATLAB files: variables, structures and arrays of structures; those of version 7.3 are read as HDF5."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """NumPy archives: .npz (one column or table an array) and .npy (one table)."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Parquet and Feather tables."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

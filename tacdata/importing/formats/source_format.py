@@ -4,8 +4,6 @@
 reads a file into a `SourceTable`: named columns as they stand in the file, nothing converted or filled in.
 """
 
-from __future__ import annotations
-
 import gc
 import traceback
 import zipfile

@@ -1,7 +1,5 @@
 """TDMS files of LabVIEW: channels of one group, of one length and step, are a table."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

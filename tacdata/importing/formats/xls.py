@@ -1,7 +1,5 @@
 """Excel workbooks of before 2007 (.xls): as those of today."""
 
-from __future__ import annotations
-
 import io
 import re
 from pathlib import Path

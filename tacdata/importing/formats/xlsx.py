@@ -1,7 +1,5 @@
 """Excel workbooks (.xlsx): one sheet as a table, its cells as Excel last computed them."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Zarr stores, versions 2 and 3, such as those of Open-X-Tactile (FTP-1): a folder of arrays that share their rows."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Numbers that stand for no value: overload codes of instruments, and the rails of a converter."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Rows that a logger wrote twice: equal to the row before, or to an earlier one, in every column with the time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

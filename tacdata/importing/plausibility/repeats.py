@@ -1,7 +1,5 @@
 """Readings that repeat the row before although they have noise: a logger without a new reading writes the last one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

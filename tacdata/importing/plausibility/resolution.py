@@ -1,7 +1,5 @@
 """Times that were stored in floating-point numbers too short for them, as 32 bits hold Unix seconds to 128 s."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

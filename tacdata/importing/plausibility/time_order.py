@@ -5,8 +5,6 @@ order. A larger one is the wrap of a counter, a wrong time in a few rows, or a r
 begins. Where rows of several recordings alternate, no order can be restored and the file is refused.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

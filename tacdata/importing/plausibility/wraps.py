@@ -1,7 +1,5 @@
 """Readings of a counter or converter that wrap: 0 follows 65535, or a signed number was read without its sign."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

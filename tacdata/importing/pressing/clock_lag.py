@@ -1,7 +1,5 @@
 """Two clocks that do not agree: readings that lead or lag the position, or drift away from it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

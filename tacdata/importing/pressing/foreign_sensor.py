@@ -1,7 +1,5 @@
 """Describes a foreign sensor as a `Sensor`; unknown values are stand-ins and marked as such."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tacdata import schemas

@@ -3,8 +3,6 @@
 The readings decide. At a real rest they do not go on as in a motion, and they do not rise and come back.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Numbers and words of a trial that its mapping gives: constant, from a path, or from a column."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -4,8 +4,6 @@ A logger that misses a reading writes 0 or an old value, and a log that stops hi
 before presses are cut. The readings of the channels decide: a real motion changes them, a dropout does not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derives a press from the path of an indenter: depth, speed and phases."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cuts the rows of one trial into recordings of single presses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime

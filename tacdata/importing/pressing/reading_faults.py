@@ -1,7 +1,5 @@
 """Faults of readings that show only against the depth: a zero that jumps at rest, and a channel that saturates."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The channels' readings at rest from recording to recording: an offset that was set in between shows there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """A press schedule in place of a measured position: the commanded path from times, depths and speeds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 

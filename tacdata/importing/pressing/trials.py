@@ -1,7 +1,5 @@
 """Splits one set of files into recordings: by a column, by a pause, or by press."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise

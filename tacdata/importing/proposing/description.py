@@ -1,7 +1,5 @@
 """Contents of foreign files: one table of each kind, and a listing for a person."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any

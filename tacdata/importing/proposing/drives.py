@@ -1,7 +1,5 @@
 """Substitutes for a missing depth or rate, and columns that separate strokes instead of trials."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A kind of file as an entry of the mapping: its path, its parts, its clock."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Kinds of files: paths that differ by a number, its sign, or a word are one kind."""
 
-from __future__ import annotations
-
 import re
 from itertools import takewhile
 from pathlib import PurePath

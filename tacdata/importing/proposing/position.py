@@ -1,7 +1,5 @@
 """The position of a press and its consequences: sign, contact, and the end of a trial."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field, replace
 from itertools import pairwise

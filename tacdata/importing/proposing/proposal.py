@@ -1,7 +1,5 @@
 """Proposes a mapping for foreign files, and asks a person for values that the files lack."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A value that a person has to give or to check."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

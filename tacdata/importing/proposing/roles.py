@@ -1,7 +1,5 @@
 """The role of each column of a foreign table, by its name, its unit and its values."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

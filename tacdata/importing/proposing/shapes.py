@@ -1,7 +1,5 @@
 """Shapes of columns over time: a drive, a reading, or no signal at all."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

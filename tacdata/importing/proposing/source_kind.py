@@ -1,7 +1,5 @@
 """A kind of file with its name in the mapping and a role for each column."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path

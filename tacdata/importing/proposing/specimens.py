@@ -1,7 +1,5 @@
 """Specimen and place of a press, as columns or the paths of files state them."""
 
-from __future__ import annotations
-
 import re
 
 from tacdata.importing.mapping import KnownValue

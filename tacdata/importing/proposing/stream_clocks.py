@@ -1,7 +1,5 @@
 """Clocks of streams that share a table: each column has the clock before it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tacdata.importing.mapping import Axis, PositionEntry, SourceClock

@@ -1,7 +1,5 @@
 """How the pressing axis moves: its sign, its pauses and its strokes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Parts of one trial in several files or sheets, as of a ramp and a hold."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from itertools import pairwise, permutations

@@ -1,7 +1,5 @@
 """A proposed mapping, tried on some of the files: its recordings in figures, and its faults."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The encoding of a text that is not UTF-8, by its bytes and by words of measurement."""
 
-from __future__ import annotations
-
 import re
 
 ENCODINGS = {

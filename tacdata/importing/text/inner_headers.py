@@ -1,7 +1,5 @@
 """Headers among the rows: repeated ones are left out, and a header of another table is refused."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Recognizes how a text file of numbers is laid out: delimiter, decimal sign, header and units."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections import Counter

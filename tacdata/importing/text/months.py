@@ -1,7 +1,5 @@
 """Names of months in several languages, as the English abbreviations that dates are read by."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 

@@ -1,7 +1,5 @@
 """Lines of serial monitors as columns: a time before an arrow, or a name before each value."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """The rate that a text states above its rows."""
 
-from __future__ import annotations
-
 import re
 
 STATED_RATE = re.compile(

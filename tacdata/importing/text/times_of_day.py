@@ -1,7 +1,5 @@
 """Times of day and durations, as texts or as numbers, in seconds."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers that a table holds as texts: with a decimal comma, signs between thousands, or a unit in each cell."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

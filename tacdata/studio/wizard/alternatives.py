@@ -1,7 +1,5 @@
 """The answers to an open question, each as a change of the choices."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

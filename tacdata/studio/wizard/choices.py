@@ -1,7 +1,5 @@
 """Everything that a person may choose on the page."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from tacdata.importing.mapping import TrialRule

@@ -1,7 +1,5 @@
 """Choices of a mapping, and the mapping of choices."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from tacdata import documents

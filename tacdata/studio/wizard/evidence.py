@@ -1,7 +1,5 @@
 """The grounds of a column's role: its name, its unit, its course over time."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Presses that a mapping gives, as figures of the page kit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The import wizard's page, served on this computer."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from importlib.resources import files
 from threading import Lock

@@ -1,7 +1,5 @@
 """Files, their first rows and their columns, for the page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of files that were read before: a changed role reads no file again."""
 
-from __future__ import annotations
-
 from tacdata.importing.source_files import FileSet
 from tacdata.importing.source_table import SourceTable
 

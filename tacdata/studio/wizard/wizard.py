@@ -1,7 +1,5 @@
 """A source on its way to a mapping: proposal, choices, the mapping's file, the session."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
