@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import RECORD, Result
+from tacdata.errors import UsageError
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ def run(
     model: Annotated[str, typer.Option(help="auto, k1k2p1p2, k1k2p1p2k3 or rational.")] = "auto",
 ) -> Result:
     """Estimate a camera's intrinsics from images, a video or a live camera; --draw makes the board."""
-    from tacdata.errors import UsageError
     from tacdata.tags.board import read_board
 
     if draw:
@@ -104,7 +104,6 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
     from PIL import Image
 
     from tacdata import documents
-    from tacdata.errors import UsageError
     from tacdata.tags.board import DPI, Board, draw_board, printable
 
     if target.suffix.lower() not in (".pdf", ".png"):
@@ -140,7 +139,6 @@ def _watch(source: str, board: Board, size: str, views: int) -> ViewPicker:
     """Watch a live camera until there are enough views, or Ctrl-C."""
     from tacdata.clock import Clock
     from tacdata.devices.opencv_camera import OpencvCamera
-    from tacdata.errors import UsageError
     from tacdata.tags.calibration.intrinsics import coverage_of
     from tacdata.tags.calibration.view_picker import ViewPicker
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import RECORD, Result
+from tacdata.errors import UsageError
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -43,7 +44,6 @@ def run(
     import numpy as np
 
     from tacdata import documents
-    from tacdata.errors import UsageError
 
     if out.exists():
         raise UsageError(f"{out} exists", "a new file; calibrations are not overwritten", "choose another --out")

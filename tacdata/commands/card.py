@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import DATA, Result
+from tacdata.errors import UsageError
 
 ORDER = 70
 PANEL = DATA
@@ -27,7 +28,6 @@ def run(
     from tacdata import documents
     from tacdata.dataset import card, coverage_picture
     from tacdata.dataset.reader import read_dataset
-    from tacdata.errors import UsageError
 
     if out and out.exists():
         raise UsageError(f"{out} exists", "a new folder; nothing is overwritten", "choose another --out")

@@ -8,6 +8,7 @@ import typer
 
 from tacdata import progress
 from tacdata.commands.command import FIND, Result
+from tacdata.errors import TacdataError, UsageError
 
 ORDER = 10
 PANEL = FIND
@@ -68,7 +69,6 @@ def run(
 def _solved(recordings: list[Path], spec: Path | None, target: Path) -> Path:
     """Solve the presses of the recordings; return the spec that starts from it."""
     from tacdata.commands import surrogate
-    from tacdata.errors import UsageError
 
     if spec is not None or target.exists():
         raise UsageError(
@@ -93,7 +93,6 @@ def _healthy(spec: Path | None) -> list[Path]:
 
 def _compared(recordings: list[Path], healthy: list[Path], target: Path, spec: Path | None, fem: bool) -> Result:
     """Compare with a healthy machine, print and write it."""
-    from tacdata.errors import UsageError
     from tacdata.reference.run import compare, write
 
     if spec is not None or fem:
@@ -112,7 +111,6 @@ def _compared(recordings: list[Path], healthy: list[Path], target: Path, spec: P
 
 def _between(recordings: list[Path]) -> str:
     """Return in a sentence whether the first session differs from the others."""
-    from tacdata.errors import TacdataError
     from tacdata.reference.report import sentence
     from tacdata.reference.run import compare
 

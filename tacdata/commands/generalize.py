@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import LEARN, Result
+from tacdata.errors import UsageError
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ def run(
     A split that the dataset does not allow, for example by specimen where there is one, is named with the reason.
     """
     from tacdata import documents
-    from tacdata.errors import UsageError
     from tacdata.training.frames.data import read_frames
     from tacdata.training.generalization import DEFAULTS, generalize, run_name
     from tacdata.training.reports.report_page import Scored, page

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import HANDS, Result
+from tacdata.errors import UsageError
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ def run(
     A network is trained on solved presses of other spheres and ellipsoids. Every trial goes through readings alone.
     """
     from tacdata import documents
-    from tacdata.errors import UsageError
     from tacdata.grasping import picture, result
     from tacdata.grasping.fingertip import fingertip_sensor
     from tacdata.grasping.press_set import FOLDER, read_presses

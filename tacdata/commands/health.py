@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import RECORD, Result
-from tacdata.errors import Exit
+from tacdata.errors import Exit, UsageError
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -70,7 +70,6 @@ def _network_errors(model: Path, visits: list[Visit]) -> dict[str, NetworkError]
     import numpy as np
 
     from tacdata.dataset import pack
-    from tacdata.errors import UsageError
     from tacdata.health.network_error import NetworkError
     from tacdata.labels import file_names, read_label
     from tacdata.training.frames.data import read_frames

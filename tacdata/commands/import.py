@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import DATA, Result
-from tacdata.errors import Exit
+from tacdata.errors import Exit, UsageError
 from tacdata.progress import say, suggest
 
 ORDER = 10
@@ -76,7 +76,6 @@ def _together(notes: tuple[str, ...]) -> list[str]:
 
 def _inspect(source: Path, propose: Path | None) -> Result:
     from tacdata import documents
-    from tacdata.errors import UsageError
     from tacdata.importing.proposing.description import described
     from tacdata.importing.proposing.proposal import proposed_mapping
     from tacdata.importing.proposing.trial_run import tried

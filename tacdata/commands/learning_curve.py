@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import LEARN, Result
+from tacdata.errors import UsageError
 from tacdata.progress import say
 
 if TYPE_CHECKING:
@@ -47,7 +48,6 @@ def run(
     threads: Annotated[int | None, typer.Option(min=1, help="CPU threads; default: one a core, 4 at most.")] = None,
 ) -> Result:
     """Draw the learning curve: the error on presses held out, over the number of presses trained on."""
-    from tacdata.errors import UsageError
     from tacdata.training.frames.data import read_frames
     from tacdata.training.pretraining.curve_picture import draw, table
     from tacdata.training.pretraining.learning_curve import FILE, learning_curve

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import START, Result
+from tacdata.errors import UsageError
 
 ORDER = 90
 PANEL = START
@@ -21,7 +22,6 @@ def run(
     demonstration: Annotated[Path | None, typer.Option(help="A tracked demonstration, for its page too.")] = None,
 ) -> Result:
     """Draw the pictures of README and tutorial from the files of the demo: small enough for the repository."""
-    from tacdata.errors import UsageError
     from tacdata.viewers.browse.list_sources import episodes_at
     from tacdata.viewers.pictures.small_pictures import small_film, small_page
     from tacdata.viewers.source import scene_at

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tacdata.commands.command import RECORD, Result
+from tacdata.errors import UsageError
 from tacdata.progress import suggest
 
 if TYPE_CHECKING:
@@ -39,7 +40,6 @@ def run(
 ) -> Result:
     """Write a press plan (training, evaluation, diagnostic, or a recipe of yours), with a summary and a picture."""
     from tacdata import documents
-    from tacdata.errors import UsageError
     from tacdata.plans import Plan
     from tacdata.recording.motion.plan_time import plan_time
     from tacdata.sensor import default_sensor, read_sensor
@@ -75,7 +75,6 @@ def _document(
     what: str, skin: Sensor, presses: int | None, seed: int, indenter: list[str] | None
 ) -> tuple[dict[str, Any], bool]:
     """Return the plan's document, and whether it was read unchanged from a plan's file."""
-    from tacdata.errors import UsageError
     from tacdata.plans.recipe import write_out
     from tacdata.plans.shipped.shipped_plan import PlanOptions, shipped_plan
 

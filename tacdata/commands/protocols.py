@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import LEARN, Result
+from tacdata.errors import UsageError
 
 ORDER = 40
 PANEL = LEARN
@@ -31,7 +32,6 @@ def run(
     """
     from tacdata import documents
     from tacdata.dataset.reader import read_dataset
-    from tacdata.errors import UsageError
     from tacdata.training.frames.data import frames_of
     from tacdata.training.inference import checkpoint
     from tacdata.training.reports.protocol_sheet import markdown

@@ -11,7 +11,7 @@ import typer
 
 from tacdata import progress
 from tacdata.commands.command import RECORD, Result, before_it_moves
-from tacdata.errors import Exit
+from tacdata.errors import Exit, UsageError
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
@@ -63,8 +63,6 @@ def run(
         named = [k for k, v in unwanted.items() if v is not None]
         return _by_hand(rig, out, task, seconds, demonstrations, resume, named)
     if plan is None:
-        from tacdata.errors import UsageError
-
         raise UsageError("no --plan", "a plan file, or --demo", "make one with tacdata plan")
     with before_it_moves():
         from contextlib import nullcontext
@@ -131,7 +129,6 @@ def _by_hand(
     rig: Path, folder: Path, task: str, seconds: float | None, count: int, resume: bool, unwanted: list[str]
 ) -> Result:
     from tacdata.demonstrations.recording.by_hand import record_by_hand
-    from tacdata.errors import UsageError
 
     if unwanted:
         raise UsageError(f"--demo with {', '.join(unwanted)}", "--rig, --out, --task", "the demo rig names the sensors")
@@ -163,8 +160,6 @@ def _mounting(rig: Rig, bar: _Bar) -> Callable[[Press], None]:
         return lambda press: mount(rig.document, press.indenter.document, **press.angles)
 
     def ask(press: Press) -> None:
-        from tacdata.errors import UsageError
-
         bar.pause()
         sizes = ", ".join(f"{k} {v:g}" for k, v in press.indenter.document.items() if k != "shape")
         print(f"\nMount {press.indenter_name} ({press.indenter.shape}; {sizes}) at {press.turned}.")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import RECORD, Result
+from tacdata.errors import Exit
 
 ORDER = 50
 PANEL = RECORD
@@ -21,7 +22,6 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")] = None,
 ) -> Result:
     """Write a repaired copy of a recording that a crash cut off: 0 if all is there, 3 with a loss, 1 if nothing is."""
-    from tacdata.errors import Exit
     from tacdata.recording.files.recover import recover
 
     result = recover(file, out)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tacdata.commands.command import RECORD, Result, before_it_moves
-from tacdata.errors import Exit
+from tacdata.errors import Exit, UsageError
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
@@ -76,7 +76,6 @@ def run(
 
 
 def _specimen(name: str) -> dict[str, Any]:
-    from tacdata.errors import UsageError
     from tacdata.plans.specimens import specimens
 
     document = specimens((name,))[name]
@@ -90,8 +89,6 @@ def _specimen(name: str) -> dict[str, Any]:
 
 
 def _check(settings: RegistrationSettings, sensor: Sensor, target: Path) -> None:
-    from tacdata.errors import UsageError
-
     if target.exists():
         raise UsageError(
             f"{target} exists", "a new file; nothing is overwritten", "move it away, or choose another --out"
@@ -148,7 +145,6 @@ def _touch(
     motion: GuardedMotion,
     interruption: Interruption,
 ) -> tuple[dict[str, Any], str]:
-    from tacdata.errors import UsageError
     from tacdata.registration.contact_search import LIFT_SPEED
     from tacdata.registration.guarded_probe import guarded_probe
     from tacdata.registration.procedure import described, register
@@ -181,8 +177,6 @@ def _mount(rig: Rig, specimen: dict[str, Any]) -> None:
 
         mount(rig.document, specimen)
         return
-    from tacdata.errors import UsageError
-
     if not _agreed(f"Mounted: a sphere of radius {specimen['radius']:g} mm? [y/N] "):
         raise UsageError("the indenter was not mounted", "yes", "nothing was moved; start again when it sits")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tacdata.commands.command import HANDS, Result
+from tacdata.errors import UsageError
 
 if TYPE_CHECKING:
     from tacdata.demonstrations.demonstration import Demonstration
@@ -74,7 +75,6 @@ def run(
     from tacdata import documents
     from tacdata.demonstrations.compensation import read_gains
     from tacdata.demonstrations.paths.tracks_file import read_tracks
-    from tacdata.errors import UsageError
     from tacdata.replay.comparison.gain_search import GripDemand
     from tacdata.replay.comparison.trials import Trials, challenged, result, sweep
     from tacdata.replay.robot import read_robot

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import LEARN, Result
+from tacdata.errors import UsageError
 from tacdata.progress import say
 
 ORDER = 30
@@ -36,7 +37,6 @@ def run(
     """
     from tacdata import documents
     from tacdata.dataset.reader import read_dataset
-    from tacdata.errors import UsageError
     from tacdata.training.frames.data import frames_of, read_frames
     from tacdata.training.frames.frames import Frames
     from tacdata.training.inference import checkpoint

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import HANDS, Result
+from tacdata.errors import UsageError
 
 ORDER = 60
 PANEL = HANDS
@@ -30,7 +31,6 @@ def run(
 
     A CSV file has the columns condition and success, and may have position and adjustments.
     """
-    from tacdata.errors import UsageError
     from tacdata.training.scoring import success
 
     if not trials and not paper:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import HANDS, Result
+from tacdata.errors import UsageError
 from tacdata.progress import say, suggest
 
 if TYPE_CHECKING:
@@ -47,7 +48,6 @@ def run(
     from tacdata.demonstrations.paths.tracks_file import path_of, read_tracks, write_tracks
     from tacdata.demonstrations.recording.reader import read_demo
     from tacdata.demonstrations.recording.session import read_demo_session
-    from tacdata.errors import UsageError
 
     if not path.exists():
         raise UsageError(f"no {path}", "a folder that record --demo wrote, or one of its recordings", "check the path")
@@ -126,7 +126,6 @@ def _draw(demonstration: Demonstration, recording: Path) -> None:
 def _estimators(options: list[str]) -> dict[str, Estimator]:
     """Read the networks that --network names: finger -> estimator, `ALL` for one without finger."""
     from tacdata.demonstrations.paths.estimator import ALL
-    from tacdata.errors import UsageError
 
     estimators: dict[str, Estimator] = {}
     for words in options:

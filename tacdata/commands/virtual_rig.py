@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata.commands.command import RECORD
+from tacdata.errors import UsageError
 
 if TYPE_CHECKING:
     from tacdata.sensor import Sensor
@@ -64,7 +65,6 @@ def run(
     ] = None,
 ) -> None:
     """Emulate a rig (GRBL, taxel board, camera) that other verbs reach by its rig.yaml, until Ctrl-C."""
-    from tacdata.errors import UsageError
     from tacdata.virtual_rig.rig import VirtualRig
     from tacdata.virtual_rig.world.hidden import hidden_from
 
@@ -116,7 +116,6 @@ def run(
 
 def _skins(options: list[str], demo: bool) -> dict[str, Sensor]:
     """Read the sensor files of --sensor: finger -> sensor. A file without finger is for all that are not named."""
-    from tacdata.errors import UsageError
     from tacdata.sensor import read_sensor
     from tacdata.virtual_rig.world.hand import DIRECTIONS
 

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from tacdata.commands.command import Result
+from tacdata.errors import UsageError
 from tacdata.progress import suggest
 
 ORDER = 30
@@ -24,7 +25,6 @@ def run(
     """Write parts of a dataset as datasets of their own, by lerobot's tool, with sensors and records kept."""
     from tacdata.commands.dataset.command import counted, lacking, numbers
     from tacdata.dataset.edit import split
-    from tacdata.errors import UsageError
 
     parts: dict[str, list[int]] = {}
     for entry in part:

@@ -7,6 +7,7 @@ import typer
 
 from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
+from tacdata.errors import SolveError
 from tacdata.progress import suggest
 
 ORDER = 35
@@ -28,7 +29,6 @@ def run(
     """Copy finished labels to SESSION/labels; run again, it copies new ones."""
     from time import sleep
 
-    from tacdata.errors import SolveError
     from tacdata.label_farm.remote.client import Client
     from tacdata.label_farm.remote.fetch import Fetch
 

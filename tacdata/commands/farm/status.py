@@ -6,6 +6,7 @@ import typer
 
 from tacdata.commands.command import Result
 from tacdata.commands.farm import command as service
+from tacdata.errors import SolveError, UsageError
 from tacdata.progress import suggest
 
 ORDER = 30
@@ -21,7 +22,6 @@ def run(
     """Print submissions, their progress, the workers, and reasons of failed presses."""
     from time import sleep
 
-    from tacdata.errors import SolveError, UsageError
     from tacdata.label_farm.remote.client import Client
 
     client = Client(url, token)
