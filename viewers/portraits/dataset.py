@@ -1,23 +1,15 @@
 """A dataset: how deep its episodes are, and the deepest frame of it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure
 
+from tacdata.dataset import Dataset
+from tacdata.dataset.format import features
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.dataset import Dataset
 
 
 def portrait(noun: Dataset) -> Figure:
     """Draw the depth of the tip in each episode and the deepest labelled map."""
-    from tacdata.dataset.format import features
-
     figure = parts.figure()
     left, right = figure.subplots(1, 2)
     tip = noun[features.TIP]

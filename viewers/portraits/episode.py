@@ -1,17 +1,10 @@
 """An episode: readings and tip depth over time, and the label where it is deepest."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure
 
+from tacdata.recording.episode import Episode
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.recording.episode import Episode
 
 
 def portrait(noun: Episode) -> Figure:

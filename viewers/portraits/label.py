@@ -1,15 +1,9 @@
 """A label: the deepest map, its error, and force and depth over time."""
 
-from __future__ import annotations
+from matplotlib.figure import Figure
 
-from typing import TYPE_CHECKING
-
+from tacdata.labels import Label
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.labels import Label
 
 
 def portrait(noun: Label) -> Figure:

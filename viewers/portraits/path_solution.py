@@ -1,17 +1,10 @@
 """A solved press: the deepest map, and force over depth on the way down and up."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure
 
+from tacdata.labels import PathSolution
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.labels import PathSolution
 
 
 def portrait(noun: PathSolution) -> Figure:

@@ -1,15 +1,9 @@
 """A plan: where it presses, and how deep."""
 
-from __future__ import annotations
+from matplotlib.figure import Figure
 
-from typing import TYPE_CHECKING
-
+from tacdata.plans import Plan
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.plans import Plan
 
 
 def portrait(noun: Plan) -> Figure:

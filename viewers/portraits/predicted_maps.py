@@ -1,17 +1,10 @@
 """The maps that a network predicts for an episode: the deepest of them, and the greatest depth over time."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure
 
+from tacdata.training.inference.prediction import PredictedMaps
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.training.inference.prediction import PredictedMaps
 
 
 def portrait(noun: PredictedMaps) -> Figure:

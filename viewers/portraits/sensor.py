@@ -1,17 +1,10 @@
 """A sensor from above: the skin, its taxels by number, and the area of depth maps."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from tacdata.sensor import Sensor
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.sensor import Sensor
 
 
 def portrait(noun: Sensor) -> Figure:

@@ -1,15 +1,9 @@
 """A session: where its plan presses, how deep, and which presses are recorded."""
 
-from __future__ import annotations
+from matplotlib.figure import Figure
 
-from typing import TYPE_CHECKING
-
+from tacdata.recording.session import Session
 from tacdata.viewers.portraits import portrait as parts
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from tacdata.recording.session import Session
 
 
 def portrait(noun: Session) -> Figure:
