@@ -1,10 +1,12 @@
 """How an episode is laid out in Rerun."""
 
+from typing import Any
+
 import rerun.blueprint as rrb
 
-from tacdata.viewers.rerun.columns import entity, marks_of
-from tacdata.viewers.rerun.timelines import HOST
-from tacdata.viewers.scene.scene import Scene
+from tacdata.viewers.rerun.columns import entity, heat_map_of, marks_of
+from tacdata.viewers.rerun.timelines import ELAPSED, HOST
+from tacdata.viewers.scene.scene import Scene, TaxelArray
 
 MAP_TITLES = {
     "label": "Label: depth, 0 to {high:g} mm",
@@ -23,6 +25,10 @@ EYE = (-10.0, -16.5, 14.0)
 """Where the skin is seen from [mm]."""
 
 
+Rows = list[tuple[float, rrb.ContainerLike]]
+"""Rows of a page from above, each with its share of the height."""
+
+
 def episode_blueprint(scene: Scene, follows: bool = False, stands: bool = False) -> rrb.Blueprint:
     """Return the layout for one episode: skin, maps and curves in rows, text and cameras next to them.
 
@@ -32,34 +38,57 @@ def episode_blueprint(scene: Scene, follows: bool = False, stands: bool = False)
         stands: Whether time is fixed by an address.
     """
     skins = [skin_view(s.name, SKIN_TITLES[s.name], scene) for s in scene.surfaces]
-    rows: list[rrb.ContainerLike] = [rrb.Horizontal(*skins)]
-    if scene.clouds:
-        rows = [rrb.Tabs(rrb.Horizontal(*skins, name="Skin"), _contact())]
-    shares = [7.0]
+    skin_row = rrb.Tabs(rrb.Horizontal(*skins, name="Skin"), _contact()) if scene.clouds else rrb.Horizontal(*skins)
+    rows: Rows = [(7.0, skin_row)]
     if scene.maps:
-        rows.append(rrb.Horizontal(*[_map(m.name, m.scale.high) for m in scene.maps], _heat_map(scene)))
-        shares.append(5.0)
-    rows.append(_curves(scene))
-    shares.append(5.0)
+        maps = [map_view(m.name, MAP_TITLES[m.name].format(high=m.scale.high)) for m in scene.maps]
+        rows.append((5.0, rrb.Horizontal(*maps, _heat_map(scene))))
+    rows.append((5.0, _curves(scene)))
     if scene.phases or scene.notes:
         name = " and ".join(word for word, content in (("Phases", scene.phases), ("notes", scene.notes)) if content)
-        rows.append(rrb.StateTimelineView(origin="/", contents=["phase", "notes"], name=name))
-        shares.append(3.8 if scene.phases and scene.notes else 2.2)
-    main = rrb.Vertical(*rows, row_shares=shares)
-    return rrb.Blueprint(
-        rrb.Horizontal(main, _side(scene), column_shares=[3, 1]),
-        _time_panel(follows, stands),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-    )
+        states = rrb.StateTimelineView(origin="/", contents=["phase", "notes"], name=name)
+        rows.append((3.8 if scene.phases and scene.notes else 2.2, states))
+    side = [*about_and_cameras(scene), *([] if scene.maps else [_heat_map(scene)])]
+    play: dict[str, Any] = {"loop_mode": "All"}
+    if stands or follows:
+        play = {"play_state": "paused" if stands else "following"}
+    return in_rows(rows, side, rrb.TimePanel(timeline=HOST, state="collapsed", **play))
 
 
-def _time_panel(follows: bool, stands: bool) -> rrb.TimePanel:
-    if stands:
-        return rrb.TimePanel(timeline=HOST, state="collapsed", play_state="paused")
-    if follows:
-        return rrb.TimePanel(timeline=HOST, state="collapsed", play_state="following")
-    return rrb.TimePanel(timeline=HOST, state="collapsed", loop_mode="All")
+def in_rows(rows: Rows, side: list[rrb.ContainerLike], time: rrb.TimePanel) -> rrb.Blueprint:
+    """Return rows of views over three quarters of the width, and further views at their side."""
+    main = rrb.Vertical(*[view for _, view in rows], row_shares=[share for share, _ in rows])
+    return without_panels(rrb.Horizontal(main, rrb.Vertical(*side), column_shares=[3, 1]), time)
+
+
+def without_panels(views: rrb.Container, time: rrb.TimePanel) -> rrb.Blueprint:
+    """Return views that have the window to themselves; Rerun's panels open at a click."""
+    return rrb.Blueprint(views, time, rrb.SelectionPanel(state="collapsed"), rrb.BlueprintPanel(state="collapsed"))
+
+
+def looping(scene: Scene) -> rrb.TimePanel:
+    """Return a time panel that plays a scene again and again, on the timeline that it has."""
+    return rrb.TimePanel(timeline=HOST if scene.on_host_clock else ELAPSED, state="collapsed", loop_mode="All")
+
+
+def about_and_cameras(scene: Scene) -> list[rrb.ContainerLike]:
+    """Return a scene's summary, and the view of each camera."""
+    views: list[rrb.ContainerLike] = [rrb.TextDocumentView(origin="about", name="About")]
+    for camera in scene.cameras:
+        path = f"cameras/{camera.name}"
+        views.append(rrb.Spatial2DView(origin=f"{path}/image", contents=f"{path}/**", name=f"Camera {camera.name}"))
+    return views
+
+
+def map_view(name: str, title: str) -> rrb.Spatial2DView:
+    """Return the view of one of a scene's maps with the marks on it."""
+    return rrb.Spatial2DView(origin="maps", contents=[entity("maps", name), f"{marks_of(name)}/**"], name=title)
+
+
+def array_view(array: TaxelArray, title: str) -> rrb.Spatial2DView:
+    """Return the view of an array's heat map, with the scale in its name."""
+    scale = array.scale
+    return rrb.Spatial2DView(origin=heat_map_of(array), name=f"{title}, {scale.low:g} to {scale.high:g} {scale.unit}")
 
 
 def skin_view(name: str, title: str, scene: Scene) -> rrb.Spatial3DView:
@@ -84,24 +113,8 @@ def _contact() -> rrb.Spatial3DView:
     )
 
 
-def _side(scene: Scene) -> rrb.Container:
-    parts: list[rrb.ContainerLike] = [rrb.TextDocumentView(origin="about", name="About")]
-    for camera in scene.cameras:
-        path = f"cameras/{camera.name}"
-        parts.append(rrb.Spatial2DView(origin=f"{path}/image", contents=f"{path}/**", name=f"Camera {camera.name}"))
-    if not scene.maps:
-        parts.append(_heat_map(scene))
-    return rrb.Vertical(*parts)
-
-
-def _map(name: str, high: float) -> rrb.Spatial2DView:
-    contents = [entity("maps", name), f"{marks_of(name)}/**"]
-    return rrb.Spatial2DView(origin="maps", contents=contents, name=MAP_TITLES[name].format(high=high))
-
-
 def _heat_map(scene: Scene) -> rrb.Spatial2DView:
-    scale = scene.taxels.scale
-    return rrb.Spatial2DView(origin="heat_map", name=f"Taxels, {scale.low:g} to {scale.high:g} {scale.unit}")
+    return array_view(scene.taxels, "Taxels")
 
 
 def _curves(scene: Scene) -> rrb.Container:

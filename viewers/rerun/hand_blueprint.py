@@ -3,28 +3,17 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from tacdata.viewers.rerun.columns import entity, heat_map_of
-from tacdata.viewers.rerun.timelines import ELAPSED, HOST
+from tacdata.viewers.rerun.blueprint import Rows, about_and_cameras, array_view, in_rows, looping
+from tacdata.viewers.rerun.columns import entity
 from tacdata.viewers.scene.scene import Scene
 
 
 def hand_blueprint(scene: Scene) -> rrb.Blueprint:
     """Return fingers in space next to their maps, curves below, text and cameras at the side."""
-    rows: list[rrb.ContainerLike] = [rrb.Horizontal(_space(scene), *_felt(scene), column_shares=[3, 1])]
-    shares = [6.0]
+    rows: Rows = [(6.0, rrb.Horizontal(_space(scene), *_felt(scene), column_shares=[3, 1]))]
     if scene.curves:
-        rows.append(_curves(scene))
-        shares.append(4.0)
-    side: list[rrb.ContainerLike] = [rrb.TextDocumentView(origin="about", name="About")]
-    for camera in scene.cameras:
-        path = f"cameras/{camera.name}"
-        side.append(rrb.Spatial2DView(origin=f"{path}/image", contents=f"{path}/**", name=f"Camera {camera.name}"))
-    return rrb.Blueprint(
-        rrb.Horizontal(rrb.Vertical(*rows, row_shares=shares), rrb.Vertical(*side), column_shares=[3, 1]),
-        rrb.TimePanel(timeline=HOST if scene.on_host_clock else ELAPSED, state="collapsed", loop_mode="All"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-    )
+        rows.append((4.0, _curves(scene)))
+    return in_rows(rows, about_and_cameras(scene), looping(scene))
 
 
 def _space(scene: Scene) -> rrb.Spatial3DView:
@@ -46,12 +35,7 @@ def _space(scene: Scene) -> rrb.Spatial3DView:
 def _felt(scene: Scene) -> list[rrb.ContainerLike]:
     """Return a column with each finger's predicted map, and a tab behind it with its taxels."""
     pictures = [rrb.Spatial2DView(origin=entity("maps", m.name), name=m.title) for m in scene.maps]
-    arrays = [
-        rrb.Spatial2DView(
-            origin=heat_map_of(a), name=f"{a.name}: taxels, {a.scale.low:g} to {a.scale.high:g} {a.scale.unit}"
-        )
-        for a in scene.arrays
-    ]
+    arrays = [array_view(a, f"{a.name}: taxels") for a in scene.arrays]
     tabs = []
     if pictures:
         tabs.append(rrb.Vertical(*pictures, name="Predicted depth"))

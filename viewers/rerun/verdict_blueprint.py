@@ -3,14 +3,17 @@
 import rerun.blueprint as rrb
 
 from tacdata.viewers.parts.residual_curves import READINGS, RESIDUALS
+from tacdata.viewers.rerun.blueprint import without_panels
 from tacdata.viewers.rerun.columns import entity
 from tacdata.viewers.rerun.timelines import ELAPSED
-from tacdata.viewers.scene.scene import Bars, Curves, Scene
+from tacdata.viewers.scene.scene import Curves, Scene
 
 
 def verdict_blueprint(scene: Scene) -> rrb.Blueprint:
     """Return the text next to bars, and curves where there are some."""
-    parts: list[rrb.ContainerLike] = [_bars(bars) for bars in scene.bars]
+    parts: list[rrb.ContainerLike] = [
+        rrb.TextDocumentView(origin=f"bars/{bars.name}", name=bars.title) for bars in scene.bars
+    ]
     streams = [c.name.partition("/")[2] for c in scene.curves if c.name.startswith(f"{READINGS}/")]
     parts += [_series(c) for c in scene.curves if not streams]
     if streams:
@@ -19,12 +22,8 @@ def verdict_blueprint(scene: Scene) -> rrb.Blueprint:
         parts.insert(0, rrb.Spatial2DView(origin=f"pages/{page.name}", name=page.title))
     columns = [rrb.TextDocumentView(origin="about", name="About")]
     grid = [rrb.Grid(*parts, grid_columns=2 if len(parts) > 3 else 1)] if parts else []
-    return rrb.Blueprint(
-        rrb.Horizontal(*columns, *grid, column_shares=[2, 3][: 1 + len(grid)]),
-        rrb.TimePanel(timeline=ELAPSED, state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-    )
+    views = rrb.Horizontal(*columns, *grid, column_shares=[2, 3][: 1 + len(grid)])
+    return without_panels(views, rrb.TimePanel(timeline=ELAPSED, state="collapsed"))
 
 
 def _series(curves: Curves) -> rrb.TimeSeriesView:
@@ -40,7 +39,3 @@ def _streams(scene: Scene, streams: list[str]) -> rrb.Tabs:
         curves = [by_name[f"{READINGS}/{name}"], by_name[f"{RESIDUALS}/{name}"], by_name["depth"]]
         tabs.append(rrb.Vertical(*map(_series, curves), row_shares=[3, 2, 1], name=name.replace("_", " ")))
     return rrb.Tabs(*tabs, name="Readings")
-
-
-def _bars(bars: Bars) -> rrb.TextDocumentView:
-    return rrb.TextDocumentView(origin=f"bars/{bars.name}", name=bars.title)
