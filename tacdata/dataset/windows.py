@@ -27,17 +27,14 @@ class EpisodeBounds(Protocol):
     @property
     def start(self) -> int:
         """First frame."""
-        ...
 
     @property
     def stop(self) -> int:
         """One past the last frame."""
-        ...
 
     @property
     def task(self) -> str:
         """Description of its task."""
-        ...
 
 
 class FrameColumns(Protocol):
@@ -46,20 +43,16 @@ class FrameColumns(Protocol):
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """Column by name, frames first."""
-        ...
 
     @property
     def episodes(self) -> Sequence[EpisodeBounds]:
         """Episodes in order."""
-        ...
 
     def __len__(self) -> int:
         """Number of frames."""
-        ...
 
     def __getitem__(self, key: str) -> np.ndarray:
         """Return a column."""
-        ...
 
 
 class WindowDataset(torch.utils.data.Dataset):

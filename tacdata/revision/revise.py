@@ -26,7 +26,7 @@ from tacdata.revision.corrected import write_corrected
 from tacdata.revision.episodes import sealed
 from tacdata.revision.evidence import table
 from tacdata.revision.evidence.card import card
-from tacdata.revision.evidence.curves import EpisodeCurves, curves
+from tacdata.revision.evidence.curves import curves
 from tacdata.revision.evidence.gap import GapReduction, ResidualChange, gap, noise_of
 from tacdata.revision.evidence.worst_slice import sealed_slices
 from tacdata.revision.labels.confirm import confirm, touches_fem
@@ -36,6 +36,7 @@ from tacdata.revision.labels.retrain import Recipe, retrained
 from tacdata.revision.next_presses.recommend import recommend
 from tacdata.skin.mesh.build import MeshSettings
 from tacdata.surrogate.pressed import pressed
+from tacdata.viewers.scene.episode_curves import EpisodeCurves
 
 REVISION, SPEC, CARD, TABLE, CSV = "revision.json", "spec.json", "card.html", "gap.md", "gap.csv"
 CORRECTED, LABELS = "corrected.csv", "labels"

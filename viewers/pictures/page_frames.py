@@ -20,7 +20,6 @@ class MovingPage(Protocol):
 
     def show(self, time: Any, /) -> None:
         """Move everything to where it was at a time, in the page's own unit."""
-        ...
 
 
 def page_frames(page: MovingPage, times: np.ndarray) -> Iterator[np.ndarray]:

@@ -2,64 +2,19 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from tacdata.viewers.output_file import RERUN, new_file, written_beside
 from tacdata.viewers.scene.color_scale import HUES
+from tacdata.viewers.scene.episode_curves import EpisodeCurves
 
 TIMELINE = "time_in_episode"
 COLORS = {"measured": (30, 30, 30), "before": HUES[5], "after": HUES[0]}
 
 
-class Shown(Protocol):
-    """One episode."""
-
-    @property
-    def name(self) -> str:
-        """The episode's name."""
-        ...
-
-    @property
-    def time(self) -> np.ndarray:
-        """[s], shape (n,)."""
-        ...
-
-    @property
-    def depth(self) -> np.ndarray:
-        """[mm], shape (n,)."""
-        ...
-
-    @property
-    def measured(self) -> np.ndarray:
-        """Readings, shape (n, channels)."""
-        ...
-
-    @property
-    def before(self) -> np.ndarray:
-        """Readings predicted by the model before, shape (n, channels)."""
-        ...
-
-    @property
-    def after(self) -> np.ndarray:
-        """Readings predicted by the revised model, shape (n, channels)."""
-        ...
-
-    @property
-    def channel(self) -> int:
-        """The channel with the largest change."""
-        ...
-
-    @property
-    def channel_name(self) -> str:
-        """Its name."""
-        ...
-
-
-def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
+def write(episodes: Sequence[EpisodeCurves], path: Path, title: str) -> None:
     """Write episodes, one view each of its telling channel and of its depth.
 
     Args:
@@ -87,7 +42,7 @@ def write(episodes: Sequence[Shown], path: Path, title: str) -> None:
         recording.disconnect()
 
 
-def _episode(recording: rr.RecordingStream, root: str, episode: Shown) -> None:
+def _episode(recording: rr.RecordingStream, root: str, episode: EpisodeCurves) -> None:
     index = [rr.TimeColumn(TIMELINE, duration=episode.time)]
     curves = {name: getattr(episode, name)[:, episode.channel] for name in COLORS}
     for name, values in curves.items():

@@ -10,8 +10,8 @@ from tacdata.discrepancy.heading import sentence, sizes
 from tacdata.discrepancy.verdict.sealed import WIDEST
 from tacdata.effects import load
 from tacdata.pages import Band, HtmlPage, Items, PageHeader, Paragraph, Plot, Series, Slider, Table, Tiles
-from tacdata.revision.evidence.curves import EpisodeCurves
 from tacdata.revision.evidence.table import in_words
+from tacdata.viewers.scene.episode_curves import EpisodeCurves
 
 CHANNELS = 6
 """Number of channels listed, the worst first."""
