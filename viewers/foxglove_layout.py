@@ -1,5 +1,6 @@
 """A layout for Foxglove, which shows a recording without our code."""
 
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,8 @@ def write_foxglove_layout(recording: Path, target: Path) -> None:
 
     new_file(target, ENDING)
     records = read_records(recording, images=False)
-    documents.write_text(
-        target, json.dumps(foxglove_layout({c.topic for c in records.channels.values()}), indent=1) + "\n"
-    )
+    layout = foxglove_layout({channel.topic for channel in records.channels.values()})
+    documents.write_text(target, json.dumps(layout, indent=1) + "\n")
 
 
 def foxglove_layout(recorded: set[str]) -> dict[str, Any]:
@@ -55,10 +55,8 @@ def foxglove_layout(recorded: set[str]) -> dict[str, Any]:
     for topic in sorted(t for t in recorded if t.endswith("/cube") or t.endswith("/view")):
         panels[f"Plot!{_name(topic)}"] = _plot(f"{topic}: reprojection [px]", [f"{topic}.reprojection"])
     if topics.PHASE in recorded:
-        panels["StateTransitions!phases"] = {
-            "isSynced": True,
-            "paths": [{"value": f"{topics.PHASE}.name", "timestampMethod": "receiveTime"}],
-        }
+        phases = {"value": f"{topics.PHASE}.name", "timestampMethod": "receiveTime"}
+        panels["StateTransitions!phases"] = {"isSynced": True, "paths": [phases]}
     if topics.LOG in recorded:
         panels["RosOut!log"] = {"topicToRender": topics.LOG, "minLogLevel": 1, "searchTerms": []}
     layout = {"configById": panels, "globalVariables": {}, "userNodes": {}, "playbackConfig": {"speed": 1}}
@@ -66,14 +64,10 @@ def foxglove_layout(recorded: set[str]) -> dict[str, Any]:
 
 
 def _plot(title: str, paths: list[str]) -> dict[str, Any]:
+    colors = ("#{:02x}{:02x}{:02x}".format(*hue) for hue in cycle(HUES))
     lines = [
-        {
-            "value": path,
-            "enabled": True,
-            "timestampMethod": "receiveTime",
-            "color": "#{:02x}{:02x}{:02x}".format(*HUES[k % len(HUES)]),
-        }
-        for k, path in enumerate(paths)
+        {"value": path, "enabled": True, "timestampMethod": "receiveTime", "color": color}
+        for path, color in zip(paths, colors, strict=False)
     ]
     return {
         "title": title,

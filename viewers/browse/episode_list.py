@@ -137,12 +137,9 @@ class EpisodeList:
 def with_flags(entries: tuple[Entry, ...], flags: dict[str, Flag]) -> tuple[Entry, ...]:
     """Return entries with the reasons why they are set aside, found by the recording's hash, else by its name."""
     by_file = {flag.file: flag.reason for flag in flags.values()}
+    by_hash = {recording: flag.reason for recording, flag in flags.items()}
     return tuple(
-        replace(
-            e,
-            flag=flags[e.recording].reason if e.recording in flags else "" if e.recording else by_file.get(e.file, ""),
-        )
-        for e in entries
+        replace(e, flag=by_hash.get(e.recording, "" if e.recording else by_file.get(e.file, ""))) for e in entries
     )
 
 

@@ -17,11 +17,11 @@ from fastapi import APIRouter, FastAPI
 from fastapi.responses import FileResponse, HTMLResponse
 from pydantic import BaseModel, Field
 
-from tacdata.dataset.flags import Flag, read_flags, read_history
+from tacdata.dataset.flags import read_flags, read_history
 from tacdata.dataset.notes import Note, read_notes
 from tacdata.pages import live_page
 from tacdata.viewers.browse import loopback
-from tacdata.viewers.browse.episode_list import UNITS, Entry, EpisodeList, with_flags, with_notes
+from tacdata.viewers.browse.episode_list import UNITS, EpisodeList, with_flags, with_notes
 from tacdata.viewers.browse.flagging import flag_episode, unflag_episode
 from tacdata.viewers.browse.noting import note_stretch, notes_of, unnote_stretch
 from tacdata.viewers.rerun.shield import LOOPBACK, shielded
@@ -94,7 +94,8 @@ class Pages:
         """Return the list, with the flags as they are now."""
         flags = read_flags(self.listed.root)
         by_file = {flag.file: flag for flag in flags.values()}
-        rows: list[dict[str, Any]] = [asdict(entry) for entry in self._marked(flags)]
+        marked = with_notes(with_flags(self.listed.entries, flags), read_notes(self.listed.root))
+        rows: list[dict[str, Any]] = [asdict(entry) for entry in marked]
         for row in rows:
             if row["flag"] and (flag := flags.get(row["recording"]) or by_file.get(row["file"])):
                 row |= {"flagged_at": flag.flagged_at, "flagged_by": flag.flagged_by}
@@ -105,9 +106,6 @@ class Pages:
             "remarks": self.listed.remarks,
             "viewer": self.viewer + "/?hide_welcome_screen&url=" + quote(self.address + "/episode/", safe=""),
         }
-
-    def _marked(self, flags: dict[str, Flag]) -> tuple[Entry, ...]:
-        return with_notes(with_flags(self.listed.entries, flags), read_notes(self.listed.root))
 
     def episode(self, number: int) -> tuple[Path, Times | None]:
         """Return an episode's Rerun file and times, drawn when first asked for. Raises as `viewers.source.scene_at`."""

@@ -107,11 +107,8 @@ def meant(path: Path) -> Path:
     if path.is_dir() and not file_names.finished(path):
         return next((part for part in file_names.unfinished(path) if is_growing(part)), path)
     finished_path = path.with_name(path.name.removesuffix(file_names.PARTIAL) + ".mcap")
-    return (
-        finished_path
-        if path.name.endswith(file_names.PARTIAL) and not path.exists() and finished_path.is_file()
-        else path
-    )
+    has_ended = path.name.endswith(file_names.PARTIAL) and not path.exists() and finished_path.is_file()
+    return finished_path if has_ended else path
 
 
 def follow(path: Path, web: bool) -> None:
@@ -149,14 +146,11 @@ def follow(path: Path, web: bool) -> None:
                 else:
                     _follow_one(following, viewer, ctrl_c.check)
                     visited.add(following)
-                following = next((p for p in file_names.unfinished(path.parent) if _is_next(p, visited)), None)
+                begun = (part for part in file_names.unfinished(path.parent) if is_growing(part))
+                following = next((part for part in begun if part not in visited), None)
     except TimeoutError as error:
         fault = f"the viewer does not start: {error}"
         raise DeviceError(fault, "a viewer that listens on the loopback", "use --save FILE.rrd, or --web") from None
-
-
-def _is_next(path: Path, visited: set[Path]) -> bool:
-    return is_growing(path) and path not in visited
 
 
 def _follow_one(path: Path, viewer: FedViewer, check: Callable[[], None]) -> None:

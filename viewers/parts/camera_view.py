@@ -25,12 +25,17 @@ def camera_views(episode: Episode, images: Iterable[tuple[str, int, bytes]]) -> 
         episode: Gives the intrinsics (rig file) and the cube's poses.
         images: Camera name, time of exposure [ns] and JPEG image, in any order.
     """
+    frames = _by_camera(images)
+    tags = {stream.camera: stream for stream in episode.tags}
+    cameras = episode.rig.get("cameras", {})
+    return tuple(_view(name, c, frames.get(name, []), tags.get(name)) for name, c in cameras.items())
+
+
+def _by_camera(images: Iterable[tuple[str, int, bytes]]) -> dict[str, list[tuple[int, bytes]]]:
     frames: dict[str, list[tuple[int, bytes]]] = {}
     for name, time_ns, data in images:
         frames.setdefault(name, []).append((time_ns, data))
-    tags = {stream.camera: stream for stream in episode.tags}
-    cameras = episode.rig.get("cameras", {})
-    return tuple(_view(name, c, sorted(frames.get(name, [])), tags.get(name)) for name, c in cameras.items())
+    return {name: sorted(entries) for name, entries in frames.items()}
 
 
 def _view(
@@ -64,15 +69,12 @@ def hand_views(recorded: DemoRecording, images: Iterable[tuple[str, int, bytes]]
         recorded: Gives intrinsics and the fingertips' poses.
         images: Camera name, time of exposure [ns] and JPEG image, in any order.
     """
-    frames: dict[str, list[tuple[int, bytes]]] = {}
-    for name, time_ns, data in images:
-        frames.setdefault(name, []).append((time_ns, data))
-    views = []
+    frames, views = _by_camera(images), []
     for name, camera in recorded.rig.cameras.items():
         streams = [stream for stream in recorded.views if stream.camera == name]
         fingers = tuple(_view(f"{s.finger}", camera, [], s, FINGER_AXES) for s in streams)
         pose = recorded.rig.camera_pose(name)
         if pose is not None:
             pose = np.block([[pose[:3, :3], 1000 * pose[:3, 3:]], [pose[3:]]])
-        views.append(replace(_view(name, camera, sorted(frames.get(name, [])), None), fingers=fingers, pose=pose))
+        views.append(replace(_view(name, camera, frames.get(name, []), None), fingers=fingers, pose=pose))
     return tuple(views)

@@ -74,11 +74,8 @@ def shown_label(path: Path, limit: int | None = None) -> ShownLabel:
             rows = np.flatnonzero(owners == stretch)
             deepest = rows[np.argmax(depth[rows])]
             if depth[deepest] > best[stretch]:
-                best[stretch], row[stretch], deepest_maps[stretch] = (
-                    depth[deepest],
-                    begin + deepest,
-                    maps[deepest].copy(),
-                )
+                best[stretch], row[stretch] = depth[deepest], begin + deepest
+                deepest_maps[stretch] = maps[deepest].copy()
         begin += len(maps)
     signed = np.stack([deepest_maps[k] for k in range(limit)])
     # One after the other: each is as large as all maps of the label.

@@ -47,7 +47,8 @@ def press_error(maps: tuple[DepthMaps, ...]) -> str:
     named = {item.name: item for item in maps}
     if "error" not in named:
         return ""
-    label, prediction = _at_common_times(named)
+    common = named["error"].time_ns
+    label, prediction = (m.values[np.searchsorted(m.time_ns, common)] for m in (named["label"], named["prediction"]))
     deepest = int(label.reshape(len(label), -1).max(axis=1).argmax())
     frame = frame_error(label[deepest], prediction[deepest], pitch(named["label"]))
     scores = score_frames(prediction, label)
@@ -63,9 +64,3 @@ def pitch(maps: DepthMaps) -> tuple[float, float]:
     """Return the distance of neighbouring pixels along x and y [mm]."""
     x, y = (float(np.ptp(axis) / max(len(axis) - 1, 1)) for axis in (maps.x, maps.y))
     return x, y
-
-
-def _at_common_times(named: dict[str, DepthMaps]) -> tuple[np.ndarray, np.ndarray]:
-    time = named["error"].time_ns
-    label, prediction = (m.values[np.searchsorted(m.time_ns, time)] for m in (named["label"], named["prediction"]))
-    return label, prediction

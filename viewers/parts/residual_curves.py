@@ -44,6 +44,5 @@ def _curves(
     cut = cut[(cut > 0) & (cut < len(rows))]
     # A row of NaN breaks the line between the last row of an episode and the first of the next.
     between = (time_ns[rows[cut - 1]] + 1).astype(np.int64)
-    return Curves(
-        name, unit, labels, np.insert(time_ns[rows], cut, between), np.insert(values[rows], cut, np.nan, axis=0)
-    )
+    time_ns, values = np.insert(time_ns[rows], cut, between), np.insert(values[rows], cut, np.nan, axis=0)
+    return Curves(name, unit, labels, time_ns, values)

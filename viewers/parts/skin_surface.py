@@ -35,11 +35,8 @@ def surfaces(
     if not result:
         flat = np.full((1, *sensor.map.shape), top, dtype=np.float32)
         scale = scale_of(np.zeros(1), "mm", floor=DEPTH_FLOOR)
-        result.append(
-            SkinSurface(
-                "undeformed", sensor.map.x, sensor.map.y, np.array([start_ns]), flat, np.zeros_like(flat), scale
-            )
-        )
+        x, y, depth = sensor.map.x, sensor.map.y, np.zeros_like(flat)
+        result.append(SkinSurface("undeformed", x, y, np.array([start_ns]), flat, depth, scale))
     return tuple(result)
 
 

@@ -1,6 +1,7 @@
 """The picture of `tacdata check`: channels, timing of the stream, places of the presses."""
 
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 
@@ -64,15 +65,9 @@ def _sites(axes, episodes: list[Episode]) -> None:
     sites = np.array([(e.press.x, e.press.y, e.press.depth) for e in episodes])
     points = axes.scatter(sites[:, 0], sites[:, 1], c=sites[:, 2], cmap="viridis", s=22, zorder=3)
     axes.figure.colorbar(points, ax=axes, label="depth [mm]")
-    half = sensor.skin.size_x / 2, sensor.skin.size_y / 2
-    axes.set(
-        xlim=(-half[0], half[0]),
-        ylim=(-half[1], half[1]),
-        aspect="equal",
-        xlabel="x [mm]",
-        ylabel="y [mm]",
-        title="presses and taxels",
-    )
+    half_x, half_y = sensor.skin.size_x / 2, sensor.skin.size_y / 2
+    axes.set(xlim=(-half_x, half_x), ylim=(-half_y, half_y), aspect="equal")
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", title="presses and taxels")
 
 
 def _noise(axes, report: Report, unit: str) -> None:
@@ -106,13 +101,8 @@ def _words(axes, report: Report) -> None:
     axes.axis("off")
     lines = report.text.encode("utf-8", "replace").decode().splitlines()  # a path may hold bytes that are no text
     excerpt = lines if len(lines) <= 24 else [*lines[:23], f"... {len(lines) - 23} more, see check.json"]
-    axes.text(0.0, 1.0, "\n".join(_wrapped(excerpt)), va="top", fontsize=7, transform=axes.transAxes)
-
-
-def _wrapped(lines: list[str], width: int = 70) -> list[str]:
-    import textwrap
-
-    return [part for line in lines for part in textwrap.wrap(line, width, subsequent_indent="    ") or [""]]
+    wrapped = [part for line in excerpt for part in wrap(line, 70, subsequent_indent="    ") or [""]]
+    axes.text(0.0, 1.0, "\n".join(wrapped), va="top", fontsize=7, transform=axes.transAxes)
 
 
 def _numbers(values: list[float | None]) -> list[float]:

@@ -52,17 +52,13 @@ class HandPage:
         parts: Any = self.figure.subfigures(1, 2, width_ratios=[3.0, 1.0]) if scene.maps else [self.figure]
         heights = [1.5, 1.5, 0.8] if scene.cameras else [1.5, 0.8]
         rows: Any = parts[0].subfigures(len(heights), 1, height_ratios=heights)
-        self._cameras = (
-            []
-            if not scene.cameras
-            else [
-                _CameraPicture(axes, view, scene.bodies)
-                for axes, view in zip(
-                    rows[0].subplots(1, len(scene.cameras), squeeze=False)[0], scene.cameras, strict=True
-                )
-            ]
-        )
-        low, high = _ends(scene)
+        self._cameras: list[_CameraPicture] = []
+        if scene.cameras:
+            panels = rows[0].subplots(1, len(scene.cameras), squeeze=False)[0]
+            pairs = zip(panels, scene.cameras, strict=True)
+            self._cameras = [_CameraPicture(axes, view, scene.bodies) for axes, view in pairs]
+        places = np.concatenate([body.position for body in scene.bodies])
+        low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
         self._space = [
             _Plane(axes, scene.bodies, (horizontal, up), (low, high))
             for axes, (horizontal, up) in zip(rows[-2].subplots(1, 2), ((0, 2), (0, 1)), strict=True)
@@ -217,12 +213,6 @@ def _opened(data: bytes) -> np.ndarray:
     from PIL import Image
 
     return np.asarray(Image.open(BytesIO(data)).convert("RGB"))
-
-
-def _ends(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Return least and largest x, y and z of all fingertips, with a margin [mm], shape (3,) each."""
-    places = np.concatenate([body.position for body in scene.bodies])
-    return places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
 
 
 def _bridged_at(curves: Curves | None, time_ns: int) -> bool:

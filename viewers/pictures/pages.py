@@ -84,15 +84,8 @@ def space(figure: SubFigure, scene: Scene) -> None:
             for doubtful, style in ((False, "-"), (True, ":")):
                 for k, strip in enumerate(trail.strips(doubtful)):
                     label = trail.name if k == 0 and not doubtful else None
-                    axes.plot(
-                        strip[:, horizontal],
-                        strip[:, up],
-                        style,
-                        color=color,
-                        linewidth=1.5,
-                        label=label,
-                        alpha=0.4 if trail.faint else 1.0,
-                    )
+                    look: dict[str, Any] = {"color": color, "linewidth": 1.5, "alpha": 0.4 if trail.faint else 1.0}
+                    axes.plot(strip[:, horizontal], strip[:, up], style, label=label, **look)
         for cloud in scene.clouds:
             touches = cloud.position[_most(cloud)]
             axes.plot(*touches[:, [horizontal, up]].T, ".", color="0.2", markersize=0.8)

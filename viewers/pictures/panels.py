@@ -1,6 +1,8 @@
 """The panels of a page."""
 
+from dataclasses import replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -59,14 +61,9 @@ def signals(figure: SubFigure, scene: Scene, instants: Moments) -> None:
         lower.axhline(0, color=INK, linewidth=0.7, linestyle=":")
         reported = next((c for c in scene.curves if c.name == "tip/reported"), None)
         if reported is not None:
-            lower.plot(
-                seconds(scene, reported.time_ns),
-                reported.values[:, 2],
-                ".",
-                color=np.array(HUES[5]) / 255,
-                markersize=4,
-                label="reported by the controller",
-            )
+            reported_at, color = seconds(scene, reported.time_ns), np.array(HUES[5]) / 255
+            words = "reported by the controller"
+            lower.plot(reported_at, reported.values[:, 2], ".", color=color, markersize=4, label=words)
         lower.legend(loc="upper center")
         # Travel high above the skin would flatten the press; it runs out of the panel instead.
         lower.set_ylim(1.15 * max(depth.max(), 0.1), max(depth.min(), -2 * max(depth.max(), 1.0)))
@@ -88,15 +85,8 @@ def phases(axes: Axes, scene: Scene, named: bool) -> None:
             continue
         axes.axvspan(start, end, color=SHADES[number % 2], zorder=0, linewidth=0)
         if named:
-            axes.text(
-                (start + end) / 2,
-                1.015,
-                span.name,
-                transform=axes.get_xaxis_transform(),
-                ha="center",
-                color=INK,
-                fontsize=9,
-            )
+            above: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ha": "center"}
+            axes.text((start + end) / 2, 1.015, span.name, color=INK, fontsize=9, **above)
 
 
 def key(axes: Axes, scene: Scene) -> None:
@@ -195,21 +185,14 @@ def taxels_and_tip(figure: SubFigure, scene: Scene, instants: Moments, stacked: 
     for x, y, _ in taxels.centers:
         second.add_patch(Circle((x, y), taxels.radius, facecolor="0.92", edgecolor="0.75"))
     if scene.tip is not None:
-        scale = scene.surfaces[0].scale
         path = scene.tip.values[np.argsort(scene.tip.values[:, 2], kind="stable")]
         touching = path[:, 2] > 0
+        scale = scene.surfaces[0].scale
+        bar = mappable(replace(scale, high=max(scale.high, path[:, 2].max())))
         second.plot(*scene.tip.values[:, :2].T, "-", color="0.5", linewidth=1)
         second.scatter(*path[~touching, :2].T, s=14, color="0.5", label="above the skin")
-        second.scatter(
-            *path[touching, :2].T,
-            c=path[touching, 2],
-            s=26,
-            cmap=scale.colormap,
-            vmin=scale.low,
-            vmax=max(scale.high, path[:, 2].max()),
-            label="in the skin",
-        )
-        bar = ScalarMappable(Normalize(scale.low, max(scale.high, path[:, 2].max())), scale.colormap)
+        colors: dict[str, Any] = {"c": path[touching, 2], "cmap": bar.cmap, "norm": bar.norm}
+        second.scatter(*path[touching, :2].T, s=26, label="in the skin", **colors)
         figure.colorbar(bar, ax=second, shrink=0.8).set_label("tip depth [mm]")
     second.set(xlim=(low[0] - 0.5, high[0] + 0.5), ylim=(low[1] - 0.5, high[1] + 0.5), aspect="equal")
     second.set_title("Path of the tip over the taxels (grey: above the skin)")

@@ -49,24 +49,15 @@ def _pad(axes, plan: Plan, sensor: Sensor, names: list[str]):
     axes.plot(*sensor.taxels.centers.T, "s", color="0.85", markersize=11, zorder=1, label="taxel")
     depths = [max(press.depth, HOVER) for press in plan.presses]
     scale = {"vmin": min(0.0, *depths), "vmax": max(depths), "cmap": "viridis"}
+    rim = {"edgecolors": "black", "linewidths": 0.4, "zorder": 3}
     points: Any = None
     for number, name in enumerate(names):
         presses = [press for press in plan.presses if press.indenter_name == name]
         # Shallow ones last, so that a deep press at the same site does not hide them: rings of growing size.
         presses.sort(key=lambda press: -press.depth)
-        size = [20 + 110 * max(press.depth, 0.0) for press in presses]
-        points = axes.scatter(
-            [p.x for p in presses],
-            [p.y for p in presses],
-            c=[max(p.depth, HOVER) for p in presses],
-            s=size,
-            zorder=3,
-            marker=MARKS[number % len(MARKS)],
-            edgecolors="black",
-            linewidths=0.4,
-            label=name,
-            **scale,
-        )
+        x, y, depth = np.array([(press.x, press.y, max(press.depth, HOVER)) for press in presses]).reshape(-1, 3).T
+        size, mark = 20 + 110 * np.maximum(depth, 0.0), MARKS[number % len(MARKS)]
+        points = axes.scatter(x, y, size, c=depth, label=name, marker=mark, **rim, **scale)
     for press in (p for p in plan.presses if p.approach_from):
         dx, dy = (plan.motion.run_up * c for c in SIDES[press.approach_from])
         axes.annotate(
@@ -82,13 +73,8 @@ def _course(axes, plan: Plan, press_seconds: tuple[float, ...], names: list[str]
     begins = np.array([0.0, *accumulate(press_seconds)][:-1]) / 60
     for number, name in enumerate(names):
         rows = [k for k, press in enumerate(plan.presses) if press.indenter_name == name]
-        axes.plot(
-            begins[rows],
-            [max(plan.presses[k].depth, HOVER) for k in rows],
-            MARKS[number % len(MARKS)],
-            ms=4,
-            label=name,
-        )
+        depths = [max(plan.presses[k].depth, HOVER) for k in rows]
+        axes.plot(begins[rows], depths, MARKS[number % len(MARKS)], ms=4, label=name)
     last = None
     for press, begin in zip(plan.presses, begins, strict=True):
         if last not in (None, press.mounting):

@@ -78,7 +78,9 @@ class ReplayPage:
         self._pads: dict[tuple[str, int], list[tuple[Ellipse, Any]]] = {}
         self._links: dict[tuple[str, int], LineCollection] = {}
         self._curves: list[ReplayCurves] = []
-        force_limit = 1.3 * max(_strongest(replay) for replay in replays.values()) + 0.1
+        # After the verdict empty fingers may hit anything: their force would flatten the curves before it.
+        forces = [replay.path.force[replay.time <= replay.decided].max() for replay in replays.values()]
+        force_limit = 1.3 * float(max(forces)) + 0.1
         for column, (kind, replay) in enumerate(replays.items()):
             for row, up in enumerate((2, 1)):
                 axes = self._axes[row, column]
@@ -135,11 +137,6 @@ def _felt_maps(figure: Any, targets: FingertipTargets) -> FeltMaps:
     grids = {name: targets.source.sensors[name].map for name in maps} if targets.source else {}
     felt = {name: (maps[name], grid.x, grid.y) for name, grid in grids.items()}
     return FeltMaps(figure, felt, scale_of(deepest, "mm", floor=DEPTH_FLOOR))
-
-
-def _strongest(replay: ReplayOutcome) -> float:
-    """Return the largest force on a pad until the verdict falls [N]; afterwards empty fingers may hit anything."""
-    return float(replay.path.force[replay.time <= replay.decided].max())
 
 
 def _two_lines(words: str) -> str:

@@ -9,7 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from tacdata.viewers.pictures.panels import Moments, mappable, seconds
 from tacdata.viewers.scene.moments import nearest
-from tacdata.viewers.scene.scene import Body, Scene
+from tacdata.viewers.scene.scene import Scene
+
+BODY_COLOR = 0.55, 0.6, 0.68, 0.3
+"""Of the indenter: pale, so that the skin below it shows."""
 
 
 def skin(figure: SubFigure, scene: Scene, instants: Moments, bar: bool = True) -> None:
@@ -20,17 +23,13 @@ def skin(figure: SubFigure, scene: Scene, instants: Moments, bar: bool = True) -
     axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
     x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
     colors = surface.colors[index].reshape(*x.shape, 3) / 255
-    axes.plot_surface(
-        x,
-        y,
-        surface.height[index],
-        facecolors=colors,
-        rstride=1,
-        cstride=1,
-        linewidth=0.3,
-        edgecolor=(1, 1, 1, 0.25 if shaded else 0.8),
-        shade=False,
-    )
+    mesh: dict[str, Any] = {
+        "rstride": 1,
+        "cstride": 1,
+        "linewidth": 0.3,
+        "edgecolor": (1, 1, 1, 0.25 if shaded else 0.8),
+    }
+    axes.plot_surface(x, y, surface.height[index], facecolors=colors, shade=False, **mesh)
     low, high = scene.corners
     for level in (low[2], high[2]):
         axes.plot(
@@ -40,7 +39,10 @@ def skin(figure: SubFigure, scene: Scene, instants: Moments, bar: bool = True) -
         axes.plot([a, a], [b, b], [low[2], high[2]], color="0.6", linewidth=0.9, zorder=0)
     top = high[2]
     for body in scene.bodies:
-        top = max(top, _wireframe(axes, body, moment))
+        vertices = Rotation.from_quat(body.quaternion).apply(body.vertices)
+        placed = (vertices + body.position[nearest(body.time_ns, moment)]).T
+        axes.plot_trisurf(*placed, triangles=body.faces, color=BODY_COLOR, linewidth=0, shade=False, zorder=3)
+        top = max(top, float(placed[2].max()))
     axes.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], top))
     axes.set_zlabel("z [mm]")
     axes.set_box_aspect((high[0] - low[0], high[1] - low[1], top - low[2]), zoom=1.05 if shaded else 0.8)
@@ -56,11 +58,3 @@ def skin(figure: SubFigure, scene: Scene, instants: Moments, bar: bool = True) -
 
 def _corners(low: np.ndarray, high: np.ndarray) -> list[tuple[float, float]]:
     return [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]), (low[0], low[1])]
-
-
-def _wireframe(axes: Any, body: Body, moment: int) -> float:
-    """Draw a body as thin lines and return the height of its top [mm]."""
-    vertices = Rotation.from_quat(body.quaternion).apply(body.vertices)
-    placed = vertices + body.position[nearest(body.time_ns, moment)]
-    axes.plot_trisurf(*placed.T, triangles=body.faces, color=(0.55, 0.6, 0.68, 0.3), linewidth=0, shade=False, zorder=3)
-    return float(placed[:, 2].max())

@@ -21,7 +21,8 @@ SKIN_TITLES = {
     "prediction": "Skin by the prediction [mm]",
     "undeformed": "Skin without a label: undeformed [mm]",
 }
-EYE = (-10.0, -16.5, 14.0)
+Place = tuple[float, float, float]
+EYE: Place = (-10.0, -16.5, 14.0)
 """Where the skin is seen from [mm]."""
 
 
@@ -94,22 +95,21 @@ def array_view(array: TaxelArray, title: str) -> rrb.Spatial2DView:
 def skin_view(name: str, title: str, scene: Scene) -> rrb.Spatial3DView:
     """Return the view of one of a scene's skins, the others left out of it."""
     exclusions = [f"- /{entity('world/skin', s.name)}/**" for s in scene.surfaces if s.name != name]
-    return rrb.Spatial3DView(
-        origin="world",
-        contents=["$origin/**", *exclusions],
-        name=title,
-        eye_controls=rrb.EyeControls3D(position=EYE, look_target=(0.0, 0.0, 2.6)),
-        line_grid=rrb.LineGrid3D(visible=False),
-    )
+    return space_view("world", ["$origin/**", *exclusions], title)
 
 
 def _contact() -> rrb.Spatial3DView:
+    contents = ["contact/**", "world/footprint", "world/indenter/**"]
+    return space_view("/", contents, "Contact points: pressed in by more than 0.1 mm")
+
+
+def space_view(
+    origin: str, contents: list[str], name: str, eye: Place = EYE, target: Place = (0.0, 0.0, 2.6)
+) -> rrb.Spatial3DView:
+    """Return a view of space without a ground grid, seen from a place [mm] towards another [mm]."""
+    eye_controls, line_grid = rrb.EyeControls3D(position=eye, look_target=target), rrb.LineGrid3D(visible=False)
     return rrb.Spatial3DView(
-        origin="/",
-        contents=["contact/**", "world/footprint", "world/indenter/**"],
-        name="Contact points: pressed in by more than 0.1 mm",
-        eye_controls=rrb.EyeControls3D(position=EYE, look_target=(0.0, 0.0, 2.6)),
-        line_grid=rrb.LineGrid3D(visible=False),
+        origin=origin, contents=contents, name=name, eye_controls=eye_controls, line_grid=line_grid
     )
 
 

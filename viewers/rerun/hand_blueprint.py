@@ -3,7 +3,7 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from tacdata.viewers.rerun.blueprint import Rows, about_and_cameras, array_view, in_rows, looping
+from tacdata.viewers.rerun.blueprint import Rows, about_and_cameras, array_view, in_rows, looping, space_view
 from tacdata.viewers.rerun.columns import entity
 from tacdata.viewers.scene.scene import Scene
 
@@ -21,15 +21,8 @@ def _space(scene: Scene) -> rrb.Spatial3DView:
     points = np.concatenate(places) if places else np.zeros((0, 3))
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.full(3, 100.0))
     middle, size = (low + high) / 2, max(float(np.linalg.norm(high - low)), 60.0)
-    return rrb.Spatial3DView(
-        origin="/",
-        contents=["world/**", "contact/**"],
-        name="Fingertips [mm]; pale: bridged",
-        eye_controls=rrb.EyeControls3D(
-            position=tuple((middle + size * np.array([-0.7, -1.1, 0.8])).tolist()), look_target=tuple(middle.tolist())
-        ),
-        line_grid=rrb.LineGrid3D(visible=False),
-    )
+    eye, target = tuple((middle + size * np.array([-0.7, -1.1, 0.8])).tolist()), tuple(middle.tolist())
+    return space_view("/", ["world/**", "contact/**"], "Fingertips [mm]; pale: bridged", eye, target)
 
 
 def _felt(scene: Scene) -> list[rrb.ContainerLike]:

@@ -53,9 +53,8 @@ def maps_comparison(
             pairs.append((f"{side.name} − {truth.name}", side.depth[at], truth.depth[truth_rows], common))
     differences = [(name, (a - b).astype(np.float32), t) for name, a, b, t in pairs if len(t)]
     # All differences on one scale, so that a small one looks small.
-    signed = scale_of(
-        np.array([float(np.abs(d).max(initial=0.0)) for _, d, _ in differences]), "mm", signed=True, floor=ERROR_FLOOR
-    )
+    largest = np.array([float(np.abs(d).max(initial=0.0)) for _, d, _ in differences])
+    signed = scale_of(largest, "mm", signed=True, floor=ERROR_FLOOR)
     layers += [DepthMaps(n, x, y, t, d, signed, f"{n}, ±{signed.high:g} mm") for n, d, t in differences]
     curves = [_course(all_sides), *(_of_difference(name, d, t) for name, d, t in differences)]
     drawn = depth_maps.thinned(tuple(layers))
@@ -107,9 +106,8 @@ def readings_comparison(
         curves.append(Curves(f"left/{name}", unit, labels, time_ns, values))
         arrays.append(_heat(f"measured − {name}", shape, time_ns, values, signed))
     errors = {name: np.sqrt(np.mean(np.square(values), axis=1)) for name, values in residuals.items()}
-    curves.insert(
-        0, Curves("root mean square left", unit, tuple(errors), time_ns, np.column_stack(list(errors.values())))
-    )
+    error_table = np.column_stack(list(errors.values()))
+    curves.insert(0, Curves("root mean square left", unit, tuple(errors), time_ns, error_table))
     lines = [f"# {title}", "", "Readings since the first frame, measured and predicted by a model.", ""]
     for name, values in residuals.items():
         worst = int(np.argmax(np.square(values).mean(axis=0)))

@@ -10,6 +10,7 @@ from tacdata.training.inference.prediction import PredictedMaps
 from tacdata.viewers.parts import maps, signals, skin_surface, summary
 from tacdata.viewers.scene.scene import Curves, Scene, Span
 from tacdata.viewers.scenes.episode import thinned_remark
+from tacdata.viewers.scenes.single_episode import SHOWN
 
 
 def dataset_scene(
@@ -38,18 +39,7 @@ def dataset_scene(
         raise UsageError(f"--episode {number}", f"0 to {count - 1} in {dataset.root}", "choose one of them")
     sensor = dataset.sensors[entry.sensor]
     part = slice(entry.start, entry.stop)
-    column = {
-        key: np.asarray(dataset[key][part])
-        for key in (
-            features.TIME,
-            features.STATE,
-            features.RAW,
-            features.DEPTH,
-            features.TIP,
-            features.FORCE,
-            features.PHASE,
-        )
-    }
+    column = {key: np.asarray(dataset[key][part]) for key in SHOWN}
     time, tip, depth = column[features.TIME], column[features.TIP].astype(float), column[features.DEPTH]
     if prediction is not None and prediction.depth.shape[1:] != sensor.map.shape:
         raise FormatError(

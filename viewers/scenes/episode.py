@@ -111,11 +111,8 @@ def thinned_remark(count: int, drawn: tuple[DepthMaps, ...]) -> tuple[str, ...]:
 
 def _device_times(episode: Episode) -> np.ndarray:
     device_ns = episode.taxels.device_ns
-    return (
-        device_ns
-        if device_ns is not None and len(device_ns) and (device_ns >= 0).all()
-        else np.zeros(0, dtype=np.int64)
-    )
+    has_clock = device_ns is not None and len(device_ns) and (device_ns >= 0).all()
+    return device_ns if has_clock else np.zeros(0, dtype=np.int64)
 
 
 def _counter(counter: np.ndarray) -> np.ndarray:

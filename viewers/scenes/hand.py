@@ -156,17 +156,9 @@ def spread(track: FingerTrack) -> np.ndarray:
 
 def depth_of(name: str, sensor: Sensor, time_ns: np.ndarray, track: FingerTrack, scale: ColorScale) -> DepthMaps:
     """Return a finger's predicted maps, at most `thinning.MAPS` of them; without reading 0."""
-    depth = np.nan_to_num(np.asarray(track.depth, np.float32))
-    full = DepthMaps(
-        f"predicted {name}",
-        sensor.map.x,
-        sensor.map.y,
-        time_ns,
-        depth,
-        scale,
-        f"{name}: predicted depth, 0 to {scale.high:g} mm",
-    )
-    return thinned((full,))[0]
+    depth, x, y = np.nan_to_num(np.asarray(track.depth, np.float32)), sensor.map.x, sensor.map.y
+    title = f"{name}: predicted depth, 0 to {scale.high:g} mm"
+    return thinned((DepthMaps(f"predicted {name}", x, y, time_ns, depth, scale, title),))[0]
 
 
 def contact(maps: DepthMaps, track: FingerTrack, time_ns: np.ndarray) -> Cloud:

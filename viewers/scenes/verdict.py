@@ -94,9 +94,8 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
         lines += [f"## {effect['title']} ({effect['mechanism']}, {effect['stage']}): {effect['status']}", ""]
         for name, p in effect["parameters"].items():
             value = np.ravel(p["value"])
-            value_text = (
-                f"{value[0]:.4g}" if len(value) == 1 else f"{value.min():.3g} to {value.max():.3g}, one a channel"
-            )
+            a_channel = f"{value.min():.3g} to {value.max():.3g}, one a channel"
+            value_text = f"{value[0]:.4g}" if len(value) == 1 else a_channel
             spread = f" ± {p['error']:.2g}" if p["error"] is not None else ""
             lines.append(f"- {name} = {value_text}{spread}" + (f" {p['unit']}" if p["unit"] != "1" else ""))
         if effect["alternatives"]:
@@ -147,18 +146,10 @@ def _slices(verdict: dict[str, Any]) -> list[Bars]:
 def _margins(verdict: dict[str, Any]) -> list[Bars]:
     charts = []
     for effect in verdict["effects"]:
-        if effect["margins"]:
-            rivals = _smallest(effect["margins"]).items()
+        if margins := _smallest(effect["margins"]):
             title = f"{effect['mechanism']}: by how many standard errors better than"
-            charts.append(
-                Bars(
-                    f"margins/{effect['effect']}",
-                    title,
-                    tuple(n for n, _ in rivals),
-                    np.array([v for _, v in rivals], float),
-                    SURELY,
-                )
-            )
+            values = np.array([*margins.values()], float)
+            charts.append(Bars(f"margins/{effect['effect']}", title, (*margins,), values, SURELY))
     return charts
 
 
