@@ -257,14 +257,8 @@ def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:
     slowest = min(press.speed for press in presses)
     # A recording that touches nothing has a negative depth: the plan flies lower than that.
     clearance = 1.0 + max(0.0, *(-press.depth for press in presses))
-    motion = {
-        "clearance": clearance,
-        "travel_speed": slowest,
-        "approach_speed": slowest,
-        "press_speed": slowest,
-        "hold": 0.0,
-        "rest": 0.0,
-    }
+    speeds = dict.fromkeys(("travel_speed", "approach_speed", "press_speed"), slowest)
+    motion = {"clearance": clearance, **speeds, "hold": 0.0, "rest": 0.0}
     entries = [
         {
             "indenter": p.indenter_name,

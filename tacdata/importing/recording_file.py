@@ -94,11 +94,8 @@ def write(path: Path, imported: ImportedPress) -> None:
         file.add(topics.LOG, begin, begin, 0, note.SerializeToString())
     for topic, time_ns, data in _messages(imported):
         file.add(topic, time_ns, time_ns, 0, data)
-    counts = {
-        "received": len(imported.taxels.time_ns),
-        "lost": max(imported.lost, 0),
-        "notes": imported.record["notes"],
-    }
+    received, lost = len(imported.taxels.time_ns), max(imported.lost, 0)
+    counts = {"received": received, "lost": lost, "notes": imported.record["notes"]}
     file.describe("stream_counts/taxels", {key: json.dumps(value) for key, value in counts.items()})
     file.describe("sync", {pair.name: pair.words for pair in stream_pairs({"taxels": None})})
     file.describe("episode", {"complete": "true", "reason": ""})

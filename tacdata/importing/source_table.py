@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -232,7 +231,8 @@ def _differ(first: str, second: str, where: str) -> bool:
 def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> FormatError:
     """Return the error of a column of text, which may be numbers in another dress."""
     texts = [str(value).strip() for value in values.tolist() if value is not None]
-    fault = f"{where}: column {name} of {table.path.name} holds text, for example {_example(values)!r}"
+    example = next((value for value in values.tolist() if value is not None), None)
+    fault = f"{where}: column {name} of {table.path.name} holds text, for example {example!r}"
     if texts and sum(bool(THOUSANDS.fullmatch(text)) for text in texts) > len(texts) / 2:
         return FormatError(
             f"{fault}: numbers with a sign between thousands, or with three decimal places, as text",
@@ -244,7 +244,3 @@ def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> Form
     return FormatError(
         fault, "numbers", "name another column, or add the texts that stand for no value to the file's missing"
     )
-
-
-def _example(values: np.ndarray) -> Any:
-    return next((value for value in values.tolist() if value is not None), None)

@@ -169,20 +169,9 @@ def _timed(
                 f"{name}: {shared} of {len(rows)} rows have the time of the row before; they are spread evenly up to "
                 "the next time"
             )
-        stretches.append(
-            Stream(
-                name,
-                apart_ns,
-                values[rows],
-                names,
-                unit,
-                zero,
-                tuple(notes),
-                doubts=(*table.doubts, *order.notes, *doubts),
-                stated_rate=table.rate,
-                steps_back=order.steps_back,
-            )
-        )
+        stream = Stream(name, apart_ns, values[rows], names, unit, zero, tuple(notes), stated_rate=table.rate)
+        all_doubts = (*table.doubts, *order.notes, *doubts)
+        stretches.append(replace(stream, doubts=all_doubts, steps_back=order.steps_back))
     return stretches
 
 
@@ -317,14 +306,9 @@ def _position(entry: PositionEntry, table: SourceTable, place: tuple[float, floa
     if not complete.any():
         raise FormatError("position: no row has all of its numbers", "a position", "correct the columns or missing")
     assumed = tuple(_taken_as_mm(table, entry))
-    return [
-        replace(
-            stream.chosen(np.flatnonzero(np.isfinite(stream.values).all(axis=1))),
-            assumed=bool(assumed),
-            notes=(*stream.notes, *assumed),
-        )
-        for stream in stretches
-    ]
+    complete_rows = (np.flatnonzero(np.isfinite(stream.values).all(axis=1)) for stream in stretches)
+    chosen = [stream.chosen(rows) for stream, rows in zip(stretches, complete_rows, strict=True)]
+    return [replace(stream, assumed=bool(assumed), notes=(*stream.notes, *assumed)) for stream in chosen]
 
 
 def _taken_as_mm(table: SourceTable, entry: PositionEntry) -> Iterator[str]:

@@ -147,7 +147,8 @@ def _refuse_unsaid(values: np.ndarray, unit: str, where: str) -> None:
     Raises:
         FormatError: Saying which unit the mapping may give.
     """
-    steps = _steps(values)
+    steps = np.diff(values.astype(float))
+    steps = steps[np.isfinite(steps) & (steps > 0)]
     middle = float(np.nanmedian(values.astype(float))) if len(values) else 0.0
     if not len(steps) or unit != "s" or YEAR_2000 < middle < YEAR_2100:
         return  # the values themselves say that they are Unix times
@@ -206,11 +207,6 @@ def _refuse_fast(values: np.ndarray, unit: str, scale: float, where: str) -> Non
         f"times at no more than {FASTEST:.0f} Hz",
         f"correct unit under time in the mapping, to {dated or 'd'} for example",
     )
-
-
-def _steps(values: np.ndarray) -> np.ndarray:
-    steps = np.diff(values.astype(float))
-    return steps[np.isfinite(steps) & (steps > 0)]
 
 
 DATES = (

@@ -44,7 +44,8 @@ class Mat(SourceFormat):
         except NotImplementedError:
             return Hdf5().read(path, options)
         variables = {name: value for name, value in loaded.items() if not name.startswith("__")}
-        if any(type(value).__name__ == "MatlabOpaque" for value in loaded.values()) and not _readable(variables):
+        is_opaque = any(type(value).__name__ == "MatlabOpaque" for value in loaded.values())
+        if is_opaque and not any(_flatten(name, value, []) for name, value in variables.items()):
             raise FormatError(
                 f"{path} holds an object of MATLAB (a table, timetable, datetime or string), which only MATLAB reads",
                 "numbers, texts and structures",
@@ -79,11 +80,6 @@ def _loaded(path: Path) -> dict[str, Any]:
     return loadmat(path, simplify_cells=True)
 
 
-def _readable(variables: dict[str, Any]) -> bool:
-    """Return whether any variable holds numbers or texts."""
-    return any(_flatten(name, value, []) for name, value in variables.items())
-
-
 def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
     """Return the arrays of a variable by name; the names of other contents are added to ``lost``."""
     if isinstance(value, dict):
@@ -108,9 +104,8 @@ def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
 def _signals(value: dict[str, Any]) -> dict[str, np.ndarray]:
     """Return the signals of Simulink's structure with time by their labels; {} of another structure."""
     signals = value.get("signals")
-    signals = (
-        [signals] if isinstance(signals, dict) else list(signals) if isinstance(signals, list | np.ndarray) else []
-    )
+    signals = [signals] if isinstance(signals, dict) else signals
+    signals = list(signals) if isinstance(signals, list | np.ndarray) else []
     time = np.atleast_1d(np.squeeze(np.asarray(value.get("time", ()))))
     if not signals or not all(isinstance(each, dict) and "values" in each for each in signals) or time.ndim > 1:
         return {}

@@ -306,11 +306,9 @@ def _parts_of(message: Any) -> dict[str, Any]:
     """Return the fields of a message, or of an object in JSON; none of a plain value."""
     if isinstance(message, dict):
         return message
-    return (
-        {each.name: getattr(message, each.name) for each in fields(message) if each.name != TYPE}
-        if (is_dataclass(message))
-        else {}
-    )
+    if not is_dataclass(message):
+        return {}
+    return {each.name: getattr(message, each.name) for each in fields(message) if each.name != TYPE}
 
 
 def _columns(rows: list[dict[str, Any]], topic: str, path: Path) -> tuple[dict[str, np.ndarray], list[str]]:

@@ -55,8 +55,6 @@ def _value(cell: Any, epoch: int) -> Any:
         return xlrd.error_text_from_code.get(cell.value, "#N/A")
     if cell.ctype == xlrd.XL_CELL_BOOLEAN:
         return bool(cell.value)
-    return (
-        CONTROL.sub("", cell.value)
-        if isinstance(cell.value, str) and cell.value
-        else cell.value or (0.0 if cell.ctype == xlrd.XL_CELL_NUMBER else None)
-    )
+    if cell.ctype == xlrd.XL_CELL_NUMBER:
+        return cell.value or 0.0
+    return CONTROL.sub("", cell.value) if isinstance(cell.value, str) and cell.value else cell.value or None

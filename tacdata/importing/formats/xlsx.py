@@ -21,7 +21,7 @@ from tacdata.importing.source_table import SourceTable
 from tacdata.importing.units import OTHERS, plain, quantity_of
 
 TABS = ReadOptions(delimiter="tab", decimal=".")
-MERGED = re.compile(rb'<(?:\w+:)?mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
+MERGED = re.compile(rb'<(?:\w+:)?mergeCell [^>]*ref="([A-Z]+\d+:[A-Z]+\d+)"')
 HIDDEN = re.compile(rb'<(?:\w+:)?row [^>]*hidden="(?:1|true)"[^>]*>')
 NUMBERED = re.compile(rb'\br="(\d+)"')
 """How a sheet marks merged ranges, hidden rows and the number of a row."""
@@ -72,13 +72,9 @@ class Xlsx(SourceFormat):
             table, read, remainder = _first_table(path, book, options, self.marks)
         finally:
             book.close()
-        notes = [
-            *table.notes,
-            *([f"{path.name}: sheet {read} is read, not {', '.join(remainder)}"] if remainder else []),
-        ]
-        if zipped_size(path) and any(
-            values.dtype != object and not np.isfinite(values).any() for values in table.columns.values()
-        ):
+        notes = [*table.notes, *[f"{path.name}: sheet {read} is read, not {', '.join(remainder)}"] * bool(remainder)]
+        columns = [values for values in table.columns.values() if values.dtype != object]
+        if zipped_size(path) and any(not np.isfinite(values).any() for values in columns):
             notes += _never_computed(path, read)
         return replace(table, notes=tuple(notes))
 
@@ -95,6 +91,8 @@ class Xlsx(SourceFormat):
 
     def marks(self, path: Path, sheet: Any) -> Marks:
         """Return the merged ranges and the hidden rows of a sheet."""
+        from openpyxl.utils import range_boundaries
+
         name = str(getattr(sheet, "_worksheet_path", "")).lstrip("/")
         with zipfile.ZipFile(path) as archive:
             if name not in archive.namelist() or archive.getinfo(name).file_size > MOST_MARKED:
@@ -102,8 +100,8 @@ class Xlsx(SourceFormat):
             text = archive.read(name)
         merged = []
         for match in MERGED.finditer(text):
-            left, top, right, bottom = (group.decode() for group in match.groups())
-            merged.append((int(top) - 1, int(bottom) - 1, _column_number(left), _column_number(right)))
+            left, top, right, bottom = range_boundaries(match[1].decode())
+            merged.append((top - 1, bottom - 1, left - 1, right - 1))
         rows = (NUMBERED.search(match[0]) for match in HIDDEN.finditer(text))
         return Marks(tuple(merged), frozenset(int(match[1]) - 1 for match in rows if match))
 
@@ -122,12 +120,8 @@ def _first_table(
     for name, data, decimal in [(name, data, decimal) for decimal in ".," for name, data in sheets.items()]:
         try:
             formats = _units_of_formats(book[name])
-            table = table_of(
-                path,
-                data,
-                replace(options, delimiter=TABS.delimiter, decimal=decimal),
-                [f"{path.name}: {note}" for note in notes[name]],
-            )
+            tabs = replace(options, delimiter=TABS.delimiter, decimal=decimal)
+            table = table_of(path, data, tabs, [f"{path.name}: {note}" for note in notes[name]])
         except FormatError as error:
             refused = refused or error
             continue
@@ -152,13 +146,6 @@ def _units_of_formats(sheet: Any) -> list[str]:
                 if quantity_of(unit) or plain(unit).lower() in OTHERS:
                     units[number] = plain(unit)
     return units
-
-
-def _column_number(letters: str) -> int:
-    number = 0
-    for letter in letters:
-        number = 26 * number + ord(letter) - ord("A") + 1
-    return number - 1
 
 
 def _as_text(sheet: Any, marks: Marks, notes: list[str], limit: int | None = None) -> bytes:

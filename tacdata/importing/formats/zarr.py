@@ -42,7 +42,10 @@ class Zarr(SourceFormat):
         arrays: dict[str, np.ndarray] = {}
         notes: list[str] = []
         units: dict[str, str] = {}
-        for folder in _arrays(path):
+        # Groups may lack a description of their own, so arrays are looked for and not asked of them.
+        second = {described.parent for described in path.rglob(".zarray")}
+        third = {file.parent for file in path.rglob("zarr.json") if '"array"' in file.read_text()}
+        for folder in sorted(second | third):
             name = folder.relative_to(path).as_posix()
             array = zarr.open_array(str(folder), mode="r")
             if int(np.prod(array.shape[1:])) > WIDEST:
@@ -122,17 +125,7 @@ def _refuse_cut_chunks(folder: Path) -> None:
         return
     for chunk in sorted(file for file in folder.rglob("*") if file.is_file() and file.name not in DESCRIBED):
         data = chunk.read_bytes()
-        if len(data) < BLOSC_HEADER or int.from_bytes(data[12:16], "little") != len(data):
-            fault = (
-                f"{len(data)} bytes"
-                if len(data) < BLOSC_HEADER
-                else (f"{len(data)} bytes in place of {int.from_bytes(data[12:16], 'little')}")
-            )
+        has_header, stated = len(data) >= BLOSC_HEADER, int.from_bytes(data[12:16], "little")
+        if not has_header or stated != len(data):
+            fault = f"{len(data)} bytes" + f" in place of {stated}" * has_header
             raise FormatError(f"{chunk}: a damaged chunk, {fault}", "whole chunks", "copy the store again")
-
-
-def _arrays(path: Path) -> list[Path]:
-    """Return the folders of arrays; groups may lack a description of their own, so they are not asked."""
-    second = {described.parent for described in path.rglob(".zarray")}
-    third = {file.parent for file in path.rglob("zarr.json") if '"array"' in file.read_text()}
-    return sorted(second | third)

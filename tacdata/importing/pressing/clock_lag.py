@@ -87,11 +87,7 @@ def lag_doubts(taxels: Stream, position: Stream, policy: LagPolicy = POLICY) -> 
             f"position: its clock and that of the channels drift apart: the readings' lag changes by {drift:+.3g} s in "
             "the course of the recording: give drift [ppm] under the time of one",
         )
-    lag, gain, correlation = (
-        float(np.median(lags)),
-        float(np.median(gains)),
-        float(np.median([each[1] for each in found])),
-    )
+    lag, gain, correlation = (float(np.median(each)) for each in (lags, gains, [each[1] for each in found]))
     is_shift = gain >= policy.other_gain or (gain >= policy.full_gain and correlation >= policy.full_correlation)
     if not is_shift or abs(lag) < max(least, policy.lead if lag < 0 else policy.lag):
         return ()

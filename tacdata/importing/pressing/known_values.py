@@ -9,17 +9,8 @@ from tacdata.importing.mapping import Axis, KnownValue, Value
 from tacdata.importing.source_table import SourceTable, axis, single
 from tacdata.importing.units import factor
 
-UNITS = {
-    "x": "mm",
-    "y": "mm",
-    "z": "mm",
-    "yaw": "deg",
-    "tilt_x": "deg",
-    "tilt_y": "deg",
-    "depth": "mm",
-    "speed": "mm/s",
-    "hold": "s",
-}
+LENGTHS, ANGLES = ("x", "y", "z", "depth"), ("yaw", "tilt_x", "tilt_y")
+UNITS = {**dict.fromkeys(LENGTHS, "mm"), **dict.fromkeys(ANGLES, "deg"), "speed": "mm/s", "hold": "s"}
 
 
 def known_numbers(

@@ -140,17 +140,11 @@ def _doubts(mapping: Mapping, streams: ImportedStreams, place: Registration) -> 
     taxels, position, entry = streams.taxels, streams.position, mapping.position
     if position is None or entry is None or min(len(taxels.time_ns), len(position.time_ns)) < FEWEST:
         return ()
-    doubts = () if mapping.taxels.trusted else _reading_doubts(streams, place)
+    depth = place.to_sensor(position.values)[:, 2]
+    doubts = () if mapping.taxels.trusted else reading_doubts(taxels, position.time_ns, depth)
     if (entry.file, entry.clock.column) != (mapping.taxels.file, mapping.taxels.clock.column):
         doubts += lag_doubts(taxels, position)
     return doubts
-
-
-def _reading_doubts(streams: ImportedStreams, place: Registration) -> tuple[str, ...]:
-    position, taxels = streams.position, streams.taxels
-    if position is None:
-        return ()
-    return reading_doubts(taxels, position.time_ns, place.to_sensor(position.values)[:, 2])
 
 
 def _check_rows(streams: ImportedStreams, trial: str) -> None:

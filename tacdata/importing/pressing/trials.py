@@ -115,7 +115,9 @@ def windows(
         if path is None:
             raise FormatError("trials: press_above without a position", "a position", "add position, or split by gap")
         time_ns, depth = path
-        begins, stops = _excursions(depth > trials.press_above)
+        deep = np.concatenate([[False], depth > trials.press_above, [False]])
+        edges = np.flatnonzero(np.diff(deep.astype(np.int8)))
+        begins, stops = edges[::2], edges[1::2] - 1
         if not len(begins):
             raise FormatError(
                 f"trials: press_above {trials.press_above:g} mm, the deepest is {depth.max():.3f} mm",
@@ -125,9 +127,3 @@ def windows(
         # Half way between two presses: both keep readings without contact.
         ends[1:1] = [(int(time_ns[b]) + int(time_ns[e])) // 2 for e, b in zip(stops[:-1], begins[1:], strict=True)]
     return [(a, b) for a, b in pairwise(ends) if b > a]
-
-
-def _excursions(deep: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first and the last row of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], deep, [False]]).astype(np.int8)))
-    return edges[::2], edges[1::2] - 1

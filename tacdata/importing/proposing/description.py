@@ -226,7 +226,9 @@ def _columns(table: SourceTable) -> list[str]:
 
 def _line(table: SourceTable, name: str) -> str:
     values = table.column(name)
-    unit = f" [{table.units[name]}]" if table.units.get(name) and not _says(name, table.units[name]) else ""
+    unit = table.units.get(name, "")
+    is_named = any(f"{opening}{unit}{closing}" in name for opening, closing in ("[]", "()", "{}"))
+    unit = f" [{unit}]" if unit and not is_named else ""
     if values.dtype == object:
         texts = sorted({str(value) for value in values.tolist() if value is not None})
         return f"    {name}{unit}: text, {len(texts)} different, for example {', '.join(texts[:3])}"
@@ -238,11 +240,6 @@ def _line(table: SourceTable, name: str) -> str:
     low, high = np.nanmin(numbers) + 0.0, np.nanmax(numbers) + 0.0  # no "-0"
     remark = f", {100 * missing:.0f} % missing" * bool(missing) + _sentinel(numbers)
     return f"    {name}{unit}{shape}: {low:.9g} to {high:.9g}{remark}"
-
-
-def _says(name: str, unit: str) -> bool:
-    """Return whether a column's name contains its unit already."""
-    return any(f"{opening}{unit}{closing}" in name for opening, closing in ("[]", "()", "{}"))
 
 
 def _sentinel(numbers: np.ndarray) -> str:

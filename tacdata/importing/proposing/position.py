@@ -57,7 +57,10 @@ def proposed_position(
         words = "taken for the position by its shape: it is smooth, comes back, and the readings follow it"
         questions.append(Question(f"{names['depth']}: {words}"))
     unsaid = [name for name in names.values() if name not in table.units and quantity_of(split_unit(name)[1]) != "mm"]
-    unit = _length(table, names[pressing]) if unsaid and "stand_in" not in roles else "mm"
+    unit, path = "mm", table.column(names[pressing])
+    # A stroke below 0.02 is no press in mm, but 2 mm written in m is.
+    if unsaid and "stand_in" not in roles and float(np.nanmax(path) - np.nanmin(path)) < SHORTEST:
+        unit = "m"
     counted = [name for name in unsaid if COUNTED.search(name)]
     units = dict.fromkeys(unsaid, unit) | dict.fromkeys(counted, "steps")
     axes = {key: Axis(name, units.get(name, "")) for key, name in names.items()}
@@ -201,9 +204,3 @@ def _without_error(table: SourceTable, target: str, error: str) -> tuple[Axis, Q
     axis = Axis(unit="" if stated and stated == table.units.get(error) else "mm", expression=f"`{target}` - `{error}`")
     text = f"the position is taken as {target} - {error}: is the error the set point minus the position?"
     return axis, Question(text)
-
-
-def _length(table: SourceTable, pressing: str) -> str:
-    """Return the unit of lengths without one: m where no press would be so short in mm."""
-    # A stroke below 0.02 is no press in mm, but 2 mm written in m is.
-    return "m" if float(np.nanmax(table.column(pressing)) - np.nanmin(table.column(pressing))) < SHORTEST else "mm"

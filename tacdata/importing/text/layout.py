@@ -111,7 +111,7 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     if header and len(header[-1]) == width - 1 and _are_row_names(sample):
         header = [[ROW_NAME, *row] if len(row) == width - 1 else row for row in header]
     names, units = _names(header, width)
-    start = _line_of(lines, lines_of_data[first], skip)
+    start = lines.index(lines_of_data[first], skip)
     _refuse_unclear_signs(sample, names, origin)
     kinds = tuple(_kind([row[k] for row in sample], decimal) for k in range(width))
     return TextLayout(delimiter, decimal, start, names, units, kinds)
@@ -290,7 +290,8 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         below = None
     units_row = rows[below] if below is not None else None
     titles = _filled(rows[:below])
-    first = max((k + 1 for k, row in enumerate(rows) if _holds_numbers(row)), default=0)
+    numeric = [any(field and field not in MISSING and is_number(field, ".") for field in row) for row in rows]
+    first = max((k + 1 for k, holds_numbers in enumerate(numeric) if holds_numbers), default=0)
     groups = [row for k, row in enumerate(rows) if first <= k != below and row != titles]
     names: list[str] = []
     units: dict[str, str] = {}
@@ -306,10 +307,6 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         if unit and not unit.isdigit() and unit.lower() not in LABELS:  # "pos (5)" is the fifth's
             units[name] = unit
     return tuple(names), units
-
-
-def _holds_numbers(fields: list[str]) -> bool:
-    return any(field and field not in MISSING and is_number(field, ".") for field in fields)
 
 
 def _filled(rows: list[list[str]]) -> list[str]:
@@ -346,7 +343,3 @@ def _kind(fields: list[str], decimal: str) -> str:
         long = values and all(re.fullmatch(r"[-+]?\d{16,}", field) for field in values)
         return "int" if long else "float"
     return "text"
-
-
-def _line_of(lines: list[str], line: str, skip: int) -> int:
-    return next(k for k, candidate in enumerate(lines) if k >= skip and candidate == line)
