@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import PurePath
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,7 +58,7 @@ def console() -> Console:
     """Return where spinners and words about the work go: standard error."""
     from rich.console import Console
 
-    return Console(stderr=True, quiet=_quiet)
+    return Console(stderr=True, quiet=_quiet, markup=False, highlight=False, soft_wrap=True)
 
 
 LEAST_DONE, LEAST_SHARE = 5, 0.02
@@ -103,3 +105,60 @@ def bars(*columns: str | ProgressColumn, **options: Any) -> Progress:
     from rich.progress import Progress
 
     return Progress(*columns, console=Console(quiet=True) if _quiet else None, disable=_quiet, **options)
+
+
+STAGES = {
+    "read": "reading recordings",
+    "look": "looking for labels",
+    "compile": "compiling kernels",
+    "solve": "solving presses",
+    "write": "writing episodes",
+}
+"""Stage of a job of presses -> words on its bar."""
+
+
+class StageBars:
+    """A bar a stage, with the time that remains; lines in place of bars where there is no terminal."""
+
+    def __init__(self, pause: float, each_press: bool = False) -> None:
+        """Make the display.
+
+        Args:
+            pause: Least time between two lines [s].
+            each_press: Print a line for every solved press, and the first line about kernels at once.
+        """
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+
+        words, elapsed = TextColumn("{task.description}"), TimeElapsedColumn()
+        self._progress = bars(words, BarColumn(), MofNCompleteColumn(), elapsed, remaining_column())
+        self._pause, self._each_press = pause, each_press
+        self._tasks: dict[str, Any] = {}
+        self._printed = -pause if each_press else 0.0
+        self.solving_seconds = 0.0
+        """Time from the beginning to the last press that was solved [s]."""
+
+    def __enter__(self) -> Self:
+        self._began = time.monotonic()
+        if sys.stdout.isatty():
+            self._progress.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._progress.stop()
+
+    def show(self, stage: str, done: int, total: int) -> None:
+        """Move the bar of a stage, one of `STAGES`."""
+        if stage not in self._tasks:
+            self._tasks[stage] = self._progress.add_task(STAGES[stage], total=total)
+        self._progress.update(self._tasks[stage], completed=done)
+        seconds, line = time.monotonic() - self._began, ""
+        is_due = seconds - self._printed > self._pause
+        if stage == "compile" and is_due:
+            line = f"  compiling kernels: {done} of about {total} modules"
+        if stage == "solve":
+            self.solving_seconds = seconds
+            if done if self._each_press else is_due:
+                line = ", ".join(filter(None, [f"  press {done} of {total} solved", remaining(done, total, seconds)]))
+        if line and not sys.stdout.isatty():
+            self._printed = seconds
+            say(line)

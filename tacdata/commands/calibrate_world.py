@@ -54,11 +54,8 @@ def run(
     elif board is not None and images is not None and calibration is not None:
         solution = _by_board(board, images, calibration, camera, frame)
     else:
-        raise UsageError(
-            "neither --pairs nor --board with --images and --calibration",
-            "one of them",
-            "see tacdata calibrate-world --help",
-        )
+        fault = "neither --pairs nor --board with --images and --calibration"
+        raise UsageError(fault, "one of them", "see tacdata calibrate-world --help")
     document = solution.document(datetime.now(UTC).isoformat(timespec="seconds"))
     documents.write(out, document, "camera_world")
     x, y, z = solution.matrix[:3, 3]

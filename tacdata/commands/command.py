@@ -65,6 +65,15 @@ def members(room: str, base: str) -> list[tuple[ModuleType, str]]:
     return [(module, module.__name__.rsplit(".", 1)[-1].replace("_", "-")) for module in modules]
 
 
+def agreed(question: str) -> bool:
+    """Ask on the terminal and return whether the answer is yes; no answer (the input is closed) is a no."""
+    try:
+        return input(question).strip().lower() in ("y", "yes")
+    except EOFError:
+        print()
+        return False
+
+
 @contextmanager
 def before_it_moves() -> Iterator[None]:
     """Let a Ctrl-C say that nothing was moved yet."""

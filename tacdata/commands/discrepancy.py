@@ -54,15 +54,14 @@ def run(
 
         def show(words: str) -> None:
             status.update(words)
-            line = f"{time.monotonic() - begun:5.0f} s  {words}"
-            console.print(line, markup=False, highlight=False, soft_wrap=True)
+            console.print(f"{time.monotonic() - begun:5.0f} s  {words}")
 
         verdict = td.judge(recordings, out, spec=spec, stop_after=stop_after, progress=show)
     print("base: " + ("a response fitted to these recordings" if spec is None else str(spec)))
     print(verdict.text, end="")
     if len(recordings) > 1:
         print(_between(recordings))
-    console.print(f"written: {verdict.folder}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"written: {verdict.folder}")
     return Result(verdict.document)
 
 

@@ -39,11 +39,5 @@ def run(
         ("tacdata demo", f"run the whole pipeline ({install_line('all')})"),
     ):
         say(f"  {command:<{len(str(out)) + 18}}{purpose}")
-    return Result(
-        {
-            "check": report.document,
-            "press": {"number": DEEPEST, "found": scene.found},
-            "folder": out,
-            "picture": out / PICTURE,
-        }
-    )
+    press = {"number": DEEPEST, "found": scene.found}
+    return Result({"check": report.document, "press": press, "folder": out, "picture": out / PICTURE})

@@ -56,7 +56,7 @@ def run(
     if (path / SESSION).is_file():
         demonstrations, direct = _presses(path), True
     else:
-        files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [_tracks(path)]
+        files = [path_of(p) for p in read_demo_session(path).episodes] if path.is_dir() else [tracks_of(path)]
         demonstrations = map(read_tracks, files)
     episodes = []
     for demonstration in demonstrations:
@@ -103,7 +103,8 @@ def _notes(targets: FingertipTargets) -> list[str]:
     return [words for words in targets.remarks if words not in source.remarks] + source.guesses(targets.fingers)
 
 
-def _tracks(path: Path) -> Path:
+def tracks_of(path: Path) -> Path:
+    """Return the tracks of a recording; a file of tracks is itself."""
     from tacdata.demonstrations.paths.tracks_file import ENDING, path_of
 
     return path if path.name.endswith(ENDING) else path_of(path)

@@ -66,12 +66,8 @@ def _together(notes: tuple[str, ...]) -> list[str]:
     for note in notes:
         name, colon, message = note.partition(": ")
         files.setdefault(message if colon and "." in name else note, []).append(name)
-    return [
-        f"{names[0]} and {len(names) - 1} more files: {text}"
-        if len(names) > 1
-        else next(note for note in notes if note.endswith(text))
-        for text, names in files.items()
-    ]
+    joined = {text: f"{names[0]} and {len(names) - 1} more files: {text}" for text, names in files.items() if names[1:]}
+    return [joined.get(text) or next(note for note in notes if note.endswith(text)) for text in files]
 
 
 def _inspect(source: Path, propose: Path | None) -> Result:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,7 @@ import typer
 
 from tacdata.commands.command import DATA, Result
 from tacdata.errors import SolveError
-from tacdata.progress import bars, remaining, remaining_column, say, suggest
+from tacdata.progress import StageBars, say, suggest
 
 if TYPE_CHECKING:
     from tacdata.label_farm.labelling import LabellingSummary
@@ -24,8 +23,8 @@ EXAMPLES = (
     "tacdata label session --follow --into dataset",
 )
 
-SAY_SECONDS = 10.0
-"""Seconds between two lines about kernels where there is no terminal."""
+PAUSE = 10.0
+"""Time between two lines about kernels where there is no terminal [s]."""
 
 
 def run(
@@ -75,7 +74,7 @@ def run(
 
     if hint := "" if dask else idle_gpus(device or ()):
         say(hint)
-    with _Bars() as bars:
+    with StageBars(PAUSE, each_press=True) as bars:
         summary = td.label(
             session,
             sensor=sensor,
@@ -98,48 +97,6 @@ def run(
     if follow and (remaining := len(td.read_session(session).remaining)):
         say(f"{remaining} presses of the plan were not recorded: label again when they are")
     return _report(summary, file_names.folder(out or session), out or session)
-
-
-class _Bars:
-    """One bar a stage, with the time that remains; a line a press where there is no terminal."""
-
-    def __enter__(self) -> _Bars:
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-
-        self._progress = bars(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), remaining_column()
-        )
-        if sys.stdout.isatty():
-            self._progress.start()
-        self._tasks: dict = {}
-        self._spoke = -SAY_SECONDS
-        self._began = time.monotonic()
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._progress.stop()
-
-    def _estimate(self, done: int, total: int) -> str:
-        return remaining(done, total, time.monotonic() - self._began)
-
-    def show(self, stage: str, done: int, total: int) -> None:
-        """Move the bar of a stage."""
-        names = {
-            "read": "reading recordings",
-            "look": "looking for labels",
-            "compile": "compiling kernels",
-            "solve": "solving presses",
-        }
-        if stage not in self._tasks:
-            self._tasks[stage] = self._progress.add_task(names[stage], total=total)
-        self._progress.update(self._tasks[stage], completed=done)
-        if sys.stdout.isatty():
-            return
-        if stage == "solve" and done:
-            say(", ".join(filter(None, [f"  press {done} of {total} solved", self._estimate(done, total)])))
-        if stage == "compile" and time.monotonic() - self._spoke > SAY_SECONDS:
-            self._spoke = time.monotonic()
-            say(f"  compiling kernels: {done} of about {total} modules")
 
 
 def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:

@@ -42,15 +42,10 @@ def run(
 
 def _verbs() -> list[dict[str, Any]]:
     """Print the verbs by task; return name, task, meaning and examples of each."""
-    verbs = [
-        {
-            "name": name,
-            "task": module.PANEL,
-            "meaning": (module.run.__doc__ or "").split("\n")[0],
-            "examples": getattr(module, "EXAMPLES", ()),
-        }
-        for module, name in members("tacdata.commands", "command")
-    ]
+    verbs = []
+    for module, name in members("tacdata.commands", "command"):
+        meaning, examples = (module.run.__doc__ or "").split("\n")[0], getattr(module, "EXAMPLES", ())
+        verbs.append({"name": name, "task": module.PANEL, "meaning": meaning, "examples": examples})
     for task in TASKS:
         print(task)
         for verb in verbs:

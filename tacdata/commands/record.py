@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tacdata import progress
-from tacdata.commands.command import RECORD, Result, before_it_moves
+from tacdata.commands.command import RECORD, Result, agreed, before_it_moves
 from tacdata.errors import Exit, UsageError
 from tacdata.progress import say, suggest
 
@@ -86,7 +86,7 @@ def run(
     def confirm(summary: Preflight) -> bool:
         print(summary.text, flush=True)
         print("\n".join(registered.warnings), file=sys.stderr, flush=True)
-        return yes or _answer("Move now? [y/N] ").lower() in ("y", "yes")
+        return yes or agreed("Move now? [y/N] ")
 
     if live:
         from tacdata.viewers.live.window import live_view
@@ -109,7 +109,7 @@ def run(
             say=lambda words: say(f"  {words}"),
             watch=watch,
             interruption=interruption,
-            ask=lambda question: _answer(question).lower() in ("y", "yes"),
+            ask=agreed,
             confirmed=confirm_position,
             prove=prove_zero,
         )
@@ -143,15 +143,6 @@ def _by_hand(
     return Result({"session": folder, "demonstrations": [path.name for path in session.episodes]})
 
 
-def _answer(question: str) -> str:
-    """Ask on the terminal; no answer (the input is closed) is an empty one."""
-    try:
-        return input(question).strip()
-    except EOFError:
-        print()
-        return ""
-
-
 def _mounting(rig: Rig, bar: _Bar) -> Callable[[Press], None]:
     """Return who mounts indenters: the virtual rig, or a person who is asked."""
     if "mounting" in rig.document:
@@ -163,7 +154,7 @@ def _mounting(rig: Rig, bar: _Bar) -> Callable[[Press], None]:
         bar.pause()
         sizes = ", ".join(f"{k} {v:g}" for k, v in press.indenter.document.items() if k != "shape")
         print(f"\nMount {press.indenter_name} ({press.indenter.shape}; {sizes}) at {press.turned}.")
-        if _answer("Mounted, and its tip zeroed? [y/N] ").lower() not in ("y", "yes"):
+        if not agreed("Mounted, and its tip zeroed? [y/N] "):
             raise UsageError(
                 f"{press.indenter_name} was not mounted", "yes", "continue later with --resume; nothing is lost"
             )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tacdata.commands.command import RECORD, Result, before_it_moves
+from tacdata.commands.command import RECORD, Result, agreed, before_it_moves
 from tacdata.errors import Exit, UsageError
 from tacdata.progress import say, suggest
 
@@ -123,7 +123,7 @@ def _measure(
     with Interruption() as interruption:
         devices = RigDevices.of(rig)
         state = MachineState(rig, devices.cnc)
-        guard = PositionGuard(state, devices.cnc, _agreed, confirmed)
+        guard = PositionGuard(state, devices.cnc, agreed, confirmed)
         motion = GuardedMotion(devices.cnc, rig.clock, interruption, state)
         try:
             return _touch(rig, sensor, settings, specimen, yes, devices, guard, motion, interruption)
@@ -161,7 +161,7 @@ def _touch(
             print(
                 "caution: homing is switched off ($22=0): the registration holds until the controller is switched off"
             )
-        if not yes and not _agreed("Move now? [y/N] "):
+        if not yes and not agreed("Move now? [y/N] "):
             raise UsageError("the summary was not confirmed", "yes", "nothing was moved; start again when ready")
         guard.require_known(safe)
         _mount(rig, specimen)
@@ -177,14 +177,5 @@ def _mount(rig: Rig, specimen: dict[str, Any]) -> None:
 
         mount(rig.document, specimen)
         return
-    if not _agreed(f"Mounted: a sphere of radius {specimen['radius']:g} mm? [y/N] "):
+    if not agreed(f"Mounted: a sphere of radius {specimen['radius']:g} mm? [y/N] "):
         raise UsageError("the indenter was not mounted", "yes", "nothing was moved; start again when it sits")
-
-
-def _agreed(question: str) -> bool:
-    """Ask on the terminal; no answer (the input is closed) is a no."""
-    try:
-        return input(question).strip().lower() in ("y", "yes")
-    except EOFError:
-        print()
-        return False

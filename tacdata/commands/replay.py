@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tacdata.commands.command import HANDS, Result
+from tacdata.commands.export import tracks_of
 from tacdata.errors import UsageError
 
 if TYPE_CHECKING:
@@ -86,24 +87,23 @@ def run(
             raise UsageError(f"{file} exists", "a new file", "choose another name")
     if gain_from is not None and not find_gain:
         raise UsageError("--gain-from without --find-gain", "both or none", "add --find-gain")
-    limits = {
-        "radius": (radius, 1, 200, "mm"),
-        "mass": (mass, 0.001, 10, "kg"),
-        "stiffness": (stiffness, 1, 1e5, "N/m"),
-    }
-    limits |= {"most-slip": (most_slip, 0.1, 100, "mm"), "most-force": (most_force, 0.1, 1000, "N")}
-    limits["least-grip"] = (least_grip, 0.1, 100, "times the load")
-    for option, (value, lower, upper, unit) in limits.items():
+    for option, value, lower, upper, unit in (
+        ("radius", radius, 1, 200, "mm"),
+        ("mass", mass, 0.001, 10, "kg"),
+        ("stiffness", stiffness, 1, 1e5, "N/m"),
+        ("most-slip", most_slip, 0.1, 100, "mm"),
+        ("most-force", most_force, 0.1, 1000, "N"),
+        ("least-grip", least_grip, 0.1, 100, "times the load"),
+    ):
         if value is not None and not lower <= value <= upper:
             raise UsageError(f"--{option} {value:g}", f"{lower:g} to {upper:g} {unit}", "correct it")
-    demonstrations = [read_tracks(_tracks(path)) for path in paths]
-    source = read_tracks(_tracks(gain_from)) if gain_from is not None else demonstrations[0]
+    demonstrations = [read_tracks(tracks_of(path)) for path in paths]
+    source = read_tracks(tracks_of(gain_from)) if gain_from is not None else demonstrations[0]
     names = {task or demonstration.task for demonstration in (*demonstrations, source)}
     if len(names) > 1:
         raise UsageError(f"recordings of the tasks {', '.join(sorted(names))}", "one task", "replay each task alone")
-    if gain_from is not None and source.recording_hash in {
-        demonstration.recording_hash for demonstration in demonstrations
-    }:
+    by_hash = {demonstration.recording_hash: demonstration for demonstration in demonstrations}
+    if gain_from is not None and source.recording_hash in by_hash:
         raise UsageError(f"{gain_from} among those tried", "other recordings than that", "try others")
     name = names.pop()
     own: dict[str, Any] = {"name": thing}
@@ -115,9 +115,7 @@ def run(
     hand = None if robot is None else read_robot(robot)
     gain_sets, gain = {"compensated": read_gains(gains).of(name)}, None
     # Before the search: these remarks may explain its failure.
-    for demonstration in {
-        demonstration.recording_hash: demonstration for demonstration in (source, *demonstrations)
-    }.values():
+    for demonstration in ({source.recording_hash: source} | by_hash).values():
         untouched = Trials(demonstration, {}, scene, hand, place)
         original = untouched.seen
         if not with_guesses:
@@ -186,12 +184,6 @@ def _other_network(source: Demonstration, demonstration: Demonstration) -> tuple
         f"its depth is predicted by checkpoint {ours[:12]}, the gain is found with {theirs[:12]}: a gain makes up for "
         "the errors of one network on one unit, so find it with the same",
     )
-
-
-def _tracks(path: Path) -> Path:
-    from tacdata.demonstrations.paths.tracks_file import ENDING, path_of
-
-    return path if path.name.endswith(ENDING) else path_of(path)
 
 
 def _save(view: Path | None, video: Path | None, tried: Trials, scene: ReplayScene) -> None:

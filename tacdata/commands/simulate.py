@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tacdata.commands.command import DATA, Result
-from tacdata.progress import bars, remaining, remaining_column, say, suggest
+from tacdata.progress import StageBars, say, suggest
 
 if TYPE_CHECKING:
     from tacdata.pipeline.simulate import SimulatedPresses
@@ -22,8 +20,8 @@ EXAMPLES = (
     "tacdata simulate plan.yaml --out simulated --workers 2",
     "tacdata simulate --presses 50 --effects effects.json --out worn",
 )
-SAY_SECONDS = 30.0
-"""Seconds between two lines of progress where there is no terminal."""
+PAUSE = 30.0
+"""Time between two lines of progress where there is no terminal [s]."""
 
 
 def run(
@@ -58,7 +56,7 @@ def run(
     """
     import tacdata as td
 
-    with _Bars() as bars:
+    with StageBars(PAUSE) as bars:
         done = td.simulate(
             out,
             presses,
@@ -86,43 +84,6 @@ def run(
     suggest("train", out, "--out NETWORK")
     left_out = done.left_out.total()
     return Result({**figures, "dataset": out, "episodes": done.episodes, "frames": done.frames, "left_out": left_out})
-
-
-class _Bars:
-    """A bar a stage, with the time that remains; a line now and then where there is no terminal."""
-
-    def __init__(self) -> None:
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
-
-        self._bar = bars(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), remaining_column())
-        self._tasks: dict = {}
-        self.solving_seconds = 0.0
-
-    def __enter__(self) -> _Bars:
-        self._began = self._spoke = time.monotonic()
-        if sys.stdout.isatty():
-            self._bar.start()
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._bar.stop()
-
-    def show(self, stage: str, done: int, total: int) -> None:
-        """Move the bar of a stage."""
-        if stage not in self._tasks:
-            names = {"compile": "compiling kernels", "solve": "solving presses", "write": "writing episodes"}
-            self._tasks[stage] = self._bar.add_task(names[stage], total=total)
-        self._bar.update(self._tasks[stage], completed=done)
-        if stage == "write":
-            return
-        words = f"  compiling kernels: {done} of about {total} modules"
-        if stage == "solve":
-            self.solving_seconds = time.monotonic() - self._began
-            estimate = remaining(done, total, self.solving_seconds)
-            words = ", ".join(filter(None, [f"  press {done} of {total} solved", estimate]))
-        if not sys.stdout.isatty() and time.monotonic() - self._spoke > SAY_SECONDS:
-            self._spoke = time.monotonic()
-            say(words)
 
 
 def _report(done: SimulatedPresses, seconds: float) -> None:

@@ -41,10 +41,7 @@ def run(
     mesh = answer["mesh"]
     console.print(
         f"mesh: {mesh['elements']:.0f} elements, radius ratio {mesh['worst_ratio']:.2f} at worst, "
-        f"{mesh['median_ratio']:.2f} in the median (1 is best), volume {100 * mesh['volume_error']:+.2f} %",
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
+        f"{mesh['median_ratio']:.2f} in the median (1 is best), volume {100 * mesh['volume_error']:+.2f} %"
     )
     for remark in answer["remarks"]:
         print(f"warning: {remark}", file=sys.stderr)

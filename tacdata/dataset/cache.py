@@ -122,15 +122,10 @@ def _shape(feature: dict[str, Any]) -> tuple[int, ...]:
 def _fill(root: Path, info: dict[str, Any], paths: list[Path], target: Path) -> None:
     total, at = info["total_frames"], 0
     described = {key: f for key, f in info["features"].items() if f["dtype"] not in ("string", "video", "language")}
-    maps = {
-        key: open_memmap(
-            target / f"{key}.npy",
-            mode="w+",
-            shape=(total, *_shape(feature)),
-            dtype="float32" if feature["dtype"] == "image" else feature["dtype"],
-        )
-        for key, feature in described.items()
-    }
+    maps = {}
+    for key, feature in described.items():
+        dtype = "float32" if feature["dtype"] == "image" else feature["dtype"]
+        maps[key] = open_memmap(target / f"{key}.npy", mode="w+", dtype=dtype, shape=(total, *_shape(feature)))
     for path in paths:
         table = folder.read_parquet(path, list(described))
         index = table["index"].to_numpy()

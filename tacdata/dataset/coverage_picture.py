@@ -34,15 +34,8 @@ def draw(path: Path | BinaryIO, dataset: Dataset) -> None:
     ]
     for axes, horizontal, vertical in views:
         for number, name in enumerate(names):
-            group = [press for press in presses if press.indenter_name == name]
-            axes.scatter(
-                [horizontal(p) for p in group],
-                [vertical(p) for p in group],
-                s=14,
-                color=f"C{number % 10}",
-                label=name,
-                alpha=0.75,
-            )
+            places = [(horizontal(press), vertical(press)) for press in presses if press.indenter_name == name]
+            axes.scatter(*zip(*places, strict=True), s=14, color=f"C{number % 10}", label=name, alpha=0.75)
     centers = sensor.taxels.centers
     plane.plot(centers[:, 0], centers[:, 1], "+", color="0.6", markersize=5, zorder=0)
     plane.set(xlim=(-half_x, half_x), ylim=(-half_y, half_y), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")

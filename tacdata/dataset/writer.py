@@ -196,12 +196,9 @@ class DatasetWriter:
         tasks: list[str],
         task: str,
     ) -> None:
-        folder.write_parquet(
-            self.root / folder.data_path(self.data_file),
-            episode_table(
-                frame_columns, self.info["features"], {metadata.SHARD_KEY: metadata.shard_metadata(self.sensor, record)}
-            ),
-        )
+        stamp = {metadata.SHARD_KEY: metadata.shard_metadata(self.sensor, record)}
+        table = episode_table(frame_columns, self.info["features"], stamp)
+        folder.write_parquet(self.root / folder.data_path(self.data_file), table)
         metadata.append_record(self.root, record)
         row = folder.EpisodeRow(
             index=self.info["total_episodes"],

@@ -46,44 +46,29 @@ INDEX_COLUMNS = {
 }
 """LeRobot's own columns."""
 
-UNITS = {
-    STATE: "counts",
-    RAW: "counts",
-    DEPTH: "mm",
-    TIP: "mm",
-    FORCE: "N",
-    TAXEL_FORCE: "N",
-    LABEL_ERROR: "mm",
-    TIME: "ns",
-    PHASE: "1",
-    VALID: "1",
-    SENSOR: "1",
-    RECORD: "1",
-    "timestamp": "s",
+OWN = {
+    STATE: ("float32", "counts"),
+    RAW: ("float32", "counts"),
+    DEPTH: ("image", "mm"),
+    TIP: ("float32", "mm"),
+    FORCE: ("float32", "N"),
+    TAXEL_FORCE: ("float32", "N"),
+    LABEL_ERROR: ("float32", "mm"),
+    TIME: ("int64", "ns"),
+    PHASE: ("int64", "1"),
+    VALID: ("bool", "1"),
+    SENSOR: ("int64", "1"),
+    RECORD: ("int64", "1"),
 }
-"""Unit of every column as `read_dataset` gives it."""
+"""LeRobot dtype of every column that `DatasetWriter` is given, and its unit as `read_dataset` gives it."""
+DTYPES = {key: dtype for key, (dtype, _) in OWN.items()}
+UNITS = {key: unit for key, (_, unit) in OWN.items()} | {"timestamp": "s"}
 
 EXTRA = {f"tacdata.{name}": name for name in ("error_map", *columns.OPTIONAL)}
 """Columns that a dataset has only where they were asked for -> the label's column that they hold, as float32.
 
 Maps, such as the error of each pixel, are stored flat, shape (pixels_x * pixels_y,), x slowest: LeRobot would
 take another depth image for a camera."""
-
-DTYPES = {
-    STATE: "float32",
-    RAW: "float32",
-    DEPTH: "image",
-    TIP: "float32",
-    FORCE: "float32",
-    TAXEL_FORCE: "float32",
-    LABEL_ERROR: "float32",
-    TIME: "int64",
-    PHASE: "int64",
-    VALID: "bool",
-    SENSOR: "int64",
-    RECORD: "int64",
-}
-"""LeRobot dtype of every column that `DatasetWriter` is given."""
 
 
 def short_hash(digest: str) -> int:
@@ -128,14 +113,8 @@ def _names(key: str, sensor: Sensor) -> list[str] | None:
     taxels = [f"taxel_{k % width}_{k // width}" for k in range(sensor.taxels.count)]
     if key in EXTRA:
         return taxels if columns.ALL[EXTRA[key]].kind == "taxels" else None
-    return {
-        STATE: taxels,
-        RAW: taxels,
-        TAXEL_FORCE: taxels,
-        DEPTH: ["height", "width", "channels"],
-        TIP: ["x", "y", "depth"],
-        FORCE: ["x", "y", "z"],
-    }.get(key)
+    axes = {DEPTH: ["height", "width", "channels"], TIP: ["x", "y", "depth"], FORCE: ["x", "y", "z"]}
+    return taxels if key in (STATE, RAW, TAXEL_FORCE) else axes.get(key)
 
 
 def lerobot_features(sensor: Sensor, extra: Iterable[str] = ()) -> dict[str, dict[str, Any]]:
@@ -145,12 +124,8 @@ def lerobot_features(sensor: Sensor, extra: Iterable[str] = ()) -> dict[str, dic
         info: dict[str, Any] = {"unit": unit(key)}
         if key == DEPTH:
             shape, info = (*shape, 1), {"is_depth_map": True, "depth_unit": "m", "unit": "m"}
-        features[key] = {
-            "dtype": DTYPES.get(key, "float32"),
-            "shape": list(shape or (1,)),
-            "names": _names(key, sensor),
-            "info": info,
-        }
+        dtype, names = DTYPES.get(key, "float32"), _names(key, sensor)
+        features[key] = {"dtype": dtype, "shape": list(shape or (1,)), "names": names, "info": info}
     for key, dtype in INDEX_COLUMNS.items():
         features[key] = {"dtype": dtype, "shape": [1], "names": None}
     return features

@@ -166,16 +166,8 @@ def rows_in(path: Path) -> dict[int, EpisodeRow]:
     Raises:
         FormatError: If it is damaged.
     """
-    fields = [
-        "episode_index",
-        "tasks",
-        "data/chunk_index",
-        "data/file_index",
-        "dataset_from_index",
-        "dataset_to_index",
-        "meta/episodes/chunk_index",
-        "meta/episodes/file_index",
-    ]
+    places = [f"{part}/{level}_index" for part in ("data", "meta/episodes") for level in ("chunk", "file")]
+    fields = ["episode_index", "tasks", "dataset_from_index", "dataset_to_index", *places]
     return {
         entry["episode_index"]: EpisodeRow(
             entry["episode_index"],

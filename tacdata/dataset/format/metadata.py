@@ -96,17 +96,10 @@ class EpisodeRecord:
 def write_main(root: Path, sensors: dict[str, dict[str, Any]], rate: float) -> None:
     """Write meta/tacdata.json for sensor documents by content hash; ``rate`` in Hz."""
     stamp = provenance.stamp("tacdata.dataset", {}, {})
+    made = {k: stamp[k] for k in ("made_by", "code_version", "made_at")}
+    columns = {"rate": rate, "units": UNITS, "tare": TARE}
     documents.write(
-        root / MAIN,
-        {
-            "version": schemas.version("dataset"),
-            **{k: stamp[k] for k in ("made_by", "code_version", "made_at")},
-            "rate": rate,
-            "units": UNITS,
-            "tare": TARE,
-            "sensors": sensors,
-        },
-        "dataset",
+        root / MAIN, {"version": schemas.version("dataset"), **made, **columns, "sensors": sensors}, "dataset"
     )
 
 

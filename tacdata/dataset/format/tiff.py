@@ -11,19 +11,11 @@ MM_PER_METRE = np.float32(1000.0)
 
 def _header(height: int, width: int) -> bytes:
     size = height * width * 4
-    # (tag, type, value); type 3 is a 16-bit, 4 a 32-bit unsigned integer. 339 = 3: floating point.
-    fields = [
-        (256, 4, width),
-        (257, 4, height),
-        (258, 3, 32),
-        (259, 3, 1),
-        (262, 3, 1),
-        (273, 4, 0),
-        (277, 3, 1),
-        (278, 4, height),
-        (279, 4, size),
-        (339, 3, 3),
-    ]
+    # Tag -> value; 339 = 3: floating point. The strip's start, 273, follows from the number of tags.
+    longs = {256: width, 257: height, 273: 0, 278: height, 279: size}
+    shorts = {258: 32, 259: 1, 262: 1, 277: 1, 339: 3}
+    # (tag, type, value), by tag; type 3 is a 16-bit, 4 a 32-bit unsigned integer.
+    fields = sorted([(tag, 4, v) for tag, v in longs.items()] + [(tag, 3, v) for tag, v in shorts.items()])
     # Padded to 16 bytes so that the strip of every frame starts aligned.
     start = -(-(8 + 2 + 12 * len(fields) + 4) // 16) * 16
     entries = b"".join(struct.pack("<HHII", tag, kind, 1, start if tag == 273 else v) for tag, kind, v in fields)

@@ -10,6 +10,7 @@ from tacdata.commands import label
 from tacdata.label_farm.simulated import crew
 from tacdata.label_farm.workers import loading
 from tacdata.label_farm.workers.loading import Loading, modules_of
+from tacdata.progress import StageBars
 
 
 def test_kernels_that_load_at_once_are_not_worth_a_word(monkeypatch):
@@ -56,7 +57,7 @@ def test_a_process_of_a_simulation_reports_its_kernels(tmp_path, monkeypatch):
 
 
 def test_the_verb_says_so(capsys):
-    with label._Bars() as bars:
+    with StageBars(label.PAUSE, each_press=True) as bars:
         for done in (1, 2, 3):
             bars.show("compile", done, 29)
     assert capsys.readouterr().out.strip() == "compiling kernels: 1 of about 29 modules"
