@@ -28,7 +28,7 @@ EXAMPLES = (
 def run(
     board: Annotated[Path, typer.Option(help="Board file (YAML); with --draw it is written and must not exist.")],
     source: Annotated[str | None, typer.Option(help="Folder of images, video, camera index or stream URL.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Calibration to write (YAML), with a picture beside it.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Calibration to write (YAML), with a picture next to it.")] = None,
     draw: Annotated[Path | None, typer.Option(help="Draw a board to print here (.pdf or .png) and stop.")] = None,
     columns: Annotated[int, typer.Option(help="Squares across, with --draw.")] = 11,
     rows: Annotated[int, typer.Option(help="Squares down, with --draw.")] = 7,

@@ -60,7 +60,7 @@ def run(
     documents.write(out, document, "camera_world")
     x, y, z = solution.matrix[:3, 3]
     place, turn = solution.residual
-    print(f"camera {solution.camera} stands at {x:.4f}, {y:.4f}, {z:.4f} m in {solution.frame!r} ({solution.method})")
+    print(f"camera {solution.camera} is at {x:.4f}, {y:.4f}, {z:.4f} m in {solution.frame!r} ({solution.method})")
     print(f"{solution.poses} poses leave {1000 * place:.2f} mm and {np.degrees(turn):.3f} deg (root mean square)")
     if solution.spread:
         print(f"it is known to {1000 * solution.spread[0]:.2f} mm and {np.degrees(solution.spread[1]):.3f} deg")

@@ -28,7 +28,7 @@ START_LIMIT = 60.0
 def run(
     out: Annotated[
         Path,
-        typer.Option(help="Folder to make. A recorded demo in it goes on; beside any other, a numbered one is made."),
+        typer.Option(help="Folder to make. A recorded demo in it goes on; next to any other, a numbered one is made."),
     ] = Path("demo"),
     presses: Annotated[int, typer.Option(min=8, help="Presses to record.")] = 96,
     epochs: Annotated[int, typer.Option(min=1, help="Passes of the training over its frames.")] = 10,

@@ -23,7 +23,8 @@ def run(
         Path, typer.Argument(help="A folder or file of measured data: CSV, Excel, JSON, NumPy, MATLAB, Parquet.")
     ],
     mapping: Annotated[
-        Path | None, typer.Option(help="Mapping file: columns, units, clocks. Left out: says what is in the source.")
+        Path | None,
+        typer.Option(help="Mapping file: columns, units, clocks. Left out: the contents of the source are listed."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Session folder to create.")] = None,
     propose: Annotated[

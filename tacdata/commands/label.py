@@ -145,4 +145,4 @@ def _report_margins(summary: LabellingSummary) -> None:
     print(f"medians inside contact: numerical error ± {numerical:.4f} mm; by the sensor file's spreads: {spread}")
     print(f"largest error of a state that is left out: {between:.4f} mm, median of the labels")
     if 0 < len(uncertainties) < len(margins):
-        print(f"{len(margins) - len(uncertainties)} labels know of no spread: their provenance says why")
+        print(f"{len(margins) - len(uncertainties)} labels have no spread: the reason is in their provenance")

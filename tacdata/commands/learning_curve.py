@@ -38,7 +38,7 @@ def run(
     ] = "0,3,10,30,100,300",
     seeds: Annotated[int, typer.Option(min=1, help="Seeds of each number.")] = 3,
     network: Annotated[
-        list[str] | None, typer.Option(help="Train this network from random weights beside it; repeat for several.")
+        list[str] | None, typer.Option(help="Train this network from random weights, too; repeat for several.")
     ] = None,
     simulated: Annotated[
         Path | None, typer.Option(help="Mix in frames of a dataset that `tacdata simulate` made.")

@@ -83,7 +83,7 @@ def run(
         say(f"{source.name}: taring, do not touch the skin")
         loop = LiveLoop(source, stream, trained.content_hash, server, watch, maps)
         if sys.stdin.isatty():
-            print("Enter tares anew, Ctrl-C ends", flush=True)
+            print("Enter tares again, Ctrl-C ends", flush=True)
             Thread(target=_tare_at_enter, args=(loop,), daemon=True).start()
         with _stopping(loop):
             loop.run(seconds, say)
@@ -107,8 +107,8 @@ def _mode(name: str, lookahead: int, causal: bool, rate: float) -> str:
         return f"network {name} needs no later frames: each estimate is of the newest one"
     if causal:
         return (
-            f"causal: network {name} was trained to look {wait} ahead; the newest frame stands for them. That is right "
-            "while a contact holds still and late while it changes; `tacdata train --network causal` needs none."
+            f"causal: network {name} was trained to look {wait} ahead; the newest frame takes their place. That is "
+            "right while a contact holds still and late while it changes; `tacdata train --network causal` needs none."
         )
     return f"network {name} looks {wait} ahead: every estimate is at least so old (with --causal it is not)"
 

@@ -83,7 +83,7 @@ def _document(
         return shipped_plan(what, skin, PlanOptions(presses, tuple(indenter) if indenter else None, seed)), False
     if presses is not None or indenter:
         raise UsageError(
-            f"--presses or --indenter with the file {what}", "neither: the file says both", "leave them out"
+            f"--presses or --indenter with the file {what}", "neither: both are in the file", "leave them out"
         )
     document = _read(path)
     return (write_out(document, skin, what, seed), False) if "blocks" in document else (document, True)

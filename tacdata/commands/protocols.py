@@ -19,7 +19,7 @@ JSON, SHEET = "protocols.json", "protocols.md"
 
 
 def run(
-    dataset: Annotated[Path, typer.Argument(help="Dataset of the trials, recorded apart from training.")],
+    dataset: Annotated[Path, typer.Argument(help="Dataset of the trials, recorded separately from training.")],
     network: Annotated[
         Path | None, typer.Option(help="Training run or checkpoint; without it only the labels are evaluated.")
     ] = None,

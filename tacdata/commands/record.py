@@ -35,7 +35,7 @@ def run(
     plan: Annotated[Path | None, typer.Option(help="Plan file: what to press.")] = None,
     sensor: Annotated[Path | None, typer.Option(help="Sensor file; default: the paper's.")] = None,
     registration: Annotated[
-        Path | None, typer.Option(help="Registration file; default: registration.yaml beside the rig file.")
+        Path | None, typer.Option(help="Registration file; default: registration.yaml next to the rig file.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the next press not yet done.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the first move.")] = False,

@@ -19,7 +19,7 @@ EXAMPLES = (
 
 def run(
     file: Annotated[Path, typer.Argument(help="The damaged recording (MCAP).")],
-    out: Annotated[Path | None, typer.Option(help="Where to write the repaired copy; default beside it.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Where to write the repaired copy; default: next to it.")] = None,
 ) -> Result:
     """Write a repaired copy of a recording that a crash cut off: 0 if all is there, 3 with a loss, 1 if nothing is."""
     from tacdata.recording.files.recover import recover

@@ -33,7 +33,7 @@ EXAMPLES = (
 def run(
     rig: Annotated[Path, typer.Option(help="Rig file; its registration is where the search begins.")],
     out: Annotated[
-        Path | None, typer.Option(help="Registration file to write; default: registration.yaml beside the rig file.")
+        Path | None, typer.Option(help="Registration file to write; default: registration.yaml next to the rig file.")
     ] = None,
     sensor: Annotated[Path | None, typer.Option(help="Sensor file; default: the paper's.")] = None,
     indenter: Annotated[str, typer.Option(help="Spherical specimen that touches.")] = "sphere_2",
@@ -105,7 +105,7 @@ def _check(settings: RegistrationSettings, sensor: Sensor, target: Path) -> None
         raise UsageError(
             f"--taxel {', '.join(map(str, settings.taxels))}",
             f"two or more of 0 to {sensor.taxels.count - 1}",
-            "choose taxels that lie apart",
+            "choose taxels at a distance from each other",
         )
 
 

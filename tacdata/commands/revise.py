@@ -91,7 +91,7 @@ def run(
         print(
             f"{t['session']}: tip {t['before']:.4f} mm off before, {t['after']:.4f} after (rms in contact, against "
             f"{t['against']}); {t['better']} of {t['episodes']} episodes better, {t['worse']} worse; "
-            f"beside that a constant {t['constant_before']:.4f} mm before, {t['constant_after']:.4f} after"
+            f"in addition a constant {t['constant_before']:.4f} mm before, {t['constant_after']:.4f} after"
         )
     if document["retrained"]:
         print(in_words(document["retrained"]))

@@ -44,7 +44,9 @@ def run(
     ] = False,
     effects: Annotated[
         list[Path] | None,
-        typer.Option(help="Verdict or model spec whose effects are laid over the readings, beside the plan's own."),
+        typer.Option(
+            help="Verdict or model spec whose effects are laid over the readings, in addition to the plan's own."
+        ),
     ] = None,
     column: Annotated[
         list[str] | None, typer.Option(help="Column of the labels to carry along, such as error_map (mm a pixel).")
@@ -78,7 +80,7 @@ def run(
         return Result(figures)
     if done.left_out:
         say(f"left out: {done.left_out.total()} solved presses; {done.left_out.most_common(1)[0][0]}")
-        say("an older release may have solved them: to have them too, solve anew into another --solved folder")
+        say("an older release may have solved them: to have them too, solve them again into another --solved folder")
     print(f"simulated dataset: {done.episodes} episodes, {done.frames} frames, {done.specimens} specimens in {out}")
     say(f"solved presses stay in {done.solved}")
     suggest("train", out, "--out NETWORK")

@@ -25,7 +25,7 @@ def run(
     group: Annotated[
         list[str] | None, typer.Option(help="Positions that belong together: edge=1,2,7,8; give it repeatedly.")
     ] = None,
-    paper: Annotated[bool, typer.Option("--paper", help="The paper's own counts beside.")] = False,
+    paper: Annotated[bool, typer.Option("--paper", help="The paper's own counts, too.")] = False,
 ) -> Result:
     """Print success rates with 95 % Wilson intervals, by condition, group and position.
 

@@ -144,7 +144,7 @@ def _say_calibration(best: Checkpoint, dataset: Path) -> None:
     if calibration.mixing is not None:
         wider = "farther" if calibration.spread >= 0 else "less far"
         print(
-            f"the model spreads a load {wider} than this skin, and its forces are spread alike: variance "
+            f"the model spreads a load {wider} than this skin, and its forces are spread in the same way: variance "
             f"{calibration.spread:+.2f} ± {calibration.spread_error:.2f} mm²"
         )
     for words in doubts(calibration, read_frames(dataset), best.split.train):

@@ -57,7 +57,7 @@ def run(
         list[str] | None,
         typer.Option(
             metavar="KIND=SIZE",
-            help="something that rig.yaml does not tell of, for discrepancy to find: play=0.06, late=0.08, give=0.05",
+            help="an effect that rig.yaml does not mention, for discrepancy to find: play=0.06, late=0.08, give=0.05",
         ),
     ] = None,
     fault: Annotated[

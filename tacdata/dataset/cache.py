@@ -134,7 +134,7 @@ def _fill(root: Path, info: dict[str, Any], paths: list[Path], target: Path) -> 
         if not np.array_equal(index[:counted], np.arange(at, at + counted)):
             raise FormatError(
                 f"{path}: its frames are not {at} to {at + counted - 1}",
-                "data files that follow each other, as meta/episodes says",
+                "data files that follow each other, as listed in meta/episodes",
                 "put the original files back, or pack the session again",
             )
         for key, feature in described.items():

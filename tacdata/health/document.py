@@ -144,7 +144,7 @@ def remarks(history: History) -> list[str]:
         if visit.session.remaining:
             lines.append(f"{visit.name}: {len(visit.session.remaining)} presses of its plan are not recorded")
     if len({visit.sensor.content_hash for visit in history.visits}) > 1:
-        lines.append("the sensor file changed between visits: gains beside the model compare two models")
+        lines.append("the sensor file changed between visits: gains relative to the model compare two models")
     return lines
 
 

@@ -154,7 +154,7 @@ def read_visit(folder: StrPath) -> Visit:
     if not entries:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out[:3]) or "it holds none"
         raise UsageError(
-            f"{folder}: no recording tells how the unit is ({reasons})",
+            f"{folder}: no recording shows the state of the unit ({reasons})",
             "complete presses with rest, way in and hold",
             "record the plan that `tacdata plan health` writes",
         )
@@ -177,7 +177,7 @@ def _predicted(
         episode = entry.recording.episode
         path = present.get(episode.number)
         if path is None:
-            return (), {}, f"{episode.path.name} has no label: gains beside the model need one for each; label it"
+            return (), {}, f"{episode.path.name} has no label: gains relative to the model need one for each; label it"
         try:
             label = read_label(path)
             check_pair(episode, label, {"recording": recording_hash(episode)})

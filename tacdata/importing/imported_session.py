@@ -275,7 +275,7 @@ def plan_of(name: str, presses: list[Any]) -> dict[str, Any]:
     return {
         "version": schemas.version("plan"),
         "name": name,
-        "purpose": "told from imported data, not driven",
+        "purpose": "described by imported data, not driven",
         "indenters": indenters,
         "motion": motion,
         "presses": entries,

@@ -214,7 +214,7 @@ def side_by_side(parts: list[SourceTable], titles: Sequence[str], clock: Selecto
             columns[new] = values
             units |= {new: part.units[name]} if name in part.units else {}
             typed |= {new} if name in part.typed else set()
-    notes = [f"{first}: the columns of {len(parts)} parts stand side by side"]
+    notes = [f"{first}: the columns of {len(parts)} parts are side by side"]
     notes += [note for part in parts for note in part.notes]
     doubts = tuple(doubt for part in parts for doubt in part.doubts)
     return replace(parts[0], columns=columns, units=units, typed=frozenset(typed), notes=tuple(notes), doubts=doubts)
@@ -240,7 +240,7 @@ def _check_clocks(parts: list[SourceTable], time: str) -> None:
                 continue
         raise FormatError(
             f"{parts[0].path.name} has {len(first)} rows by {time}, {part.path.name} {len(times)} of other times",
-            "one clock for tables that stand side by side",
+            "one clock for tables that are side by side",
             "give the second one a file of its own and bring its columns in under measured, with their own times",
         )
 
@@ -257,7 +257,7 @@ def joined(parts: list[SourceTable], continued: Selector | None = None) -> Sourc
         listed = "; ".join(f"{part.path.name}: {', '.join(list(part.columns)[:8])}" for part in parts)
         raise FormatError(f"parts without a column in common ({listed})", "the same columns", "leave join out")
     columns = {name: [part.column(name) for part in parts] for name in shared}
-    notes = [f"{parts[0].path.name}: the rows of {len(parts)} parts stand below each other"]
+    notes = [f"{parts[0].path.name}: the rows of {len(parts)} parts are below each other"]
     if isinstance(continued, str):
         name = single(parts[0], continued, "files: time: column")
         if any(values.dtype == object for values in columns.get(name, [np.empty(0, object)])):

@@ -186,7 +186,7 @@ def unit_of(table: SourceTable, column: Selector, where: str, given: str = "") -
         return stated
     if not given and _differ(stated, inside, where):
         raise FormatError(
-            f"{where}: {table.path.name} states {stated} for {base_name}, whose name says {inside}",
+            f"{where}: {table.path.name} states {stated} for {base_name}, whose name has the unit {inside}",
             "one unit",
             f"give unit: {stated} or unit: {inside} there in the mapping",
         )
@@ -242,5 +242,5 @@ def _text(table: SourceTable, name: str, values: np.ndarray, where: str) -> Form
     if texts and sum(bool(WRITTEN.fullmatch(text)) for text in texts) > len(texts) / 2:
         return FormatError(f"{fault}: numbers as text", "numbers", "save it again as numbers")
     return FormatError(
-        fault, "numbers", "name another column, or add the texts that stand for no value to the file's missing"
+        fault, "numbers", "name another column, or add the texts that mean no value to the file's missing"
     )

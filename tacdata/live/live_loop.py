@@ -75,7 +75,7 @@ class LiveLoop:
             if self._tare_wanted:
                 self._tare_wanted = False
                 self._stream.tare()
-                say(f"{self._source.name}: taring anew, do not touch the skin")
+                say(f"{self._source.name}: taring again, do not touch the skin")
             frames = self._source.board.read(PATIENCE)
             for frame in frames:
                 # When late, only the newest estimate helps a controller; the others would make it later still.

@@ -136,7 +136,7 @@ def simulate(
         raise SolveError(
             f"none of {presses} presses is left: {left_out.most_common(1)[0][0]}",
             "presses that the skin can take",
-            "solve anew into another --solved folder, or narrow the plan",
+            "solve them again into another --solved folder, or narrow the plan",
         )
     specimens = len(simulation.specimens)
     return SimulatedPresses(folder, presses, missing, given_up, Path(out), episodes, frames, specimens, left_out)

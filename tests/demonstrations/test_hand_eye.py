@@ -134,7 +134,7 @@ def test_images_of_a_robot_that_carries_a_cube_give_a_file_that_a_demo_rig_takes
     document = {"version": "1.0", "camera": "eye", "frame": "base", "intrinsics": intrinsics, "tag_cube": cube}
     (tmp_path / "pairs.yaml").write_text(yaml.safe_dump({**document, "pairs": entries}))
     out = tmp_path / "world.yaml"
-    assert "camera eye stands at 0.30" in run("--pairs", tmp_path / "pairs.yaml", "--out", out).stdout
+    assert "camera eye is at 0.30" in run("--pairs", tmp_path / "pairs.yaml", "--out", out).stdout
     found = CameraWorld.from_document(yaml.safe_load(out.read_text()), "world.yaml")
     place, turn = off(found.matrix, eye)
     assert place < 0.001 and turn < 0.004 and found.poses >= 8

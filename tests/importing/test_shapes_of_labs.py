@@ -190,7 +190,7 @@ def test_parts_of_one_trial_are_joined_and_their_clock_is_continued(tmp_path):
     made, (episode,) = imported(tmp_path, path, files=of(path, join="continued"))
     np.testing.assert_allclose(episode.taxels.counts, rows[:, 2:], atol=1e-6)
     np.testing.assert_allclose(np.diff(episode.taxels.sample_ns), 50_000_000, atol=1000)
-    assert any("2 parts stand below each other" in note for note in made.notes)
+    assert any("2 parts are below each other" in note for note in made.notes)
 
 
 def test_sheets_of_one_trial_are_joined(tmp_path):

@@ -73,7 +73,7 @@ def test_whole_thousands_next_to_decimals_are_refused_as_unclear(tmp_path):
     text = "\n".join(
         ";".join([*row.split(";")[:2], *(c.partition(",")[0] for c in row.split(";")[2:])]) for row in text.split("\n")
     )
-    with pytest.raises(TacdataError, match="does it stand between thousands"):
+    with pytest.raises(TacdataError, match="does it separate thousands"):
         imported(tmp_path, {"run.csv": text})
 
 

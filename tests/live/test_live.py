@@ -206,7 +206,7 @@ def test_a_reader_can_have_the_skin_tared_anew():
         assert loop._tare_wanted and loop._stream.baseline is not None
         said = []
         loop.run(0.1, said.append)
-        assert said == ["index: taring anew, do not touch the skin"] and loop._stream.baseline is None
+        assert said == ["index: taring again, do not touch the skin"] and loop._stream.baseline is None
     finally:
         server.close()
 

@@ -66,7 +66,7 @@ def test_the_page_shows_each_column_with_its_role_its_grounds_and_its_course(wiz
     roles = {each["column"]: each["role"] for each in contents["choices"]["assignments"]}
     assert roles == {"t_s": "time", "arm (mm)": "z", "a": "channels", "b": "channels", "oven": "channels"}
     grounds = {column["name"]: "; ".join(column["evidence"]) for column in file["columns"]}
-    assert "its name says time; its unit is s" in grounds["t_s"] and "always rises" in grounds["t_s"]
+    assert "its name states time; its unit is s" in grounds["t_s"] and "always rises" in grounds["t_s"]
     assert "follows the position (r = -1.00)" in grounds["a"]
     assert "follows" not in grounds["oven"]
     assert file["head"][0][:2] == ["0", "31.2"] and len(file["head"]) == 6

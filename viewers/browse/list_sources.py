@@ -58,7 +58,7 @@ def _session(root: Path, labels: Path, predictions: Path | None) -> EpisodeList:
 def _checked(root: Path) -> tuple[dict[str, float], list[str]]:
     """Return the share of frames that came, by recording, as `tacdata check` counted them."""
     if not (root / "check.json").is_file():
-        return {}, ["no check.json: `tacdata check` says how good the recordings are"]
+        return {}, ["no check.json: `tacdata check` judges the recordings"]
     try:
         document = documents.read(root / "check.json", "check")
     except TacdataError as error:

@@ -24,13 +24,13 @@ def of_demonstration(
         lines.append(f"- **Task** {demonstration.task}, {demonstration.seconds[-1]:.1f} s")
     absent = []
     if demonstration is None:
-        absent.append("no tracks, so the fingers do not stand in space: run `tacdata track`")
+        absent.append("no tracks, so the fingers have no place in space: run `tacdata track`")
     else:
         lines += _tracks(demonstration)
         if demonstration.network is None:
             absent.append("no predicted depth: run `tacdata track --network RUN`")
     if recorded is None:
-        absent.append("no recording beside the tracks, so no cameras and no boards")
+        absent.append("no recording next to the tracks, so no cameras and no boards")
     if absent:
         lines += ["", "Not shown: " + "; ".join(absent) + "."]
     notes = (*remarks, *(recorded.notes if recorded else ()), *(demonstration.remarks if demonstration else ()))
@@ -83,5 +83,5 @@ def of_targets(title: str, targets: FingertipTargets, count: int, joints: dict[s
         lost = np.isnan(np.column_stack(list(joints.values()))).any(axis=1).sum()
         lines.append(f"- **Joints** {len(joints)}; {lost} of {len(targets.time_ns)} targets are not reached (gaps)")
     if count:
-        lines += ["", f"{count} more beside it: --episode 0 to {count}."]
+        lines += ["", f"{count} more in the folder: --episode 0 to {count}."]
     return "\n".join([*lines, *(["", *(f"- {note}" for note in targets.remarks)] if targets.remarks else [])])

@@ -70,5 +70,5 @@ def _times(path: Path) -> np.ndarray:
         raise FormatError(
             f"{path} is no readable prediction file: {str(error).splitlines()[0]}",
             "a file that `tacdata evaluate` wrote",
-            "run `tacdata evaluate` again: predictions can always be made anew",
+            "run `tacdata evaluate` again: predictions can always be made again",
         ) from None

@@ -35,12 +35,12 @@ def prediction_scene(title: str, prediction: PredictedMaps, sensor: Sensor | Non
         f"{prediction.checkpoint[:12]}, part {prediction.part}",
         f"- **Depth** to {flat.max():.2f} mm in {len(time)} frames; an estimate, no measurement",
         "",
-        "Not shown: label, signals and cameras; `tacdata view DATASET --predictions RUN` shows them beside it.",
+        "Not shown: label, signals and cameras; `tacdata view DATASET --predictions RUN` shows them next to it.",
     ]
     if files > 1:
         lines += ["", f"{files} predictions lie there: choose one with --episode."]
     if not fits:
-        lines += ["", "- no checkpoint of this sensor lies beside it, so the maps are in pixels"]
+        lines += ["", "- no checkpoint of this sensor is next to it, so the maps are in pixels"]
     return Scene(
         title,
         "\n".join(lines),

@@ -27,6 +27,6 @@ def run(
 
     indices = numbers(episodes)
     missing = delete(dataset, indices, out)
-    print(f"{out}: {dataset} without {counted(set(indices))}; the others are numbered anew{lacking(missing)}")
+    print(f"{out}: {dataset} without {counted(set(indices))}; the others have new numbers{lacking(missing)}")
     suggest("card", out)
     return Result({"dataset": out, "without_record": missing})

@@ -345,7 +345,7 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path,
         raise FormatError(
             f"{path}: column {name}, row {row + 1} of the data: {cell}",
             f"a number with a decimal {'comma' if layout.decimal == ',' else 'point'}",
-            f"add {cell} to missing in the mapping if it stands for no value, else correct the file"
+            f"add {cell} to missing in the mapping if it means no value, else correct the file"
             if grouped is None
             else "save it again without a sign between thousands",
         )

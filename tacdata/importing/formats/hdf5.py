@@ -167,7 +167,7 @@ def _opened(path: Path) -> Any:
                 _chunks(dataset)
         os._exit(0)
     if os.WIFSIGNALED(os.waitpid(copy, 0)[1]):
-        raise FormatError(f"{path}: its index is damaged", "a whole file", "copy it again, or save its arrays anew")
+        raise FormatError(f"{path}: its index is damaged", "a whole file", "copy it again, or save its arrays again")
     return h5py.File(path, "r", locking="best-effort")
 
 

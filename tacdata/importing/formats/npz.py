@@ -127,7 +127,7 @@ def _shapes(path: Path, arrays: dict[str, np.ndarray], options: ReadOptions) -> 
         return []
     shape = " x ".join(map(str, array.shape))
     if array.ndim > 2:
-        return [f"{path.name}: {shape} values; its first axis is taken for time (trial_axis says where trials lie)"]
+        return [f"{path.name}: {shape} values; its first axis is taken for time (trial_axis names the axis of trials)"]
     if array.ndim == 2 and array.shape[0] < array.shape[1]:
         words = "its first axis is taken for time; if it is the second, write transpose: true under the file"
         return [f"{path.name}: {shape} values; {words}"]

@@ -222,7 +222,7 @@ def _opened(path: Path) -> Iterator[_RosLog | _McapLog]:
     if path.name in parts[1:]:
         raise FormatError(
             f"{path} is part {parts.index(path.name) + 1} of a bag of {len(parts)} files",
-            f"its first file, {parts[0]}: it stands for the whole bag",
+            f"its first file, {parts[0]}: it is read as the whole bag",
             f"name {parts[0]} in the mapping",
         )
     try:

@@ -94,7 +94,7 @@ def _without_lost(array: Any, folder: Path, values: np.ndarray) -> tuple[np.ndar
     the values stay.
     """
     if values.dtype.kind not in "biuf" or array.shards is not None:
-        return values, f"some of {array.nchunks} chunks are not there; {array.fill_value} stands for their values"
+        return values, f"some of {array.nchunks} chunks are not there; {array.fill_value} is taken for their values"
     result, lost, empty = values.astype(float), 0, 0
     step = np.quantile(np.abs(np.diff(result, axis=0)), USUAL) if len(result) > 1 else 0.0
     for place in np.ndindex(*(-(-size // chunk) for size, chunk in zip(array.shape, array.chunks, strict=True))):

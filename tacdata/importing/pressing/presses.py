@@ -195,9 +195,9 @@ def _imported(
     if mapping.indenter:
         name = mapping.indenter["shape"]
     else:
-        stand_ins.append("indenter: not said by the source; a sphere of 2 mm stands in")
+        stand_ins.append("indenter: not given by the source; a sphere of 2 mm is the stand-in")
     if path.speed is None and "speed" not in trial.press:
-        stand_ins.append("speed: the indenter does not move; 1 mm/s stands in")
+        stand_ins.append("speed: the indenter does not move; 1 mm/s is the stand-in")
     angles = {"yaw": 0.0, "tilt_x": 0.0, "tilt_y": 0.0}
     values = {"x": path.x, "y": path.y, "depth": path.depth, "speed": path.speed or 1.0, "hold": path.hold, **angles}
     values = {key: round(value, 4) for key, value in {**values, **trial.press}.items()}

@@ -166,7 +166,7 @@ def _unnamed(kind: SourceKind) -> list[str]:
         time = f", {clocks[0]} as the time by its steps" if clocks else ""
         questions.append(
             f"the columns of {table.path.name} have no names: which are position, force and channels? "
-            f"{', '.join(short(kind.channels))} stand as channels{time}"
+            f"{', '.join(short(kind.channels))} are taken for channels{time}"
         )
     return questions
 

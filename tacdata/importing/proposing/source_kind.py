@@ -98,5 +98,5 @@ def _whole_strokes(table: SourceTable, columns: dict[str, list[str]]) -> tuple[d
     if not are_halves(labels, table.column(moving[0]).astype(float)):
         return columns, ""
     words = listed(list(dict.fromkeys(labels.tolist()))[:3])
-    remark = f"{name} tells the way in from the way back ({words}): trials are cut by depth instead"
+    remark = f"{name} distinguishes the way in from the way back ({words}): trials are cut by depth instead"
     return {role: names for role, names in columns.items() if role != "trial"}, remark

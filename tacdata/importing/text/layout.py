@@ -159,7 +159,7 @@ def _refuse_commas_for_both(
     if delimiter == "," and names + 1 < width <= 2 * names and are_whole:
         raise FormatError(
             f"{origin}: {names} names in the header, and {width} whole numbers a row: its commas part the fields and "
-            "stand for decimal points too",
+            "are decimal points too",
             "one sign for each",
             "save it again with semicolons or tabs between the fields, or with decimal points",
         )
@@ -181,7 +181,7 @@ def _refuse_unclear_signs(rows: list[list[str]], names: tuple[str, ...], origin:
         if len(signs) == 1 and len(decimal) == 1 and signs != decimal and all(map(THREE.fullmatch, fields)):
             raise FormatError(
                 f"{origin}: column {name}: {fields[0]!r} has {min(signs)!r} where others have {min(decimal)!r} before "
-                "decimal places: does it stand between thousands?",
+                "decimal places: does it separate thousands?",
                 "one decimal sign in all columns",
                 "save it again without signs between thousands, and with one decimal sign",
             )

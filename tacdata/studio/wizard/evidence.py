@@ -27,7 +27,9 @@ def evidence(kind: SourceKind, name: str, path: np.ndarray | None, idle: dict[st
     outer = name.rpartition("[")[0] if name not in table.columns else name
     roles = [role for role, names in kind.roles.items() if name in names or outer in names]
     bare = bare_name(name)
-    grounds += [f"its name says {role}" for role in roles if role in GUESSES and re.fullmatch(GUESSES[role], bare)][:1]
+    grounds += [f"its name states {role}" for role in roles if role in GUESSES and re.fullmatch(GUESSES[role], bare)][
+        :1
+    ]
     unit = plain(table.units.get(outer) or split_unit(outer)[1])
     if quantity_of(unit) in ("mm", "N", "s", "deg"):
         grounds.append(f"its unit is {unit}")

@@ -130,7 +130,7 @@ def test_an_array_without_names_is_shown_by_column_and_asked_about(tmp_path):
     assert found.document["files"]["log"]["time"] == {"column": "array[0]"}
     assert found.document["taxels"]["columns"] == ["array[1-3]"]
     assert any("no names" in question for question in found.questions)
-    assert "as it stands, it imports nothing: neither a position" in tried(source, found.mapping)
+    assert "in this form it imports nothing: neither a position" in tried(source, found.mapping)
 
 
 def test_a_serial_monitors_times_stand_apart_and_its_presses_are_cut(tmp_path):

@@ -38,7 +38,7 @@ def test_commas_that_part_fields_and_decimals_are_refused(tmp_path):
         read_table(written(tmp_path / "a.csv", ","))
     assert "semicolons" in error.value.remedy
     shown = tacdata("import", "a.csv", folder=tmp_path)
-    assert shown.returncode == 3 and "stand for decimal points too" in shown.stderr
+    assert shown.returncode == 3 and "are decimal points too" in shown.stderr
 
 
 def test_what_the_mapping_says_wrongly_is_tried_the_other_way(tmp_path):

@@ -32,7 +32,7 @@ def test_of_two_columns_that_rise_alike_evenly_the_first_one_is_the_time(tmp_pat
 def test_what_was_taken_for_the_time_is_said(tmp_path):
     np.savetxt(tmp_path / "run.txt", np.column_stack([STRESS, STRETCH, 0.1 * ROWS]))
     found = proposed_mapping(tmp_path, described(tmp_path)[0])
-    assert any("0, 1 stand as channels, 2 as the time by its steps" in question for question in found.questions)
+    assert any("0, 1 are taken for channels, 2 as the time by its steps" in question for question in found.questions)
 
 
 def test_a_comma_at_the_end_of_each_row_makes_no_channel(tmp_path):

@@ -90,7 +90,7 @@ def test_every_kind_has_its_place_and_its_noun():
 def test_tracks_stand_in_space_with_what_was_felt(tracks, tmp_path):
     scene = scene_at(tracks)
     assert scene.kind in LAYOUTS
-    assert "no recording beside the tracks" in scene.summary and "a made-up finger" in scene.summary
+    assert "no recording next to the tracks" in scene.summary and "a made-up finger" in scene.summary
     body = scene.bodies[0]
     assert len(body.position) == GRID - 2, "times without a pose are left out"
     cloud = scene.clouds[0]
