@@ -30,6 +30,7 @@ def labels_at(path: Path, folders: Sequence[Path], episode: int | None) -> Scene
         recording, session_labels = path, file_names.folder(path.parent)
     else:
         recording, session_labels = episode_of(path, episode), file_names.folder(path)
+    # With one folder the question is what changed against the session's own labels.
     folders = _two([session_labels, *folders] if len(folders) == 1 else folders, "labels")
     recorded, sides = read_episode(recording), []
     for name, folder in zip(telling_names(folders), folders, strict=True):
@@ -76,6 +77,7 @@ def _labelled(
 
         dataset = read_dataset(path)
         dataset.check_measured("networks side by side")
+        # An episode that only one network predicted has nothing to compare.
         number = _common(dataset, folders) if episode is None else episode
         if not 0 <= number < len(dataset.episodes):
             raise UsageError(f"--episode {number}", f"0 to {len(dataset.episodes) - 1}", "choose one of them")

@@ -31,6 +31,7 @@ def new_file(path: Path, *suffixes: str) -> Path:
 def written_beside(path: Path) -> Iterator[Path]:
     """Yield a temporary name in the same folder; on success it becomes ``path``, else it is removed."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    # In the same folder, since a rename to another drive is not atomic.
     temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:
         yield temporary

@@ -83,6 +83,7 @@ def show(scene: Scene, output: Output) -> None:
         saved press.png
     """
     if output.save is not None:
+        # Files first: a window may stay open for hours.
         write_rerun(scene, output.save)
         print(f"saved {output.save}; look at it with: tacdata view {output.save}")
     if output.picture is not None:

@@ -112,6 +112,7 @@ def _draw(target: Path, board: Path, shape: dict[str, int | float | str], paper:
         if path.exists():
             raise UsageError(f"{path} exists", "a new file", "choose another name")
     drawing = printable(Board.from_document({"version": "1.0", **shape}, "--draw"))
+    # Black and white: grey edges of a marker would be printed as dots.
     sheet = Image.fromarray(draw_board(drawing, paper)).convert("1", dither=Image.Dither.NONE)
     target.parent.mkdir(parents=True, exist_ok=True)
     if target.suffix.lower() == ".pdf":

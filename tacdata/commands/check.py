@@ -44,6 +44,7 @@ def run(
         say(f"the report is not written: {error.given}; --out names another folder")
         report = td.check(path)
     if path.is_dir() and report.usable:
+        # Labelling would refuse these recordings, so the missing keys are named here.
         if unknown := unknown_press(report):
             say(f"labels need more than the mapping says: give {unknown} there, and import again ({HELP})")
             suggest("browse", path)

@@ -78,6 +78,7 @@ def _models(path: Path, specs: list[Path], episode: int | None) -> Scene:
     rows = np.flatnonzero((course.episode == course.names.index(recording)) & (course.averaged > 0))
     measured, readings = course.readings[rows], {}
     models = {name: read_spec(file) for name, file in zip(telling_names(specs), specs, strict=True)}
+    # One model alone shows the gap; with effects also what they contribute.
     if len(models) == 1:
         name, model = next(iter(models.items()))
         effects = " and ".join(entry["effect"] for entry in model.document["effects"])

@@ -80,6 +80,7 @@ def _record(place: _Place, recording: list[tuple[str, list[str]]], line: stages.
             # Recording is mostly waiting, so labels are computed meanwhile; the recorder has priority.
             log = place.folder / "label.log"
             labelling = stack.enter_context(stages.Background(place.labelling(), log, yielding=True))
+            # In the foreground: its progress is what a person watches.
             line.run(*recording[-1])
         line.run("check what was recorded", ["check", str(place.session)])
         # A press that could not be solved has no label and is left out of the dataset; the others go on.
@@ -139,6 +140,7 @@ class _Place:
         session, dataset, network = str(self.session), str(self.dataset), str(self.network)
         train = ["train", dataset, "--from", "shipped", "--out", network, "--epochs", str(epochs), "--seed", str(seed)]
         if self.network.is_dir():
+            # A training that was stopped left its folder, which a new run would refuse.
             train.append("--resume")
         packed = self.dataset / "meta" / "info.json"
         return [
@@ -176,6 +178,7 @@ def _new_folder(target: Path) -> Path:
     while True:
         try:
             folder.mkdir(parents=True)
+        # Made and not only looked for: two demos that start together get different folders.
         except FileExistsError:
             number += 1
             folder = target.with_name(f"{target.name}-{number}")

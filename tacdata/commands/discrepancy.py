@@ -40,6 +40,7 @@ def run(
     ] = False,
 ) -> Result:
     """Find where recordings and a model disagree, and name the missing effect, or say why not."""
+    # A spec can name healthy sessions, too; then it is the same comparison.
     healthy = reference or _healthy(spec)
     if healthy:
         return _compared(recordings, healthy, out, spec if reference else None, fem)
@@ -84,6 +85,7 @@ def _healthy(spec: Path | None) -> list[Path]:
     """Return the healthy machine's sessions that a spec names as its response; none for other specs."""
     from tacdata.discrepancy.model.spec import read_spec
 
+    # Also without --spec: that is a fitted response, which names no sessions.
     response = read_spec(spec).document["response"]
     if spec is None or response["kind"] != "recordings":
         return []
@@ -116,6 +118,7 @@ def _between(recordings: list[Path]) -> str:
     remainder, first = recordings[1:], recordings[0]
     named = f"sessions: {', '.join(map(str, remainder))} with {first} as the reference"
     try:
+        # Only a remark below the verdict, so a session that cannot be compared does not end the verb.
         compared = compare(remainder, [first])
     except TacdataError as error:
         return f"{named}: not compared, {error.given}"

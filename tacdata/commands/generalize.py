@@ -69,6 +69,7 @@ def run(
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out} is a file", "a folder", "choose another --out")
     splits = tuple(split or DEFAULTS)
+    # An unknown split ends the verb here and not after hours of training.
     for name in splits:
         describe(name)
     frames = read_frames(dataset)

@@ -88,6 +88,7 @@ def _network_errors(model: Path, visits: list[Visit]) -> dict[str, NetworkError]
     for visit in labelled:
         present = file_names.present(file_names.folder(visit.session.folder))
         episodes = [entry.recording.episode for entry in visit.entries]
+        # Next to the session: a dataset of maps may not fit into the system's temporary folder.
         with TemporaryDirectory(dir=visit.session.folder.parent, prefix=".health-") as folder:
             members = [e for e in episodes if e.number in present]
             packed = pack(members, lambda e, paths=present: read_label(paths[e.number]), Path(folder) / "dataset")

@@ -63,6 +63,7 @@ def run(
 
 def _together(notes: tuple[str, ...]) -> list[str]:
     """Return notes with those that say the same of several files as one."""
+    # A hundred files with one fault would otherwise fill the terminal with the same sentence.
     files: dict[str, list[str]] = {}
     for note in notes:
         name, colon, message = note.partition(": ")
@@ -87,6 +88,7 @@ def _inspect(source: Path, propose: Path | None) -> Result:
         suggest("import", source, "--propose mapping.yaml")
         return Result(result)
     documents.write(propose, proposal.document, "import_mapping")
+    # As comments at the top: the file stays valid, and the questions stay until a person deletes them.
     heads = "".join(f"# ? {question}\n" for question in proposal.questions)
     propose.write_text(heads + propose.read_text(encoding="utf-8"), encoding="utf-8")
     print(f"a mapping to start from is in {propose}; read it over, it rests on names, units and values")

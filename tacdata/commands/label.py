@@ -121,6 +121,7 @@ def _report(summary: LabellingSummary, labels: Path, session: Path) -> Result:
     if summary.failed:
         count = len(summary.failed) + len(summary.written) + len(summary.current)
         remedies = {reason.partition("next:")[2].strip() for reason in summary.failed.values()}
+        # One remedy for all failures is worth printing; of several, the files name each.
         same = remedies.pop() if len(remedies) == 1 else ""
         error = SolveError(
             f"{len(summary.failed)} of {count} episodes have no label",

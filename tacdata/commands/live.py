@@ -82,6 +82,7 @@ def run(
         stack.enter_context(source.board)
         say(f"{source.name}: taring, do not touch the skin")
         loop = LiveLoop(source, stream, trained.content_hash, server, watch, maps)
+        # Without a terminal, as in a service, standard input may be closed or belong to somebody else.
         if sys.stdin.isatty():
             print("Enter tares again, Ctrl-C ends", flush=True)
             Thread(target=_tare_at_enter, args=(loop,), daemon=True).start()
@@ -117,6 +118,7 @@ def _mode(name: str, lookahead: int, causal: bool, rate: float) -> str:
 def _stopping(loop: LiveLoop) -> Iterator[None]:
     """Ctrl-C ends the loop and prints the measured figures."""
     numbers = (signal.SIGINT, signal.SIGTERM)
+    # The loop ends at the next frame, so that the figures of the whole run are printed.
     handlers = [signal.signal(number, lambda *_: loop.stop()) for number in numbers]
     try:
         yield

@@ -53,6 +53,7 @@ def run(
     plan.check_against(skin)
     if out:
         documents.write(out, document, "plan")
+    # A plan's file may be named alone, for its summary.
     elif not (picture or is_plan):
         raise UsageError(
             f"nowhere to write the plan {what}", "--out FILE, --picture FILE or both", "add --out plan.yaml"

@@ -59,6 +59,7 @@ def run(
 ) -> Result:
     """Press the sensor by the plan and record every press to its own MCAP file; or --demo, by hand."""
     if demo:
+        # The demo rig names sensors and cameras itself: a plan or a sensor file would silently do nothing.
         unwanted = {"--plan": plan, "--sensor": sensor, "--registration": registration, "--live": live}
         named = [k for k, v in unwanted.items() if v is not None]
         return _by_hand(rig, out, task, seconds, demonstrations, resume, named)
@@ -83,11 +84,14 @@ def run(
         registered = chosen_registration(read_rig(rig), rig, registration, skin)
         bench = registered.rig
 
+    # Asked after the devices answered and before anything moves.
     def confirm(summary: Preflight) -> bool:
         print(summary.text, flush=True)
+        # On standard error, so that a pipe does not swallow them.
         print("\n".join(registered.warnings), file=sys.stderr, flush=True)
         return yes or agreed("Move now? [y/N] ")
 
+    # The viewer is a process of its own: drawing must not delay the streams.
     if live:
         from tacdata.viewers.live.window import live_view
 
@@ -119,6 +123,7 @@ def run(
             print("\n".join(["interrupted", *getattr(error, "__notes__", ())]), file=sys.stderr)
             raise typer.Exit(Exit.INTERRUPTED) from None
         finally:
+            # Kept however the recording ends: without the registration the recordings have no place on the skin.
             registered.keep(out)
     print(f"{len(session.done)} of {len(session.plan.presses)} presses recorded in {out}")
     suggest("check", out)

@@ -93,6 +93,7 @@ def _check(settings: RegistrationSettings, sensor: Sensor, target: Path) -> None
         raise UsageError(
             f"{target} exists", "a new file; nothing is overwritten", "move it away, or choose another --out"
         )
+    # Beyond half of the skin's thickness a wrong height would press the sphere onto the board below.
     half = sensor.skin.thickness / 2
     if max(settings.limit, settings.depth) > half:
         raise UsageError(
@@ -130,6 +131,7 @@ def _measure(
         except BaseException as error:
             interruption.last_words()
             data = ("nothing was written",)
+            # However it ends, the person is told where the machine is and that nothing was written.
             error.add_note(ending(motion, guard.loss(), data, "the same command", error))
             raise
 
@@ -150,7 +152,9 @@ def _touch(
     from tacdata.registration.procedure import described, register
     from tacdata.registration.result import document_of
 
+    # Travel height: the sphere must clear a skin that is tilted or higher than expected.
     safe = rig.registration.origin[2] + max(3.0, settings.above + 1.0)
+    # A lost position is asked about before homing, since homing itself may move into something.
     guard.before_homing(resumed=False)
     with guard.opened(devices):
         controller = devices.cnc.settings()

@@ -102,6 +102,7 @@ def run(
     names = {task or demonstration.task for demonstration in (*demonstrations, source)}
     if len(names) > 1:
         raise UsageError(f"recordings of the tasks {', '.join(sorted(names))}", "one task", "replay each task alone")
+    # A gain that is found and tried on one recording says nothing about others.
     by_hash = {demonstration.recording_hash: demonstration for demonstration in demonstrations}
     if gain_from is not None and source.recording_hash in by_hash:
         raise UsageError(f"{gain_from} among those tried", "other recordings than that", "try others")
@@ -112,6 +113,7 @@ def run(
         own, place = read_object(Path(thing), {demonstration.frame for demonstration in (source, *demonstrations)})
     own |= {"stiffness": stiffness} if mass is None else {"stiffness": stiffness, "mass": mass}
     scene = scene_of(name, width=None if radius is None else radius / 1000, **own)
+    # Without a robot the pads follow the targets themselves.
     hand = None if robot is None else read_robot(robot)
     gain_sets, gain = {"compensated": read_gains(gains).of(name)}, None
     # Before the search: these remarks may explain its failure.

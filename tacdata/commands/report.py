@@ -58,6 +58,7 @@ def run(
             raise UsageError(
                 f"the dataset {place} of {network.path} is not there", "a dataset folder", "give --dataset"
             )
+        # Runs of one dataset share its frames: they take most of the memory.
         frames = by_folder.setdefault(place, read_frames(place)) if place not in by_folder else by_folder[place]
         folder = network.path.parent
         scored.append(Scored(network.settings.title, evaluate(network, frames, device, threads), frames, folder))

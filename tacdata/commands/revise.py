@@ -75,6 +75,7 @@ def run(
         )
         for change in gap["elsewhere"]:
             print(f"  left out, {change['name']}: {change['before']:.3g} before, {change['after']:.3g} after")
+        # A good mean can hide one slice that became worse.
         worst = max(gap["slices"], key=lambda c: c["after"])
         print(f"  worst of them after, {worst['name']}: {worst['before']:.3g} before, {worst['after']:.3g} after")
     for entry in document["labels"]:

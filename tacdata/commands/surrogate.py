@@ -48,6 +48,7 @@ def run(
         settings = TableSettings(spacing, MeshSettings() if fine else None, device, capacity, left_out)
         ready = work(what.sensor, what.reaches, settings)
     mesh = ready.model.settings.mesh
+    # Presses that ship, or were solved for another session, are not solved again.
     missing = len(ready.missing)
     print(
         f"{ready.presses} presses of {', '.join(ready.names)} on {len(ready.model.mesh.nodes)} nodes "

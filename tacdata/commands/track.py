@@ -58,6 +58,7 @@ def run(
     summary = []
     for recording in recordings:
         read = read_demo(recording)
+        # The recorder searches only the images that it has time for; --every-image searches those that it passed over.
         demonstration = track(look_again(read, _told) if every_image else read, rate, estimators)
         tracks_path = path_of(recording)
         if not estimators and tracks_path.is_file() and (lost := read_tracks(tracks_path).network):

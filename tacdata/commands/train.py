@@ -136,6 +136,7 @@ def _say_calibration(best: Checkpoint, dataset: Path) -> None:
     calibration = best.calibration
     if not calibration:
         return
+    # The median: one channel at the rim, which few presses reach, is known far worse than the others.
     mean, error = calibration.gain.mean(), float(np.median(calibration.gain_error / calibration.gain))
     print(
         f"calibration: {mean:.3g} N at 1000 counts, each channel to {100 * error:.0f} %; "

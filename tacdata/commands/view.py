@@ -52,6 +52,7 @@ def run(
         print(f"saved {foxglove}; in Foxglove open {path}, then Layouts, Import from file")
         return Result({"written": [foxglove]})
     path = viewable(following.meant(path) if episode is None else path)
+    # Refused before a long file is read.
     output = showing.Output(save, picture, video, web)
     output.check()
     if path.suffix == output_file.RERUN and path.is_file():

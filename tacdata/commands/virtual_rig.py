@@ -77,6 +77,7 @@ def run(
         raise UsageError(f"--object {thing} without --demo", f"--demo --object {thing}", "add --demo")
     if nub is not None and not demo:
         raise UsageError(f"--nub {nub:g} without --demo", f"--demo --nub {nub:g}", "add --demo")
+    # Handlers before the start: a signal that comes meanwhile must not leave ports and files behind.
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
@@ -129,5 +130,6 @@ def _skins(options: list[str], demo: bool) -> dict[str, Sensor]:
             which = f"finger {finger}" if finger else "all fingers"
             raise UsageError(f"two sensors for {which}", "one each", "leave one --sensor out")
         skins[finger] = read_sensor(Path(file))
+    # A file without a finger is for all fingers that have none of their own.
     default = skins.pop("", None)
     return skins if default is None else {**dict.fromkeys(DIRECTIONS, default), **skins}

@@ -60,6 +60,7 @@ def advice(history: History) -> tuple[Advice, ...]:
     advices = [*_wiring(history, faults)]
     advices += [Advice(MACHINE, (), finding.text) for finding in history.last.depth_findings]
     advices += [*_noise(history, [c for c in changed if c[1].quantity == "noise"])]
+    # Graver causes first: a tip elsewhere changes readings, which would pass for gains.
     for do, quantities in (
         (REGISTER, ("depth", "x", "y", "repeatability")),
         (RECALIBRATE, ("common gain", "gain", "loop", "network error")),
@@ -116,6 +117,7 @@ def _noise(history: History, changed: list[tuple[int, Change]]) -> list[Advice]:
             for against, change in changed
             if change.channel is not None
         ]
+    # Many channels at once have one cause, outside the sensor.
     middle = sorted(change.value for _, change in changed)[len(changed) // 2]
     where = history.visits[changed[0][0]].name
     why = f"noise of {len(changed)} channels is about {middle:.1f} times that at {where}: ground, shield or supply"

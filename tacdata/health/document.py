@@ -100,6 +100,7 @@ def _change(change: Change) -> dict[str, Any]:
 
 
 def _number(value: float) -> float | None:
+    # More digits than the figures have; fewer changes between machines.
     return float(f"{value:.6g}") if np.isfinite(value) else None
 
 
@@ -132,6 +133,7 @@ def remarks(history: History) -> list[str]:
     """Return remarks on the sessions, as sentences."""
     lines = []
     for visit, model in zip(history.visits, history.model, strict=True):
+        # A nominal transduction is off for every unit: its size says nothing about this one.
         if model and not 1 / MISMATCH < model.common.value < MISMATCH:
             lines.append(
                 f"{visit.name}: it responds {model.common.value:.3g} times as strongly as its labels predict: the "

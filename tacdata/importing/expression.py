@@ -81,6 +81,7 @@ def evaluated(table: SourceTable, text: str, where: str) -> tuple[np.ndarray, st
 
     with np.errstate(all="ignore"):
         result = np.broadcast_to(np.asarray(value(tree.body), dtype=float), (table.rows,)).copy()
+    # A division by zero is a missing value, and no reading of infinity.
     result[~np.isfinite(result)] = np.nan
     plain = len(units) == 1 and not kinds - {ast.Add, ast.Sub}
     return result, units.pop() if plain else ""

@@ -129,6 +129,7 @@ class _Import:
         except TacdataError as error:
             self.failures.append((files.label or self.source.name, error))
             return
+        # One trial that cannot be read must not cost the others.
         for label, rows in trials:
             named = " ".join(part for part in (files.label, label) if part)
             try:
@@ -145,6 +146,7 @@ class _Import:
 
         A copy is no second measurement: counted as one, it would make every error look smaller.
         """
+        # The table belongs to it: two sheets of one workbook have one hash.
         contents = tuple((source_hash(file.paths[0]), str(file.entry.table)) for file in files.files.values())
         name = ", ".join(file.paths[0].name for file in files.files.values())
         first = self.seen.setdefault(contents, name)
@@ -188,6 +190,7 @@ class _Import:
             "mapping_hash": self.hash,
             "code_version": provenance.code_version(),
         }
+        # From the first files: all recordings of a session share one origin.
         if self.centre is None:
             self.centre = centre_of(self.mapping.position, full_tables)
         yield from presses_of(self.mapping, rows, files.parts, record, self.centre)

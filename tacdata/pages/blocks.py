@@ -57,6 +57,7 @@ class Shares:
     @property
     def widths(self) -> list[tuple[str, float, float]]:
         """Name, share [%] and width of the bar [%] of each part."""
+        # Shares that do not add up to 1, as of overlapping parts, still fill the bar.
         total = max(sum(share for _, share in self.parts), 1e-12)
         return [(name, 100 * share, 100 * share / total) for name, share in self.parts]
 
@@ -95,6 +96,7 @@ class Picture:
     @property
     def data(self) -> str:
         """The file in base 64."""
+        # Drawn when the page is written, and once: a page may be asked for its text several times.
         if not self._drawn.tell():
             self.draw(self._drawn)
         return base64.b64encode(self._drawn.getvalue()).decode("ascii")

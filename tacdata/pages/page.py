@@ -57,6 +57,7 @@ class Section:
         """The blocks: figures that follow each other in one row, each other block by itself."""
         rows: list[list[Any]] = []
         for block in self.blocks:
+            # Only figures of one kind: a plot and a map have different heights.
             if rows and block.kind in ("plot", "map") and rows[-1][-1].kind == block.kind:
                 rows[-1].append(block)
             else:
@@ -79,6 +80,7 @@ class HtmlPage:
     @property
     def text(self) -> str:
         """The file."""
+        # A page without figures goes without the plotting script, which is most of its size.
         drawn = any(block.kind in PLOTS for section in self.sections for block in section.blocks)
         listed = len(self.sections) >= LISTED
         return _template().render(
@@ -120,6 +122,7 @@ def _template(name: str = "page.html.j2") -> Any:
             pieces.append(f"<code{command}>{escape(piece)}</code>" if number % 2 else escape(piece))
         return "".join(pieces)
 
+    # Words come from files of users: everything is escaped unless a filter has done so.
     environment = Environment(
         loader=PackageLoader("tacdata.pages", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )

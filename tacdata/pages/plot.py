@@ -80,6 +80,7 @@ class Plot:
         Raises:
             UsageError: If a series is not as long as its places.
         """
+        # The script in the page would draw a wrong length without a word.
         for series in self.series:
             places = series.x if series.x is not None else self.x
             if places is None or len(places) != len(series.values):
@@ -89,6 +90,7 @@ class Plot:
                     "as many values as places",
                     "give x to the figure or the series",
                 )
+        # All series of common places are thinned alike, or the cursor would show values of different places.
         pick = None if self.x is None else picked(len(self.x), self.most)
         return {
             "title": self.title,

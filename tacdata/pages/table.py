@@ -35,6 +35,7 @@ class Cell:
     @property
     def order(self) -> str:
         """The value to sort by where it is a number; empty for words."""
+        # The printed words cannot be sorted: they are rounded and have units.
         number = isinstance(self.value, int | float) and math.isfinite(self.value)
         return repr(float(self.value)) if number else ""
 
@@ -75,6 +76,7 @@ class Table:
     @property
     def numeric(self) -> list[bool]:
         """Whether a column begins with a number in most of its cells."""
+        # By most of its cells: a column of numbers may have a dash or a remark here and there.
         columns = zip(*self.cells, strict=True) if self.rows else ([] for _ in self.heads)
         return [2 * sum(_numeric(cell.words) for cell in column) > len(column) for column in map(list, columns)]
 

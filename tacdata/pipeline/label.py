@@ -85,6 +85,7 @@ def label(
         recorded = linked_session(recorded, Path(out))
         folder = recorded.folder
     workplaces = devices_named(devices)
+    # Refused before anything is solved, since hours later it would be too late.
     if alone and set(workplaces) != {"cpu"}:
         raise UsageError(
             f"labels that are the same to the last bit, on {', '.join(workplaces)}",
@@ -106,6 +107,7 @@ def label(
     paths = {int(path.stem[-6:]): path for path in recorded.episodes}
     recordings = {number: partial(read_episode, path) for number, path in paths.items()}
     flow = DatasetFlow(Path(into), folder, recorded.episodes, skin) if into else None
+    # Without a dataset, finished labels need no further step.
     deliver = flow.deliver if flow else lambda *_: None
     place = Store(Path(store) if store else file_names.store(labels))
     try:

@@ -72,6 +72,7 @@ def pack(
     recorded = read_session(folder)
     files = LabelFiles(Path(labels) if labels else recorded.labels)
     skin = sensor if sensor is None or isinstance(sensor, Sensor) else read_sensor(sensor)
+    # Before the first episode is written: labels of two models must not share a dataset.
     files.check(recorded.episodes, skin, model)
     packed = pack_episodes(recorded, files, root, append=append, sensor=skin, model=model, extra=extra, done=progress)
     reasons = {name: files.failure(folder / name) for name, _ in packed.left_out}

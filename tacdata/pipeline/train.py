@@ -98,6 +98,7 @@ def train(
         progress(step)
         log(step)
 
+    # From a pretrained network few presses are enough, and all of them are used: they are left out in turn.
     if begun:
         best = fit(
             frames, settings, folder, begun, device, resume, threads, listen, compiled, mixed, shape_groups=leave_out

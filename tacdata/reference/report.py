@@ -38,6 +38,7 @@ def word(mechanism: str) -> str:
 def sentence(result: Difference, unit: str) -> str:
     """Return the answer in one sentence, with sizes, units and the conditions without a change."""
     if result.status == "none":
+        # The largest bound: no effect above it would have been missed.
         threshold = max((s.bound for m in result.mechanisms for s in m.sizes), default=0.0)
         bound = f": no named effect above {threshold:.2g} {unit}" if threshold else ""
         return f"The readings do not differ from the healthy machine beyond its own scatter{bound}."
@@ -82,6 +83,7 @@ def _amount(sizes: Sequence[Size], unit: str) -> str:
     """Return sizes in the readings' unit and as a share of the reading, one figure or a range."""
     peaks, shares = [s.peak for s in sizes], [100 * s.share for s in sizes]
     mean = sum(peaks) / len(peaks)
+    # One figure where all agree; a range says that the effect is not the same everywhere.
     if max(abs(p - mean) for p in peaks) <= SIMILAR * abs(mean):
         return f"{mean:+.2g} {unit} ({sum(shares) / len(shares):+.0f} %)"
     return f"{min(peaks):+.2g} to {max(peaks):+.2g} {unit} ({min(shares):+.0f} to {max(shares):+.0f} %)"

@@ -61,5 +61,6 @@ def pages_in(root: Path, *folders: Path) -> tuple[str, ...]:
     """Return the files of some folders that a browser shows, pages before pictures, from the root on."""
     files = [path for folder in folders if folder.is_dir() for path in sorted(folder.iterdir())]
     pages = [path for path in files if path.suffix in PAGES and not path.name.startswith(".") and path.is_file()]
+    # Pages to read first, then pictures.
     pages.sort(key=lambda path: PAGES.index(path.suffix))
     return tuple(path.relative_to(root).as_posix() for path in pages[:MOST_PAGES])

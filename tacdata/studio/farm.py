@@ -50,4 +50,5 @@ def running_at(lock: Path) -> str:
         pass
     except (OSError, OverflowError):
         return ""
+    # An address that listens everywhere is no address to open.
     return f"http://127.0.0.1:{match[3]}" if match[2] == "0.0.0.0" else match[1]

@@ -70,8 +70,10 @@ class Inventory:
 
     def entries(self) -> list[LabEntry]:
         """Return the entries by section, the newest first; a damaged one has its error as its sentence."""
+        # Walking through a lab's folder takes longer than the page's pause between two looks.
         if time.monotonic() - self._searched >= SEARCH:
             self._tasks, self._searched = self._tasks_of_folder(), time.monotonic()
+        # What was deleted since the last search is left out.
         current = [self._entry(task) for task in self._tasks if task[1].exists()]
         return sorted(current, key=lambda entry: (SECTIONS.index(entry.section), -entry.order, entry.path))
 
@@ -98,6 +100,7 @@ class Inventory:
         section, path, make = task
         state = tuple(_changed(path / part) for part in WATCHED)
         cached = self._cache.get((section, path))
+        # A running recording changes without its watched files: it is always read.
         if cached is not None and cached[0] == state and not cached[1].running:
             return cached[1]
         try:

@@ -88,6 +88,7 @@ def catalogue_server(
         served.mkdir()
         deepest = _draw(listed, labels, predictions, served, layout, drawn)
         server = ["server", "--host", LOOPBACK, "--port", str(port), "--dataset", f"{name}={served}"]
+        # The viewer outlives no page: both end with the context.
         with running(server, environment) as process, running(viewer, environment):
             _wait_for(port, lambda: process.poll() is None)
             address = f"rerun+http://{LOOPBACK}:{port}"

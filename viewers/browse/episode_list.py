@@ -114,7 +114,9 @@ class EpisodeList:
         """
         name = key.lstrip("-")
         _known(name)
+        # The worst episode is the one to look at.
         falling = key.startswith("-") or name == "error"
+        # Unknown values compare with nothing, so they come last whichever way it is sorted.
         entries = [e for e in self.entries if getattr(e, name) is not None]
         unknown = tuple(e for e in self.entries if getattr(e, name) is None)
         ordered = sorted(entries, key=lambda e: getattr(e, name), reverse=falling)
@@ -179,6 +181,7 @@ def errors_of(depth: np.ndarray, time_ns: np.ndarray, predicted: np.ndarray, pre
     """
     from tacdata.training.metrics.depth_maps import score_frames
 
+    # By time: a network may have left out frames, and a label has its own.
     _, ours, theirs = np.intersect1d(time_ns, predicted_ns, return_indices=True)
     if not len(ours) or depth.shape[1:] != predicted.shape[1:]:
         return None

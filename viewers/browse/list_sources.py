@@ -68,6 +68,7 @@ def _checked(root: Path) -> tuple[dict[str, float], list[str]]:
         taxels = entry["taxels"]
         total = taxels["frames"] + taxels["lost"]
         shares[entry["file"]] = taxels["frames"] / total if total else 0.0
+    # A recording that cannot be used has no good frames, however many came.
     for finding in document["findings"]:
         if finding["severity"] == "unusable" and finding["file"] in shares:
             shares[finding["file"]] = 0.0
@@ -81,6 +82,7 @@ def _label_state(labels: Path, recording: Path) -> str:
 
 
 def _with_session_errors(entries: tuple[Entry, ...], labels: Path, predictions: Path) -> tuple[Entry, ...]:
+    # Predictions are numbered by a dataset, recordings by their session: only times agree.
     by_start = {int(p.time_ns[0]): p for p in map(read_prediction, prediction_paths(predictions))}
     result = []
     for entry in entries:
@@ -112,6 +114,7 @@ def _dataset(root: Path, predictions: Path | None) -> EpisodeList:
             continue
         entry = of_press(row.index, record.recording_file, record.configuration)
         model = record.label_provenance.get("parents", {}).get("model", "")
+        # Labels of an older model stay in the dataset until they are made again.
         label = "complete" if states["models"].get(record.sensor, model) == model else "stale"
         entries.append(replace(entry, quality=record.quality, label=label, recording=record.recording))
     listing = with_notes(with_flags(tuple(entries), read_flags(root)), read_notes(root))

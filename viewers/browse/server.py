@@ -98,6 +98,7 @@ class Pages:
         rows: list[dict[str, Any]] = [asdict(entry) for entry in marked]
         for row in rows:
             if row["flag"] and (flag := flags.get(row["recording"]) or by_file.get(row["file"])):
+                # Who and when, so that a second person can ask the first.
                 row |= {"flagged_at": flag.flagged_at, "flagged_by": flag.flagged_by}
         return {
             "root": str(self.listed.root),

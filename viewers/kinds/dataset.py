@@ -33,6 +33,7 @@ class DatasetKind(Kind):
             raise UsageError("--labels with a dataset", "a dataset holds its labels", "leave it out")
         number = options.episode or 0
         if options.episode is None and options.predictions is not None:
+            # Networks are asked about test episodes, and the first of a dataset is seldom one.
             number = _predicted(path, options.predictions)
         dataset, count = read_single(path, number)
         prediction, remarks = None, []

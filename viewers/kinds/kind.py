@@ -46,6 +46,7 @@ class Kind(ABC):
 def kinds() -> list[Kind]:
     """Return one of every kind, the narrowest first."""
     members: list[Any] = [registry.load(ROOM, BASE, name, Kind) for name in registry.names(ROOM, BASE)]
+    # Narrow kinds first: every folder would pass for a session.
     instances: list[Kind] = [member() for member in members]
     return sorted(instances, key=lambda kind: kind.ORDER)
 

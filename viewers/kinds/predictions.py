@@ -64,5 +64,6 @@ def _sensor(path: Path, digest: str) -> Sensor | None:
                 sensor = load(folder).sensor
             except TacdataError:
                 return None
+            # A network of another sensor has another grid: its axes would be wrong.
             return sensor if sensor.content_hash == digest else None
     return None

@@ -59,6 +59,7 @@ def episode_of(folder: Path, episode: int | None) -> Path:
         UsageError: If there is none, or none of that number.
     """
     finished, begun = file_names.finished(folder), file_names.unfinished(folder)
+    # A recording in progress can be followed from its first frame on.
     if not finished and begun and episode is None:
         return begun[0]
     if not finished:

@@ -46,6 +46,7 @@ def fed_viewer(web: bool) -> Iterator[FedViewer]:
         with running(command, environment) as process, ExitStack() as shield:
             _wait_for(port)
             page = shield.enter_context(shielded(inner, free_port(WEB_PORT))) if web else ""
+            # Percent-encoded: the whole address of the feed is one parameter of the page's.
             address = f"{page}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{port}%2Fproxy"
             yield FedViewer(process, address if web else "", f"rerun+http://{LOOPBACK}:{port}/proxy")
 

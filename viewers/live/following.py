@@ -79,6 +79,7 @@ class Follower:
         """Send the layout again where another view or another scale belongs into it."""
         from tacdata.viewers.rerun.blueprint import episode_blueprint
 
+        # Sent only on a change: each new layout resets what the person has moved or hidden.
         scales = tuple((a.scale.low, a.scale.high) for a in scene.arrays)
         layout = (scales, bool(scene.phases), tuple(c.name for c in scene.curves), len(scene.bodies))
         if layout != self._layout:

@@ -66,6 +66,7 @@ def live_view(where: str, columns: int, rows: int) -> Iterator[Watch]:
         with suppress(Full):
             values.put(None, timeout=PATIENCE)  # after everything in the queue
         ending.set()
+        # First by itself, then asked, then forced: a viewer that hangs must not hold the recorder.
         for end in (lambda: None, process.terminate, process.kill):
             if process.is_alive():
                 end()

@@ -35,6 +35,7 @@ def depth_maps(
     pairs = {name: pair for name, pair in (("label", label), ("prediction", prediction)) if pair is not None}
     if not pairs:
         return ()
+    # One scale for both, or equal depths would have different colours.
     scale = scale_of(np.array([depth.max(initial=0.0) for _, depth in pairs.values()]), "mm", floor=DEPTH_FLOOR)
     x, y = sensor.map.x, sensor.map.y
     maps = [DepthMaps(name, x, y, time, depth, scale) for name, (time, depth) in pairs.items()]
@@ -97,6 +98,7 @@ def thinned(maps: tuple[DepthMaps, ...], limit: int = thinning.MAPS) -> tuple[De
     first = max(maps, key=lambda m: len(m.time_ns))
     flat = first.values.reshape(len(first.values), -1)
     strength = np.maximum(flat.max(axis=1), -flat.min(axis=1))
+    # The map with the most times decides, so that label and prediction stay comparable frame by frame.
     times = first.time_ns[thinning.strongest(strength, limit)]
     result = []
     for m in maps:

@@ -55,6 +55,7 @@ def press_error(maps: tuple[DepthMaps, ...]) -> str:
     contact = scores.labelled
     text = f"deepest frame {frame.predicted:.2f} mm predicted, {frame.labelled:.2f} mm labelled ({frame})"
     if contact.any():
+        # Medians, since the first and last frames of a contact have large relative errors.
         peak, rmse = np.median(scores.peak_error[contact]), np.median(scores.contact_rmse[contact])
         text += f"; {int(contact.sum())} frames in contact: median peak error {peak:.3f} mm, contact RMSE {rmse:.3f} mm"
     return text

@@ -116,6 +116,7 @@ def _places(stream: IO[bytes], chunks: list[ChunkIndex], channel: int) -> list[t
 def _messages(stream: IO[bytes], places: list[tuple[int, int]]) -> Iterator[bytes]:
     opened, content = -1, b""
     for start, offset in places:
+        # A chunk is decompressed once for all of its messages.
         if start != opened:
             stream.seek(start + RECORD)
             data, length = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=True)

@@ -25,6 +25,7 @@ def signal_change(counts: np.ndarray, resting: np.ndarray) -> np.ndarray:
         counts: Raw readings [counts], shape (n, taxels).
         resting: Which frames lie in the rest phase, shape (n,), bool; if none does, the first few are taken.
     """
+    # The median: a touch during the rest would shift a mean.
     reference = counts[resting] if resting.any() else counts[:FRAMES_WITHOUT_REST]
     if not np.isnan(reference).any():
         return counts - np.median(reference, axis=0)
@@ -111,6 +112,7 @@ def tag_curves(tags: TagStream) -> list[Curves]:
     if not len(tags.sample_ns):
         return []
     visible = np.isfinite(tags.position).all(axis=1)
+    # Where no face was seen the error is that of nothing.
     quality = np.where(visible, tags.reprojection, np.nan)
     name = f"tags/{tags.camera}"
     return [

@@ -46,6 +46,7 @@ def of_episode(
     time = episode.taxels.sample_ns
     seconds = (time[-1] - time[0]) / 1e9
     rate = f", {(len(time) - 1) / seconds:.1f} Hz" if seconds > 0 else ""
+    # A counter that starts again goes back, and is no loss.
     lost = int(np.maximum(np.diff(episode.taxels.counter) - 1, 0).sum())
     lines = [
         f"# Episode {episode.number}",

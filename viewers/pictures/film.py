@@ -79,6 +79,7 @@ def film_times(scene: Scene, rate: float, limit: int) -> np.ndarray:
     begin, end = int(scene.frame_ns[0]), int(scene.frame_ns[-1])
     marked = [span for span in scene.phases if span.name != "rest"]
     if marked:
+        # The rest before and after would be most of the film.
         begin, end = max(begin, marked[0].start_ns), min(end, max(span.end_ns for span in marked))
     count = int(np.clip((end - begin) / 1e9 * rate, 2, limit))
     return np.linspace(begin, end, count).astype(np.int64)
@@ -158,6 +159,7 @@ def _write_mp4(path: Path, frames: Iterator[np.ndarray], rate: float) -> None:
             height, width = (2 * (n // 2) for n in picture.shape[:2])  # H.264 wants even numbers
             if stream is None:
                 stream = film.add_stream("libx264", rate=round(rate))
+                # 4:2:0, which every browser and phone plays.
                 stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
             film.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]))))
         film.mux(stream.encode())

@@ -140,6 +140,7 @@ class _Plane:
         tips = []
         for (dot, _), tail, plate, body in zip(self._marks, self._tails, self._plates, self._bodies, strict=True):
             row = nearest(body.time_ns, time_ns)
+            # Only the latest part: the whole path would cover the scene.
             recent = (body.time_ns <= time_ns) & (body.time_ns >= time_ns - TAIL * 1e9)
             place = body.position[row]
             offset = Rotation.from_quat(np.atleast_2d(body.quaternion)[row]).apply([PLATE / 2, 0.0, 0.0])

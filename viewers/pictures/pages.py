@@ -70,6 +70,7 @@ def one_scale(grid: Iterable[Axes], curves: list[Curves]) -> None:
     for axes, curve in zip(grid, curves, strict=False):
         groups.setdefault(curve.name.split("/")[0], []).append(axes)
     for members in groups.values():
+        # Residuals of two models compare by height only on one axis.
         low, high = zip(*(axes.get_ylim() for axes in members), strict=True)
         for axes in members:
             axes.set_ylim(min(low), max(high))

@@ -69,6 +69,7 @@ def signals(figure: SubFigure, scene: Scene, instants: Moments) -> None:
         lower.set_ylim(1.15 * max(depth.max(), 0.1), max(depth.min(), -2 * max(depth.max(), 1.0)))
     lower.set_ylabel("tip depth [mm]")
     lower.set_xlabel("time since the first frame [s]")
+    # A recording of one frame still gets an axis of some width.
     upper.set_xlim(time[0], max(time[-1], time[0] + 1e-3))
     for axes in (upper, lower):
         phases(axes, scene, named=axes is upper)
@@ -93,6 +94,7 @@ def key(axes: Axes, scene: Scene) -> None:
     """Draw the colours of the curves as the array that they come from."""
     inset = axes.inset_axes((0.05, 0.62, 0.15, 0.32))
     columns, rows = scene.taxels.columns, scene.taxels.rows
+    # A legend of two dozen names would hide the curves.
     inset.imshow(taxel_colors(columns, rows).reshape(rows, columns, 3), origin="lower", aspect="equal")
     inset.set_xticks(range(columns))
     inset.set_yticks(range(rows))

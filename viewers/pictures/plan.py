@@ -77,6 +77,7 @@ def _course(axes, plan: Plan, press_seconds: tuple[float, ...], names: list[str]
         axes.plot(begins[rows], depths, MARKS[number % len(MARKS)], ms=4, label=name)
     last = None
     for press, begin in zip(plan.presses, begins, strict=True):
+        # A person works there: the time axis does not count it.
         if last not in (None, press.mounting):
             axes.axvline(begin, color="0.6", linewidth=0.8)
             axes.text(begin, 0.99, " mount", transform=axes.get_xaxis_transform(), fontsize=7, va="top")

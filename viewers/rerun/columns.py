@@ -96,6 +96,7 @@ class RerunParts:
         if not len(time_ns):
             return
         if not self._scene.on_host_clock:
+            # Times of verdicts and predictions have no date.
             elapsed = [rr.TimeColumn(ELAPSED, duration=1e-9 * time_ns)]
             self._recording.send_columns(path, indexes=elapsed, columns=columns)
             return
@@ -110,6 +111,7 @@ class RerunParts:
     def _curves(self, curves: Curves) -> None:
         array = next((a for a in self._scene.arrays if a.values.shape[1] == len(curves.labels) > 6), None)
         if array is not None:
+            # Neighbouring taxels have neighbouring colours, so that a curve shows its place.
             colors = taxel_colors(array.columns, array.rows)
         else:
             colors = np.array([HUES[k % len(HUES)] for k in range(len(curves.labels))], dtype=np.uint8)

@@ -107,6 +107,7 @@ def window(file: Path, moment: Moment | None = None) -> None:
     with quiet_environment() as environment:
         port = free_port(GRPC_PORT)
         command = [executable(), "--bind", LOOPBACK, "--port", str(port), str(file)]
+        # The window is ended with this process, or closed by the person.
         with _running(command, environment) as viewer:
             if moment is not None:
                 threading.Thread(target=steer, args=(port, moment), daemon=True).start()
@@ -156,6 +157,7 @@ def _running(command: list[str], environment: dict[str, str]) -> Iterator[subpro
         try:
             yield process
         finally:
+            # Asked first: Rerun then closes its ports in order.
             process.terminate()
             try:
                 process.wait(timeout=10)

@@ -39,6 +39,7 @@ def maps_comparison(
         phases: Marked phases.
     """
     first, second = sides
+    # Label versions may have different frames; only common ones can be subtracted.
     time, ours, theirs = np.intersect1d(first.time_ns, second.time_ns, return_indices=True)
     all_sides = (*((truth,) if truth else ()), first, second)
     high = np.array([float(side.depth.max(initial=0.0)) for side in all_sides])

@@ -57,6 +57,7 @@ def episode_scene(
         layers += maps.contact_maps(sensor, label.map_ns, label.traction)
     if label and label.taxel_pressure is not None:
         layers += (maps.board_map(sensor, label.map_ns, label.taxel_pressure),)
+    # On the frames' times: curves of one scene share a cursor.
     tip = episode.tip_at(time) if len(episode.tip_ns) else None
     cameras = camera_view.camera_views(episode, images)
     curves = signals.episode_curves(episode, unit) + (signals.label_curves(label) if label else ())

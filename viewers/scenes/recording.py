@@ -74,6 +74,7 @@ def scene_of(
     from tacdata.viewers.scenes.episode import episode_scene
 
     episode, remarks, prediction = recording.episode, list(remarks), None
+    # A label of an earlier recording with the same name would be drawn at wrong times.
     if label is not None and not np.isin(label.time_ns, episode.taxels.sample_ns).any():
         remarks.append("the label's times are not those of this recording: run `tacdata label` again")
     if predictions is not None:

@@ -63,6 +63,7 @@ def _columns(path: Path, info: dict, row: folder.EpisodeRow) -> dict[str, np.nda
     table = folder.read_parquet(path, [*keys, "index"])
     index = table["index"].to_numpy()
     first, last = np.searchsorted(index, [row.start, row.stop])
+    # An edit by another tool may have removed frames without telling the rows of episodes.
     if not np.array_equal(index[first:last], np.arange(row.start, row.stop)):
         raise FormatError(
             f"{path}: it lacks frames of episode {row.index}",

@@ -128,6 +128,7 @@ def verdict_words(title: str, verdict: dict[str, Any], picture: str | None) -> s
 def _left(verdict: dict[str, Any]) -> list[Bars]:
     names, remainder = ("before", "after", "noise floor"), verdict["left"]
     values = np.array([remainder["before"], remainder["after"], remainder["floor"]], float)
+    # On a linear axis the bars near the noise floor would vanish.
     wide = values[0] > WIDE * min(values[1:])
     return [Bars("gap", "Residual: mean square over the noise", names, values, 1.0, bool(wide))]
 

@@ -32,6 +32,7 @@ def run(
         _all(state)
         return Result(state)
     entry = client.get(client.submission(number))
+    # The service is asked, and not its folder: it may be on another computer.
     while wait and entry["state"] in ("waiting", "planning", "running"):
         sleep(1.0)
         entry = client.get(client.submission(number))

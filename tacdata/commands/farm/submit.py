@@ -56,6 +56,7 @@ def run(
     filed = client.post("/api/submissions", wish)
     print(f"submission {filed['id']} of {session} is filed", flush=True)
     filed = client.planned(filed["id"], wait) if wait else filed
+    # Filing always succeeds; the service refuses when it has read the recordings.
     if filed["state"] == "refused":
         return Result(filed, refusal(filed))
     if wait and filed["state"] in ("waiting", "planning"):

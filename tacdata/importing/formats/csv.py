@@ -153,6 +153,7 @@ def _decoded(path: Path, options: ReadOptions) -> tuple[bytes, list[str]]:
             )
     notes: list[str] = []
     tried = options.encoding
+    # A mapping for files of several instruments may name several encodings; the first that fits is taken.
     if isinstance(tried, list):
         tried = next((name for name in tried if _decodes(raw, name)), tried[-1])
     encoding = tried or next((name for mark, name in MARKS.items() if raw.startswith(mark)), None)
@@ -341,6 +342,7 @@ def _numbers(texts: list[str | None], layout: TextLayout, name: str, path: Path,
     cell = repr((texts[row] or "").strip()[:SHOWN])
     words = {(texts[row] or "").strip() for row in wrong}
     share = OF_WORDS if len(words) <= WORDS else UNREADABLE
+    # A number with a sign between thousands can be read in two ways, so one is enough to refuse.
     if grouped is not None or len(wrong) > share * len(texts):
         raise FormatError(
             f"{path}: column {name}, row {row + 1} of the data: {cell}",

@@ -51,6 +51,7 @@ def _by_name(content: Any) -> Any:
     names, rows = (content.get(key) for key in ("columns", "data")) if isinstance(content, dict) else (None, None)
     if not (isinstance(names, list) and isinstance(rows, list)) or not all(isinstance(row, list) for row in rows):
         return content
+    # Without one value for each column the two lists only look like a table.
     if len({str(name) for name in names}) < len(names) or {len(row) for row in rows} != {len(names)}:
         return content
     return {str(name): list(values) for name, values in zip(names, zip(*rows, strict=True), strict=True)}

@@ -89,6 +89,7 @@ def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:
         for key, inner in value.items():
             fields |= _flatten(f"{name}.{key}" if name else key, inner, lost)
         return fields
+    # A cell array may hold structures, columns, or anything.
     if isinstance(value, (list, np.ndarray)) and np.ndim(value) and len(value):
         if all(isinstance(entry, dict) for entry in value):
             return _stacked(name, list(value), lost)

@@ -71,6 +71,7 @@ def _column(column: Any, where: str, notes: list[str]) -> np.ndarray:
         return np.array([row if row is not None and len(row) == width else np.full(width, np.nan) for row in rows])
     if pa.types.is_duration(kind):
         column, kind = column.cast(pa.int64()), pa.int64()
+    # Texts that repeat are stored once each; their column has a type of its own.
     if pa.types.is_dictionary(kind):
         column = column.cast(kind.value_type)
         kind = kind.value_type

@@ -140,6 +140,7 @@ class _McapLog:
 
     def messages(self, topic: str) -> Iterator[tuple[dict[str, Any], Any]]:
         """Yield the times and the content of a topic's messages, in the order of receipt."""
+        # An MCAP file may hold messages in the order of arrival at the disk.
         rows = sorted(self.rows[topic], key=lambda row: row[:2])
         differ = any(received != sent for received, sent, _, _ in rows)
         for received, sent, kind, data in rows:

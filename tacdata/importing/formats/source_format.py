@@ -170,6 +170,7 @@ def refuse_growth(path: Path, size: float, largest: int = LARGEST) -> None:
         FormatError: With both sizes.
     """
     files = [path] if path.is_file() else [inside for inside in path.rglob("*") if inside.is_file()]
+    # A folder counts as a file: a Zarr store is a folder of chunks.
     packed = sum(inside.stat().st_size for inside in files)
     if size > max(largest, DENSEST * packed):
         raise FormatError(
@@ -237,6 +238,7 @@ def _by_ending(path: Path) -> str:
     for name in registry.names(ROOM, BASE):
         for ending in registry.load(ROOM, BASE, name, SourceFormat).endings:
             endings[ending] = name
+    # The longest match: .csv.gz is a text, .gz alone would be unknown.
     matches = [ending for ending in endings if path.name.lower().endswith(ending)]
     ending = path.suffix.lower()
     if ending == ".xls" and path.is_file():
