@@ -168,13 +168,8 @@ def _by_labels(later: Visit, earlier: Visit, faults: Wiring) -> GainFit | None:
         k: _ratio(e, earlier_gains.channels[k]) for k, e in later_gains.channels.items() if k in earlier_gains.channels
     }
     ratios = {k: _ratio(e, earlier_gains.own[k]) for k, e in later_gains.own.items() if k in earlier_gains.own}
-    return GainFit(
-        ratio,
-        _ratio(later_gains.common, earlier_gains.common),
-        ratios,
-        {},
-        min(later_gains.presses, earlier_gains.presses),
-    )
+    common, presses = _ratio(later_gains.common, earlier_gains.common), min(later_gains.presses, earlier_gains.presses)
+    return GainFit(ratio, common, ratios, {}, presses)
 
 
 def model_gains(visit: Visit, faults: Wiring) -> GainFit | None:
@@ -214,11 +209,9 @@ def _channel_changes(later: Visit, earlier: Visit, faults: Wiring, order: np.nda
     for taxel, channel in enumerate(order.tolist()):
         if channel in faults.unfit or not strongest[taxel] > 0:
             continue
-        shift = UncertainValue(
-            zero[channel].value - earlier_zero[taxel].value,
-            float(np.hypot(zero[channel].error, earlier_zero[taxel].error)),
-            min(zero[channel].freedom, earlier_zero[taxel].freedom),
-        )
+        now, then = zero[channel], earlier_zero[taxel]
+        error, freedom = float(np.hypot(now.error, then.error)), min(now.freedom, then.freedom)
+        shift = UncertainValue(now.value - then.value, error, freedom)
         changes.append(_change("zero", channel, shift, later.unit, ZERO * float(strongest[taxel])))
         changes.append(_change("drift", channel, drift[channel], f"{later.unit}/min", DRIFT * float(strongest[taxel])))
         changes.append(_louder(channel, noise[channel], noisy[taxel]))
@@ -239,11 +232,9 @@ def _louder(channel: int, later: Spread, earlier: Spread) -> Change:
     """Return the ratio of two noises, with the bounds of F."""
     ratio = later.value / max(earlier.value, 1e-9)
     (low, high), (earlier_low, earlier_high) = later.interval, earlier.interval
-    half = (
-        np.hypot(np.log(high / low), np.log(earlier_high / earlier_low)) / 2
-        if earlier.value > 0 and later.value > 0
-        else 0.0
-    )
+    half = 0.0
+    if earlier.value > 0 and later.value > 0:
+        half = np.hypot(np.log(high / low), np.log(earlier_high / earlier_low)) / 2
     p = later.p_louder(earlier, NOISE)
     return Change("noise", channel, ratio, ratio * float(np.exp(-half)), ratio * float(np.exp(half)), "1", NOISE, p)
 

@@ -7,7 +7,7 @@ import numpy as np
 from tacdata import provenance, schemas
 from tacdata.health import comparison
 from tacdata.health.advice import Advice, advice, elsewhere, named
-from tacdata.health.comparison import Change
+from tacdata.health.comparison import Change, VisitComparison
 from tacdata.health.estimate import Spread, UncertainValue
 from tacdata.health.gains import GainFit
 from tacdata.health.history import History
@@ -48,21 +48,19 @@ def _visit(history: History, number: int) -> dict[str, Any]:
         "saturated": list(wiring.saturated),
         "gain_of_model": _gains(history.model[number]),
         "gain_of_first": _gains(first.gains if first else None),
-        "noise": [_spread(value) for value in visit.noise.values()],
+        "noise": [_estimate(value) for value in visit.noise.values()],
         "zero": [_estimate(value) for value in visit.zero.values()],
         "drift": [_estimate(value) for value in visit.drift.values()],
         "loop": _estimate(visit.loop),
-        "repeatability": _spread(repeatability) if repeatability else None,
+        "repeatability": _estimate(repeatability) if repeatability else None,
         "network_error": _estimate(errors.mean) if errors else None,
-        "comparisons": [
-            {
-                "against": history.visits[c.against].name,
-                "presses": len(c.pairs),
-                "changes": [_change(change) for change in c.changes],
-            }
-            for c in history.comparisons[number]
-        ],
+        "comparisons": [_comparison(history, each) for each in history.comparisons[number]],
     }
+
+
+def _comparison(history: History, compared: VisitComparison) -> dict[str, Any]:
+    changes = [_change(change) for change in compared.changes]
+    return {"against": history.visits[compared.against].name, "presses": len(compared.pairs), "changes": changes}
 
 
 def _gains(fit: GainFit | None) -> dict[str, Any] | None:
@@ -75,28 +73,16 @@ def _gains(fit: GainFit | None) -> dict[str, Any] | None:
     }
 
 
-def _estimate(estimate: UncertainValue) -> dict[str, Any]:
+def _estimate(estimate: UncertainValue | Spread) -> dict[str, Any]:
     low, high = estimate.interval
     return {"value": _number(estimate.value), "low": _number(low), "high": _number(high)}
 
 
-def _spread(spread: Spread) -> dict[str, Any]:
-    low, high = spread.interval
-    return {"value": _number(spread.value), "low": _number(low), "high": _number(high)}
-
-
 def _change(change: Change) -> dict[str, Any]:
-    return {
-        "quantity": change.quantity,
-        "channel": change.channel,
-        "value": _number(change.value),
-        "low": _number(change.low),
-        "high": _number(change.high),
-        "unit": change.unit,
-        "tolerance": _number(change.tolerance),
-        "p": _number(change.corrected),
-        "changed": change.changed,
-    }
+    stated = {"quantity": change.quantity, "channel": change.channel}
+    interval = {name: _number(getattr(change, name)) for name in ("value", "low", "high")}
+    test = {"tolerance": _number(change.tolerance), "p": _number(change.corrected), "changed": change.changed}
+    return stated | interval | {"unit": change.unit} | test
 
 
 def _number(value: float) -> float | None:

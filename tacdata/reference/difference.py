@@ -281,21 +281,10 @@ def _mechanisms(
                 acting = np.abs(curve) > 0.5 * np.abs(curve[at])
                 usual = float(np.abs(condition.base[acting, channel]).mean())
                 top, size = abs(float(curve[at])), float(value[j, 0])
-                t = size / max(float(error[j]), 1e-300)
-                p = 2 * float(stats.t.sf(abs(t), freedom))
-                peak = top * size
-                sizes[j].append(
-                    Size(
-                        condition.name,
-                        channel,
-                        size,
-                        float(error[j]),
-                        peak,
-                        top * float(error[j]),
-                        peak / max(usual, 1e-300),
-                        p,
-                    )
-                )
+                spread, peak = float(error[j]), top * size
+                p = 2 * float(stats.t.sf(abs(size / max(spread, 1e-300)), freedom))
+                share = peak / max(usual, 1e-300)
+                sizes[j].append(Size(condition.name, channel, size, spread, peak, top * spread, share, p))
     ranges = {c.name: c.range for c in conditions}
     # Bonferroni, over all sizes that could have been a change.
     tests = max(len({s.mechanism for s in columns[0]}) * len(conditions) * conditions[0].base.shape[1], 1)

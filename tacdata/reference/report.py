@@ -6,7 +6,7 @@ from typing import Any
 
 from tacdata import provenance, schemas
 from tacdata.effects import load
-from tacdata.reference.difference import NAMED, ZERO, Difference, Mechanism, Size
+from tacdata.reference.difference import NAMED, Z90, ZERO, Difference, Mechanism, Size
 
 NEGLIGIBLE = 0.3
 """A bound below this share of the changed sizes counts as nothing there [1]."""
@@ -98,7 +98,7 @@ def table(result: Difference, unit: str) -> list[tuple[str, ...]]:
     rows = []
     for m in result.mechanisms:
         for s in m.sizes:
-            low, high = s.peak - 1.645 * s.peak_error, s.peak + 1.645 * s.peak_error
+            low, high = s.peak - Z90 * s.peak_error, s.peak + Z90 * s.peak_error
             size_text = f"{s.peak:+.3g} {unit} ({low:+.3g} to {high:+.3g})"
             if m.unit != "reading":
                 size_text += f", from {s.value:.3g} {'' if m.unit == '1' else m.unit}".rstrip()
@@ -184,9 +184,7 @@ def document(result: Difference, heading: Machines, parents: dict[str, str]) -> 
                 "probability": m.probability,
                 "rival": m.rival,
                 "named": m in result.named,
-                "sizes": [
-                    {**asdict(s), "channel": result.channels[s.channel], "interval": _interval(s)} for s in m.sizes
-                ],
+                "sizes": [_size(s, result) for s in m.sizes],
             }
             for m in result.mechanisms
         ],
@@ -200,5 +198,6 @@ def document(result: Difference, heading: Machines, parents: dict[str, str]) -> 
     }
 
 
-def _interval(size: Size) -> list[float]:
-    return [size.value - 1.645 * size.error, size.value + 1.645 * size.error]
+def _size(size: Size, result: Difference) -> dict[str, Any]:
+    interval = [size.value - Z90 * size.error, size.value + Z90 * size.error]
+    return {**asdict(size), "channel": result.channels[size.channel], "interval": interval}
