@@ -102,11 +102,9 @@ class LiveLoop:
 
     def _words(self, estimate: Estimate) -> str:
         figures = self.meter.figures
-        where = (
-            "no contact"
-            if estimate.centre is None
-            else f"centre {estimate.centre[0]:+.2f}, {estimate.centre[1]:+.2f} mm"
-        )
+        where = "no contact"
+        if estimate.centre is not None:
+            where = f"centre {estimate.centre[0]:+.2f}, {estimate.centre[1]:+.2f} mm"
         if estimate.novelty is not None and estimate.novelty > 1:
             word = "a guess" if estimate.novelty > ALIEN else "may be off"
             where += f" ({word}: {estimate.novelty:.1f} times as far from what was learnt as validation presses)"

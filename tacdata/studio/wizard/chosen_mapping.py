@@ -28,11 +28,8 @@ BY_HAND = "read off by a person"
 
 def column_names(table: SourceTable) -> list[str]:
     """Return the columns of a table, those inside arrays each by itself."""
-    return [
-        inner
-        for name in table.columns
-        for inner in ([f"{name}[{k}]" for k in range(table.inner(name))] if table.inner(name) else [name])
-    ]
+    inner = {name: [f"{name}[{k}]" for k in range(table.inner(name))] for name in table.columns}
+    return [column for name, columns in inner.items() for column in columns or [name]]
 
 
 def choices_of(mapping: Mapping, tables: Tables) -> Choices:
@@ -147,6 +144,9 @@ def with_choices(base: Mapping, files: dict[str, FileEntry], tables: Tables, cho
     contact = {key: value for key, value in base.contact.items() if key != "z" or not isinstance(value, float | int)}
     touched = position is not None and not position.depth_given and choices.contact is not None
     contact |= {"z": choices.contact} if touched else {}
+    known_from = BY_HAND if contact else Mapping.known_from
+    if choices.contact == earlier.contact:
+        known_from = base.known_from
     mapping = replace(
         base,
         name=choices.name or base.name,
@@ -157,11 +157,7 @@ def with_choices(base: Mapping, files: dict[str, FileEntry], tables: Tables, cho
         measured=measured,
         trials=TrialRule(column=numbering[0].column) if numbering else choices.trials,
         contact=contact,
-        known_from=base.known_from
-        if choices.contact == earlier.contact
-        else BY_HAND
-        if contact
-        else Mapping.known_from,
+        known_from=known_from,
         specimen=specimen,
         indenter=base.indenter if choices.radius == earlier.radius else _sphere(choices.radius),
     )

@@ -79,17 +79,10 @@ def _press(press: ImportedPress, number: int) -> dict[str, Any]:
     hidden = f", {len(largest)} of {len(spans)}" if len(largest) < len(spans) else ""
     channels = [_series(press.taxels.names[k], color, change[:, k]) for k, color in zip(largest, COLORS, strict=False)]
     name = f"press {number}" + f" ({trial})" * bool(trial)
-    return {
-        "name": name,
-        "depth": _figure(
-            f"{name}: {press.press.depth:.3g} mm deep",
-            "depth [mm]",
-            seconds,
-            [_series("depth", "blue", depth)],
-            "press",
-        ),
-        "channels": _figure(f"change of the channels{hidden}", f"change [{unit}]", seconds, channels, "press"),
-    }
+    title, line = f"{name}: {press.press.depth:.3g} mm deep", _series("depth", "blue", depth)
+    above = _figure(title, "depth [mm]", seconds, [line], "press")
+    below = _figure(f"change of the channels{hidden}", f"change [{unit}]", seconds, channels, "press")
+    return {"name": name, "depth": above, "channels": below}
 
 
 def _first(values: np.ndarray) -> np.ndarray:
