@@ -66,7 +66,7 @@ def test_a_damaged_recording_is_left_out_and_the_rest_is_used(copied):
 def test_a_session_without_a_press_says_what_to_record(copied):
     for path in (copied / "monday").glob("*.mcap"):
         path.write_bytes(b"nothing")
-    with pytest.raises(UsageError, match="no recording tells how the unit is") as told:
+    with pytest.raises(UsageError, match="no recording shows the state of the unit") as told:
         read_visit(copied / "monday")
     assert "tacdata plan health" in str(told.value)
 

@@ -187,7 +187,7 @@ def test_the_verb_writes_a_recipe_out_with_a_summary_and_a_picture(tmp_path):
     for arguments, word in (
         ((source, "--out", tmp_path / "plan.yaml"), "exists"),
         ((tmp_path / "none.yaml", "--out", tmp_path / "new.yaml"), "no file"),
-        ((source, "--presses", "4", "--out", tmp_path / "new.yaml"), "the file says both"),
+        ((source, "--presses", "4", "--out", tmp_path / "new.yaml"), "both are in the file"),
         (("training",), "nowhere to write"),
     ):
         code, said = run(*arguments)

@@ -69,7 +69,7 @@ def without_codes(
         codes[:, column] |= _isolated(np.where(codes[:, column], np.nan, values[:, column]), policy)
     doubts = []
     if codes.any():
-        doubts.append(_counted(values, codes, name, "mean an overload or no value"))
+        doubts.append(_counted(values, codes, name, "stand for an overload or for no value"))
     clipped = _at_rail(np.where(codes, np.nan, values), policy) if rails else np.zeros_like(codes)
     if clipped.any():
         doubts.append(_counted(values, clipped, name, "are the largest that its converter has, and so no readings"))
@@ -77,7 +77,7 @@ def without_codes(
     if (stays := _constant(np.where(missing, np.nan, values), policy)).any():
         doubts.append(_counted(values, stays, name, "stay far from all others", "they count as measured"))
     if (shifted := _shifted(np.where(missing, np.nan, values), policy)).any():
-        words = "are ten, a hundred or a thousand times the numbers around them"
+        words = "are ten, a hundred or a thousand times the others among which they stand"
         doubts.append(_counted(values, shifted, name, words, "was a decimal sign lost?"))
     if (spikes := _spikes(np.where(missing, np.nan, values), policy)).any():
         doubts.append(_counted(values, spikes, name, "lie far from all others", "they count as measured"))

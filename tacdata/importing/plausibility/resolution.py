@@ -52,7 +52,7 @@ def restored(
     if len(np.unique(values)) < policy.distinct:
         raise FormatError(
             f"{fault}, {len(np.unique(values))} different ones in {len(values)} rows",
-            "times that distinguish the rows",
+            "times that tell the rows apart",
             "save the clock in 64 bits, or from the first row on; if the rate is known, give time: {rate: HZ}",
         )
     slope, first = np.polyfit(rows, values, 1)

@@ -84,7 +84,7 @@ def lag_doubts(taxels: Stream, position: Stream, policy: LagPolicy = POLICY) -> 
     least = policy.steps * step / 1e9
     if (drift := _drift(lags, policy)) and abs(drift) > least:
         return (
-            f"position: its clock and that of the channels drift: the readings' lag changes by {drift:+.3g} s in "
+            f"position: its clock and that of the channels drift apart: the readings' lag changes by {drift:+.3g} s in "
             "the course of the recording: give drift [ppm] under the time of one",
         )
     lag, gain, correlation = (float(np.median(each)) for each in (lags, gains, [each[1] for each in found]))

@@ -74,7 +74,7 @@ def read_schedule(schedule: Schedule | None, tables: dict[str, SourceTable], tax
     inside = [p for p in presses if p.start_ns <= taxels.time_ns[-1] and p.knots[0][-1] >= taxels.time_ns[0]]
     if not inside:
         raise FormatError(
-            "schedule: no press is within the time of the channels, "
+            "schedule: no press lies within the time of the channels, "
             f"{taxels.time_ns[0] / 1e9:.3f} to {taxels.time_ns[-1] / 1e9:.3f} s",
             "presses within it",
             "correct start, or the schedule's time: {offset: SECONDS}",

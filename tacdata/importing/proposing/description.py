@@ -101,7 +101,7 @@ def _read(path: Path, options: ReadOptions) -> tuple[SourceTable, ReadOptions]:
             break
         if len(_lost(tried)) < best:
             table, best, best_options = tried, len(_lost(tried)), replace(options, trial_axis=axis)
-    if not best and any("trial_axis says" in note for note in table.notes):
+    if not best and any("trial_axis" in note for note in table.notes):
         for axis in (2, 1, 0):
             tried = read_table(path, replace(options, trial_axis=axis))
             if _one_clock(tried):

@@ -59,7 +59,7 @@ class TrialRun:
     def sentence(self) -> str:
         """The recordings in figures, or why there are none."""
         if not self.presses:
-            return f"in this form it imports nothing: {self.refusals[0].given}; {self.refusals[0].remedy}"
+            return f"as it stands, it imports nothing: {self.refusals[0].given}; {self.refusals[0].remedy}"
         tried = len(self.by_set)
         names = f"{tried} of {self.sets} sets of files hold" if self.sets > 1 else "the source holds"
         return f"tried: {names} {_figures(self.presses, self.policy)}"
@@ -73,7 +73,7 @@ class TrialRun:
 def tried(source: Path, mapping: Mapping) -> str:
     """Return the outcome of importing some of the files by a mapping, or why nothing is imported, as a sentence."""
     run = trial_run(source, mapping)
-    return f"{run.sentence}\nnot good in this form: {'; '.join(run.faults)}" if run.faults else run.sentence
+    return f"{run.sentence}\nnot good as it stands: {'; '.join(run.faults)}" if run.faults else run.sentence
 
 
 def trial_run(

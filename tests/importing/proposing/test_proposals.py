@@ -130,7 +130,7 @@ def test_an_array_without_names_is_shown_by_column_and_asked_about(tmp_path):
     assert found.document["files"]["log"]["time"] == {"column": "array[0]"}
     assert found.document["taxels"]["columns"] == ["array[1-3]"]
     assert any("no names" in question for question in found.questions)
-    assert "in this form it imports nothing: neither a position" in tried(source, found.mapping)
+    assert "as it stands, it imports nothing: neither a position" in tried(source, found.mapping)
 
 
 def test_a_serial_monitors_times_stand_apart_and_its_presses_are_cut(tmp_path):
@@ -305,7 +305,7 @@ def test_a_clock_in_capitals_is_a_time_and_a_copy_of_the_depth_is_no_gauge(tmp_p
     assert found.document["taxels"]["columns"] == ["Force_N"]
     assert found.document["position"]["depth"]["column"] == "Displacement_mm"
     assert "measured" not in found.document, "the size is the displacement from another zero"
-    assert any("tells the way in from the way back" in question for question in found.questions)
+    assert any("distinguishes the way in from the way back" in question for question in found.questions)
     assert [press.press.depth for press in imported(tmp_path, found.document, tmp_path / "made")] == [1, 1, 1, 1]
 
 

@@ -202,7 +202,7 @@ def test_a_proposal_with_a_fault_is_not_called_good(tmp_path, columns, fault):
         "position": {"file": "run", "depth": {"column": "depth", "unit": "mm"}},
     }
     text = tried(tmp_path, Mapping.from_document(mapping, tmp_path))
-    assert "not good in this form: " in text
+    assert "not good as it stands: " in text
     assert fault in text
 
 
