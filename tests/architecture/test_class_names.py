@@ -1,7 +1,7 @@
-"""One word, one thing: a public class name stands for one class in the whole code."""
+"""One word, one thing: a public class name stands for one class in the whole code, a test file's for one file."""
 
 import ast
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 from tacdata import catalogue, registry
@@ -45,3 +45,11 @@ def test_a_public_class_name_stands_for_one_thing():
     members = registry_files()
     found = stand_for_several(path for path in FILES if path not in members)
     assert not found
+
+
+def test_every_test_file_has_a_name_of_its_own():
+    """Pytest imports each by its bare name, and refuses the second."""
+    names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
+    shared = sorted(name for name, count in names.items() if count > 1)
+    assert len(names) > 100
+    assert not shared, f"{shared}: rename all but one of each, pytest collects a whole room group at once"

@@ -1,7 +1,8 @@
 """Every room explains itself, is small, and has a name that says what it holds."""
 
+import csv
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,10 @@ TESTS = sorted(p for p in (ROOT / "tests").rglob("*") if p.is_dir() and any(p.gl
 MOST_LINES, LONGEST_LINE = 40, 140
 """Of a room's README; a row of a table may be longer."""
 MOST_ENTRIES = 15
+CEILINGS = Path(__file__).with_name("library_lines.csv")
+"""Most lines of Python of each room, and of all together."""
+SLACK = 0.05
+"""Share of a ceiling that may stay unused before it is lowered."""
 MEANINGLESS = {"utils", "util", "common", "helpers", "helper", "misc", "manager", "base"}
 
 
@@ -77,6 +82,30 @@ def test_every_file_has_one_subject():
 def test_most_files_are_small():
     lines = sorted(len(p.read_text().splitlines()) for p in FILES)
     assert lines[len(lines) // 2] <= 120
+
+
+def test_no_room_grows():
+    """A ceiling is only lowered, and their sum stays within the total (decision 0033)."""
+    with CEILINGS.open(newline="") as file:
+        ceilings = {row["room"]: int(row["lines"]) for row in csv.DictReader(file)}
+    total, lines = ceilings.pop("total"), Counter()
+    for path in FILES:
+        parts = path.relative_to(ROOT).parts
+        room = "/".join(parts[:2]) if parts[0] == "tacdata" and len(parts) > 2 else parts[0]
+        lines[room] += len(path.read_text().splitlines())
+    wrong = []
+    for room in sorted({*lines, *ceilings}):
+        count, ceiling = lines[room], ceilings.get(room, 0)
+        if count > ceiling:
+            remedy = (
+                f"take {count - ceiling} out of it, or out of another room, and lower that one's ceiling by as many"
+            )
+            wrong.append(f"{room} has {count} lines, at most {ceiling}: {remedy}")
+        elif count < (1 - SLACK) * ceiling - 10:
+            wrong.append(f"{room} has {count} lines, at most {ceiling}: lower its ceiling to {round(1.01 * count)}")
+    if sum(ceilings.values()) > total:
+        wrong.append(f"the ceilings are {sum(ceilings.values())} lines, at most {total} together: lower one of them")
+    assert not wrong, f"{CEILINGS.name}:\n" + "\n".join(wrong)
 
 
 def test_readmes_name_only_files_that_exist():
