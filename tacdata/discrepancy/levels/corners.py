@@ -1,8 +1,8 @@
 """The corner in which an effect lives: presses of one rate or one place, one range of depth.
 
-An effect of the whole machine has one size everywhere, and most evidence with all readings. A fault of one place, or
-of fast motion alone, is absent elsewhere: it has most evidence with its corner. Presses of other corners are then only
-noise, and a test over all presses hardly sees it.
+An effect of the whole machine has one size everywhere. All readings together are its best evidence. A fault of one
+place is absent elsewhere. So is a fault of fast motion. Its corner alone is its best evidence. Presses elsewhere add
+only noise. A test over all presses hardly sees it.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Corner:
 
     @property
     def alarm(self) -> Alarm:
-        """The alarm that it raises where no effect of all presses is found."""
+        """Its alarm, where no effect of all presses is found."""
         return Alarm(f"in one corner alone, {self.seen}", "press there again, and next to it, at the same rates")
 
 
@@ -90,7 +90,9 @@ class _Best:
 
 
 def corner(problem: Problem, explained: float = 0.0) -> Corner | None:
-    """Return the effect with the most evidence and its corner; None if none has enough, or if it is everywhere.
+    """Return the effect with the most evidence, and its corner.
+
+    None if none has enough. None if it is everywhere.
 
     Args:
         problem: The model as it was given, with all candidates.
@@ -215,7 +217,10 @@ def _rates(course: Course) -> list[tuple[str, np.ndarray]]:
 
 
 def places(course: Course) -> list[tuple[str, np.ndarray]]:
-    """Return the name and the presses of each place; none of a single place, or of many."""
+    """Return the name and the presses of each place.
+
+    None of a single place. None of many places.
+    """
     numbers = np.unique(course.site)
     if not 1 < len(numbers) <= MOST_PLACES:
         return []
