@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from tacdata import provenance, schemas
 from tacdata.plans.beside_skin import tip_aside
 from tacdata.sensor import Sensor
+from tacdata.skin.contact.first_touch import reach
 from tacdata.skin.contact.press_limits import check_press
 from tacdata.skin.mesh.generation.true_volume import volume_error
 from tacdata.skin.mesh.skin_mesh import quality
@@ -69,7 +70,8 @@ class CaseAnswer:
             "remarks": [*self.model.remarks, *(self.readings.remarks if self.readings else ())],
             "provenance": stamp,
         }
-        if blunt := fineness.remark(self.model.mesh, self.model.sensor, self.request):
+        extent = reach(self.model.sensor, self.request)
+        if blunt := fineness.remark(self.model.mesh, self.model.sensor, self.request, extent):
             document["remarks"].append(blunt)
         if aside := tip_aside(self.request.indenter):
             document["remarks"].append(aside)
