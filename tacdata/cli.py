@@ -202,7 +202,7 @@ def missing_path(error: TacdataError, arguments: Sequence[str]) -> str:
 
 
 def in_words(error: Any) -> UsageError:
-    """Return the fault of a typed line in three parts: given, allowed, remedy."""
+    """Return a typed line's fault in three parts: given, allowed, remedy."""
     context, kind = error.ctx, type(error).__name__
     path = context.command_path if context else "tacdata"
     allowed = context.get_usage().removeprefix("Usage: ") if context else "tacdata VERB"

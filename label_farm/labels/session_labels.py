@@ -123,7 +123,7 @@ class SessionLabels:
         return self.parents(request.episode) == parents(request)
 
     def write(self, request: LabelRequest, solution: PathSolution | None) -> Label:
-        """Make and write a label, and forget an earlier failure; return the label."""
+        """Make and write a label; forget an earlier failure. Return the label."""
         label = make_label(request, solution)
         write_label(self.path(request.episode), label)
         self._parents.pop(request.episode, None)

@@ -152,7 +152,7 @@ class Ledger:
         self.close()
 
     def rows(self, statement: str, values: Iterable[Any] = ()) -> list[tuple]:
-        """Run one statement and return its rows; for reading, and for the roster."""
+        """Run one statement and return its rows: for reads and the roster."""
         return self._db.execute(statement, tuple(values)).fetchall()
 
     def register(self, sensors: Mapping[str, dict[str, Any]]) -> None:

@@ -43,7 +43,7 @@ class Coverage:
 
 
 def coverage(presses: list[Press], dataset: Dataset) -> Coverage:
-    """Count presses that touch, by part of the taxel array and by depth."""
+    """Count presses with contact by part of the taxel array and depth."""
     taxels = dataset.sensor.taxels
     half = np.array([taxels.pitch_x * taxels.columns, taxels.pitch_y * taxels.rows]) / 2
     counts = np.zeros((COLUMNS, ROWS, len(DEPTH_BORDERS) + 1), int)

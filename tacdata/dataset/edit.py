@@ -1,6 +1,6 @@
 """Deletes from, splits and merges datasets by lerobot's edit tools, and restores fields that these drop.
 
-A new dataset is written to a temporary folder and renamed when complete. Sources stay as they are.
+A new dataset is written to a temporary folder, then renamed. Sources stay as they are.
 """
 
 import logging

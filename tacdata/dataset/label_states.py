@@ -1,4 +1,4 @@
-"""States of a dataset's labels: which episodes are complete, failed, waiting or stale."""
+"""States of a dataset's labels: complete, failed, waiting or stale episodes."""
 
 from dataclasses import dataclass, field
 from datetime import UTC, datetime

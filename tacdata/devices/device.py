@@ -153,7 +153,7 @@ class MotionController(Device):
 
     @property
     def position_lost(self) -> str:
-        """Why the position is unknown, as a sentence; empty while it is known. Answered after `close` too."""
+        """Reason for an unknown position, as a sentence; empty while it is known. Answered after `close` too."""
         return ""
 
     @property

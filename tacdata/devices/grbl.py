@@ -146,7 +146,7 @@ class Grbl(MotionController):
 
     @property
     def position_lost(self) -> str:
-        """Why the position is unknown, as a sentence; empty while it is known."""
+        """Reason for an unknown position, as a sentence; empty while it is known."""
         return (self._link.lost if self._link is not None else "") or self._lost
 
     @property

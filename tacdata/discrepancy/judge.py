@@ -1,4 +1,4 @@
-"""From recordings and a model to a verdict: the workflow, in one direction."""
+"""The workflow from recordings and a model to a verdict."""
 
 from __future__ import annotations
 

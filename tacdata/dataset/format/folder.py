@@ -49,7 +49,7 @@ def data_path(number: int) -> Path:
 
 
 def row_path(number: int) -> Path:
-    """Return the path of a file of episode rows relative to the dataset."""
+    """Return a file of episode rows as a path relative to the dataset."""
     return _numbered("meta/episodes", number)
 
 

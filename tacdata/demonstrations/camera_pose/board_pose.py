@@ -21,7 +21,7 @@ SAMPLE = 4
 def board_poses(
     images: Iterable[tuple[str, np.ndarray]], board: Board, intrinsics: dict[str, Any]
 ) -> tuple[list[np.ndarray], float, float]:
-    """Return the board's pose in the camera for every image that shows it.
+    """Return the board's pose in the camera for each image of it.
 
     The board's frame is OpenCV's: origin at an outer corner of the board, x along its columns, y along its rows.
 

@@ -20,7 +20,7 @@ BLOCKS, BLOCK = 8, 100
 def choose(sightings: Sightings) -> ProcessNoise:
     """Return the densities, out of `VELOCITIES` and `TURNINGS`, with the largest likelihood.
 
-    Stretches from the whole recording count. The beginning alone would give too small a noise for fast motion later.
+    Stretches from the whole recording count. The beginning alone underestimates the noise of fast motion later.
     """
     parts, nothing = _stretches(sightings), np.zeros(0, np.int64)
 

@@ -93,7 +93,7 @@ def _mean(rotations: list[np.ndarray]) -> np.ndarray:
 
 
 def flips(sightings: Sightings, accepted: np.ndarray, angle: np.ndarray, name: str) -> list[str]:
-    """Describe how many sightings were flipped against the path, and by how much."""
+    """Describe the number and size of sightings flipped against the path."""
     outlier = ~accepted & (angle > TURNED)
     if not outlier.any():
         return []

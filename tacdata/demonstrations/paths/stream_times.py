@@ -1,6 +1,6 @@
 """Faults of the times of a recording's streams: gone astray, gone back, or one camera later than another.
 
-Two cameras that see the same fingers have their lag in the motion. The lag is the one at which both paths
+Motion of the same fingers shows the lag of two cameras. The lag is the one at which both paths
 differ least. Latency only makes images late, so the later camera is the wrong one.
 """
 

@@ -34,7 +34,7 @@ REMEDY = "run `tacdata track` again: the recording holds everything"
 
 
 def path_of(recording: Path) -> Path:
-    """Return the path of a recording's tracks: in the folder of the recording."""
+    """Return the path of a recording's tracks, in the recording's own folder."""
     return recording.with_name(recording.name.removesuffix(".mcap") + ENDING)
 
 

@@ -52,7 +52,7 @@ class Swing:
 
 
 def swings(cleaned: Cleaned) -> list[Alarm]:
-    """Return the alarm of swings that differ from press to press, or none."""
+    """Return the alarm of swings that differ between presses, or none."""
     swing = strongest(cleaned)
     if swing is None or not swing.test.alarms:
         return []

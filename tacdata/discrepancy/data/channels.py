@@ -136,7 +136,7 @@ def _stops(values: np.ndarray, depth: np.ndarray, limit: float, step: float) -> 
 
 
 def without_codes(recordings: Sequence[Recording]) -> tuple[Sequence[Recording], list[str]]:
-    """Return recordings whose codes are missing values, and remarks on those set aside.
+    """Return recordings with codes as missing values, and remarks on these.
 
     Args:
         recordings: Of the same channels.

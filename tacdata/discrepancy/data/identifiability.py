@@ -26,7 +26,7 @@ SAME_CLOCK = 0.995
 
 
 def lookalikes(course: Course, effect: Effect, values: Mapping[str, np.ndarray | float]) -> tuple[str, ...]:
-    """Return mechanisms that a course cannot tell from an effect with some values.
+    """Return mechanisms that a course cannot distinguish from an effect with values.
 
     Presses of one rate, without holds, or evenly spaced, leave several open. So do two delays that hardly differ.
 

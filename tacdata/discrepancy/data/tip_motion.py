@@ -31,7 +31,7 @@ STAIRS = 3
 
 
 def speeds(course: Course) -> tuple[np.ndarray, np.ndarray]:
-    """Return how fast each episode that touches is pressed and let go of.
+    """Return the press and release speeds of each episode with contact.
 
     A speed is the median over levels of depth of the way between two over the time that it takes: neither noise of the
     path, nor a stop at a few depths, nor how the tip comes to the skin changes it.
@@ -103,7 +103,7 @@ def longest_hold(course: Course) -> float:
 def stairs(course: Course) -> bool:
     """Return whether most presses stop at several depths on the way in, and on the way out.
 
-    A lagging reading catches up at a stop; friction and play do not.
+    Lag vanishes at a stop; friction and play do not.
     """
     band = STILL * course.stroke + SWAY * course.dither
     count, pressed = 0, 0

@@ -337,7 +337,7 @@ class _Free:
         return inside + np.einsum("sk,kl,sl->s", solution, np.einsum("spk,spl->kl", joint, pose), solution)
 
     def fitted(self, episode: int, weights: np.ndarray) -> np.ndarray:
-        """Return the change of an episode by weights, shape (streams, m, k)."""
+        """Return an episode's change by weights, shape (streams, m, k)."""
         errors, joint = self._errors[episode], self._joints[episode]
         flat = joint.reshape(joint.shape[0] * joint.shape[1], joint.shape[2])
         through = errors.root @ (flat.T @ weights.reshape(len(flat), -1))

@@ -1,4 +1,4 @@
-"""Drift of offsets from episode to episode: an Ornstein-Uhlenbeck process, estimated by REML.
+"""Drift of offsets between episodes: an Ornstein-Uhlenbeck process, estimated by REML.
 
 The offset of a stream in an episode is the sum of a level (of its place and session), an Ornstein-Uhlenbeck process in
 time, and an independent error. Their variances are estimated by restricted maximum likelihood (REML: Patterson &

@@ -168,7 +168,7 @@ def _added(setting: Setting, selection: Selection, best: Refined) -> Selection:
 def least_p_values(
     problem: Problem, tests: ScoreTests, earlier: tuple[tuple[str, float], ...]
 ) -> tuple[tuple[str, float], ...]:
-    """Return the least corrected p-value of each mechanism, those of earlier tests included."""
+    """Return the least corrected p-value of each mechanism, earlier tests included."""
     least_p = dict(earlier)
     for candidate, p in zip(problem.candidates, tests.p, strict=True):
         least_p[candidate.called] = min(least_p.get(candidate.called, 1.0), float(p))

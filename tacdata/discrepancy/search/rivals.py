@@ -188,7 +188,7 @@ class Spectra:
 
 
 def stands_in(margin: float, level: float, deficit: float, kin: bool = True) -> bool:
-    """Return whether a rival explains the episodes about as well as an effect.
+    """Return whether a rival explains the episodes as well as an effect.
 
     A rival with more parameters that fits about as well is excluded, unless the episodes prefer it significantly. The
     limit is higher within a family: a law that contains another one always fits a little better.

@@ -1,1 +1,1 @@
-"""Estimates and tests on Gram matrices, robust to episodes that err by themselves."""
+"""Estimates and tests on Gram matrices, robust to single deviant episodes."""
