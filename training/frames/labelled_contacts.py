@@ -45,7 +45,7 @@ class Contacts:
     regressed: torch.Tensor
     """Maxima over D_max of ridge regressions without each frame's press [1], shape (n,)."""
     products: np.ndarray
-    """`ridge.products` of the presses [counts^2, counts mm], shape (taxels + 1, taxels + 1 + pixels)."""
+    """Products of readings and labels of the presses (`ridge.products`)."""
     top: float
     """D_max [mm]."""
 
