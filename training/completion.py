@@ -15,8 +15,7 @@ import numpy as np
 import torch
 
 from tacdata.training.frames.frames import Frames
-from tacdata.training.frames.labelled_contacts import LEAST, contacts
-from tacdata.training.frames.peak_process import PeakProcess, fit_process
+from tacdata.training.frames.peak_process import LEAST, PeakProcess, contacts, fit_process
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference import checkpoint
 from tacdata.training.inference.checkpoint import Checkpoint
@@ -70,9 +69,6 @@ def complete(
     origin = None
     if parent:
         origin = copy.deepcopy(parent.network).to(best.network.get_buffer("mean").device).requires_grad_(False).eval()
-        if isinstance(origin.peak, PeakProcess):
-            # Readings of another unit mean other depths.
-            origin.peak = replace(origin.peak, linear=None)
     process = fit_process(contacts(best.network, frames, presses, origin))
     results = [_predicted(part, frames, presses, origin, process) for part in parts]
     if process:
@@ -141,8 +137,8 @@ def _predicted(
         maps, label = predict(part.network, windows, chosen, top), np.clip(frames.depth[chosen], 0.0, top)
         maximum, deviation = maps.max(axis=(1, 2)), np.ones(len(chosen))
         # A process of these presses too would err too little on them.
-        others = known.without(part.presses if part.together else (number,), frames)
-        if own := process and fit_process(others, process):
+        others = known.without(part.presses if part.together else (number,))
+        if own := process and fit_process(others, process.kernel):
             answer, deviation = own.answers(part.network, windows, chosen)
             maximum = answer * top
         results.append(_Press(maps, label, maximum, deviation, top))

@@ -8,9 +8,6 @@ The predicted maximum is that of the network before it was fitted, with the unit
 network has learned from, its errors are too small to tell those on others. A correction that the network had before
 the fit is the prior's mean, and is applied to the fitted one's maxima too.
 
-Far from the presses a ridge regression of the map on the readings errs less. So both logarithms are averaged, each by
-its precision on presses left out: the process's falls with its deviation, that of the regression is constant.
-
 Kernel: a constant, a linear part, and a squared exponential. Its size, length and noise are those with the least error
 on presses left out. The process's deviation grows away from the presses, and scales intervals.
 """
@@ -18,31 +15,41 @@ on presses left out. The process's deviation grows away from the presses, and sc
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 
-from tacdata.training.frames import ridge
-from tacdata.training.frames.contact_features import SHALLOW, features
-from tacdata.training.frames.labelled_contacts import BATCH, Contacts, prior_maxima
 from tacdata.training.frames.windows import Windows
 
 if TYPE_CHECKING:
+    from tacdata.training.frames.frames import Frames
     from tacdata.training.networks.network import Correction, Network
 
 FEWEST = 6
 """Presses below which nothing is corrected [count]: with 3 presses the correction did harm on rig 20."""
+LEAST = 0.06
+"""Labelled maximum from which a frame counts [mm]: below, noise decides the region."""
+FRAMES = 40
+"""Frames of a press that are taken at most, evenly [count]."""
+ROWS = 1000
+"""Frames of all presses together that are taken at most [count]: time and memory grow with its square."""
 FOLDS = 5
 """Parts of the presses, each left out once to choose the kernel [count]."""
 CONSTANT = 0.3
 """Standard deviation of the constant [1]."""
 AMPLITUDES, LENGTHS, SLOPES, NOISES = (0.0, 0.1, 0.25), (0.7, 1.2), (0.1, 0.3, 1.0), (0.05, 0.15, 0.4)
 """Values that are tried of each quantity of `Kernel`."""
+SHALLOW = 0.01
+"""Maximum of a map over D_max below which it is not corrected [1]: 0.03 mm at D_max = 3 mm."""
+EDGE = 1 / 30
+"""Depth over D_max from which a pixel counts as in contact [1]: 0.1 mm at D_max = 3 mm."""
 FARTHEST = 0.8
 """Largest correction of a maximum, in its logarithm [1]."""
+BATCH = 256
+"""Frames computed together [count]."""
 _BEYOND = 3.0
 """Standard deviations beyond which a feature is not extrapolated [1]."""
 
@@ -102,26 +109,19 @@ class PeakProcess:
     """The network before the fit; None if the maps are those of the corrected network itself."""
     share: float = 1.0
     """Share of the process in the logarithm of the maximum [1]; the network has the remaining one."""
-    linear: torch.Tensor | None = None
-    """Ridge regression of the pixels over D_max on (1, readings [counts]), shape (taxels + 1, pixels); None without."""
-    balance: float = 1.0
-    """Deviation, squared, at which the regression is as precise as the process [1]."""
     _factor: list[torch.Tensor] = field(default_factory=list, repr=False)
 
-    def corrected(
-        self, depth: torch.Tensor, signals: torch.Tensor, network: Network, counts: torch.Tensor
-    ) -> torch.Tensor:
+    def corrected(self, depth: torch.Tensor, signals: torch.Tensor, network: Network) -> torch.Tensor:
         """Return maps over D_max with their maxima corrected, (b, pixels_x, pixels_y).
 
         Args:
             depth: Maps of the network over D_max, shape (b, pixels_x, pixels_y).
             signals: Output of `Network.calibrated`, shape (b, T, taxels).
             network: The network.
-            counts: The newest readings [counts], shape (b, taxels).
         """
-        maximum, _ = self._answer(*self._features(depth, signals, network, counts), counts)
+        maximum = self._maximum(*self._features(depth, signals, network))
         if self.prior is not None:
-            depth = self.prior.corrected(depth, signals, network, counts)
+            depth = self.prior.corrected(depth, signals, network)
         return self.rescaled(depth, maximum)
 
     @property
@@ -131,10 +131,10 @@ class PeakProcess:
 
     def moved(self, change: Callable[[torch.Tensor], torch.Tensor]) -> PeakProcess:
         """Return the process with each tensor changed: another device or precision."""
-        names = ("centers", "mean", "scale", "weight", "rows", "effect", "noise", "linear")
-        values = {name: change(value) for name in names if (value := getattr(self, name)) is not None}
+        values = (self.centers, self.mean, self.scale, self.weight, self.rows, self.effect, self.noise)
+        centers, mean, scale, weight, rows, effect, noise = map(change, values)
         origin = self.origin._apply(change) if self.origin else None
-        return replace(self, **values, origin=origin, _factor=[])
+        return PeakProcess(centers, mean, scale, weight, rows, effect, noise, self.kernel, origin, self.share)
 
     def rescaled(self, depth: torch.Tensor, maximum: torch.Tensor) -> torch.Tensor:
         """Return maps over D_max with maxima between their present ones and those of the process, (b,)."""
@@ -156,12 +156,11 @@ class PeakProcess:
         """
         maxima, deviations, place = [], [], windows.taxels.device
         for batch in torch.as_tensor(frames).split(BATCH):
-            readings = windows.batch(batch.to(place))
-            signals, counts = network.calibrated(readings), network.newest(readings)
+            signals = network.calibrated(windows.batch(batch.to(place)))
             depth = network.respond(signals) if self.origin is None else signals.new_zeros(0)
-            maximum, deviation = self._answer(*self._features(depth, signals, network, counts), counts)
-            maxima.append(maximum.cpu().numpy())
-            deviations.append(deviation.cpu().numpy())
+            standard, largest = self._features(depth, signals, network)
+            maxima.append(self._maximum(standard, largest).cpu().numpy())
+            deviations.append(self._deviation(standard).cpu().numpy())
         return np.concatenate([*maxima, np.empty(0)]), np.concatenate([*deviations, np.empty(0)])
 
     @property
@@ -169,16 +168,12 @@ class PeakProcess:
         """Everything but the frames as plain data (in `schemas/checkpoint.schema.json`)."""
         values = {name: getattr(self, name).double().tolist() for name in ("mean", "scale", "weight")}
         prior = {"prior": self.prior.document} if isinstance(self.prior, PeakProcess) else {}
-        balance = {"balance": self.balance} if self.linear is not None else {}
-        kernel = {"kernel": asdict(self.kernel)} if self.kernel else {}
-        return {**values, "share": self.share, **balance, **kernel, **prior}
+        return {**values, "share": self.share, **({"kernel": asdict(self.kernel)} if self.kernel else {}), **prior}
 
     @property
     def tensors(self) -> dict[str, torch.Tensor]:
         """The frames and the weights of the network before the fit, for the checkpoint's file."""
         content = {f"peak.{name}": getattr(self, name) for name in ("rows", "effect", "noise")}
-        if self.linear is not None:
-            content["peak.linear"] = self.linear
         for name, value in (self.origin.state_dict() if self.origin else {}).items():
             half = value.half()
             # The network that ships is kept in half precision: so is its copy.
@@ -206,92 +201,168 @@ class PeakProcess:
         )
         kernel = Kernel(**document["kernel"]) if "kernel" in document else None
         places = torch.as_tensor(np.float32(centers), device=device)
-        share, linear = document.get("share", 1.0), None
-        if "balance" in document:
-            linear = tensors["peak.linear"].to(device)
-        balance = document.get("balance", 1.0)
-        return cls(places, mean, scale, weight, rows, effect, noise, kernel, origin, share, linear, balance)
+        share = document.get("share", 1.0)
+        return cls(places, mean, scale, weight, rows, effect, noise, kernel, origin, share)
 
     def _features(
-        self, depth: torch.Tensor, signals: torch.Tensor, network: Network, counts: torch.Tensor
+        self, depth: torch.Tensor, signals: torch.Tensor, network: Network
     ) -> tuple[torch.Tensor, torch.Tensor]:
         if self.origin is not None:
             network, depth = self.origin, self.origin.respond(signals)
         values, largest = features(depth, signals, network, self.centers)
         if self.origin is not None:
-            largest = prior_maxima(largest, depth, signals, network, counts)
+            largest = _known(largest, depth, signals, network)
         # A linear correction of an earlier release has the first features alone.
         values = values[:, : len(self.mean)]
         return ((values - self.mean) / self.scale).clamp(-_BEYOND, _BEYOND), largest
 
-    def _answer(
-        self, standard: torch.Tensor, largest: torch.Tensor, counts: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return maxima over D_max and the process's deviations, both (b,)."""
+    def _maximum(self, standard: torch.Tensor, largest: torch.Tensor) -> torch.Tensor:
         change = self.weight[0] + standard @ self.weight[1:]
+        if self.kernel:
+            change = change + self.kernel.nonlinear(standard, self.rows) @ self.effect
+        return largest * change.clamp(-FARTHEST, FARTHEST).exp()
+
+    def _deviation(self, standard: torch.Tensor) -> torch.Tensor:
         if not self.kernel:
-            return largest * change.clamp(-FARTHEST, FARTHEST).exp(), torch.ones_like(largest).double()
-        change = change + self.kernel.nonlinear(standard, self.rows) @ self.effect
-        maximum, deviation = largest * change.clamp(-FARTHEST, FARTHEST).exp(), self._deviation(self.kernel, standard)
-        if self.linear is not None:
-            regressed = (self.linear[0] + counts @ self.linear[1:]).amax(dim=1).clamp(min=SHALLOW)
-            weight = (self.balance / (self.balance + deviation.square())).to(maximum.dtype)
-            maximum = (weight * maximum.log() + (1.0 - weight) * regressed.log()).exp()
-        return maximum, deviation
-
-    def _deviation(self, kernel: Kernel, standard: torch.Tensor) -> torch.Tensor:
-        rows, contact = self.rows.double(), standard.double()
+            return torch.ones(len(standard), dtype=torch.float64, device=standard.device)
+        rows = self.rows.double()
         if not self._factor:
-            root = torch.linalg.cholesky(kernel(rows, rows) + torch.diag(self.noise.double()))
-            identity = torch.eye(len(rows), dtype=rows.dtype, device=rows.device)
-            self._factor.append(torch.linalg.solve_triangular(root, identity, upper=False))
-        known = self._factor[0] @ kernel(rows, contact)
-        return (kernel.variance(contact) - known.square().sum(0)).clamp(min=1e-9).sqrt()
+            covariance = self.kernel(rows, rows) + torch.diag(self.noise.double())
+            self._factor.append(torch.linalg.cholesky(covariance))
+        contact = standard.double()
+        known = torch.linalg.solve_triangular(self._factor[0], self.kernel(rows, contact), upper=False)
+        return (self.kernel.variance(contact) - known.square().sum(0)).clamp(min=1e-9).sqrt()
 
 
-def fit_process(known: Contacts, model: PeakProcess | None = None) -> PeakProcess | None:
+def features(
+    depth: torch.Tensor, signals: torch.Tensor, network: Network, centers: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return quantities of map and loads on which a maximum's error depends (b, features), and the maxima (b,).
+
+    Depth, region, place and load of a contact, how taxels share the load, and how it changes with time.
+
+    Args:
+        depth: Maps over D_max, shape (b, pixels_x, pixels_y).
+        signals: Output of `Network.calibrated`, shape (b, T, taxels).
+        network: The network of the maps, for the scale of its signals and its window.
+        centers: Places of the taxels [mm], shape (taxels, 2).
+    """
+    largest = depth.amax(dim=(1, 2)).clamp(min=SHALLOW)
+    size = signals.abs() / network.get_buffer("sd").square().mean().sqrt()
+    newest, oldest = size[:, network.offsets.index(0)], size[:, 0].sum(dim=1).clamp(min=1e-3)
+    total = newest.sum(dim=1).clamp(min=1e-3)
+    area = (depth > EDGE).float().sum(dim=(1, 2)) + 1.0
+    # Shares of the deepest pixel that areas are taken at, beside the half.
+    half, quarter, upper, top = (
+        (depth > level * largest[:, None, None]).float().sum(dim=(1, 2)) + 1.0 for level in (0.5, 0.25, 0.75, 0.9)
+    )
+    deep, load = largest.log(), total.log()
+    part = newest / total[:, None]
+    shares = part.topk(min(6, part.shape[1]), dim=1).values
+    concentration = shares[:, :4].sum(dim=1).clamp(min=1e-3).log()
+    change = (total / oldest).log().clamp(-2.0, 2.0)
+    products = [deep**2, load**2, deep * load, concentration * deep, concentration * load]
+    first = [deep, load, area.log(), half.log(), change, concentration, *products]
+    past = size[:, 1 : min(4, size.shape[1] - 1)].sum(dim=2).clamp(min=1e-3)
+    pixel = depth.flatten(1).argmax(dim=1)
+    column = torch.div(pixel, depth.shape[2], rounding_mode="floor")
+    place = [column.float(), (pixel - column * depth.shape[2]).float()]
+    values = [torch.stack([*first, *_spread(part, centers), *place, quarter.log(), upper.log(), top.log()], dim=1)]
+    values += [shares.clamp(min=1e-3).log(), (past.log() - load[:, None]).clamp(-2.0, 2.0)]
+    return torch.cat(values, dim=1), largest
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Frames of labelled presses in contact, as a process learns from them."""
+
+    values: torch.Tensor
+    """Their features [1], shape (n, features)."""
+    target: torch.Tensor
+    """Logarithms of labelled over predicted maximum [1], shape (n,)."""
+    peak: torch.Tensor
+    """Labelled maxima [mm], shape (n,)."""
+    press: np.ndarray
+    """Press of each frame [number], shape (n,)."""
+    centers: torch.Tensor
+    """Places of the taxels [mm], shape (taxels, 2)."""
+    origin: Network | None
+    """The network before the fit, of which the maps are; None if they are those of the network itself."""
+
+    def without(self, presses: tuple[int, ...]) -> Contacts:
+        """Return the frames of the other presses."""
+        others = np.flatnonzero(~np.isin(self.press, presses))
+        values, target, peak = (part[torch.from_numpy(others)] for part in (self.values, self.target, self.peak))
+        return Contacts(values, target, peak, self.press[others], self.centers, self.origin)
+
+
+@torch.inference_mode()
+def contacts(network: Network, frames: Frames, presses: tuple[int, ...], origin: Network | None = None) -> Contacts:
+    """Return the frames of presses that a process learns from.
+
+    Args:
+        network: The network that is corrected, on the CPU or a GPU; a correction that it has is left out.
+        frames: The dataset.
+        presses: Numbers of the presses.
+        origin: The network before the fit, on the same device.
+    """
+    place = network.get_buffer("mean").device
+    windows, top = Windows(frames, network.offsets, place), frames.sensor.map.depth_max
+    centers = torch.as_tensor(np.float32(frames.sensor.taxels.centers), device=place)
+    used, most, rows = origin or network, max(2, min(FRAMES, ROWS // len(presses))), []
+    for press in presses:
+        touching = frames.indices((press,))
+        touching = touching[frames.depth[touching].max(axis=(1, 2)) > LEAST]
+        rows.append(touching[:: -(-len(touching) // most) or 1])
+    chosen, press = np.concatenate(rows), np.repeat(presses, [len(part) for part in rows])
+    thinning = -(-len(chosen) // ROWS) or 1
+    chosen, press = chosen[::thinning], press[::thinning]
+    peak = torch.from_numpy(np.clip(frames.depth[chosen].max(axis=(1, 2)), 0.0, top).astype(float))
+    values, maxima = [], []
+    for batch in torch.as_tensor(chosen).split(BATCH):
+        signals = network.calibrated(windows.batch(batch.to(place)))
+        depth = used.respond(signals)
+        columns, largest = features(depth, signals, used, centers)
+        if origin is not None:
+            largest = _known(largest, depth, signals, origin)
+        values.append(columns.double().cpu())
+        maxima.append(largest.double().cpu())
+    target = (peak / top / torch.cat([*maxima, peak.new_empty(0)])).log()
+    return Contacts(
+        torch.cat([*values, peak.new_empty(0, 0)][: len(values) or 1]), target, peak, press, centers, origin
+    )
+
+
+def fit_process(known: Contacts, kernel: Kernel | None = None) -> PeakProcess | None:
     """Fit the process to frames of presses; None if fewer than `FEWEST` presses touch.
 
     Args:
         known: The frames.
-        model: A process with the covariance and the balance, for which two presses do; by default those with the
-            least error on presses left out.
+        kernel: The covariance; that with the least error on presses left out by default. With it, two presses do.
     """
-    if len(np.unique(known.press)) < (2 if model else FEWEST):
+    if len(np.unique(known.press)) < (2 if kernel else FEWEST):
         return None
     mean, scale = known.values.mean(dim=0), known.values.std(dim=0, correction=0)
     scale = torch.where(scale > 1e-6, scale, torch.ones_like(scale))
     rows = ((known.values - mean) / scale).clamp(-_BEYOND, _BEYOND)
-    kernel = model.kernel if model and model.kernel else _chosen(rows, known)
+    kernel = kernel or _chosen(rows, known)
     noise = kernel.label_variance(known.peak)
-    observed = kernel(rows, rows) + torch.diag(noise)
-    balance = model.balance if model else _balance(observed, noise, known)
-    effect = torch.linalg.solve(observed, known.target)
+    effect = torch.linalg.solve(kernel(rows, rows) + torch.diag(noise), known.target)
     weight = torch.cat([CONSTANT**2 * effect.sum()[None], kernel.slope**2 * (effect @ rows) / rows.shape[1]])
-    linear = torch.from_numpy(ridge.regression(known.products) / known.top)
 
     def single(value: torch.Tensor) -> torch.Tensor:
         # As in the file: a checkpoint that is read again must answer the same way.
         return value.float().to(known.centers.device)
 
-    mean, scale, weight, rows, effect, noise, linear = map(single, (mean, scale, weight, rows, effect, noise, linear))
-    return PeakProcess(
-        known.centers, mean, scale, weight, rows, effect, noise, kernel, known.origin, 1.0, linear, balance
-    )
+    mean, scale, weight, rows, effect, noise = map(single, (mean, scale, weight, rows, effect, noise))
+    return PeakProcess(known.centers, mean, scale, weight, rows, effect, noise, kernel, known.origin)
 
 
-def _balance(observed: torch.Tensor, noise: torch.Tensor, known: Contacts) -> float:
-    """Return the squared deviation at which the regression is as precise as the process, on presses left out [1]."""
-    inverse = torch.linalg.inv(observed)
-    effect, squares = inverse @ known.target, []
-    for press in np.unique(known.press):
-        # The closed form of a process without a press (C. E. Rasmussen, C. K. I. Williams, 2006, section 5.4.2).
-        own = torch.from_numpy(np.flatnonzero(known.press == press))
-        block = torch.linalg.inv(inverse[own][:, own])
-        variance = (torch.diagonal(block) - noise[own]).clamp(min=1e-9)
-        squares.append((block @ effect[own]).square() / variance)
-    regressed = (known.regressed.log() - (known.peak / known.top).log()).square().median()
-    return float(regressed / torch.cat(squares).median().clamp(min=1e-9))
+def _known(largest: torch.Tensor, depth: torch.Tensor, signals: torch.Tensor, origin: Network) -> torch.Tensor:
+    """Return the maxima of the network before the fit (b,), by its own correction if it has one: the prior's mean."""
+    if origin.peak is None:
+        return largest
+    return origin.peak.corrected(depth, signals, origin).amax(dim=(1, 2)).clamp(min=SHALLOW)
 
 
 def _chosen(rows: torch.Tensor, known: Contacts) -> Kernel:
@@ -316,3 +387,13 @@ def _chosen(rows: torch.Tensor, known: Contacts) -> Kernel:
             if loss < least:
                 best, least = kernel, loss
     return best
+
+
+def _spread(part: torch.Tensor, centers: torch.Tensor) -> list[torch.Tensor]:
+    """Return the logarithms of the variances of the load's place along its two axes [mm^2], each (b,)."""
+    offset = centers[None] - (part @ centers)[:, None]
+    along_x, along_y, mixed = ((part * offset[..., i] * offset[..., j]).sum(dim=1) for i, j in ((0, 0), (1, 1), (0, 1)))
+    middle = 0.5 * (along_x + along_y)
+    # The eigenvalues of the two by two matrix.
+    apart = (0.25 * (along_x - along_y) ** 2 + mixed**2).clamp(min=1e-12).sqrt()
+    return [(middle - apart).clamp(min=1e-3).log(), (middle + apart).clamp(min=1e-3).log()]

@@ -71,11 +71,10 @@ def export(trained: Checkpoint, path: Path, windows: np.ndarray | None = None) -
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     os.close(handle)
     try:
-        # Before the export: what the first frame computes once must not be traced.
-        with torch.no_grad():
-            reference = DepthNetwork(trained).eval()(torch.from_numpy(inputs)).numpy()
         _write(onnx, trained, DepthNetwork(trained).eval(), torch.from_numpy(inputs[:2]), temporary)
         session = runtime.InferenceSession(temporary, providers=["CPUExecutionProvider"])
+        with torch.inference_mode():
+            reference = DepthNetwork(trained).eval()(torch.from_numpy(inputs)).numpy()
         batch_output = session.run(None, {"windows": inputs})[0]
         # Singly, too: a batch size that the tracer took for a constant shows only at another one.
         single = np.concatenate([session.run(None, {"windows": window[None]})[0] for window in inputs[:16]])

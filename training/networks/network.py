@@ -27,10 +27,8 @@ CALIBRATION_UNIT = 1000.0
 class Correction(Protocol):
     """Change of a network's maps by what presses of the unit show."""
 
-    def corrected(
-        self, depth: torch.Tensor, signals: torch.Tensor, network: Network, counts: torch.Tensor
-    ) -> torch.Tensor:
-        """Return maps over D_max from maps, the output of `Network.calibrated` and that of `Network.newest`."""
+    def corrected(self, depth: torch.Tensor, signals: torch.Tensor, network: Network) -> torch.Tensor:
+        """Return maps over D_max from maps and the output of `Network.calibrated`."""
         ...
 
     def moved(self, change: Callable[[torch.Tensor], torch.Tensor]) -> Correction:
@@ -100,11 +98,7 @@ class Network(nn.Module, ABC):
         """Return depth maps over D_max, not clipped; (b, T, taxels) [counts] -> (b, pixels_x, pixels_y)."""
         signals = self.calibrated(windows)
         depth = self.respond(signals)
-        return depth if self.peak is None else self.peak.corrected(depth, signals, self, self.newest(windows))
-
-    def newest(self, windows: torch.Tensor) -> torch.Tensor:
-        """Return the readings of the target frame [counts], (b, T, taxels) -> (b, taxels)."""
-        return windows[:, self.offsets.index(0)]
+        return depth if self.peak is None else self.peak.corrected(depth, signals, self)
 
     def calibrated(self, windows: torch.Tensor) -> torch.Tensor:
         """Return forces [N] for readings [counts], (b, T, taxels); the readings where there is no calibration."""

@@ -8,10 +8,7 @@ import torch
 
 from tacdata.training.completion import _Press as Press
 from tacdata.training.completion import _share
-from tacdata.training.frames import ridge
-from tacdata.training.frames.contact_features import features
-from tacdata.training.frames.labelled_contacts import contacts
-from tacdata.training.frames.peak_process import FEWEST, PeakProcess, fit_process
+from tacdata.training.frames.peak_process import FEWEST, PeakProcess, contacts, features, fit_process
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference import checkpoint
 from tacdata.training.inference.predictor import deviations, predict
@@ -98,28 +95,7 @@ def test_the_deviation_grows_away_from_the_presses(frames, flattened):
         return float(np.median(process.answers(flattened, windows, touching)[1]))
 
     for press in shallow[:3]:
-        assert deviation(fit_process(known.without((press,), frames), process), (press,)) > deviation(process, (press,))
-
-
-def test_far_from_the_presses_the_regression_decides(frames, flattened):
-    process = fitted(flattened, frames)
-    assert 0.0 < process.balance < np.inf
-    windows, chosen = Windows(frames, (0,)), frames.indices(UNSEEN)
-    chosen = chosen[frames.depth[chosen].max(axis=(1, 2)) > 0.2]
-    linear = ridge.predicted(frames.taxels[chosen], ridge.regression(ridge.products(frames, FITTED))).max(axis=1)
-    alone = replace(process, linear=None).answers(flattened, windows, chosen)[0]
-    for balance, expected in ((1e-12, linear / 3.0), (1e12, alone)):
-        answer, deviation = replace(process, balance=balance).answers(flattened, windows, chosen)
-        np.testing.assert_allclose(answer, expected, rtol=1e-4)
-    answer = replace(process, balance=float(deviation[0]) ** 2).answers(flattened, windows, chosen[:1])[0]
-    np.testing.assert_allclose(answer, np.sqrt(linear[:1] / 3.0 * alone[:1]), rtol=1e-4)
-
-
-def test_a_regression_without_a_press_is_that_of_the_others(frames):
-    assert frames.sensor.map.depth_max == 3.0
-    without = ridge.products(frames, FITTED) - ridge.products(frames, (3,))
-    others = ridge.products(frames, tuple(press for press in FITTED if press != 3))
-    np.testing.assert_allclose(ridge.regression(without), ridge.regression(others), rtol=1e-6, atol=1e-9)
+        assert deviation(fit_process(known.without((press,)), process.kernel), (press,)) > deviation(process, (press,))
 
 
 def test_presses_left_out_choose_the_share():
@@ -171,4 +147,4 @@ def test_a_linear_correction_of_an_earlier_release_is_still_applied(frames, flat
     _, largest = features(depth, signals, flattened, process.centers)
     # The first feature is the logarithm of the maximum, taken up to three deviations.
     expected = largest * torch.exp(0.1 + 0.2 * largest.log().clamp(-3.0, 3.0))
-    torch.testing.assert_close(process.corrected(depth, signals, flattened, signals[:, -1]).amax(dim=(1, 2)), expected)
+    torch.testing.assert_close(process.corrected(depth, signals, flattened).amax(dim=(1, 2)), expected)
