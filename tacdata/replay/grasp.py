@@ -19,7 +19,7 @@ STRONGEST = 0.98
 """Quantile of a finger's readings that counts as its strongest [1]: single readings may be wrong."""
 LEAST_COUNTS = 25.0
 """Smallest sum of readings that counts as pressing [counts]."""
-ASIDE = 0.001
+CONTACT_DEVIATION = 0.001
 """Standard deviation of a contact's place along a pad [m]: few fingers may agree by chance."""
 BEFORE, AFTER = 1.0, 0.2
 """Time before and after the touch that belongs to a grasp [s]."""
@@ -118,7 +118,7 @@ def felt_place(targets: FingertipTargets, touch: int, reach: float) -> ObjectPla
     fingers = np.arange(len(targets.fingers))
     each = targets.seen[rows, fingers] + reach * targets.normals[rows, fingers]
     scatter = np.zeros(3) if len(each) < 2 else each.var(axis=0, ddof=1)
-    variance = np.maximum(scatter, ASIDE**2) / len(each)
+    variance = np.maximum(scatter, CONTACT_DEVIATION**2) / len(each)
     if targets.source is not None:
         paths = [targets.source.tracks[name].covariance[targets.rows] for name in targets.fingers]
         # Cameras are off for all fingers at once, so that their mean is known no better than one of them.
