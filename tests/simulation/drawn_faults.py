@@ -92,13 +92,12 @@ class Faults:
     def due(self):
         """Return the first time at which a fault must have ended the run [s]; None on a late computer.
 
-        While a person mounts a tool nothing moves, and the recorder waits for the person.
+        While a person mounts a tool nothing moves, and the recorder waits for the person: that time does not count.
         """
         computer, changes = self.world.computer, self.world.tool_changes
         if not self.fatal or computer.stalls or computer.lateness:
             return None
-        ends = [(next((end for begin, end in changes if begin <= at <= end), at), most) for at, most in self.fatal]
-        return min(at + most for at, most in ends)
+        return min(_outside(changes, at, most) for at, most in self.fatal)
 
     def seen(self, cameras=True):
         """Return when the recorder could first see one of them [s], or None; without ``cameras``, one of the others."""
@@ -276,6 +275,14 @@ def controller_mute(faults):
     faults.deaf = True
     faults.must_end(SILENT + 1.5)
     faults.world.controller.inject_wire(to_host=lambda text: None)
+
+
+def _outside(changes, at, seconds):
+    """Return the time [s] at which so many seconds from ``at`` have passed outside of (begin, end) of changes."""
+    for begin, end in changes:
+        if end > at and begin < at + seconds:
+            at, seconds = end, seconds - max(begin - at, 0.0)
+    return at + seconds
 
 
 def alarm(faults):
