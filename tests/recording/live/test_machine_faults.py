@@ -26,8 +26,9 @@ def place(virtual):
 
 
 def left_state(virtual):
-    """What is on disk of where the machine was left."""
-    return json.loads(next((virtual.directory / "machine_state").glob("*.json")).read_text())
+    """The latest record of where the machine was left; the rig's first one and the recorder's differ in name."""
+    records = [json.loads(path.read_text()) for path in (virtual.directory / "machine_state").glob("*.json")]
+    return max(records, key=lambda record: record["number"])
 
 
 def on_the_skin(virtual, act):
