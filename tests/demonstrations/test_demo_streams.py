@@ -95,7 +95,7 @@ def test_a_board_that_breaks_is_said_with_what_to_do_and_costs_no_other():
     clock, said = Clock.start(), []
     boards = {"thumb": Board(clock), "index": Board(clock, most=10)}
     with DemoStreams(boards, {}, {}, {}, None, said.append) as streams:
-        until(lambda: streams.silent)
+        until(lambda: said)
         sink, _ = recorded(streams, clock, 30)
         assert said == ["taxels index: the line broke; check the cable"]
         assert sink.notes[0] == (said[0], "error") and {name for name, _ in sink.frames} == {"thumb"}
@@ -183,7 +183,7 @@ def test_readings_that_cannot_be_are_said_within_two_seconds_and_kept_in_the_fil
         streams.record_into(sink)
         begun = time.monotonic()
         boards["index"].frozen = reading
-        until(lambda: said)
+        until(lambda: said and sink.notes)
         assert time.monotonic() - begun < 2.0
         assert said[0].startswith("taxels index: ") and words in said[0]
         assert (said[0], "error") in sink.notes
