@@ -36,9 +36,7 @@ class LiveValues:
             FormatError: If it is no recording.
         """
         if self._file is None or self._file.records.path != path:
-            if self._file is not None:
-                self._file.close()
-            self._file = None
+            self.close()
             self._file = GrowingFile(path)
         self._file.update()
         records = self._file.records
@@ -60,3 +58,9 @@ class LiveValues:
             "tip": tip,
             "phase": pb.Phase.FromString(phases[-1]).name if phases else "",
         }
+
+    def close(self) -> None:
+        """Close the file that is followed."""
+        if self._file is not None:
+            self._file.close()
+        self._file = None

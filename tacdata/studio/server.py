@@ -1,7 +1,7 @@
 """The page of a lab's folder, served on this computer."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
@@ -43,13 +43,13 @@ def application(inventory: Inventory, token: str, wizards: ExitStack) -> FastAPI
     Args:
         inventory: The lab's folder.
         token: First part of every path.
-        wizards: Holds the servers of wizards that were opened.
+        wizards: Holds the servers of wizards that were opened, and the recording that is followed.
     """
     api = FastAPI(openapi_url=None)
     routes = APIRouter(prefix=f"/{token}")
     loopback.guard(api, token, {"Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"})
     opened: dict[str, str] = {}  # measured files -> address of their wizard
-    values = LiveValues()
+    values = wizards.enter_context(closing(LiveValues()))
     one_at_a_time = Lock()  # requests run in threads of their own, the list has one memory
 
     @routes.get("/")
