@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from tacdata.chain import Course
 from tacdata.discrepancy.alarms.all_alarms import alarms
 from tacdata.discrepancy.data.checks import DataChecks, check
@@ -42,6 +44,8 @@ class Verdict:
     """The same with the effects in place."""
 
 
+# Threads wait for each other at matrices of a few hundred rows: two took twice the time of one.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def judge(
     course: Course,
     spec: Spec,

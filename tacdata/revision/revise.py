@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tacdata import documents, provenance, schemas
 from tacdata.discrepancy.data.recordings import course_of
@@ -84,6 +85,7 @@ class Revised:
     """The sealed episodes in which the effects change most."""
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # as in a verdict (tacdata.discrepancy.judge)
 def revise(
     judged: Path,
     recordings: list[Path],

@@ -7,8 +7,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from pressing import course
+from threadpoolctl import threadpool_info
 
 from tacdata import documents
+from tacdata.discrepancy import judge
 from tacdata.discrepancy.data.checks import DataChecks, check
 from tacdata.discrepancy.data.sufficiency import shortcomings
 from tacdata.discrepancy.levels.margins import Level
@@ -61,6 +63,19 @@ def judged(effects=FEW, made=None, **world):
 def sealed(power, share):
     """Return what four sealed episodes show of an answer, of a squared size of ``power``."""
     return Gap(*np.ones((3, 4)), tuple("abcd"), ratio=LikelihoodRatio(power, share))
+
+
+def test_a_verdict_uses_one_thread_of_linear_algebra(monkeypatch):
+    threads = []
+
+    def chosen(course):
+        threads.extend(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+        raise InterruptedError
+
+    monkeypatch.setattr(judge, "chosen", chosen)
+    with pytest.raises(InterruptedError):
+        judge.judge(course(episodes=1), cast(Any, None))
+    assert threads and set(threads) == {1}
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
