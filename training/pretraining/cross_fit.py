@@ -29,7 +29,7 @@ import torch
 
 from tacdata import documents, provenance
 from tacdata.errors import UsageError
-from tacdata.training.completion import HeldOut, complete
+from tacdata.training.completion import HeldOut, chosen, complete
 from tacdata.training.frames.channel_calibration import calibrate
 from tacdata.training.frames.frames import Frames
 from tacdata.training.frames.windows import Windows
@@ -179,17 +179,6 @@ def between(start: Network, ends: Sequence[Network], share: float, into: Network
     }
     into.load_state_dict(weights)
     return into.eval()
-
-
-def chosen(losses: np.ndarray) -> int:
-    """Return the first column whose mean is at most a standard error above the least one.
-
-    Args:
-        losses: Loss on each press by each share, shape (presses, shares), the most cautious share first.
-    """
-    excess = losses - losses[:, [losses.mean(axis=0).argmin()]]
-    error = excess.std(axis=0, ddof=1) / np.sqrt(len(excess)) if len(excess) > 1 else 0.0
-    return int(np.argmax(excess.mean(axis=0) <= error))
 
 
 def _dealt(presses: tuple[int, ...], seed: int) -> list[tuple[int, ...]]:

@@ -46,6 +46,29 @@ def test_intervals_of_four_presses_that_scatter_hold_their_share_on_average():
         assert share == pytest.approx(level, abs=0.025)
 
 
+def test_intervals_of_many_presses_serve_a_predictor_that_few_presses_judge():
+    inside, plain, ratios = [], [], []
+    for draw in range(20):
+        scales = np.exp(0.6 * np.random.default_rng(draw).normal(size=34))
+        presses = [episodes(1, 100 * draw + k, scale) for k, scale in enumerate(scales)]
+        maps, labels = ([part[side][0] for part in presses] for side in (0, 1))
+        # The second predictor errs half as much on every press.
+        second = [label + 0.5 * (depth - label) for depth, label in zip(maps, labels, strict=True)]
+        spreads = [np.ones(len(depth)) for depth in maps]
+        first = calibrate(maps[:30], labels[:30], PITCH, "a" * 64, spreads=spreads[:30])
+        # Of 400 presses the ratio of errors is believed nearly whole, of four by half.
+        many = first.adapted(*([some[0]] * 400 for some in (second, maps, labels, spreads)), PITCH)
+        few = first.adapted(second[:4], maps[:4], labels[:4], spreads[:4], PITCH)
+        ratios.append([np.divide(known.factors, first.factors) for known in (many, few)])
+        for found, known in ((inside, many), (plain, calibrate(second[:4], labels[:4], PITCH, "a" * 64))):
+            entries = reliability(known, second[30:], labels[30:], PITCH, spreads[30:])
+            found.append({entry["level"]: entry["inside"] for entry in entries}[0.68])
+    np.testing.assert_allclose(np.mean(ratios, axis=0), np.outer((0.5, 0.5**0.5), np.ones(len(LEVELS))), rtol=0.05)
+    assert np.mean(inside) == pytest.approx(0.68, abs=0.04)
+    # Intervals by four presses alone scatter more from draw to draw.
+    assert np.mean(np.abs(np.array(inside) - 0.68)) < 0.8 * np.mean(np.abs(np.array(plain) - 0.68))
+
+
 def test_larger_errors_than_calibrated_are_told():
     known = calibrate(*episodes(20, 0), PITCH, "a" * 64)
     inside = {e["level"]: e["inside"] for e in reliability(known, *episodes(20, 1, scale=3.0), PITCH)}

@@ -8,12 +8,13 @@ from torch.optim import AdamW
 from training_frames import build_frames
 
 from tacdata.errors import FormatError, UsageError
+from tacdata.training.completion import EACH
 from tacdata.training.frames.windows import Windows
 from tacdata.training.inference import checkpoint
 from tacdata.training.inference.predictor import predict
 from tacdata.training.metrics import conformal_intervals, novelty
 from tacdata.training.metrics.depth_maps import score_frames
-from tacdata.training.pretraining import curve_picture
+from tacdata.training.pretraining import cross_fit, curve_picture
 from tacdata.training.pretraining.cross_fit import fit
 from tacdata.training.pretraining.learning_curve import learning_curve
 from tacdata.training.pretraining.recipe import FITTING, PULL, recipe
@@ -127,6 +128,17 @@ def test_presses_left_out_make_the_intervals_of_a_fit(known, unit, tmp_path):
     spans = {span.number: span.shape for span in unit.episodes}
     assert all(len({spans[n] for n in part}) == 1 for part in shapes.document["cross_fit"]["left_out"])
     assert conformal_intervals.read(shapes.path.parent, shapes.content_hash).source == UNSEEN
+
+
+def test_every_press_makes_the_intervals_of_a_fit_without_members(known, unit, tmp_path, monkeypatch):
+    monkeypatch.setattr(cross_fit, "MANY", 4)
+    settings, division = recipe({"epochs": 1}, known), Split("episode", 0, tuple(range(8)), (8, 9), (15,))
+    run = fit(unit, settings, tmp_path / "run", known, "cpu", threads=1, split=division)
+    kept = conformal_intervals.read(run.path.parent, run.content_hash)
+    assert kept.source == EACH and np.isfinite(kept.factors).all() and kept.factors == tuple(sorted(kept.factors))
+    weights = known.network.state_dict()
+    # The network before the fit answers for the presses; the fitted one stays.
+    assert any(not value.equal(weights[name]) for name, value in run.network.state_dict().items())
 
 
 def test_a_curve_goes_on_where_it_ended_and_refuses_another(known, unit, many, tmp_path):
