@@ -14,6 +14,9 @@ those of validation. Away from the presses that were learned from, they are wide
 deviation of the network's Gaussian process (`training.frames.peak_process`) too. So the scores are normalized ones
 (H. Papadopoulos et al., Journal of Artificial Intelligence Research 40 (2011) 815).
 
+A network fitted from another one has few presses of validation. There `adapted` scales the other one's intervals by the
+ratio of both errors on these presses (`training.completion`).
+
 `training.pretraining.unseen_shapes` calibrates on shapes left out of training instead. `reliability` measures the share
 inside on the scored episodes.
 """

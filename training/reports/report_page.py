@@ -191,8 +191,8 @@ def _reliability(result: HtmlPage, group_list: list[Group]) -> None:
         inside = [float(np.mean(group.reliability[level])) for level in levels]
         series.append(Series(f"{group.name}, {group.split}", inside, COLORS[k % len(COLORS)], "both", levels))
     words = (
-        "Share of errors inside intervals that were calibrated on validation episodes, against the share that should "
-        "be inside: on the diagonal the uncertainty is right, below it too small."
+        "Share of errors inside intervals that were calibrated on presses left out of training, against the share that "
+        "should be inside: on the diagonal the uncertainty is right, below it too small."
     )
     drawn = Plot("share of errors inside their interval", "should be inside [1]", "is inside [1]", series, least=0.0)
     result.add("Reliability of the pixels' uncertainty", Paragraph(words), drawn)
