@@ -1,6 +1,7 @@
 """Clocks of foreign files as nanoseconds."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -50,6 +51,9 @@ def times(table: SourceTable, clock: SourceClock, where: str) -> tuple[np.ndarra
             raise FormatError(f"{where}: neither column nor rate", "one of them", "say where the times are")
         return _shifted(np.arange(table.rows) / clock.rate, clock), clock.zero or "own"
     if isinstance(column, list):
+        if (parts := seconds_and_parts(table, column, where)) is not None:
+            zero = "unix" if YEAR_2000 < np.median(parts) / 1e9 < YEAR_2100 else "shared"
+            return _shifted_ns(parts, clock), clock.zero or zero
         table, column = _joined(table, column, where)
     name = single(table, column, f"{where}: column")
     if clock.rate is not None:  # the column counts rows, so that its restarts and lost rows are seen
@@ -231,6 +235,13 @@ DATES = (
 WEEKDAYS = ("%a %b %d %H:%M:%S %Y", "%a %b %d %H:%M:%S.%f %Y")
 CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S.%f %p", "%I:%M:%S %p", "%I:%M %p", "%H%M%S", "%H:%M:%S:%f")
 """Dates and times of day as instruments write them; the layout that fits all rows of a file decides."""
+_ZONES = (
+    "UTC 0 GMT 0 WET 0 WEST 1 CET 1 MEZ 1 CEST 2 MESZ 2 EET 2 EEST 3 MSK 3 JST 9 KST 9 "
+    "EST -5 EDT -4 CDT -5 MST -7 MDT -6 PST -8 PDT -7"
+).split()
+ZONES: dict[str, int] = dict(zip(_ZONES[::2], map(int, _ZONES[1::2]), strict=True))
+"""Zones that have one meaning -> hours ahead of UTC [h]. CST, IST and BST have several."""
+ZONE = re.compile(rf"\s*\b({'|'.join(ZONES)})$")
 
 
 def _joined(table: SourceTable, columns: list[str | int], where: str) -> tuple[SourceTable, str]:
@@ -240,6 +251,21 @@ def _joined(table: SourceTable, columns: list[str | int], where: str) -> tuple[S
     texts = [" ".join(row) if all(row) else None for row in zip(*parts, strict=True)]
     joined = " ".join(names)
     return replace(table, columns={**table.columns, joined: np.array(texts, dtype=object)}), joined
+
+
+def seconds_and_parts(table: SourceTable, columns: Sequence[str | int], where: str) -> np.ndarray | None:
+    """Return times [ns], shape (rows,), of whole seconds and their parts, as secs and nsecs; None of other columns."""
+    names = [single(table, column, f"{where}: column") for column in columns]
+    values = [table.column(name) for name in names]
+    if len(names) != 2 or any(each.dtype == object or not np.isfinite(each).all() for each in values):
+        return None
+    units = [plain(table.units.get(name) or clock_unit(name) or clock_unit(name.rsplit(".", 1)[-1])) for name in names]
+    size = FACTORS["s"].get(units[1], 1.0)
+    seconds, parts = (np.rint(each).astype(np.int64) for each in values)
+    is_whole = units[0] == "s" and size < 1 and (seconds == values[0]).all() and parts.min() >= 0
+    if not is_whole or parts.max() * size >= 1 or (np.diff(parts) >= 0).all():
+        return None
+    return seconds * 1_000_000_000 + parts * round(size * 1e9)
 
 
 def _as_texts(values: np.ndarray) -> list[str]:
@@ -271,7 +297,8 @@ def _datetimes(values: np.ndarray, layout: str | None, where: str) -> np.ndarray
 def _iso(texts: list[str]) -> list[datetime | None] | None:
     """Return times in ISO 8601; None if one has another layout."""
     try:
-        return [datetime.fromisoformat(text.replace(",", ".")) if text else None for text in texts]
+        zoned = (ZONE.sub(lambda match: f"{ZONES[match[1]]:+03d}:00", text.replace(",", ".")) for text in texts)
+        return [datetime.fromisoformat(text) if text else None for text in zoned]
     except ValueError:
         return None
 

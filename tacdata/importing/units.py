@@ -7,17 +7,7 @@ from tacdata.errors import FormatError
 GRAVITY = 9.80665
 """Standard gravity [m/s^2]: a load cell in grams was calibrated with weights (CGPM 1901)."""
 FACTORS: dict[str, dict[str, float]] = {
-    "mm": {
-        "m": 1e3,
-        "dm": 100.0,
-        "cm": 10.0,
-        "mm": 1.0,
-        "um": 1e-3,
-        "nm": 1e-6,
-        "in": 25.4,
-        "mil": 0.0254,
-        "ft": 304.8,
-    },
+    "mm": {"m": 1e3, "dm": 1e2, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "in": 25.4, "mil": 0.0254, "ft": 304.8},
     "N": {
         "N": 1.0,
         "mN": 1e-3,
@@ -37,53 +27,39 @@ FACTORS: dict[str, dict[str, float]] = {
     "deg": {"deg": 1.0, "rad": 57.29577951308232},
 }
 """Our unit -> the units that can be converted to it, and the factor."""
-_LENGTHS = ("", "milli", "micro", "nano", "centi")
-SPELLED = {
-    **dict.fromkeys(("sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden"), "s"),
-    **dict.fromkeys(("seconde", "secondes", "segundo", "segundos", "secondo", "secondi", "\u79d2"), "s"),
-    **dict.fromkeys(("millisekunde", "millisekunden", "milisegundos", "millisecondes", "\u6beb\u79d2"), "ms"),
-    **dict.fromkeys(("msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"), "ms"),
-    **dict.fromkeys(("usec", "usecs", "micros", "microsec", "microsecs", "microsecond", "microseconds"), "us"),
-    **dict.fromkeys(("nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"), "ns"),
-    **dict.fromkeys(("mins", "minute", "minutes"), "min"),
-    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
-    "day": "d",
-    "days": "d",
-    **{
-        f"{size}met{end}": unit
-        for size, unit in zip(_LENGTHS, ("m", "mm", "um", "nm", "cm"), strict=True)
-        for end in ("er", "ers", "ern", "re", "res")
-    },
-    **dict.fromkeys(("mikrometer", "mikrometern", "mikron", "micrometro", "\u5fae\u7c73"), "um"),
-    **dict.fromkeys(("millim\u00e8tre", "millim\u00e8tres", "mil\u00edmetros", "milimetros", "millimetri"), "mm"),
-    **dict.fromkeys(("zentimeter", "\u5398\u7c73"), "cm"),
-    "\u6beb\u7c73": "mm",
-    "micron": "um",
-    "microns": "um",
-    "inch": "in",
-    "inches": "in",
-    "mils": "mil",
-    "thou": "mil",
-    "foot": "ft",
-    "feet": "ft",
-    **dict.fromkeys(("newton", "newtons", "newtonios", "\u725b"), "N"),
-    "millinewton": "mN",
-    "millinewtons": "mN",
-    "kilonewton": "kN",
-    "gram": "g",
-    "grams": "g",
-    "kilogram": "kg",
-    "kilograms": "kg",
-    "kp": "kgf",
-    "lbs": "lb",
-    "oz": "ozf",
-    "degree": "deg",
-    "degrees": "deg",
-    "radian": "rad",
-    "radians": "rad",
-    "mm/sec": "mm/s",
-    "m/sec": "m/s",
+SPELLINGS = {
+    "s": "sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondo secondi \u79d2",
+    "ms": "millisekunde millisekunden milisegundos millisecondes \u6beb\u79d2 msec "
+    "msecs millis millisec millisecs millisecond milliseconds",
+    "us": "usec usecs micros microsec microsecs microsecond microseconds",
+    "ns": "nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
+    "min": "mins minute minutes",
+    "h": "hr hrs hour hours",
+    "d": "day days",
+    "um": "mikrometer mikrometern mikron micrometro \u5fae\u7c73 micron microns",
+    "mm": "millim\u00e8tre millim\u00e8tres mil\u00edmetros milimetros millimetri \u6beb\u7c73",
+    "cm": "zentimeter \u5398\u7c73",
+    "in": "inch inches",
+    "mil": "mils thou",
+    "ft": "foot feet",
+    "N": "newton newtons newtonios \u725b",
+    "mN": "millinewton millinewtons",
+    "kN": "kilonewton",
+    "g": "gram grams",
+    "kg": "kilogram kilograms",
+    "kgf": "kp",
+    "lb": "lbs",
+    "ozf": "oz",
+    "deg": "degree degrees",
+    "rad": "radian radians",
+    "V": "volt volts",
+    "mm/s": "mm/sec",
+    "m/s": "m/sec",
 }
+"""Unit -> its other spellings, in lower case."""
+METRES = {"met": "m", "millimet": "mm", "micromet": "um", "nanomet": "nm", "centimet": "cm"}
+SPELLED = {word: unit for unit, words in SPELLINGS.items() for word in words.split()}
+SPELLED |= {start + end: unit for start, unit in METRES.items() for end in ("er", "ers", "ern", "re", "res")}
 """Other spellings, in lower case -> the unit."""
 SCALE = re.compile(
     r"[x\u00d7*]?\s*(?:10\^?([-+]\d+)|(1/)?(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?))\s*[*x\u00b7\u00d7]?\s*([^\d\s].*)"
@@ -96,35 +72,7 @@ WORDS = ("IN", "MIN")
 CLOCKS = r"(time|t|zeit|elapsed|timestamp|clock)"
 """Names behind which a capital S is seconds, and no siemens."""
 BRACKETED = r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*"
-OTHERS = {
-    "pf",
-    "ff",
-    "nf",
-    "v",
-    "mv",
-    "uv",
-    "count",
-    "counts",
-    "lsb",
-    "adc",
-    "ut",
-    "mt",
-    "gauss",
-    "kpa",
-    "pa",
-    "mpa",
-    "degc",
-    "c",
-    "k",
-    "ohm",
-    "kohm",
-    "a",
-    "ma",
-    "hz",
-    "1",
-    "raw",
-    "%",
-}
+OTHERS = set("pf ff nf v mv uv count counts lsb adc ut mt gauss kpa pa mpa degc c k ohm kohm a ma hz 1 raw %".split())
 """Units that are recognized behind a column's name but not converted."""
 
 
@@ -177,7 +125,8 @@ def prefixed(first: str, second: str) -> bool:
 
 
 def quantity_of(unit: str) -> str | None:
-    """Return our unit that ``unit`` converts to, or None. "MM" is mm."""
+    """Return our unit that ``unit`` converts to, or None. "MM" is mm, and "1/800 mm" too."""
+    unit = match[4] if (match := SCALE.fullmatch(unit)) else unit
     spelled = {plain(unit), plain(unit.lower()) if len(unit) > 1 and unit.isupper() and unit not in WORDS else ""}
     return next((ours for ours, table in FACTORS.items() if spelled & table.keys()), None)
 

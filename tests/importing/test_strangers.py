@@ -154,3 +154,89 @@ def test_two_boards_in_one_file_stand_side_by_side(tmp_path):
     episodes, _ = of(tmp_path / "files")
     are_right(episodes)
     assert episodes[0].taxels.counts.shape[1] == 4
+
+
+FORCE = 2.0 * ROWS[:, 1:2] ** 1.5
+LABVIEW = "Y_Unit_Label\tmm\tN\tVolts\tVolts\nX0\t0\t0\t0\t0\n***End_of_Header***\t\t\t\t\n"
+
+
+@pytest.mark.parametrize(
+    ("names", "further", "head"),
+    (
+        (("Fz (N)", "Tz (N-mm)"), [-FORCE, 3 * FORCE], ""),
+        (("wrench.force.z [N]", "wrench.torque.x [Nm]"), [-FORCE, FORCE], ""),
+        (("/ft/wrench/force/z [N]", "/ft/wrench/torque/z [N m]"), [FORCE, FORCE], ""),
+    ),
+)
+def test_forces_and_torques_of_a_wrench_are_neither_place_nor_readings(tmp_path, names, further, head):
+    rows = np.hstack([ROWS, *further])
+    episodes, _ = imported(tmp_path, {"run.csv": head + lines(rows, names=(*NAMES, *names))})
+    are_right(episodes)
+    measured = {stream.name: stream for stream in episodes[0].measured}
+    assert set(measured) == {"force", "torque"}
+    assert measured["force"].unit == "N"
+    assert np.abs(measured["force"].values).max() == pytest.approx(2 * 1.2**1.5, rel=1e-3)
+
+
+def test_the_state_of_a_robot_is_no_reading(tmp_path):
+    names = ("timestamp", "actual_TCP_pose_2", "register_0", "register_1")
+    state = tuple(f"actual_{name}_{k}" for name in ("q", "qd", "current", "TCP_force") for k in (0, 5))
+    rows = np.hstack([ROWS[:, :1], 0.3 - ROWS[:, 1:2] / 1000, ROWS[:, 2:], *[FORCE + k for k in range(8)]])
+    episodes, said = imported(tmp_path, {"run.csv": lines(rows, names=(*names, *state), places=7)})
+    are_right(episodes)
+    assert episodes[0].taxels.counts.shape[1] == 2
+    assert any("no unit is given: give unit: N" in text for text in said)
+
+
+@pytest.mark.parametrize("parts", (("stamp.secs", "stamp.nsecs", 1_000_000_000), ("tv_sec", "tv_usec", 1_000_000)))
+def test_seconds_and_their_parts_are_one_time(tmp_path, parts):
+    first, second, size = parts
+    ticks = np.rint((ROWS[:, 0] + 1_790_000_000.0) * 20).astype(int)
+    clock = [f"{tick // 20},{tick % 20 * size // 20}" for tick in ticks]
+    rows = lines(ROWS[:, 1:], names=NAMES[1:]).split("\n")
+    head = f"{first},{second},{rows[0]}"
+    are_right(imported(tmp_path, {"run.csv": "\n".join([head, *map(",".join, zip(clock, rows[1:], strict=False))])})[0])
+
+
+def test_zones_by_name_are_read_across_the_end_of_summer_time(tmp_path):
+    utc = np.datetime64("2026-10-25T00:59:55") + np.rint(ROWS[:, 0] * 1000).astype("timedelta64[ms]")
+    summer = utc < np.datetime64("2026-10-25T01:00:00")
+    stamps = [f"{t + np.timedelta64(1 + s, 'h')} {'CEST' if s else 'CET'}" for t, s in zip(utc, summer, strict=True)]
+    rows = lines(ROWS[:, 1:], names=NAMES[1:]).split("\n")
+    text = "\n".join(
+        ["stamp," + rows[0], *(f"{t.replace('T', ' ', 1)},{row}" for t, row in zip(stamps, rows[1:], strict=False))]
+    )
+    are_right(imported(tmp_path, {"run.csv": text})[0])
+
+
+def test_the_line_of_units_above_labview_names_is_read(tmp_path):
+    names = ("X_Value", "Weg", "Kraft", "Sensor_0", "Sensor_1")
+    rows = np.hstack([ROWS[:, :2], FORCE, ROWS[:, 2:]])
+    episodes, said = imported(tmp_path, {"run.lvm": LABVIEW + lines(rows, "\t", names)})
+    are_right(episodes)
+    assert [stream.unit for stream in episodes[0].measured] == ["N"]
+    assert not any("no unit is given" in text for text in said)
+
+
+def test_a_text_with_an_ending_of_its_own_is_read_where_nothing_else_is(tmp_path):
+    are_right(imported(tmp_path, {"series.TRA": lines(ROWS)})[0])
+    (tmp_path / "beside").mkdir()
+    are_right(imported(tmp_path / "beside", {"run.csv": lines(ROWS), "old.backup": lines(ROWS[:50])})[0])
+
+
+@pytest.mark.parametrize("noise", (b"\xff\xfe\x80,8", b"\x00\x10,9\x00", b"\xff\xfe\x00"))
+def test_noise_of_a_port_before_the_first_line_hides_nothing(tmp_path, noise):
+    """Two bytes of it may look like the mark of UTF-16. The head states the size of the encoder's counts."""
+    rows = lines(np.round(ROWS * [1000, 800, 1, 1], 4), names=("millis", "enc", "c0", "c1"))
+    text = noise + b"\r\nready\r\n# encoder: 800 counts/mm\r\n" + rows.replace(".0000,", ",").encode()
+    are_right(imported(tmp_path, {"run.log": text})[0])
+
+
+def test_durations_with_days_and_names_with_brackets_are_read(tmp_path):
+    names = ("elapsed", NAMES[1], "/skin/raw[0]", "/skin/raw[1]")
+    rows = [row.split(",") for row in lines(ROWS, names=names).split("\n")]
+    spans = [f"0 days 00:00:{float(row[0]):09.6f}" for row in rows[1:-1]]
+    text = "\n".join(
+        ",".join(row) for row in [rows[0], *([span, *row[1:]] for span, row in zip(spans, rows[1:], strict=False))]
+    )
+    are_right(imported(tmp_path, {"run.csv": text})[0])

@@ -27,7 +27,7 @@ from tacdata.importing.text.layout import (
     text_layout,
 )
 from tacdata.importing.text.serial_lines import with_receipt, without_labels
-from tacdata.importing.text.stated_rate import stated_rate
+from tacdata.importing.text.stated_rate import stated_counts, stated_rate
 from tacdata.importing.text.written_numbers import ungrouped
 
 SHOWN = 40
@@ -99,7 +99,8 @@ def table_of(path: Path, data: bytes, options: ReadOptions, notes: list[str]) ->
     if skipped:
         notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
     rate = stated_rate(head, layout.skip)
-    return SourceTable(path, columns, dict(layout.units), notes=tuple(notes), doubts=tuple(doubts), rate=rate)
+    units = {**stated_counts(head, layout.skip, columns), **layout.units}
+    return SourceTable(path, columns, units, notes=tuple(notes), doubts=tuple(doubts), rate=rate)
 
 
 def _upright(data: bytes, options: ReadOptions, path: Path, notes: list[str]) -> bytes:
@@ -157,6 +158,8 @@ def _decoded(path: Path, options: ReadOptions) -> tuple[bytes, list[str]]:
     if isinstance(tried, list):
         tried = next((name for name in tried if _decodes(raw, name)), tried[-1])
     encoding = tried or next((name for mark, name in MARKS.items() if raw.startswith(mark)), None)
+    if encoding and not tried and 8 * raw[:HEAD].count(0) < len(raw[:HEAD]):
+        encoding = None  # digits in UTF-16 hold a zero byte each: these are noise of a port that was just opened
     if b"\0" in raw and not encoding:
         raw = _without_zeros(path, raw, notes)
     if encoding:
@@ -202,7 +205,7 @@ def _whole_cells(head: bytes) -> bytes:
 
 
 def _without_zeros(path: Path, raw: bytes, notes: list[str]) -> bytes:
-    """Return text without the zero bytes that a logger without power leaves at a file's end.
+    """Return text without the zero bytes at a file's end, of a logger without power, or in its first line.
 
     Raises:
         FormatError: If zero bytes stand elsewhere: it is another kind of file, or another encoding.
@@ -212,6 +215,10 @@ def _without_zeros(path: Path, raw: bytes, notes: list[str]) -> bytes:
     body = raw.rstrip(b"\0")
     if body and b"\0" not in body:
         notes.append(f"{path.name}: {len(raw) - len(body)} zero bytes at its end are left out")
+        return body
+    body = raw.partition(b"\n")[2]
+    if body and b"\0" not in body:
+        notes.append(f"{path.name}: its first line holds zero bytes, as of a port that was just opened; left out")
         return body
     # In UTF-16 digits and Latin letters have a zero byte each: in little endian the second.
     for start, name in ((1, "utf-16-le"), (0, "utf-16-be")):

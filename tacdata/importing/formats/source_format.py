@@ -233,11 +233,19 @@ def _markup(path: Path) -> str:
     return "a table in HTML" if b"<html" in head or b"<table" in head else "an XML Spreadsheet"
 
 
+def is_known(path: Path) -> bool:
+    """Return whether the ending of a file says what it is, or that it is not read."""
+    return path.name.lower().endswith((*_endings(), *CONVERSIONS))
+
+
+def _endings() -> dict[str, str]:
+    """Return the format of each ending."""
+    kinds = {name: registry.load(ROOM, BASE, name, SourceFormat) for name in registry.names(ROOM, BASE)}
+    return {ending: name for name, kind in kinds.items() for ending in kind.endings}
+
+
 def _by_ending(path: Path) -> str:
-    endings = {}
-    for name in registry.names(ROOM, BASE):
-        for ending in registry.load(ROOM, BASE, name, SourceFormat).endings:
-            endings[ending] = name
+    endings = _endings()
     # The longest match: .csv.gz is a text, .gz alone would be unknown.
     matches = [ending for ending in endings if path.name.lower().endswith(ending)]
     ending = path.suffix.lower()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tacdata.errors import FormatError, TacdataError, UsageError
-from tacdata.importing.formats.source_format import read_table, tables_in
+from tacdata.importing.formats.source_format import is_known, read_table, tables_in
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.proposing.file_kinds import INSIDE, kinds_of, merged, numberless
 from tacdata.importing.proposing.roles import is_whole, roles_of
@@ -47,7 +47,19 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
         UsageError: If nothing there can be read.
     """
     check_source(source)
+    try:
+        return _described(source, "")
+    except TacdataError as error:
+        try:  # a machine's program gives its texts an ending of its own; among other data such files are notes
+            return _described(source, "csv")
+        except TacdataError:
+            raise error from None
+
+
+def _described(source: Path, form: str) -> tuple[dict[str, FoundKind], str]:
+    """Return the tables and their description; with a format, those of files whose ending is not known."""
     paths = [source] if is_one(source) else files_below(source)
+    paths = [path for path in paths if not form or not is_known(path)]
     kinds: dict[str, FoundKind] = {}
     refused, remedies = [], dict[str, None]()
     below = [path.relative_to(source) if path != source else Path(path.name) for path in paths]
@@ -57,12 +69,12 @@ def described(source: Path) -> tuple[dict[str, FoundKind], str]:
         if members or kind in refused:
             continue
         try:
-            for name in tables_in(path):
+            for name in tables_in(path) if not form else ("",):
                 key = f"{kind}{INSIDE}{numberless(name)}" if name else kind
                 if key in kinds:
                     kinds[key] = replace(kinds[key], count=kinds[key].count + 1)
                     continue
-                table, options = _read(path, ReadOptions(table=name or None))
+                table, options = _read(path, ReadOptions(table=name or None, format=form))
                 kinds[key] = FoundKind(table, name_below, 1, options)
         except ModuleNotFoundError:
             raise

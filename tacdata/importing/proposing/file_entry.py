@@ -12,7 +12,7 @@ from tacdata.importing.proposing.shapes import counting_column
 from tacdata.importing.proposing.source_kind import SourceKind
 from tacdata.importing.proposing.stream_clocks import clock_by
 from tacdata.importing.source_table import SourceTable
-from tacdata.importing.times import layouts_of, times
+from tacdata.importing.times import layouts_of, seconds_and_parts, times
 
 PLACES = {"columns": "side by side", "rows": "below each other"}
 """How parts of a trial are joined -> their places."""
@@ -63,7 +63,8 @@ def _clock(kind: SourceKind, file: str) -> tuple[SourceClock, tuple[Question, ..
         )
         return SourceClock(rate=rate, column=counter or None), (Question(text, "rate", file=kind.alias, value=rate),)
     is_dated = [table.column(name).dtype for name in names] == [object, object]  # a date and a time of day
-    clock = SourceClock(column=names) if is_dated else clock_by(table, names[0])
+    is_dated = is_dated or (len(names) > 1 and seconds_and_parts(table, names[:2], file) is not None)
+    clock = SourceClock(column=names[:2]) if is_dated else clock_by(table, names[0])
     questions = ()
     if "by_values" in kind.roles:
         text = f"{names[0]}: it rises evenly, and is taken for the time, in s where no unit is given"

@@ -22,10 +22,10 @@ from tacdata.importing.proposing.source_kind import SourceKind, source_kinds, wi
 from tacdata.importing.proposing.specimens import place_in_path, specimen_of
 from tacdata.importing.proposing.stream_clocks import clock_by, own_clocks
 from tacdata.importing.times import NEVER, times
-from tacdata.importing.units import plain
+from tacdata.importing.units import plain, split_unit
 
 AXES = ("depth", "z", "x", "y")
-IDLE = ("idle", "setting", "state", "counter", "orientation", "joint", "derived")
+IDLE = ("idle", "setting", "state", "counter", "orientation", "joint", "motion", "derived")
 """Roles of columns that are no channels of a sensor."""
 NO_POSITION = ProposedPosition(
     questions=questions_of(["no column is named as a position or a depth: give position, or schedule"])
@@ -106,14 +106,23 @@ def proposed_mapping(source: Path, found: dict[str, FoundKind]) -> Proposal:
         *place.questions,
         *questions_of([f"{listed([*path])} of the press: taken from the files' names, in mm"] if path else []),
         *(question for _, further in specimens for question in further),
-        *questions_of([*_unnamed(wide), *shared, *_unused(kinds, used, wide)]),
+        *questions_of(
+            [
+                *(_unsaid(measured["force"]) if "force" in measured else ()),
+                *_unnamed(wide),
+                *shared,
+                *_unused(kinds, used, wide),
+            ]
+        ),
     )
     return Proposal(Mapping.from_document(document_of(mapping), source.parent), questions, kinds, files)
 
 
 def _taxels(kind: SourceKind, clock: SourceClock) -> tuple[ColumnsEntry, tuple[str, ...]]:
     """Return the sensor's channels, and a doubt if there is none."""
-    table, roles, columns, doubts = kind.table, kind.roles, short(kind.channels), ()
+    table, roles, columns, doubts = kind.table, kind.roles, kind.channels, ()
+    if not set(columns) <= set(table.columns):  # columns inside an array, and no names with brackets
+        columns = short(columns)
     if not columns:  # the import says why columns of text are no numbers
         used = {name for names in roles.values() for name in names}
         texts = [name for name in table.columns if name not in used and table.column(name).dtype == object]
@@ -144,12 +153,20 @@ def _measured(kinds: list[SourceKind], clocks: dict[str, SourceClock]) -> dict[s
         lengths = kind.roles.get("depth", [])
         # A second length is a gauge in addition to the drive; it separates compliance from the skin's deformation.
         gauges = [name for name in lengths[1:] if not is_copy(kind.table, lengths[0], name)][:1]
-        columns = {"displacement": gauges} | {key: kind.roles.get(key, []) for key in ("force", "temperature")}
+        columns = {"displacement": gauges}
+        columns |= {key: kind.roles.get(key, []) for key in ("force", "torque", "temperature")}
         for key, names in columns.items():
             if names and key not in measured:
                 unit = plain(kind.table.units.get(names[0], "")) or ("mm" if key == "displacement" else "")
                 measured[key] = ColumnsEntry(file=kind.alias, clock=clocks[kind.alias], columns=names, unit=unit)
     return measured
+
+
+def _unsaid(force: ColumnsEntry) -> list[str]:
+    """Return a question about a force without a unit."""
+    names = [str(name) for name in force.columns] if isinstance(force.columns, list) else [str(force.columns)]
+    is_said = force.unit or any(split_unit(name)[1] for name in names)
+    return [] if is_said else [f"{listed(names)}: no unit is given: give unit: N under force"]
 
 
 def _unnamed(kind: SourceKind) -> list[str]:

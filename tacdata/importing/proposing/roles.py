@@ -30,7 +30,11 @@ GUESSES = {
     "x": rf"({BODY}[_.]?)?x|p_?x|x_{BODY}|(actual_)?tcp_pose_?0",
     "y": rf"({BODY}[_.]?)?y|p_?y|y_{BODY}|(actual_)?tcp_pose_?1",
     "z": rf"({BODY}[_.]?)?z|p_?z(_?(meas(ured)?|act(ual)?|ist))?|z_{BODY}|height|(actual_)?tcp_pose_?2",
-    "force": r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)",
+    "force": (
+        r"(f|fz|fn|force(_?z)?|load|weight|kraft|normal_?force|force_?[xyz]|f[xy]|力|荷重|载荷)"
+        r"|(actual_)?tcp_force_?[0-2]"
+    ),
+    "torque": r"(torque|moment)(_?[xyz])?|tau_?[xyz]|drehmoment|(actual_)?tcp_force_?[3-5]",
     "temperature": r"(temp(erature)?(_?\w{1,4})?|t_?amb)",
     "trial": r"(trial|run|cycle|episode|press|repeat|rep|test|versuch|zyklus|element)(_?(id|no|nr|number))?",
     "specimen": (
@@ -52,7 +56,11 @@ GUESSES = {
         r"|(\w+_)?(flag|fault|alarm|warning|status|state|error(_code)?)|is_\w+|battery\w*|cpu\w*"
     ),
     "orientation": r"(rot(ation)?|quat(ernion)?|orientation|q)_?[xyzw]|roll|pitch|yaw",
-    "joint": r"(joint|axis|q)_?\d(_?(pos(ition)?|angle|vel(ocity)?|torque|effort))?",
+    "joint": (
+        r"(joint|axis|q)_?\d(_?(pos(ition)?|angle|vel(ocity)?|torque|effort))?"
+        r"|actual_(qd{0,2}|current|moment|tcp_\w+|joint_\w+)_?\d"
+    ),
+    "motion": r"((linear|angular)(_(velocity|acceleration|speed))?|velocity)_[xyz]",
     "derived": (
         r"((true|eng(ineering)?|nominal|tensile|compressive|shear)_?)?(stress|spannung)"
         r"|grad(ient)?|derivative|slope|rms|std(_?dev)?|variance|r_?(2|squared)"
@@ -61,11 +69,17 @@ GUESSES = {
         r"((true|eng(ineering)?|nominal|axial|tensile|compressive|compression|shear|hencky|log(arithmic)?|applied)_?)?"
         r"(strain|stretch|elongation|dehnung|stauchung)(_?ratio)?"
     ),
-    "angle": r"((rotary|joint|motor)_?)?(encoder|angle)(_?(pos(ition)?|counts?))?",
+    "angle": r"((rotary|joint|motor)_?)?(enc(oder)?|angle)(_?(pos(ition)?|counts?|ticks?))?",
 }
 """Meaning of a column by its name without the unit."""
 PLACE = r"(pos(ition)?s?|pose|xyz|(tip|tcp|probe|indenter|stage|eef?|end_?effector|robot)(_?pos(e|ition)?)?)"
 """Name of an array whose first three columns are a place."""
+WRENCH = r"wrench|f(orce)?_?(/|_|and)?_?t(orque)?|force_?torque|(ft|wrench)_?(sensor|data)?"
+"""Name of an array whose first three columns are a force, and the others a torque."""
+TORQUE = re.compile(
+    r"[kmucn]?N[ .*\u00b7\u22c5-]?[mc]?m|(in|ft)[ .*\u00b7-]?(lbf?|ozf?)|(lbf?|ozf?)[ .*\u00b7-]?(in|ft)"
+)
+"""Units of torques."""
 GAUGE = r"lvdt|laser|gauge|extensometer|encoder|true|actual|measured"
 """Words that mark a length as measured, in addition to the commanded one."""
 COMMAND = r"(?<![a-z])(set|target|cmd|command(ed)?|desired|demand(ed)?|soll)(?![a-z])|set_?point|sollw"
@@ -75,6 +89,11 @@ ROWS = 50
 """Rows of a text column that are tried as times."""
 EVEN = 1e-4
 """Steps that scatter by less are uniform [step]."""
+NO_PLACE = (
+    r"\w*(force|torque|moment|wrench|orientation|rotation|quat(ernion)?|linear|angular|velocity|acceleration|gyro|imu)"
+    r"|(mag\w*|taxel|cell|pad|sensor)_?\d*"
+)
+"""What has axes and is no place, in the path of a name."""
 AGAIN, NUMBERED = re.compile(r"(.+?)\.\d+"), re.compile(r"(.+?)[ _-]?[(#]?\d+\)?")
 """A name that comes again, as pandas numbers it, and as people do."""
 NAMED = re.compile(r"_?(id|no|nr|number|index)$")
@@ -90,9 +109,10 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
         if name in later or (values.dtype.kind == "f" and np.isnan(values).all()):
             continue  # a comma at the end of each row makes an empty one
         role = None if lettered and values.dtype != object else _role(table, name, values)
-        if role == "place":
-            for axis, number in zip("xyz", range(3), strict=True):
-                roles.setdefault(axis, []).append(f"{name}[{number}]")
+        if role in ("place", "wrench"):
+            parts = "xyz" if role == "place" else ("force",) * 3 + ("torque",) * 3
+            for number, part in enumerate(parts):
+                roles.setdefault(part, []).append(f"{name}[{number}]")
         elif role is None and values.dtype != object:
             roles["channels"].append(name)
         elif role:
@@ -159,20 +179,30 @@ def is_whole(roles: dict[str, list[str]]) -> bool:
 
 
 def bare_name(name: str) -> str:
-    """Return a column's name without its unit and path, in small letters: "stage.posZ [mm]" is pos_z."""
-    bare, _ = split_unit(name.rsplit(".", 1)[-1])
-    return re.sub(r"[\s-]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
+    """Return a column's name without its unit and path, in small letters: "stage.posZ [mm]" is pos_z.
+
+    An axis of what is no place has its name in front: force.z is force_z.
+    """
+    path = re.split(r"[./]" if name.startswith("/") else r"\.", name)
+    bare, _ = split_unit(path[-1])
+    if len(path) > 1 and bare in "xyzw" and re.fullmatch(NO_PLACE, path[-2].lower()):
+        bare = f"{path[-2]}_{bare}"
+    return re.sub(r"[\s-]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower()).strip("_")
 
 
 def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     bare, inside = bare_name(name), split_unit(name.rsplit(".", 1)[-1])[1]
     if values.ndim == 2 and values.shape[1] in (3, 6, 7) and re.fullmatch(PLACE, bare):
         return "place"
+    if values.ndim == 2 and values.shape[1] == 6 and re.fullmatch(WRENCH, bare):
+        return "wrench"
     role = next((role for role, pattern in GUESSES.items() if re.fullmatch(pattern, bare)), None)
     unit_text = plain(table.units.get(name) or inside)
     unit = quantity_of(unit_text)
     if unit_text.lower() in DEGREES:
         return "temperature"
+    if TORQUE.fullmatch(unit_text):
+        return "torque"
     # "t" with the unit of another quantity, as V, is no time.
     if role == "time" and values.dtype != object and unit != "s" and unit_text.lower() in OTHERS:
         role = None

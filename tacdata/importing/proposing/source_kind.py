@@ -59,7 +59,9 @@ def source_kinds(found: dict[str, FoundKind]) -> tuple[tuple[SourceKind, ...], t
     roles = {alias: roles_of(kept[kind].table) for alias, kind in aliases.items()}
     if not any(columns["channels"] for columns in roles.values()):
         # Nothing else was read: the load cell is the sensor.
-        roles = {alias: columns | {"channels": columns.pop("force", [])} for alias, columns in roles.items()}
+        for role in ("torque", "force"):
+            for columns in roles.values():
+                columns["channels"] = columns.pop(role, columns["channels"])
     question = stand_in({alias: kept[kind].table for alias, kind in aliases.items()}, roles)
     kinds, halves = [], []
     for alias, kind in aliases.items():

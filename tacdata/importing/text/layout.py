@@ -46,8 +46,8 @@ SAMPLE, TAIL = 2000, 100
 """Lines that are examined, and the last of them, which tell the layout."""
 
 
-LABELS = ("unit", "units", "einheit")
-"""Words before the units of a line that are no unit."""
+LABEL = re.compile(r"(\w+[_ ])?(units?|einheit(en)?)([_ ]\w+)?:?", re.IGNORECASE)
+"""First cell of a line of units, which is no unit."""
 ROW_NAME = "row"
 """Name of a column of row names that the header leaves out."""
 LINES_OF_HEADER = 6
@@ -288,7 +288,9 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
     below = next((k for k in range(len(rows) - 1, 0, -1) if are_units(rows[k])), None)
     if below is not None and not all(_filled(rows[:below])[1:]):
         below = None
-    units_row = rows[below] if below is not None else None
+    # LabVIEW writes units above the names, behind Y_Unit_Label.
+    above = next((row for row in rows[-2::-1] if LABEL.fullmatch(row[0]) and are_units(row[1:])), None)
+    units_row = rows[below] if below is not None else above
     titles = _filled(rows[:below])
     numeric = [any(field and field not in MISSING and is_number(field, ".") for field in row) for row in rows]
     first = max((k + 1 for k, holds_numbers in enumerate(numeric) if holds_numbers), default=0)
@@ -303,8 +305,8 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
         while name in names:
             name += "'"
         names.append(name)
-        unit = units_row[k].strip("[]() ") if units_row else split_unit(name)[1]
-        if unit and not unit.isdigit() and unit.lower() not in LABELS:  # "pos (5)" is the fifth's
+        unit = (units_row[k].strip("[]() ") if units_row else "") or split_unit(name)[1]
+        if unit and not unit.isdigit() and not LABEL.fullmatch(unit):  # "pos (5)" is the fifth's
             units[name] = unit
     return tuple(names), units
 

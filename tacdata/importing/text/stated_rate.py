@@ -1,6 +1,8 @@
-"""The rate that a text states above its rows."""
+"""The rate and the size of a count that a text states above its rows."""
 
 import re
+
+import numpy as np
 
 STATED_RATE = re.compile(
     r"(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq\w*)?[^\d\n]{0,20}?"
@@ -16,6 +18,20 @@ RATE_ALONE = re.compile(
     re.IGNORECASE | re.MULTILINE,
 )
 """A rate with its unit before the number, or without one."""
+COUNTS = r"(?:counts?|steps?|ticks?|pulses|inc(?:rement)?s?)"
+STATED_COUNTS = re.compile(
+    rf"(\d+(?:\.\d+)?)\s*{COUNTS}\s*(?:/|per )\s*mm\b|{COUNTS}\s*(?:/|per )\s*mm\b\W{{1,4}}(\d+(?:\.\d+)?)", re.I
+)
+"""How a file states how many counts of its encoder are a millimetre."""
+COUNTED = re.compile(r"(enc(oder)?|steps?|pulses|((stage|motor|z)_?)?pos(ition)?|z)(_?(counts?|steps?|ticks?))?", re.I)
+"""Names of positions that a motor or an encoder may count."""
+
+
+def stated_counts(text: str, skip: int, columns: dict[str, np.ndarray]) -> dict[str, str]:
+    """Return the unit, as 1/800 mm, of positions in whole numbers, if the first lines of a text state their size."""
+    match = STATED_COUNTS.search("\n".join(text.split("\n", skip)[:skip]))
+    names = [name for name in columns if match and COUNTED.fullmatch(name) and columns[name].dtype != object]
+    return {n: f"1/{match[1] or match[2]} mm" for n in names if match and not np.nansum(columns[n] % 1)}
 
 
 def stated_rate(text: str, skip: int) -> float:

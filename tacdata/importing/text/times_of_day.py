@@ -15,7 +15,7 @@ def times_of_day(values: np.ndarray) -> np.ndarray | None:
     """
     texts = [str(text).strip() for text in values.tolist() if text is not None]
     if any(re.fullmatch(DURATION, text) for text in texts) and all(
-        re.fullmatch(r"-?\d+:\d{2}:\d{2}.*", t) for t in texts
+        re.fullmatch(r"(\d+ days?,? )?-?\d+:\d{2}:\d{2}.*", t) for t in texts
     ):
         return np.array([np.nan if text is None else _duration(str(text)) for text in values.tolist()])
     forms = {
@@ -71,11 +71,14 @@ def digits_of_day(values: np.ndarray) -> np.ndarray | None:
     return result
 
 
-DURATION = r"-\d+:\d{2}:\d{2}([.,]\d+)?|(2[4-9]|[3-9]\d|\d{3,}):\d{2}:\d{2}([.,]\d+)?"
-"""A time since a start and no time of day: with a sign, or of more than 24 hours."""
+DURATION = (
+    r"\d+ days?,? \d+:\d{2}:\d{2}([.,]\d+)?|-\d+:\d{2}:\d{2}([.,]\d+)?|(2[4-9]|[3-9]\d|\d{3,}):\d{2}:\d{2}([.,]\d+)?"
+)
+"""A time since a start and no time of day: with a sign, with days as pandas writes it, or of more than 24 hours."""
 
 
 def _duration(text: str) -> float:
-    hours, minutes, seconds = text.strip().replace(",", ".").lstrip("-").split(":")
-    size = 3600 * int(hours) + 60 * int(minutes) + float(seconds)
+    days, _, clock = text.strip().rpartition(" ")
+    hours, minutes, seconds = clock.replace(",", ".").lstrip("-").split(":")
+    size = DAY * int(days.partition(" ")[0] or 0) + 3600 * int(hours) + 60 * int(minutes) + float(seconds)
     return -size if text.strip().startswith("-") else size
