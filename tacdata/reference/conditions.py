@@ -158,7 +158,9 @@ def _on_one_clock(
     speed = np.abs(np.diff(np.mean(depths, axis=0)) / np.diff(edges[:-1]))
     at = course.tip[rows[group[0]][0], :2]
     name = names[group[0]] or f"x {at[0]:.2g}, y {at[1]:.2g} mm"
-    label = f"{name}, {spans[group[0]].depth:.3g} mm deep at {np.quantile(speed, 0.75):.2g} mm/s"
+    # A way in the air before the contact is no depth; a hold or a rest may last longer than the motion.
+    deep = min(spans[group[0]].depth, float(np.max(depths[0])))
+    label = f"{name}, {deep:.3g} mm deep at {np.median(speed[speed > HALF * speed.max()]):.2g} mm/s"
     middle = 0.5 * (edges[1:] + edges[:-1]) + lead
     return PressKind(label, middle, np.mean(depths, axis=0), *sides, effort=course.effort)
 
@@ -181,6 +183,9 @@ def _means(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarra
 
 def _distinct(conditions: list[PressKind]) -> tuple[PressKind, ...]:
     """Return conditions under the shortest names that still distinguish them."""
+    places = {c.name.partition(" mm, ")[0] for c in conditions}
+    if len(conditions) > 1 and len(places) == 1 and places.pop().startswith("x "):
+        return tuple(replace(c, name=c.name.partition(" mm, ")[2]) for c in conditions)
     short = [c.name.partition(", ")[0] if not c.name.startswith("x ") else c.name for c in conditions]
     if len(set(short)) == len(short):
         return tuple(replace(c, name=s) for c, s in zip(conditions, short, strict=True))

@@ -51,7 +51,7 @@ class Size:
     peak_error: float
     """Standard error of that [the source's unit]."""
     share: float
-    """Peak over the mean healthy reading where it acts, without sign [1]."""
+    """Peak over the mean healthy reading where it acts, without sign; of a response over its range [1]."""
     p: float
     """p-value of "no change" [1]."""
     changed: bool = False
@@ -280,6 +280,8 @@ def _mechanisms(
                 at = int(np.argmax(np.abs(curve)))
                 acting = np.abs(curve) > 0.5 * np.abs(curve[at])
                 usual = float(np.abs(condition.base[acting, channel]).mean())
+                # A response, as of a capacitance, counts from its rest; an effort, as a current, from zero.
+                usual = usual if condition.effort else float(condition.range[channel])
                 top, size = abs(float(curve[at])), float(value[j, 0])
                 spread, peak = float(error[j]), top * size
                 p = 2 * float(stats.t.sf(abs(size / max(spread, 1e-300)), freedom))

@@ -12,8 +12,8 @@ NEGLIGIBLE = 0.3
 """A bound below this share of the changed sizes counts as nothing there [1]."""
 SIMILAR = 0.25
 """Sizes that spread by less about their mean are given as one [1]."""
-LISTED = 4
-"""Conditions that a sentence lists; of more, only their number is given."""
+LISTED, LONGEST = 4, 40
+"""Conditions that a sentence lists, and their letters at most; of more, only their number is given."""
 
 
 @dataclass(frozen=True)
@@ -59,24 +59,30 @@ def _sized(result: Difference, mechanism: Mechanism, unit: str) -> str:
     rival = f" (or {word(mechanism.rival)})" if mechanism.rival else ""
     sizes = f"{word(mechanism.name)}{rival} {_amount(changed, unit)}"
     if len(result.channels) > 1:
-        sizes += f" in {len(channels)} of {len(result.channels)} channels"
+        named = _listed([result.channels[k] for k in sorted(channels)]) if len(channels) < 3 else len(channels)
+        sizes += f" in {named} of {len(result.channels)}{' channels' * (len(channels) > 2)}"
     if len(result.conditions) == 1:
         return sizes
-    places = list(dict.fromkeys(s.condition for s in changed))
-    sizes += (
-        f" at {_listed(places)}" if len(places) <= LISTED else f" in {len(places)} of {len(result.conditions)} kinds"
-    )
+    places = {s.condition for s in changed}
+    sizes += _at(changed, len(result.conditions))
     typical = sum(abs(s.peak) for s in changed) / len(changed)
     remainder = [s for s in mechanism.sizes if s.condition not in places and s.channel in channels]
     nothing = [s for s in remainder if s.bound < NEGLIGIBLE * typical]
     unsure = [s for s in remainder if s.bound >= NEGLIGIBLE * typical]
     if nothing:
-        at = list(dict.fromkeys(s.condition for s in nothing))
-        sizes += f", nothing at {_listed(at)} (less than {max(s.bound for s in nothing):.2g} {unit})"
+        sizes += (
+            f", nothing{_at(nothing, len(result.conditions))} (less than {max(s.bound for s in nothing):.2g} {unit})"
+        )
     if unsure:
-        at = list(dict.fromkeys(s.condition for s in unsure))
-        sizes += f", open at {_listed(at)}"
+        sizes += f", open{_at(unsure, len(result.conditions))}"
     return sizes
+
+
+def _at(sizes: Sequence[Size], total: int) -> str:
+    """Return the conditions of sizes by name, or their number where the names are many or long."""
+    places = list(dict.fromkeys(s.condition for s in sizes))
+    names = _listed(places)
+    return f" at {names}" if len(places) <= LISTED and len(names) <= LONGEST else f" in {len(places)} of {total} kinds"
 
 
 def _amount(sizes: Sequence[Size], unit: str) -> str:
@@ -131,6 +137,8 @@ def remarks(result: Difference) -> list[str]:
     sized = {m.name for m in result.mechanisms}
     if small := [word(n) for n, p in result.probabilities.items() if p >= NAMED and n not in sized]:
         lines.append(f"{', '.join(small)}: probable where the speed changes, too small to count")
+    if result.status == "unknown":
+        lines.append("the judged sessions alone may show an effect by name: leave out --reference")
     if result.unmatched:
         lines.append(f"{result.unmatched} presses have too few counterparts in the other session and were left out")
     return lines
@@ -139,12 +147,9 @@ def remarks(result: Difference) -> list[str]:
 def text(result: Difference, heading: Machines) -> str:
     """Return everything for reading in a terminal."""
     lines = [f"{result.status.upper()}: {sentence(result, heading.unit)}", ""]
-    lines.append(
-        f"machine: {', '.join(heading.measured)}{f', recorded {heading.recorded}' if heading.recorded else ''}"
-    )
-    lines.append(f"healthy: {', '.join(heading.healthy)}")
-    lines.append(f"version: tacdata {provenance.code_version()}")
-    lines += ["", *controls(result, heading.unit)]
+    recorded = f", recorded {heading.recorded}" if heading.recorded else ""
+    lines += [f"machine: {', '.join(heading.measured)}{recorded}", f"healthy: {', '.join(heading.healthy)}"]
+    lines += [f"version: tacdata {provenance.code_version()}", "", *controls(result, heading.unit)]
     rows = table(result, heading.unit)
     if rows:
         lines += [

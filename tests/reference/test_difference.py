@@ -1,5 +1,6 @@
 """A machine beside its healthy self: seeded faults get their names and sizes, healthy halves stay quiet."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +24,7 @@ def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01, effort=
     readings, names, measured = [], [], []
     for load in loads:
         for k in range(presses):
-            base = 0.4 + 0.2 * np.abs(WAY) + 0.002 * float(load) * WAY + 0.006 * DEPTH
+            base = 0.4 + 0.2 * np.abs(WAY) + 0.002 * float(load or 20) * WAY + 0.006 * DEPTH
             base = base + wander * rng.normal() * np.abs(WAY) + 0.02 * rng.normal(size=len(TIME))
             readings.append(change(load, base) if k >= presses // 2 else base)
             names.append(load)
@@ -114,3 +115,14 @@ def test_a_machine_that_differs_from_itself_gives_no_name():
 def test_presses_without_counterparts_are_refused_in_words():
     with pytest.raises(FormatError, match="no press of the same place"):
         machine(lambda load, base: base, presses=4)
+
+
+def test_a_kind_has_the_speed_of_its_motion_and_the_depth_below_the_face(monkeypatch):
+    """A fast press is mostly rest and hold, and its way begins in the air."""
+    path = np.interp(TIME, [0, 5, 5.4, 9, 9.4, 10], [-5.0, -5.0, 70.0, 70.0, -5.0, -5.0])
+    monkeypatch.setitem(globals(), "DEPTH", path)
+    found = machine(lambda load, base: base + 0.1, loads=("",), effort=False)
+    depth, speed = re.fullmatch(r"x 0, y 0 mm, (\S+) mm deep at (\S+) mm/s", found.conditions[0].name).groups()
+    assert float(depth) == 70 and float(speed) == pytest.approx(75 / 0.4, rel=0.15)
+    size = next(s for m in found.mechanisms for s in m.sizes)
+    assert size.share == pytest.approx(size.peak / found.conditions[0].range[0])
