@@ -177,7 +177,7 @@ def summary(history: History) -> list[tuple[str, str]]:
         tiles.append(("gain", f"{_percent(first.gains.common)} of that at {reference}, all channels (median)"))
     if model:
         tiles.append(("gain of model", f"{_percent(model.common)} of what labels predict, all channels (median)"))
-    tiles.append(("noise", f"{noise:.1f} {last.unit} (median of the channels)"))
+    tiles.append(("noise", f"{noise:.3g} {last.unit} (median of the channels)"))
     tiles.append(("loop", f"{_percent(last.loop)} of depth times response"))
     if repeated := last.repeatability:
         low, high = (100 * bound for bound in repeated.interval)

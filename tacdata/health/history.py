@@ -112,7 +112,9 @@ def in_order(visits: Sequence[Visit]) -> list[Visit]:
     if len(units) > 1:
         named = "; ".join(f"{name}: {', '.join(p.name for p in paths)}" for name, paths in units.items())
         typed = "; ".join("tacdata health " + " ".join(map(str, paths)) for paths in units.values())
-        raise UsageError(f"sessions of {len(units)} units: {named}", "sessions of one unit", f"ask for each: {typed}")
+        one = "; if it is one unit, import its visits with one mapping: the name of the sensor is the unit's"
+        remedy = f"ask for each: {typed}" + one * (len({kind.rpartition(" (")[2] for kind in units}) == 1)
+        raise UsageError(f"sessions of {len(units)} units: {named}", "sessions of one unit", remedy)
     folders = [visit.session.folder.resolve() for visit in visits]
     twice = {path.name for path in folders if folders.count(path) > 1}
     if twice:

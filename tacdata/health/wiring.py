@@ -65,7 +65,9 @@ def wiring(
     tied = tuple(sorted(pair for pair, n in pairs.items() if n >= MOST * len(entries)))
     sample = replace(sample, response=np.nan_to_num(np.array([p.hold for p in measured])))
     expected = fit_answers(sample).pattern if reference is None else _scaled(reference, sample)
-    silent = _silent(sample, expected)
+    # Half a count is the least noise of a board. Readings in pF have less, and a reference shows what is due.
+    quiet = answers(entries, 0.0) if reference is not None else None
+    silent = _silent(replace(sample, noise=quiet.noise) if quiet else sample, expected)
     dead = tuple(sorted({*stuck, *silent} - set(undefined)))
     swaps = misplaced(sample) if reference is None else exchanged(likelihood(sample, expected))
     # A dead channel fits anywhere.

@@ -10,6 +10,7 @@ from unit_examples import SEED, Fault, record
 from tacdata.health.advice import FIRST, NOTHING, WIRING, advice
 from tacdata.health.history import history
 from tacdata.health.visit import read_visit
+from tacdata.health.wiring import wiring
 
 
 def test_a_healthy_unit_needs_nothing(monday, tuesday):
@@ -52,3 +53,17 @@ def test_a_slow_loss_is_seen_against_the_first_visit(monday, tmp_path):
     beside = {against: change for against, change in found.changed if change.channel == 9}
     assert list(beside) == [0] and beside[0].value == pytest.approx(0.96**3 - 1, abs=0.03)
     assert [a.channels for a in advice(found)] == [(9,)]
+
+
+def test_a_silent_channel_is_found_in_any_unit(monday):
+    """In pF the noise is far below half a count of a board."""
+
+    def small(entry):
+        taxels = entry.document["taxels"]
+        scaled = {name: [v and 1e-3 * v for v in taxels[name]] for name in ("idle_noise", "response")}
+        return replace(entry, document={**entry.document, "taxels": {**taxels, **scaled}})
+
+    alive = np.where(np.arange(24) == 7, 1e-6, 1e-3)
+    measured = [replace(press, levels=alive * press.levels) for press in monday.responses]
+    reference = [replace(press, levels=1e-3 * press.levels) for press in monday.responses]
+    assert wiring([small(entry) for entry in monday.entries], measured, reference).dead == (7,)

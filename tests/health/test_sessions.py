@@ -43,6 +43,7 @@ def test_visits_of_two_units_are_refused_with_the_commands_for_each(copied):
     with pytest.raises(UsageError, match=r"sessions of 2 units: tacprint .*: monday; other_unit .*: tuesday") as told:
         history(visits)
     assert f"tacdata health {copied / 'tuesday'}" in str(told.value)
+    assert "if it is one unit, import its visits with one mapping" in str(told.value)
 
 
 def test_a_session_twice_is_refused(monday):

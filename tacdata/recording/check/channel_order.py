@@ -59,8 +59,8 @@ class Answers:
         return np.linalg.norm(self.sites[:, None] - self.taxels.centers, axis=-1)
 
 
-def answers(recordings: list[RecordingFigures]) -> Answers | None:
-    """Collect the answers of a session's complete presses; None if there are none."""
+def answers(recordings: list[RecordingFigures], least: float = 0.5) -> Answers | None:
+    """Collect the answers of a session's complete presses, with a least noise [counts]; None if there are none."""
     presses = [f for f in recordings if counts_as_press(f)]
     if not presses:
         return None
@@ -73,7 +73,7 @@ def answers(recordings: list[RecordingFigures]) -> Answers | None:
         np.array([[0.0 if v is None else v for v in f.document["taxels"]["response"]] for f in presses]),
         np.array([(e.press.x, e.press.y) for e in episodes]),
         np.array([f"{e.press.indenter_name} {e.press.turned}" for e in episodes]),
-        np.maximum(np.nan_to_num(middle, nan=1.0), 0.5),
+        np.maximum(np.nan_to_num(middle, nan=1.0), least),
         episodes[0].sensor.taxels,
     )
 
