@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -45,25 +46,40 @@ def shift(course: Course) -> tuple[float, float, float]:
 
     With it the shares of their variance that depth does not explain then, and as they are [1].
     """
-    main = _main(course)
-    lags = np.linspace(-WIDEST, WIDEST, LAGS)
-    shares = np.array([_left_at(course, main, lag) for lag in lags])
+    lags, presses = np.linspace(-WIDEST, WIDEST, LAGS), list(_presses(course))
+    unexplained = np.array([sum(_unexplained(press, lag) for press in presses) for lag in lags])
+    shares = unexplained / max(sum(float(press.reading @ press.reading) for press in presses), 1e-30)
     best = int(np.argmin(shares))
     return float(lags[best]), float(shares[best]), float(shares[LAGS // 2])
 
 
-def _left_at(course: Course, reading: np.ndarray, lag: float) -> float:
-    """Return the share of a reading's variance that depth does not explain at a delay, an offset an episode allowed."""
-    reduced, unexplained, total = course.reduced, 0.0, 0.0
+@dataclass(frozen=True)
+class _Press:
+    """One press: a reading without its mean, shape (m,), and the tip's depth, shape (n,), each with its times [s]."""
+
+    reading: np.ndarray
+    reading_time: np.ndarray
+    depth: np.ndarray
+    time: np.ndarray
+
+
+def _presses(course: Course) -> Iterator[_Press]:
+    reduced, main = course.reduced, _main(course)
     for e in np.unique(reduced.episode):
         rows, path = reduced.episode == e, course.episode == e
-        depth = np.interp(reduced.time[rows] - lag, course.time[path], np.maximum(course.tip[path, 2], 0.0))
-        centred = reading[rows] - reading[rows].mean()
-        depth = depth - depth.mean()
-        own_power, power = float(centred @ centred), float(depth @ depth)
-        total += own_power
-        unexplained += own_power - (float(centred @ depth) ** 2 / power if power > 0 else 0.0)
-    return unexplained / max(total, 1e-30)
+        reading = main[rows]
+        yield _Press(
+            reading - reading.mean(), reduced.time[rows], np.maximum(course.tip[path, 2], 0.0), course.time[path]
+        )
+
+
+def _unexplained(press: _Press, lag: float) -> float:
+    """Return the sum of squares of a reading that depth does not explain at a delay [s], but for an offset."""
+    depth = np.interp(press.reading_time - lag, press.time, press.depth)
+    depth = depth - depth.mean()
+    power = float(depth @ depth)
+    total = float(press.reading @ press.reading)
+    return total - (float(press.reading @ depth) ** 2 / power if power > 0 else 0.0)
 
 
 def edges(course: Course, about: float) -> tuple[float, float]:

@@ -85,7 +85,7 @@ def _of(final: Problem, at: int, conditions: dict[str, np.ndarray]) -> dict[str,
     applicable = {name: labels for name, labels in conditions.items() if not (clock and name == TIME)}
     each = {name: [signal * (labels == k) for k in range(int(labels.max()) + 1)] for name, labels in applicable.items()}
     columns = np.stack([residual, *(c for parts in each.values() for c in parts)], axis=2)
-    white = whitener.whitened(np.concatenate([columns, moving], axis=2).astype(np.float32))
+    white = whitener.whitened(np.concatenate([columns, moving], axis=2, dtype=np.float32))
     gram = episode_grams(white, setting.course.reduced, final.null.nuisances, final.null.inner).gram
     count = columns.shape[2]
     fixed = np.arange(count - 1, gram.shape[1] - 1)

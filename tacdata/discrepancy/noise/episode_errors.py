@@ -61,7 +61,7 @@ class EpisodeErrors:
         residual = readings.beside_depth(self.residual, course)
         least = LEAST_SCALE * np.abs(self.rise).max(axis=0)
         estimate = _at_least(readings.first_guess(residual, course, relative), least)
-        columns = np.concatenate([residual[:, :, None], self.rich], axis=2)
+        columns = np.concatenate([residual[:, :, None], self.rich], axis=2, dtype=np.float32)
         best = np.zeros(self.rich.shape[2])
         # Noise and the over-rich fit depend on each other; a second turn changes little afterwards.
         for _ in range(2):
@@ -90,7 +90,7 @@ class EpisodeErrors:
             errors: Of pose, shape (m, streams, kinds).
             counts: Weight of each episode, shape (episodes,); equal, unless given.
         """
-        columns = np.concatenate([self.residual[:, :, None].astype(np.float32), self.rich], axis=2)
+        columns = np.concatenate([self.residual[:, :, None], self.rich], axis=2, dtype=np.float32)
         best = self._best(columns, Whitener(self.course, noise, self.context, self.features, errors), counts)
         return (self.residual - self.rich @ best.astype(np.float32)).astype(np.float32)
 

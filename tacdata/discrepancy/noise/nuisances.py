@@ -68,7 +68,7 @@ def set_ups(setting: Setting, placed: Sequence[Placed]) -> tuple[np.ndarray, np.
         return np.zeros((*pose_columns.shape[:2], 0), dtype=np.float32), np.zeros(0)
     of = recording[setting.course.reduced.episode]
     each = [SET_UP_FACTOR * pose_columns * (of == number)[:, None, None] for number in range(recording.max() + 1)]
-    columns = np.concatenate(each, axis=2).astype(np.float32)
+    columns = np.concatenate(each, axis=2, dtype=np.float32)
     return columns, np.ones(columns.shape[2])
 
 

@@ -208,8 +208,8 @@ def null_model(setting: Setting) -> NullModel:
     residual = streams.measured(course) - streams.predicted(predicted)
     # Noise is estimated from the residual of a fit that is richer than any effect: else a missing effect would be taken
     # for noise.
-    candidates = np.concatenate([extra, rich, slow(course, response, list(setting.given))], axis=2)
-    candidates = candidates.astype(np.float32)
+    clock = slow(course, response, list(setting.given))
+    candidates = np.concatenate([extra, rich, clock], axis=2, dtype=np.float32)
     rise = streams.rise(predicted, response).astype(np.float32)
     measured = EpisodeErrors(residual, candidates, reduced, context, features, rise)
     noise = measured.noise(errors)

@@ -27,7 +27,7 @@ def generic(course: Course, response: Response, placed: list[Placed]) -> np.ndar
     path_histories = np.delete(histories(course), CLOCK_HISTORIES, axis=1)[streams.rows]
     parts = [rise[:, :, None] * path_histories[:, None, :], slope[:, :, None] * path_histories[:, None, :] * 0.1]
     parts.append(level[:, :, None] * path_histories[:, None, ::2])
-    return np.concatenate(parts, axis=2).astype(np.float32)
+    return np.concatenate(parts, axis=2, dtype=np.float32)
 
 
 def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray:
@@ -44,7 +44,7 @@ def slow(course: Course, response: Response, placed: list[Placed]) -> np.ndarray
         )
     follow = np.stack(clock_histories, axis=-1)[streams.rows][:, None, :]
     slope = depth_slope(course, response, placed)[:, :, None] * (0.1 * course.stroke)
-    return np.concatenate([rise[:, :, None] * follow, slope * follow], axis=2).astype(np.float32)
+    return np.concatenate([rise[:, :, None] * follow, slope * follow], axis=2, dtype=np.float32)
 
 
 def histories(course: Course) -> np.ndarray:
