@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from tacdata import documents
 from tacdata.cases.answer import CaseAnswer, answer
 from tacdata.cases.mesh import mesh_for
@@ -74,6 +76,7 @@ def read_case(path: StrPath) -> Case:
     return Case(document["name"], sensor, request, settings, document, document.get("error_estimate", True))
 
 
+@threadpool_limits.wrap(limits=1)  # as in tacdata.pipeline.skin_press
 def solve_case(
     case: Case, folder: Path, done: Callable[[float], None] = lambda depth: None, picture: bool = False
 ) -> Path:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tacdata import provenance
 from tacdata.errors import FormatError, SolveError
@@ -102,6 +103,7 @@ def read_presses(path: StrPath, sensor: Sensor) -> PressSet:
     return PressSet(tuple(indenters), **values, provenance=stamp)
 
 
+@threadpool_limits.wrap(limits=1)  # as in tacdata.pipeline.skin_press
 def solved_presses(model: SkinModel, requests: Sequence[PressRequest], capacity: int = 1) -> PressSet:
     """Solve presses.
 

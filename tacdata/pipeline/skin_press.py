@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from functools import cached_property
 
+from threadpoolctl import threadpool_limits
+
 from tacdata.indenters import Indenter, from_document
 from tacdata.label_farm.presses.ladder import Ladder, goes_up_otherwise
 from tacdata.labels import PathSolution
@@ -39,6 +41,8 @@ class SolvableSkin:
         """
         return SkinModel(self.sensor, self.settings, self.device)
 
+    # A press has too little work for several threads: with two it takes a third longer.
+    @threadpool_limits.wrap(limits=1)
     def solve(self, press: Press, depths: Sequence[float] | None = None) -> PathSolution:
         """Solve a press: maps, forces and their errors along the way down and up.
 

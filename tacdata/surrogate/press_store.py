@@ -10,6 +10,7 @@ from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tacdata import provenance
 from tacdata.errors import SolveError
@@ -94,6 +95,7 @@ class PressStore:
         each = float(np.median(seconds)) if seconds else SECONDS_EACH * len(self.model.mesh.nodes)
         return each * sum(len(r.depths) for r, s in zip(requests, stored, strict=True) if s is None)
 
+    @threadpool_limits.wrap(limits=1)  # as in tacdata.pipeline.skin_press
     def solve(
         self,
         requests: Sequence[PressRequest],
