@@ -42,6 +42,11 @@ FARTHEST = 4.0
 """Largest variance of the spreading, of either sign [mm^2]: about a pitch; a pattern is lost beyond."""
 _SWAPPED = 0.2
 """By how much the correlation with another channel's force must be the larger one, both ways, for a swap [1]."""
+_LOADED = 0.1
+"""Largest force on a channel over that of some press from which its order is judged [1].
+
+Without it 1.1 % of draws of two presses were refused on six rigs, with it 0 of 900. In 20 presses 80 % of swaps are
+found both ways (80.4 and 80.3 %)."""
 
 
 @dataclass(frozen=True)
@@ -325,7 +330,10 @@ def _check_order(presses: list[tuple[np.ndarray, np.ndarray]], origin: str) -> N
     counts, force = (np.concatenate([press[k] for press in presses]) for k in (0, 1))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = np.nan_to_num(np.corrcoef(counts.T, force.T))
-    crossed = correlation[: counts.shape[1], counts.shape[1] :]
+    # A channel that loads hardly reach shows their time course alone, in which all channels are alike.
+    sizes = [np.abs(part).max(axis=0) for _, part in presses]
+    loaded = np.any([size > _LOADED * size.max() for size in sizes], axis=0)
+    crossed = correlation[: counts.shape[1], counts.shape[1] :] * loaded[:, None]
     diagonal = np.diag(crossed)
     for k in range(len(diagonal)):
         j = int(crossed[k].argmax())

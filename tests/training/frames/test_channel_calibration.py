@@ -95,6 +95,14 @@ def test_swapped_channels_are_refused():
         calibrate(replace(frames, taxels=taxels), numbers(frames))
 
 
+def test_channels_that_loads_hardly_reach_are_not_called_swapped():
+    frames = unit(np.ones(24), episodes=20)
+    taxels, force = np.array(frames.taxels), np.array(frames.taxel_force)
+    taxels[:, [3, 14]] = taxels[:, [14, 3]]
+    force[:, [3, 14]] *= 0.01
+    assert calibrate(replace(frames, taxels=taxels, taxel_force=force), numbers(frames)).presses == 20
+
+
 def test_presses_into_the_air_and_missing_forces_are_refused():
     frames = build_frames()
     with pytest.raises(UsageError, match="none of 12 presses touches"):
