@@ -4,7 +4,8 @@ Intervals and the scale of novelty need presses that a network did not learn fro
 of a cross-fit, each press with a network that was fitted without it.
 
 Validation presses are few. The network before a fit has learned from no press, and its Gaussian process leaves each out
-in closed form. So it gives the intervals where there is one. Validation presses scale them to the fitted network.
+in closed form. So with fewer than `FEW` validation presses it gives the intervals where there is one. Validation
+presses scale them to the fitted network.
 """
 
 from __future__ import annotations
@@ -29,13 +30,16 @@ from tacdata.training.networks.network import Network
 MOST_FRAMES = 20_000
 """Frames that intervals are calibrated on, in whole presses evenly taken [count]."""
 SHARES = (0.75, 1.0, 0.5, 0.25, 0.0)
-"""Shares of the Gaussian process in a maximum that are tried [1]: the first, unless presses surely favour another one.
+"""Shares of the Gaussian process in a maximum that are tried [1].
 
-It was chosen on rigs 30 and 31. By the least error of four presses rig 61 had a share of 0: 0.066 for 0.056 mm."""
+With few presses it is the first, unless they surely favour another one. It was chosen on rigs 30 and 31. By the least
+error of four presses rig 61 had a share of 0: 0.066 for 0.056 mm."""
 MEAN = 0.5
 """The share after a cross-fit [1]: few presses choose no better (rigs 30 and 31: 0.060 mm, chosen by presses 0.068)."""
+FEW = 10
+"""Presses left out below which these choose little by themselves [count].
 
-
+The four of 30 presses gain by it (rigs 30, 31, 60, 61, 70, 71), the 14 of 96 do not (rigs 30, 60, 61)."""
 EACH = "presses left out one by one"
 """Calibration data of intervals by the network before the fit."""
 
@@ -93,7 +97,7 @@ def complete(
     left_out = [press.corrected(process) for part in results for press in part]
     if len(left_out) > 1:
         (maps, labels, spreads), pitch = _columns(left_out), frames.sensor.map.pixel_pitch
-        if process and origin and len(parts) == 1:
+        if process and origin and len(parts) == 1 and len(left_out) < FEW:
             before = copy.deepcopy(best.network)
             before.load_state_dict(origin.state_dict())
             whole = replace(process, share=1.0)
@@ -175,7 +179,9 @@ def _share(presses: Sequence[_Press]) -> float:
         if touching.any():
             ratio = np.maximum(press.maximum, LEAST) / largest
             losses.append([np.abs(largest * ratio**share - label)[touching].mean() for share in SHARES])
-    return SHARES[chosen(np.array(losses))] if losses else SHARES[0]
+    if not losses:
+        return SHARES[0]
+    return SHARES[chosen(np.array(losses)) if len(losses) < FEW else int(np.mean(losses, axis=0).argmin())]
 
 
 def chosen(losses: np.ndarray) -> int:

@@ -110,6 +110,8 @@ def test_presses_left_out_choose_the_share():
     # Four presses that contradict each other choose nothing; four that agree do.
     assert _share([press(1.0, 1.3), press(1.0, 1.2), press(1.0, 1.2), press(0.5, 1.0)]) == 0.75
     assert _share([press(1.0, 1.3), press(1.0, 1.2), press(1.0, 1.2), press(1.0, 1.3)]) == 0.0
+    # Many are believed as they are.
+    assert _share(3 * [press(1.0, 1.3), press(1.0, 1.2), press(1.0, 1.2), press(0.5, 1.0)]) != 0.75
 
 
 def test_the_correction_is_kept_with_the_checkpoint(frames, tmp_path):
