@@ -35,15 +35,9 @@ MOST_RATES = 5
 LARGEST = 6.0
 """Largest log-likelihood ratio that one press contributes [1]."""
 EVIDENCE = 24.0
-"""Least log-likelihood ratio of a corner, each press predicted by the others [1].
+"""Least log-likelihood ratio of a corner over the best effect of all presses, each press predicted by the others [1].
 
-Nine worlds without an effect (seed 98000) set it: they hold up to 17.
-Forty drawn afterwards (seed 103000) hold up to 18.6.
-"""
-BEYOND = 1.3
-"""A corner has so many times the evidence of any effect in all presses, at least [1].
-
-Chosen on 14 worlds with an effect in a corner, seed 5200.
+The number of corners searched asks for 9. Nine worlds without an effect hold up to MAXNULL (seed 98000).
 """
 REFINED = 3
 """Effects that are compared by depth: those with the most evidence."""
@@ -62,8 +56,6 @@ class Corner:
     """Rate of pressing; empty for all."""
     place: str = ""
     """Place; empty for all."""
-    evidence: float = 0.0
-    """Log-likelihood ratio over nothing, each press predicted by the others and bounded [1]."""
 
     @property
     def words(self) -> str:
@@ -89,14 +81,13 @@ class _Best:
     coefficients: np.ndarray
     gain: float
     part: int
-    third: int | None = None
-    evidence: float = 0.0
+    third: int | None
+    ratios: np.ndarray
+    """Log-likelihood ratio of each press over nothing [1], shape (presses,)."""
 
 
 def corner(problem: Problem, explained: float = 0.0) -> Corner | None:
-    """Return the effect with the most evidence, and its corner.
-
-    None if none has enough. None if it is everywhere.
+    """Return the effect with the most evidence over any effect of all presses, and its corner; None if too little.
 
     Args:
         problem: The model as it was given, with all candidates.
@@ -111,22 +102,27 @@ def corner(problem: Problem, explained: float = 0.0) -> Corner | None:
     fits = [(c, *_fitted(gram, c, c.columns, masks)) for c in candidates]
     if not fits:
         return None
-    everywhere = max(float(gains[0]) for _, _, gains in fits)
     best: dict[str, tuple[float, Candidate]] = {}
     for c, _, gains in fits:
         best[c.called] = max(best.get(c.called, (0.0, c)), (float(gains.max()), c), key=lambda item: item[0])
     chosen = [c for _, c in sorted(best.values(), key=lambda item: -item[0])[:REFINED]]
+    everywhere = max(fits, key=lambda fit: fit[2][0])[0]
+    rival = _predicted(gram, everywhere, everywhere.columns, masks[0])
     depth = course.reduced.tip[:, 2]
-    edges = np.quantile(depth[depth > 0], [0, 1 / 3, 2 / 3, 1]) if np.any(depth > 0) else np.zeros(4)
+    edges = np.append(0.0, np.quantile(depth[depth > 0], [1 / 3, 2 / 3, 1])) if np.any(depth > 0) else np.zeros(4)
     third = np.clip(np.searchsorted(edges, depth, side="right") - 1, 0, len(THIRDS) - 1)
-    found = max(_by_depth(problem, chosen, third, masks), key=lambda fit: fit.gain)
-    confined = found.third is not None or found.part > 0
-    if not confined or found.evidence < EVIDENCE or found.gain < max(BEYOND * everywhere, explained):
+    corners = [fit for fit in _by_depth(problem, chosen, third, masks) if fit.third is not None or fit.part > 0]
+    if not corners:
+        return None
+    found = max(corners, key=lambda fit: _bounded(fit.ratios - rival))
+    # Of so many corners and effects, noise prefers one by the logarithm of their number.
+    searched = np.log(len(parts) * (1 + len(THIRDS)) * len(best))
+    if _bounded(found.ratios - rival) < EVIDENCE or _bounded(found.ratios) < searched or found.gain < explained:
         return None
     k = found.third
     name = "" if k is None else f"{THIRDS[k]} ({edges[k]:.2g} to {edges[k + 1]:.2g} mm)"
     placed = found.candidate.placed(found.coefficients, course.channels)
-    return Corner(placed, name, *parts[found.part][0], found.evidence)
+    return Corner(placed, name, *parts[found.part][0])
 
 
 def _by_depth(problem: Problem, candidates: list[Candidate], third: np.ndarray, masks: np.ndarray) -> Iterator[_Best]:
@@ -145,8 +141,8 @@ def _by_depth(problem: Problem, candidates: list[Candidate], third: np.ndarray, 
             joined, index = _joined(gram, len(candidate.columns), k), np.arange(len(candidate.columns))
             coefficients, gains = _fitted(joined, candidate, index, masks)
             part = int(np.argmax(gains))
-            evidence = _evidence(joined[masks[part] > 0], candidate)
-            yield _Best(candidate, coefficients[part], float(gains[part]), part, k, evidence)
+            ratios = _predicted(joined, candidate, index, masks[part])
+            yield _Best(candidate, coefficients[part], float(gains[part]), part, k, ratios)
 
 
 def _joined(gram: np.ndarray, width: int, third: int | None) -> np.ndarray:
@@ -177,16 +173,23 @@ def _fitted(
     return values, np.einsum("pi,pi->p", values, score) - 0.5 * np.einsum("pi,pij,pj->p", values, total, values)
 
 
-def _evidence(gram: np.ndarray, candidate: Candidate) -> float:
-    """Return the log-likelihood ratio of a candidate over nothing: each press is predicted by the others, and bounded.
+def _predicted(gram: np.ndarray, candidate: Candidate, columns: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return the log-likelihood ratio of each press over nothing [1], shape (presses,); 0 outside the mask.
 
-    Noise, and one odd press, have none.
+    Each press is predicted by the others: noise, and one odd press, have no evidence.
     """
-    score, each = gram[:, 0, 1:], gram[:, 1:, 1:]
+    index, own = columns + 1, np.flatnonzero(mask)
+    score, each = gram[own[:, None], 0, index], gram[own[:, None, None], index[:, None], index]
     others = _solved(each.sum(axis=0) - each, score.sum(axis=0) - score)
     others = np.clip(others, np.minimum(candidate.low, 0.0), np.maximum(candidate.high, 0.0))
-    gains = np.einsum("ei,ei->e", others, score) - 0.5 * np.einsum("ei,eij,ej->e", others, each, others)
-    return float(np.clip(gains, -LARGEST, LARGEST).sum())
+    ratios = np.zeros(len(gram))
+    ratios[own] = np.einsum("ei,ei->e", others, score) - 0.5 * np.einsum("ei,eij,ej->e", others, each, others)
+    return ratios
+
+
+def _bounded(ratios: np.ndarray) -> float:
+    """Return the sum over presses of log-likelihood ratios, each bounded [1]."""
+    return float(np.clip(ratios, -LARGEST, LARGEST).sum())
 
 
 def _solved(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:

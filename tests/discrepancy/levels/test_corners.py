@@ -36,12 +36,20 @@ def fast(made):
     return (speeds(made)[0] > 1)[made.episode]
 
 
+def deep(made):
+    """Return the deepest third of the rows in contact, shape (rows,), bool."""
+    depth = made.tip[:, 2]
+    return depth > np.quantile(depth[depth > 0], 2 / 3)
+
+
 @pytest.mark.parametrize(
     ("where", "words"),
     [
         (lambda made: made.row_site == 1, "at (1, 0) mm"),
         (fast, "presses at 2 mm/s"),
         (lambda made: fast(made) & (made.row_site == 0), "presses at 2 mm/s, at (0, 0) mm"),
+        (deep, "deep (0.6 to 1 mm)"),
+        (lambda made: fast(made) & deep(made), "deep (0.6 to 1 mm), presses at 2 mm/s"),
     ],
 )
 def test_a_delay_of_one_corner_is_found_there(where, words):
