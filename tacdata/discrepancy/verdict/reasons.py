@@ -13,7 +13,7 @@ from tacdata.discrepancy.levels.several_names import LEFT_T, SHARE_LEFT_ALONE
 from tacdata.discrepancy.plain_number import plain_number
 from tacdata.discrepancy.search.findings import Findings, FoundEffect
 from tacdata.discrepancy.verdict.decide import Decided, Decision, Reason
-from tacdata.discrepancy.verdict.sealed import Gap
+from tacdata.discrepancy.verdict.sealed import Gap, borne_out
 from tacdata.discrepancy.verdict.text import LEAST_CLOSED, worsened
 from tacdata.effects import Family, load
 
@@ -139,11 +139,12 @@ def _there(names: str, count: int, decision: Decision, gap: Gap | None) -> str:
 
 
 def _small(count: int, gap: Gap | None) -> str:
-    """Return a remark on small effects, without which sealed presses fit as well; empty for larger ones."""
+    """Return a remark on effects that hardly change the fit of sealed presses; empty for larger ones."""
     sealed = gap.document() if gap is not None and len(gap.before) else {}
     if not sealed or abs(sealed["after"] - sealed["before"]) > SMALL * sealed["before"]:
         return ""
-    return f". {'It is' if count == 1 else 'They are'} small: sealed presses fit as well without"
+    evidence = ", yet seen on sealed presses" if borne_out(gap) else ": sealed presses fit as well without"
+    return f". {'It is' if count == 1 else 'They are'} small{evidence}"
 
 
 def _other_laws(decision: Decision, findings: Findings) -> str:

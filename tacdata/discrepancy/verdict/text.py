@@ -196,7 +196,8 @@ def _sizes(verdict: dict[str, Any]) -> list[str]:
             lines.append(
                 f"  a regression on the path's history would bring the sealed ones to {figure(sealed['ceiling'])}"
             )
-        lines += [] if none or sealed["certain"] else _borne_out(sealed.get("ratio"))
+        closes = sealed["certain"] and sealed["closed"] >= LEAST_CLOSED
+        lines += [] if none or closes else _borne_out(sealed.get("ratio"))
     if not none and remainder["after"] < remainder["before"]:
         clear = f"{remainder['t']:.1f} standard errors above zero"
         beyond = clear if remainder["t"] >= WITHIN_NOISE else "no more than chance"

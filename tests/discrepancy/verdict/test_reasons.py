@@ -141,6 +141,10 @@ def test_an_effect_that_sealed_presses_do_not_need_is_said_to_be_small():
         shown = Gap(np.full(4, 30.0), np.full(4, after), np.full(4, 1.0), tuple("abcd"))
         words = reason_in_words(decision, found, DataChecks(8), shown)
         assert words.endswith("It is small: sealed presses fit as well without") == small
+        # Given pose and gain of each press, the likelihood may support an effect that hardly lowers the mean square.
+        shown = replace(shown, ratio=LikelihoodRatio(77.0, 1.1, 1.0, 77.0))
+        words = reason_in_words(decision, found, DataChecks(8), shown)
+        assert words.endswith("It is small, yet seen on sealed presses") == small
 
 
 def test_a_family_is_said_once_with_all_that_fit_best():
