@@ -67,9 +67,8 @@ def read_case(path: StrPath) -> Case:
         check_touch(request.indenter, size, (request.x, request.y), request.yaw, deepest, str(path))
     mesh = mesh_for(sensor, request)
     if "mesh" in document:
-        entry: dict[str, Any] = dict(document["mesh"])
-        entry["focus"] = tuple(entry["focus"]) if "focus" in entry else None
-        mesh = MeshSettings(**entry)
+        focus = document["mesh"].get("focus")
+        mesh = MeshSettings(**{**document["mesh"], "focus": tuple(focus) if focus else None})
     # The estimate is made apart from the states, so that their times are their own.
     pointwise = document.get("volumes") == "points"
     settings = ModelSettings(mesh=mesh, error_estimate=False, averaged_from=0.5 if pointwise else 0.0)
