@@ -68,7 +68,7 @@ def read_case(path: StrPath) -> Case:
     mesh = mesh_for(sensor, request)
     if "mesh" in document:
         focus = document["mesh"].get("focus")
-        mesh = MeshSettings(**{**document["mesh"], "focus": tuple(focus) if focus else None})
+        mesh = MeshSettings(**dict[str, Any](document["mesh"], focus=tuple(focus) if focus else None))
     # The estimate is made apart from the states, so that their times are their own.
     pointwise = document.get("volumes") == "points"
     settings = ModelSettings(mesh=mesh, error_estimate=False, averaged_from=0.5 if pointwise else 0.0)
