@@ -65,7 +65,8 @@ def shapes(condition: PressKind) -> list[Shape]:
         *(("dry_friction", form, "reading", curve[:, None] * ones) for form, curve in friction),
         ("gain", "of the readings", "1", base - baseline),
         ("z_offset", "of the depth", "mm", slope),
-        ("backlash", "of the drive", "mm", slope * (last < 0)[:, None]),
+        ("backlash", "of the drive on its way out", "mm", slope * (last < 0)[:, None]),
+        ("backlash", "of the drive, half on either way", "mm", slope * -0.5 * last[:, None]),
     ]
     for share in MEMORIES:
         entries.append(("relaxation", f"over {share * span:.2g} s", "1", base - _lagged(base, time, share * span)))

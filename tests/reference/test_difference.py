@@ -18,13 +18,13 @@ WAY = np.sign(np.gradient(DEPTH, TIME)) * (np.abs(np.gradient(DEPTH, TIME)) > 2)
 HEADING = Machines(("after",), ("before",), "", "A")
 
 
-def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01, effort=None):
+def machine(change, presses=12, loads=("20", "40"), seed=0, wander=0.01, effort=None, law=0.006 * DEPTH):
     """Compare presses of a motor with load, friction and wander; a change acts in the second half of each load."""
     rng = np.random.default_rng(seed)
     readings, names, measured = [], [], []
     for load in loads:
         for k in range(presses):
-            base = 0.4 + 0.2 * np.abs(WAY) + 0.002 * float(load or 20) * WAY + 0.006 * DEPTH
+            base = 0.4 + 0.2 * np.abs(WAY) + 0.002 * float(load or 20) * WAY + law
             base = base + wander * rng.normal() * np.abs(WAY) + 0.02 * rng.normal(size=len(TIME))
             readings.append(change(load, base) if k >= presses // 2 else base)
             names.append(load)
@@ -70,6 +70,16 @@ def test_a_seeded_fault_is_named_with_its_signed_size(fault):
     for s in found.named[0].changed:
         assert s.value == pytest.approx(size, rel=0.2)
     assert found.named[0].changed
+
+
+@pytest.mark.parametrize("way_in", [0.0, -0.5], ids=["on the way out", "half on either way"])
+def test_play_is_named_wherever_its_zero_was_found(way_in):
+    play, last = 4.0, np.where(TIME < 6.0, 1.0, -1.0)
+    healthy, late = (0.01 * np.maximum(x - 10.0, 0.0) ** 1.25 for x in (DEPTH, DEPTH + play * (way_in + (last < 0))))
+    found = machine(lambda load, base: base + late - healthy, effort=False, law=healthy, wander=0.003)
+    assert [m.name for m in found.named] == ["backlash"]
+    for s in found.named[0].changed:
+        assert s.value == pytest.approx(play, rel=0.2)
 
 
 def test_a_response_has_no_friction_that_ends_with_the_motion():
