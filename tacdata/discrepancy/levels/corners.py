@@ -37,7 +37,7 @@ LARGEST = 6.0
 EVIDENCE = 24.0
 """Least log-likelihood ratio of a corner over the best effect of all presses, each press predicted by the others [1].
 
-Worlds without an effect hold up to 5 (nine, seed 98000) and 7 (thirty drawn afterwards, seed 112000).
+Worlds without an effect hold up to 5 (nine, seed 98000) and 7 (forty drawn afterwards, seed 112000).
 """
 REFINED = 3
 """Effects that are compared by depth: those with the most evidence."""
