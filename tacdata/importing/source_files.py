@@ -156,11 +156,10 @@ def _hits(source: Path, name: str, entry: FileEntry) -> list[Hit]:
     for path in entry.paths if not hits else ():
         fitting = _matches(source, path)
         if not fitting:
-            raise UsageError(
-                f"no file fits {path} below {source}",
-                "one or more",
-                f"correct files/{name}/path in the mapping; there is {_listing(source)}",
-            )
+            names = [p.relative_to(source).as_posix() for p in files_below(source)]
+            there = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "") or "nothing"
+            remedy = f"correct files/{name}/path in the mapping; there is {there}"
+            raise UsageError(f"no file fits {path} below {source}", "one or more", remedy)
         hits += fitting
     return _in_tables(hits, entry.table) if isinstance(entry.table, str) and "{" in entry.table else hits
 
@@ -326,8 +325,3 @@ def _regex(pattern: str) -> str:
 def natural(text: str) -> list[tuple[int, int, str]]:
     """Return the key by which names are sorted with their numbers by size."""
     return [(1, int(t), "") if t.isdigit() else (0, 0, t) for t in re.split(r"(\d+)", text) if t]
-
-
-def _listing(source: Path) -> str:
-    names = [p.relative_to(source).as_posix() for p in files_below(source)]
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "") or "nothing"

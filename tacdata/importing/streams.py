@@ -148,7 +148,8 @@ def _timed(
     bare = replace(clock, offset=None)
     time_ns, zero = times(table, bare, f"{name}: time")
     tick_ns = 0.0 if zero == "unix" else _tick(table, bare, time_ns, name)
-    where = f"{table.path.name}: {_clock_name(clock)}"
+    column = "time" if clock.column is None else clock.column
+    where = f"{table.path.name}: {' '.join(map(str, column)) if isinstance(column, list) else column}"
     if (numbers := _clock_numbers(table, bare, name)) is not None and clock.rate is None:
         time_ns, lost = restored(numbers, time_ns, where)
         doubts = (*lost, *doubts)
@@ -182,11 +183,6 @@ def _without_others(time_ns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray
         return time_ns, 0
     timed = int((empty & (time_ns != NEVER)).sum())
     return np.where(empty, NEVER, time_ns), timed
-
-
-def _clock_name(clock: SourceClock) -> str:
-    column = "time" if clock.column is None else clock.column
-    return " ".join(map(str, column)) if isinstance(column, list) else str(column)
 
 
 def _tick(table: SourceTable, clock: SourceClock, time_ns: np.ndarray, name: str) -> float:

@@ -4,14 +4,18 @@ import json
 
 import h5py
 import numpy as np
+import openpyxl
 import pytest
 import yaml
+from scipy.io import savemat
 from sources import NAMES, table
 
 from tacdata.errors import TacdataError
+from tacdata.importing.formats.source_format import read_table
 from tacdata.importing.imported_session import import_session
 from tacdata.importing.proposing.description import described
 from tacdata.importing.proposing.proposal import proposed_mapping
+from tacdata.importing.proposing.roles import roles_of
 from tacdata.recording import read_session
 from tacdata.recording.files.reader import read_episode
 
@@ -240,3 +244,77 @@ def test_durations_with_days_and_names_with_brackets_are_read(tmp_path):
         ",".join(row) for row in [rows[0], *([span, *row[1:]] for span, row in zip(spans, rows[1:], strict=False))]
     )
     are_right(imported(tmp_path, {"run.csv": text})[0])
+
+
+def test_units_in_a_block_of_json_are_those_of_the_columns(tmp_path):
+    rows = [{"t": 1000 * r[0], "depth": 1000 * r[1], "c0": r[2], "c1": r[3]} for r in ROWS.tolist()]
+    units = {"t": "ms", "depth": "um", "c0": "pF", "c1": "pF"}
+    are_right(imported(tmp_path, {"run.json": json.dumps({"units": units, "samples": rows})})[0])
+
+
+def test_cells_of_matlab_are_refused_with_the_line_that_saves_them(tmp_path):
+    cells = np.empty(3, object)
+    cells[:] = [ROWS[:100], ROWS[:90], ROWS[:80]]
+    savemat(tmp_path / "run.mat", {"trials": cells})
+    with pytest.raises(TacdataError, match=r"writematrix\(trials\{k\}"):
+        read_table(tmp_path / "run.mat")
+
+
+def test_frames_of_a_matrix_are_a_row_each(tmp_path):
+    frames = [
+        f"FRAME {k} t={1000 * r[0]:.0f} ms z={r[1]:.4f} mm\n{r[2]:.4f} {r[3]:.4f}\n{r[3]:.4f} {r[2]:.4f}\n"
+        for k, r in enumerate(ROWS)
+    ]
+    cut = "FRAME 9999 t=1 ms z=0.1 mm\n10.0 10.0\n"
+    episodes, said = imported(tmp_path, {"run.txt": "# 2 x 2\n" + "\n".join([*frames[:7], cut, *frames[7:]])})
+    are_right(episodes)
+    assert episodes[0].taxels.counts.shape[1] == 4
+    assert any("2 lines with another number of columns" in text for text in said)
+
+
+def test_an_oscilloscope_states_its_interval_and_shifts_its_units(tmp_path):
+    head = "Model,DPO4104\n\nSample Interval,0.05\nVertical Units,um,V,V\nProbe Attenuation,1,1,1\n\n"
+    rows = lines(ROWS[:, 1:] * [1000, 1, 1], names=("CH1_a", "CH2", "CH3"))
+    episodes, said = imported(tmp_path, {"T0007.CSV": head + rows})
+    are_right(episodes)
+    assert any("20 rows a second is stated" in text for text in map(str, said))
+
+
+def test_a_sheet_of_settings_states_the_rate(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["Sampling rate", 20, "Hz"])
+    sheet = book.create_sheet("Data")
+    for row in (NAMES[1:], *ROWS[:, 1:].tolist()):
+        sheet.append(row)
+    (tmp_path / "files").mkdir()
+    book.save(tmp_path / "files" / "run.xlsx")
+    are_right(of(tmp_path / "files")[0])
+
+
+@pytest.mark.parametrize(
+    ("names", "channels"),
+    (
+        (("t [s]", "Weg [mm]", "R1 [Ohm]", "R2 [Ohm]", "R3 [Ohm]", "Reading"), 3),
+        (("t [s]", "present_position [mm]", "taxel_0", "taxel_1", "present_current", "goal_current"), 2),
+        (("t [s]", "$POS_ACT.Z [mm]", "$ANIN[1]", "$ANIN[2]", "$AXIS_ACT.A1", "$POS_ACT.B"), 2),
+    ),
+)
+def test_counters_joints_and_motors_are_no_channels(tmp_path, names, channels):
+    last = np.column_stack([ROWS[:, 3], np.arange(len(ROWS))]) if channels == 3 else ROWS[:, [3, 2]]
+    (tmp_path / "run.csv").write_text(lines(np.hstack([ROWS, last]), names=names))
+    assert roles_of(read_table(tmp_path / "run.csv"))["channels"] == list(names[2 : 2 + channels])
+
+
+def test_raw_and_treated_readings_of_one_channel_are_asked_about(tmp_path):
+    names = ("t [s]", "depth [mm]", "tip0_p_raw_hPa", "tip0_p_comp_hPa")
+    assert any("raw and treated" in str(text) for text in imported(tmp_path, {"run.csv": lines(ROWS, names=names)})[1])
+
+
+def test_a_clock_without_a_unit_hides_no_question_about_the_height(tmp_path):
+    rows = lines(ROWS * [1000, -1, 1, 1] + [0, 412, 0, 0], names=("timer", "z [mm]", "c0", "c1"))
+    (tmp_path / "run.csv").write_text(rows)
+    proposal = proposed_mapping(tmp_path, described(tmp_path)[0])
+    assert all(
+        any(words in text for text in proposal.questions) for words in ("no unit is given", "a machine's height")
+    )
+    assert proposal.mapping.trials.press_above

@@ -26,7 +26,7 @@ from tacdata.importing.text.layout import (
     split,
     text_layout,
 )
-from tacdata.importing.text.serial_lines import with_receipt, without_labels
+from tacdata.importing.text.serial_lines import with_frames, with_receipt, without_labels
 from tacdata.importing.text.stated_rate import stated_counts, stated_rate
 from tacdata.importing.text.written_numbers import ungrouped
 
@@ -77,7 +77,7 @@ def table_of(path: Path, data: bytes, options: ReadOptions, notes: list[str]) ->
     Raises:
         FormatError: If it has no rows of numbers.
     """
-    data = _upright(without_labels(with_receipt(data)), options, path, notes)
+    data = _upright(without_labels(with_receipt(with_frames(data))), options, path, notes)
     # A line of settings may be longer than all that is looked at otherwise.
     begin = data[:SNIFFED] if data.count(b"\n", 0, SNIFFED) >= FEWEST else data[: SETTINGS + SNIFFED]
     head = begin.decode("utf-8", "ignore")

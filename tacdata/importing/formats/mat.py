@@ -59,16 +59,13 @@ class Mat(SourceFormat):
             variables = {selection: variables[selection]}
         arrays: dict[str, np.ndarray] = {}
         lost: list[str] = []
-        variables = _with_names(variables)
         for name, value in variables.items():
             arrays |= _flatten(name if len(variables) > 1 else "", value, lost)
         table = rows_of(path, arrays, options)
         if lost and not table.rows:
-            raise FormatError(
-                f"{path}: {', '.join(lost)} holds cells of different kinds",
-                "numbers, texts, structures, and cells that hold tables of one width",
-                "in MATLAB: T = array2table(trials{1}); writetable(T, 'trial1.csv'), and so for each trial",
-            )
+            cell = lost[0] if len(variables) > 1 else next(iter(variables))
+            way = f"in MATLAB, for each k: writematrix({cell}{{k}}, sprintf('trial%d.csv', k))"
+            raise FormatError(f"{path}: cells of MATLAB: {', '.join(lost)}", "numbers, texts and structures", way)
         notes = [f"{path.name}: neither numbers nor texts, left out: {', '.join(lost)}"] if lost else []
         return replace(table, notes=(*notes, *table.notes))
 
@@ -85,32 +82,6 @@ def _loaded(path: Path) -> dict[str, Any]:
     # `whosmat` reads the directory alone, so a file that would fill the memory is refused before it is loaded.
     refuse_growth(path, sum(8.0 * math.prod(shape) for _, shape, _ in whosmat(path)))
     return loadmat(path, simplify_cells=True)
-
-
-def _with_names(variables: dict[str, Any]) -> dict[str, Any]:
-    """Return variables with cells of tables as elements, their columns named by a cell with one text a column."""
-    found, used = dict(variables), set()
-    texts = {name: [str(text) for text in value] for name, value in variables.items() if _is_texts(value)}
-    for name, value in variables.items():
-        is_cell = isinstance(value, np.ndarray) and value.dtype.hasobject and value.ndim == 1
-        parts = list(value) if is_cell else [value]
-        if name in texts or not parts or not all(np.ndim(p) == 2 and np.asarray(p).dtype.kind in "biuf" for p in parts):
-            continue
-        widths = {np.shape(part)[1] for part in parts}
-        label = next((key for key, names in texts.items() if {len(names)} == widths), None)
-        if label is None and (not is_cell or len(widths) > 1):
-            continue
-        used |= {label}
-        tables = [dict(zip(texts[label], part.T, strict=True)) if label else {"columns": part} for part in parts]
-        found[name] = tables if is_cell else tables[0]
-    return {name: value for name, value in found.items() if name not in used}
-
-
-def _is_texts(value: Any) -> bool:
-    """Return whether a variable is a list of different texts."""
-    if not isinstance(value, list | np.ndarray) or np.ndim(value) != 1 or len(value) < 2:
-        return False
-    return all(isinstance(text, str) for text in value) and len(set(value)) == len(value)
 
 
 def _flatten(name: str, value: Any, lost: list[str]) -> dict[str, np.ndarray]:

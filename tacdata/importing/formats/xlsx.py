@@ -18,6 +18,7 @@ from tacdata.importing.formats.csv import table_of
 from tacdata.importing.formats.source_format import SourceFormat, refuse_growth, zipped_size
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.source_table import SourceTable
+from tacdata.importing.text.stated_rate import stated_rate
 from tacdata.importing.units import OTHERS, plain, quantity_of
 
 TABS = ReadOptions(delimiter="tab", decimal=".")
@@ -31,8 +32,8 @@ MOST_MARKED = 300_000_000
 """Largest sheet whose marks are read [byte]."""
 LARGEST_SHEETS = 32 * 1024 * 1024
 """Size of sheets that are always read [byte]; larger ones may be compressed as far as real ones are."""
-HEAD = 60
-"""Rows of a sheet that tell whether it holds numbers."""
+HEAD, HEAD_BYTES, FEW = 60, 4096, 10
+"""Rows of a sheet that tell whether it holds numbers, bytes of another that may state a rate, fewest rows of data."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,9 @@ def _first_table(
         if text := _as_text(sheet, marks(path, sheet), notes[sheet.title]):
             sheets[sheet.title] = text
     hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != sheet_name]
-    for name, data, decimal in [(name, data, decimal) for decimal in ".," for name, data in sheets.items()]:
+    # A sheet of a few lines holds settings.
+    ranked = sorted(sheets.items(), key=lambda sheet: sheet[1].count(b"\n") < FEW)
+    for name, data, decimal in [(name, data, decimal) for decimal in ".," for name, data in ranked]:
         try:
             formats = _units_of_formats(book[name])
             tabs = replace(options, delimiter=TABS.delimiter, decimal=decimal)
@@ -126,7 +129,9 @@ def _first_table(
             refused = refused or error
             continue
         units = {name: unit for name, unit in zip(table.columns, formats, strict=False) if unit}
-        table = replace(table, units={**units, **table.units})
+        others = [text[:HEAD_BYTES].decode("utf-8", "ignore") for title, text in sheets.items() if title != name]
+        rate = next(filter(None, [table.rate, *(stated_rate(text, len(text)) for text in others)]), 0.0)
+        table = replace(table, units={**units, **table.units}, rate=rate)
         return table, name, [*(title for title in sheets if title != name), *(f"{title} (hidden)" for title in hidden)]
     raise FormatError(
         f"{path}: no sheet with rows of numbers ({', '.join(sheets)})" if refused else f"{path} holds no rows",

@@ -37,7 +37,7 @@ class OrderPolicy:
 
 
 POLICY = OrderPolicy()
-BITS = (16, 24, 32)
+BITS = (15, 16, 24, 32)
 """Widths of counters that wrap [bit]."""
 TICKS = {1_000: "microseconds", 1_000_000: "milliseconds"}
 """Ticks that boards count, as micros() and millis() do [ns]."""

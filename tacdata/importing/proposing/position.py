@@ -77,9 +77,12 @@ def proposed_position(
     entry = PositionEntry(file=kind.alias, clock=clock, axes=dict[str, Quantity](axes))
     try:
         time_ns, _ = times(table, clock, "")
+    except FormatError:  # reported where the clock was read; the path has a sign and a zero at any rate
+        time_ns, pauses = np.arange(table.rows) * 10_000_000, False
+    try:
         path = _without_ends(table.column(names[pressing]).astype(float))
         motion = pressing_axis(time_ns, path, _deviation(table, channels, path), pauses=pauses)
-    except (FormatError, ValueError):  # reported where the clock was read
+    except ValueError:
         return ProposedPosition(entry, questions=tuple(questions))
     return _turned(entry, kind, axes, motion, channels, questions)
 

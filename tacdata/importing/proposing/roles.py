@@ -16,10 +16,10 @@ BODY = r"(pos(ition)?|loc(ation)?|stage|tcp|tip|tool|ee|robot|probe|indenter|act
 GUESSES = {
     "time": (
         r"(x_value|time|t|ts|utc|gmt|timestamp|stamp|zeit|clock|datetime|date|datum|uhrzeit|elapsed|tiempo|temps|tempo|时间|時間)"
-        r"([_ ]?(time|zeit|uhrzeit))?|\w+_(time_?)?stamp(_(ns|us|ms|s|sec))?"
+        r"([_ ]?(time|zeit|uhrzeit))?|((realtime|sys(tem)?)_?)?ticks?|\w+_(time_?)?stamp(_(ns|us|ms|s|sec))?"
     ),
     "depth": (
-        r"(depth|indentation|displacement|disp|travel|stroke|extension|crosshead|pos(ition)?"
+        r"(depth|indentation|displacement|disp|travel|stroke|extension|crosshead|((present|actual|measured)_)?pos(ition)?"
         r"|(traversen|verfahr)?weg|eindringtiefe|d|dist(ance)?|desplazamiento|d[eé]placement|spostamento|位移|変位)"
     ),
     "set_point": (
@@ -48,12 +48,13 @@ GUESSES = {
     "value": r"(value|val|reading|wert)",
     "setting": (
         r"((set_?|target_?)?(speed|velocity|vel|feed_?rate|geschwindigkeit))"
-        r"|(set|target|cmd|demand|desired|commanded)_\w+|\w+_(limit|target|set)|gain|k[pid]|(\w+_)?actions?"
+        r"|(set|target|goal|cmd|demand|desired|commanded)_\w+|\w+_(limit|target|set)|gain|k[pid]|(\w+_)?actions?"
     ),
     "state": (
         r"(segment|segm|state|status|moving|flag|block|mode|phase|enabled?|valid)(_?(id|no|nr|number|index))?"
         r"|(rel(ative)?_)?humidity|rh|rssi|snr|signal_strength|(barometric|air|ambient)_pressure|dew_?point"
         r"|(\w+_)?(flag|fault|alarm|warning|status|state|error(_code)?)|is_\w+|battery\w*|cpu\w*"
+        r"|present_(velocity|current|pwm|load|temperature|input_voltage)"
     ),
     "orientation": r"(rot(ation)?|quat(ernion)?|orientation|q)_?[xyzw]|roll|pitch|yaw",
     "joint": (
@@ -94,6 +95,8 @@ NO_PLACE = (
     r"|(mag\w*|taxel|cell|pad|sensor)_?\d*"
 )
 """What has axes and is no place, in the path of a name."""
+ROBOT = re.compile(r"\W*(?:axis|joint)\w*\.[aej]?(\d)|\W*pose?(?:_\w+)?\.[abc]")
+"""Joints and angles of robots, as $AXIS_ACT.A1 and $POS_ACT.A."""
 AGAIN, NUMBERED = re.compile(r"(.+?)\.\d+"), re.compile(r"(.+?)[ _-]?[(#]?\d+\)?")
 """A name that comes again, as pandas numbers it, and as people do."""
 NAMED = re.compile(r"_?(id|no|nr|number|index)$")
@@ -125,20 +128,20 @@ def roles_of(table: SourceTable) -> dict[str, list[str]]:
             roles["depth"] = roles.pop("x")
     if "time" not in roles and table.columns and not any(re.search(r"[A-Za-z]", name) for name in table.columns):
         _most_evenly_rising(table, roles)
-    if not roles.get("time") and (array := _lone_array(table)):
-        _first_rising_inside(table, array, roles)
+    if not roles.get("time") and len(whole := [name for name in table.columns if name != "trial"]) == 1:
+        _first_rising_inside(table, whole[0], roles)
     if not roles.get("time"):
         _evenly_rising(table, roles)
+    if not ("number" in roles and "value" in roles):
+        # Without a column that numbers channels a value is a channel, and the other way round.
+        unnumbered = [name for name in roles.pop("number", []) if not NAMED.search(name.lower())]
+        roles["channels"] += roles.pop("value", []) + unnumbered
     if idle := without_signal(table, roles["channels"]):
         roles["idle"] = list(idle)
         roles["channels"] = [name for name in roles["channels"] if name not in idle]
     if not {"depth", "z"} & set(roles):
         _drive(table, roles)
     _set_for_each_trial(table, roles)
-    if not ("number" in roles and "value" in roles):
-        # Without a column that numbers channels a value is a channel, and the other way round.
-        unnumbered = [name for name in roles.pop("number", []) if not NAMED.search(name.lower())]
-        roles["channels"] += roles.pop("value", []) + unnumbered
     if not roles["channels"] and "force" not in roles:
         roles["channels"] = roles.pop("strain", []) + roles.pop("angle", [])
     if "time" in roles and f"{roles['time'][0]}'" in table.columns:
@@ -187,6 +190,8 @@ def bare_name(name: str) -> str:
     bare, _ = split_unit(path[-1])
     if len(path) > 1 and bare in "xyzw" and re.fullmatch(NO_PLACE, path[-2].lower()):
         bare = f"{path[-2]}_{bare}"
+    if match := ROBOT.fullmatch(name.lower()):
+        bare = f"joint_{match[1]}" if match[1] else "yaw"
     return re.sub(r"[\s-]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower()).strip("_")
 
 
@@ -206,6 +211,11 @@ def _role(table: SourceTable, name: str, values: np.ndarray) -> str | None:
     # "t" with the unit of another quantity, as V, is no time.
     if role == "time" and values.dtype != object and unit != "s" and unit_text.lower() in OTHERS:
         role = None
+    # R2 is a resistance next to R1, and X a count of rows where it rises by 1.
+    if bare in ("r2", "r_2") and {"r1", "r_1", "r3", "r_3"} & set(map(bare_name, table.columns)):
+        role = None
+    if role == "x" and values.dtype != object and values.ndim == 1 and (np.diff(values) == 1).all():
+        role = "counter"
     role = {"N": "force", "s": "time"}.get(unit or "", role)
     if role is None and len(bare) > 1 and quantity_of(bare) == "s":
         return "time"  # "ms", "seconds"
@@ -250,12 +260,6 @@ def _most_evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None
         limit = max(EVEN, 2 * min(rising.values()))
         roles["time"] = [next(name for name, spread in rising.items() if spread <= limit)]
         roles["channels"].remove(roles["time"][0])
-
-
-def _lone_array(table: SourceTable) -> str:
-    """Return the name of the only array of a table that has at most a trial number besides it; else ""."""
-    names = [name for name in table.columns if name != "trial"]
-    return names[0] if len(names) == 1 and table.inner(names[0]) else ""
 
 
 def _first_rising_inside(table: SourceTable, name: str, roles: dict[str, list[str]]) -> None:

@@ -35,19 +35,15 @@ def encoding_of(raw: bytes) -> tuple[str, bool]:
     beyond = re.findall(rb"[\x80-\xff]+", head)
     total = sum(map(len, beyond))
     in_rows = sum(len(run) for run in beyond if len(run) > 1)
-    if not total or (in_rows < RUNS * total and not _words(head)):
+    # Bytes of Shift-JIS may stand alone, too, so words of measurement count.
+    words = [word for name in ("cp932", "gb18030") for word in WORDS.findall(head.decode(name, "ignore"))]
+    if not total or (in_rows < RUNS * total and max(map(len, words), default=0) < 2):
         return "latin-1", False
     hits = {name: _hits(raw, name) for name in ENCODINGS if name != "latin-1"}
     best = max(hits, key=lambda name: hits[name])
     if hits[best] > 0:
         return best, False
     return next((name for name, count in hits.items() if count == 0), "latin-1"), True
-
-
-def _words(head: bytes) -> bool:
-    """Return whether words of measurement appear: bytes of Shift-JIS may stand alone, too."""
-    texts = (head.decode(name, "ignore") for name in ("cp932", "gb18030"))
-    return any(len(word) > 1 for text in texts for word in WORDS.findall(text))
 
 
 def _hits(raw: bytes, name: str) -> int:

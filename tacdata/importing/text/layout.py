@@ -96,8 +96,10 @@ def text_layout(text: str, options: ReadOptions, origin: str) -> TextLayout:
     decimal = options.decimal or _decimal(rows)
     first = _first_row(rows, width, decimal)
     if first is None:
+        settings = [f"{name} {value!r}" for name in GUESSED if (value := getattr(options, name))]
+        given = f", read with {' and '.join(settings)} as the mapping says" if settings else ""
         raise FormatError(
-            f"{origin}: no row of numbers among its first {len(lines)} lines{_as_given(options)}",
+            f"{origin}: no row of numbers among its first {len(lines)} lines{given}",
             "a text file of columns, with or without a header",
             _otherwise(text, options, origin) or "give delimiter, decimal, skip or header under files in the mapping",
         )
@@ -124,12 +126,6 @@ def _are_row_names(rows: list[list[str]]) -> bool:
         return False
     begin = int(first[0]) if first[0].isdigit() else -1
     return first == [str(begin + k) for k in range(len(first))] or not any(is_number(name, ".") for name in first)
-
-
-def _as_given(options: ReadOptions) -> str:
-    """Return the layout that the mapping gives, as the end of a sentence."""
-    settings = [f"{name} {value!r}" for name in GUESSED if (value := getattr(options, name))]
-    return f", read with {' and '.join(settings)} as the mapping says" if settings else ""
 
 
 def _otherwise(text: str, options: ReadOptions, origin: str) -> str:
@@ -283,13 +279,14 @@ def _names(header: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[s
     """
     if not header:
         return tuple(str(k) for k in range(width)), {}
-    rows = [[field.lstrip("\ufeff").strip() for field in [*row, *[""] * width][:width]] for row in header]
-    rows = rows[-LINES_OF_HEADER:]
+    whole = [[field.lstrip("\ufeff").strip() for field in [*row, *[""] * width]] for row in header[-LINES_OF_HEADER:]]
+    rows = [row[:width] for row in whole]
     below = next((k for k in range(len(rows) - 1, 0, -1) if are_units(rows[k])), None)
     if below is not None and not all(_filled(rows[:below])[1:]):
         below = None
-    # LabVIEW writes units above the names, behind Y_Unit_Label.
-    above = next((row for row in rows[-2::-1] if LABEL.fullmatch(row[0]) and are_units(row[1:])), None)
+    # LabVIEW writes units above the names, behind Y_Unit_Label; an oscilloscope shifts them by that.
+    above = next((row for row in whole[-2::-1] if LABEL.fullmatch(row[0]) and are_units(row[1:])), None)
+    above = above and above[any(above[width:]) :]
     units_row = rows[below] if below is not None else above
     titles = _filled(rows[:below])
     numeric = [any(field and field not in MISSING and is_number(field, ".") for field in row) for row in rows]

@@ -1,4 +1,4 @@
-"""Lines of serial monitors as columns: a time before an arrow, or a name before each value."""
+"""Lines of serial monitors as columns: a time before an arrow, a name before each value, or frames of a matrix."""
 
 import re
 from collections import Counter
@@ -6,14 +6,18 @@ from collections import Counter
 from tacdata.importing.mapping import ReadOptions
 from tacdata.importing.text.layout import text_layout
 
-TAIL, SNIFFED = 16 * 1024, 256 * 1024
-"""Bytes at a text's end that tell whether its lines have labels, and bytes from which its layout is recognized."""
+TAIL, SNIFFED, FEWEST = 16 * 1024, 256 * 1024, 10
+"""Bytes at a text's end by which labels, and at its beginning by which a layout is recognized; fewest frames [1]."""
 ALIKE = 0.8
 """Smallest share of last lines with the same labels [1]: the last one may be cut off."""
 RECEIPT = re.compile(rb"\s*\[?(\d{1,2}:\d{2}:\d{2}[.,]\d+)\]?\s*->")
 """How a serial monitor marks when a line came."""
 LABELLED = re.compile(r"([A-Za-z_][\w%/\[\]]*)[ \t]*[:=][ \t]*([-+]?\.?\d[^\s,;|]*|nan|NaN)")
 """A name with its value, as a serial plotter reads them."""
+OF_FRAME = re.compile(LABELLED.pattern + r"(?:[ \t]+([A-Za-z\u00b5%]+)(?![\w%]|[ \t]*[:=]))?")
+"""The same with a unit, as above a frame."""
+FRAME = re.compile(r"^([A-Za-z].*\d.*)\n((?:[ \t]*[-+.\d][-+.\d \t,;eE]*\n){2,64})(?![ \t]*[-+.\d])", re.MULTILINE)
+"""A frame of a matrix: rows of numbers below a line with words and values. More rows are a trial."""
 
 
 def without_labels(data: bytes) -> bytes:
@@ -30,6 +34,28 @@ def without_labels(data: bytes) -> bytes:
         pairs = LABELLED.findall(line)
         rows.append("\t".join(value for _, value in pairs) if tuple(name for name, _ in pairs) == names else line)
     return "\n".join(rows).encode()
+
+
+def with_frames(data: bytes) -> bytes:
+    """Return frames of a matrix as a row each below a header; other text as it is."""
+    if not FRAME.search(data[-TAIL:].decode("utf-8", "replace")):
+        return data
+    text = data.decode("utf-8", "replace")
+    header, count = Counter(_frame(match)[0] for match in FRAME.finditer(text)).most_common(1)[0]
+    if count < FEWEST:
+        return data
+    # A frame of another shape stays: its lines are of another width, and counted as such.
+    rows = FRAME.sub(lambda match: _frame(match)[1] if _frame(match)[0] == header else match[0], text)
+    return f"{header}\n{rows}".encode()
+
+
+def _frame(match: re.Match[str]) -> tuple[str, str]:
+    """Return the names and the values of a frame as lines with tabs."""
+    pairs = OF_FRAME.findall(re.sub(r"^([A-Za-z]+)[ #]+(?=\d)", r"\1=", match[1]))
+    rows = [re.split(r"[\s,;]+", row.strip(" \t,;")) for row in match[2].splitlines()]
+    cells = {f"r{r}c{c}": cell for r, row in enumerate(rows) for c, cell in enumerate(row)}
+    names = [f"{name} [{unit}]" if unit else name for name, _, unit in pairs]
+    return "\t".join([*names, *cells]), "\t".join([*(value for _, value, _ in pairs), *cells.values()]) + "\n"
 
 
 def with_receipt(data: bytes) -> bytes:

@@ -4,14 +4,20 @@ import re
 
 import numpy as np
 
+from tacdata.importing.units import factor
+
 STATED_RATE = re.compile(
     r"(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq\w*)?[^\d\n]{0,20}?"
     r"(\d+(?:\.\d+)?)\s*(k?)(?:hz|s/s|sps|1/s)",
     re.IGNORECASE,
 )
 """How a file states its rate above its rows."""
-STATED_STEP = re.compile(r"^Delta_X\t(\d*[.,]?\d+(?:[eE][-+]?\d+)?)", re.MULTILINE)
-"""How LabVIEW states the time between two rows [s]."""
+STATED_STEP = re.compile(
+    r'^\W*(?:Delta_X|sampl\w*[ _](?:interval|period))"?[\t,;:=]\s*"?(\d*[.,]?\d+(?:e[-+]?\d+)?)'
+    r"(?:[\t ,;\"]*([m\u00b5un]?s(?:ec)?)\b)?",
+    re.MULTILINE | re.IGNORECASE,
+)
+"""How LabVIEW and oscilloscopes state the time between two rows [s]."""
 RATE_ALONE = re.compile(
     r"(?:sampl\w*|abtast\w*|acquisition|scan)[ _-]*(?:rate|freq\w*)\W{0,4}(?:(k?)(?:hz|s/s|sps|1/s)\W{1,4})?"
     r"(\d+(?:\.\d+)?)(?=\s*(?:$|[,;}\]\t\"]))",
@@ -23,7 +29,9 @@ STATED_COUNTS = re.compile(
     rf"(\d+(?:\.\d+)?)\s*{COUNTS}\s*(?:/|per )\s*mm\b|{COUNTS}\s*(?:/|per )\s*mm\b\W{{1,4}}(\d+(?:\.\d+)?)", re.I
 )
 """How a file states how many counts of its encoder are a millimetre."""
-COUNTED = re.compile(r"(enc(oder)?|steps?|pulses|((stage|motor|z)_?)?pos(ition)?|z)(_?(counts?|steps?|ticks?))?", re.I)
+COUNTED = re.compile(
+    r"(enc(oder)?|steps?|pulses|(stage|motor|present|z)?_?pos(ition)?|z)(_?(count|step|tick)s?)?", re.I
+)
 """Names of positions that a motor or an encoder may count."""
 
 
@@ -42,5 +50,6 @@ def stated_rate(text: str, skip: int) -> float:
         return float(match[1]) * (1000.0 if match[2] else 1.0)
     if match := RATE_ALONE.search(head):
         return float(match[2]) * (1000.0 if match[1] else 1.0)
-    step = STATED_STEP.search(head)
-    return 1 / float(step[1].replace(",", ".")) if step and float(step[1].replace(",", ".")) > 0 else 0.0
+    match = STATED_STEP.search(head)
+    step = float(match[1].replace(",", ".")) * factor(match[2] or "s", "s", "") if match else 0.0
+    return 1 / step if step > 0 else 0.0
