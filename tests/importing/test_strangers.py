@@ -282,7 +282,8 @@ def test_an_oscilloscope_states_its_interval_and_shifts_its_units(tmp_path):
 
 def test_a_sheet_of_settings_states_the_rate(tmp_path):
     book = openpyxl.Workbook()
-    book.active.append(["Sampling rate", 20, "Hz"])
+    for row in (("Name", "Value", "Unit"), ("Sampling rate", 20, "Hz"), ("Operator", "mh", None)):
+        book.active.append(row)
     sheet = book.create_sheet("Data")
     for row in (NAMES[1:], *ROWS[:, 1:].tolist()):
         sheet.append(row)

@@ -32,8 +32,8 @@ MOST_MARKED = 300_000_000
 """Largest sheet whose marks are read [byte]."""
 LARGEST_SHEETS = 32 * 1024 * 1024
 """Size of sheets that are always read [byte]; larger ones may be compressed as far as real ones are."""
-HEAD, HEAD_BYTES, FEW = 60, 4096, 10
-"""Rows of a sheet that tell whether it holds numbers, bytes of another that may state a rate, fewest rows of data."""
+HEAD, HEAD_BYTES = 60, 4096
+"""Rows of a sheet that tell whether it holds numbers, and bytes of another one that may state a rate."""
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,7 @@ def _first_table(
         if text := _as_text(sheet, marks(path, sheet), notes[sheet.title]):
             sheets[sheet.title] = text
     hidden = [sheet.title for sheet in book.worksheets if sheet not in visible and sheet.title != sheet_name]
-    # A sheet of a few lines holds settings.
-    ranked = sorted(sheets.items(), key=lambda sheet: sheet[1].count(b"\n") < FEW)
-    for name, data, decimal in [(name, data, decimal) for decimal in ".," for name, data in ranked]:
+    for name, data, decimal in [(name, data, decimal) for decimal in ".," for name, data in sheets.items()]:
         try:
             formats = _units_of_formats(book[name])
             tabs = replace(options, delimiter=TABS.delimiter, decimal=decimal)

@@ -253,7 +253,7 @@ def _most_evenly_rising(table: SourceTable, roles: dict[str, list[str]]) -> None
     rising = {}
     for name in roles["channels"]:
         steps = np.diff(table.columns[name])
-        if (steps >= 0).all() and (steps > 0).mean() > 0.5:  # a row of places is constant over many rows
+        if len(steps) and (steps >= 0).all() and (steps > 0).mean() > 0.5:  # a row of places is constant over many rows
             usual = float(np.median(steps))
             rising[name] = float(np.median(np.abs(steps - usual))) / usual if usual > 0 else np.inf
     if rising:
