@@ -67,7 +67,7 @@ def clock_of_nmea(folder: Path) -> None:
 
 @measured(1, told="rate|time")
 def increment_of_scope(folder: Path) -> None:
-    """An oscilloscope: numbers of rows, the increment in the header alone: 20 Hz, asked or refused."""
+    """An oscilloscope: numbers of rows, the increment in its first row alone: 20 Hz."""
     rows = presses()
     cells = [[str(k), *line[1:], *(["0.000000e+00", "5.000000e-02"] if not k else ["", ""])]
              for k, line in enumerate(texts(rows))]  # fmt: skip

@@ -280,6 +280,12 @@ def test_an_oscilloscope_states_its_interval_and_shifts_its_units(tmp_path):
     assert any("20 rows a second is stated" in text for text in map(str, said))
 
 
+def test_the_increment_of_an_oscilloscope_is_its_interval(tmp_path):
+    first, *rows = lines(np.column_stack([np.arange(len(ROWS)), ROWS[:, 1:]])).splitlines()
+    head = f"{first.replace('t [s]', 'X')},Start,Increment\n{rows[0]},0,0.05\n"
+    are_right(imported(tmp_path, {"run.csv": head + "".join(f"{row},,\n" for row in rows[1:])})[0])
+
+
 def test_a_sheet_of_settings_states_the_rate(tmp_path):
     book = openpyxl.Workbook()
     for row in (("Name", "Value", "Unit"), ("Sampling rate", 20, "Hz"), ("Operator", "mh", None)):

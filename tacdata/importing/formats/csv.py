@@ -99,6 +99,9 @@ def table_of(path: Path, data: bytes, options: ReadOptions, notes: list[str]) ->
     if skipped:
         notes.append(f"{path.name}: {skipped} lines with another number of columns are left out")
     rate = stated_rate(head, layout.skip)
+    step = columns.get("Increment", np.empty(0))  # an oscilloscope gives it in the first row alone
+    if step.dtype != object and np.isfinite(step).sum() == 1 and np.nansum(step) > 0:
+        rate = float(1 / np.nansum(step))
     units = {**stated_counts(head, layout.skip, columns), **layout.units}
     return SourceTable(path, columns, units, notes=tuple(notes), doubts=tuple(doubts), rate=rate)
 

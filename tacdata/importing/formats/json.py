@@ -86,8 +86,7 @@ def _units(value: Any) -> dict[str, str]:
         name, unit = value.get("name"), value.get("unit") or value.get("units")
         if isinstance(name, str) and isinstance(unit, str):
             return {name: unit}
-        # A block of units: {"units": {"t": "ms", "depth": "um"}}.
-        block = _flat(unit) if isinstance(unit, dict) else {}
+        block = _flat(unit) if isinstance(unit, dict) else {}  # {"units": {"t": "ms", "depth": "um"}}
         stated = {key.rpartition(".")[2]: each for key, each in block.items() if isinstance(each, str)}
         return stated | {name: unit for part in value.values() for name, unit in _units(part).items()}
     if isinstance(value, list) and len(value) < MOST_FIELDS:

@@ -24,6 +24,5 @@ WORD = re.compile(r"[^\W\d_]{3,}\.?")
 
 def in_english(text: str) -> str:
     """Return a date with English abbreviations in place of other names of months; other words stay."""
-    # Letters of NFD carry their accents behind them, and ASCII has none.
     bare = {w: unicodedata.normalize("NFD", w.lower()).encode("ascii", "ignore").decode() for w in WORD.findall(text)}
     return WORD.sub(lambda match: ENGLISH.get(bare[match[0]].rstrip("."), match[0]), text)

@@ -38,9 +38,9 @@ def without_labels(data: bytes) -> bytes:
 
 def with_frames(data: bytes) -> bytes:
     """Return frames of a matrix as a row each below a header; other text as it is."""
-    if not FRAME.search(data[-TAIL:].decode("utf-8", "replace")):
-        return data
     text = data.decode("utf-8", "replace")
+    if not FRAME.search(text[-TAIL:]):
+        return data
     header, count = Counter(_frame(match)[0] for match in FRAME.finditer(text)).most_common(1)[0]
     if count < FEWEST:
         return data
