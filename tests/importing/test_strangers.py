@@ -312,9 +312,19 @@ def test_counters_joints_and_motors_are_no_channels(tmp_path, names, channels):
     assert roles_of(read_table(tmp_path / "run.csv"))["channels"] == list(names[2 : 2 + channels])
 
 
-def test_raw_and_treated_readings_of_one_channel_are_asked_about(tmp_path):
-    names = ("t [s]", "depth [mm]", "tip0_p_raw_hPa", "tip0_p_comp_hPa")
-    assert any("raw and treated" in str(text) for text in imported(tmp_path, {"run.csv": lines(ROWS, names=names)})[1])
+@pytest.mark.parametrize(
+    ("names", "asked"),
+    [
+        (("tip0_p_raw_hPa", "tip0_p_comp_hPa"), True),
+        (("C1 [pF]", "Reading"), True),
+        (("C1 [pF]", "C2 [pF]"), False),
+        (("ch a", "ch b"), False),
+    ],
+)
+def test_channels_of_several_kinds_are_asked_about(tmp_path, names, asked):
+    text = lines(ROWS, names=("t [s]", "depth [mm]", *names))
+    questions = imported(tmp_path, {"run.csv": text})[1]
+    assert any("channels of 2 kinds" in str(text) for text in questions) is asked
 
 
 def test_a_clock_without_a_unit_hides_no_question_about_the_height(tmp_path):

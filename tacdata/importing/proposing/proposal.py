@@ -27,8 +27,8 @@ from tacdata.importing.units import plain, split_unit
 AXES = ("depth", "z", "x", "y")
 IDLE = ("idle", "setting", "state", "counter", "orientation", "joint", "motion", "derived")
 """Roles of columns that are no channels of a sensor."""
-TREATED = re.compile(r"[_ ]?(?<![a-z])(raw|comp(ensated)?|filt(ered)?|corr(ected)?|smooth(ed)?)(?![a-z])")
-"""Words by which a treated reading differs from the raw one."""
+NUMBERS = re.compile(r"\d+|(?<=[_ ])[a-z]$|(?<=^ch)[a-z]$")
+"""What differs between the names of channels of one kind: numbers, or a letter at the end."""
 NO_POSITION = ProposedPosition(
     questions=questions_of(["no column is named as a position or a depth: give position, or schedule"])
 )
@@ -181,11 +181,15 @@ def _unnamed(kind: SourceKind) -> list[str]:
             f"{table.path.name}: each name comes again, as in trials side by side; only the first is read. Put the "
             "others below it with a column that numbers them, into sheets or into files"
         )
-    treated: dict[str, list[str]] = {}
+    of_kind: dict[tuple[str, str], list[str]] = {}
     for name in kind.channels:
-        treated.setdefault(TREATED.sub("", name.lower()), []).append(name)
-    if twice := [name for names in treated.values() if len(names) > 1 for name in names]:
-        questions.append(f"{listed(twice[:4])}: raw and treated readings of one channel? Keep one of each under taxels")
+        bare, unit = split_unit(name)
+        of_kind.setdefault((NUMBERS.sub("", bare.lower()), table.units.get(name, unit)), []).append(name)
+    if len(of_kind) > 1:
+        kinds = "; ".join(listed(names[:4]) for names in list(of_kind.values())[:6])
+        questions.append(
+            f"channels of {len(of_kind)} kinds ({kinds}): keep under taxels the readings of one sensor alone"
+        )
     if (len(table.columns) == 1 and table.inner(next(iter(table.columns)))) or all(map(str.isdigit, table.columns)):
         time = f", {clocks[0]} as the time by its steps" if clocks else ""
         questions.append(
