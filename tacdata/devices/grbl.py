@@ -219,21 +219,17 @@ class Grbl(MotionController):
                 f"a move to {position} mm at {speed} mm/s", "finite positions and a speed above 0", "correct the plan"
             )
         x, y, z = position
-        self._queue(self._duration(np.array(position), speed))
-        self._target, self._moved = np.array(position), True
         # G53: machine coordinates; G90: absolute; G94: feed in mm/min; G21: mm; G1: a straight move.
-        return self._send(f"G53G90G94G21G1X{x:.4f}Y{y:.4f}Z{z:.4f}F{60 * speed:.3f}")
+        return self._go(f"G53G90G94G21G1X{x:.4f}Y{y:.4f}Z{z:.4f}F{60 * speed:.3f}", np.array(position), speed)
 
     def rise(self, position: tuple[float, float, float], speed: float) -> Motion:
         """Queue a move straight up; the line states no x and y, so a wrong report of them moves nothing sideways."""
-        self._queue(self._duration(np.array(position), speed))
-        self._target, self._moved = np.array(position), True
-        return self._send(f"G53G90G94G21G1Z{position[2]:.4f}F{60 * speed:.3f}")
+        return self._go(f"G53G90G94G21G1Z{position[2]:.4f}F{60 * speed:.3f}", np.array(position), speed)
 
     def dwell(self, seconds: float) -> Motion:
         """Pause [s]; GRBL answers only when the planner is empty and the pause is over."""
         self._queue(max(seconds, 0.0))
-        return self._send(f"G4P{max(seconds, 0.0):.3f}")
+        return self._send(f"G4P{max(seconds, 0.0):.3f}", self._remaining)
 
     def wait_idle(self, timeout: float) -> None:
         """Return when the planner is empty (``G4 P0.01`` answered) and a fresh report is Idle."""
@@ -330,9 +326,14 @@ class Grbl(MotionController):
             raise DeviceError(f"the controller on {self.port} is not open", "an open one", "open it first")
         return self._link
 
-    def _send(self, line: str) -> Motion:
-        motion = self._remaining
-        _, sent_ns, acknowledged_ns = self._opened().command(line, LATE[0] * motion + LATE[1], motion)
+    def _go(self, line: str, target: np.ndarray, speed: float) -> Motion:
+        before = self._remaining  # a move is answered before it begins: who stands idle has not received it
+        self._queue(self._duration(target, speed))
+        self._target, self._moved = target, True
+        return self._send(line, before)
+
+    def _send(self, line: str, before: float) -> Motion:
+        _, sent_ns, acknowledged_ns = self._opened().command(line, LATE[0] * self._remaining + LATE[1], before)
         return Motion(line, sent_ns, acknowledged_ns)
 
     @property
@@ -348,8 +349,7 @@ class Grbl(MotionController):
         last = self._opened().last
         start = self._target if self._target is not None else last.position if last else position
         length = float(np.linalg.norm(position - start))
-        # An upper bound: along a diagonal the slowest axis need not be the limit.
-        slowest = min(speed, float(self.max_rate.min()))
+        slowest = min(speed, float(self.max_rate.min()))  # an upper bound: a diagonal may be faster
         return length / slowest + slowest / float(self.acceleration.min()) if length else 0.0
 
     def _make_ready(self, link: GrblLink) -> str:

@@ -347,6 +347,8 @@ class Recorder:
             try:
                 # The tip first, the file afterwards: writing can wait, skin relaxes and tears.
                 lifted = self._motion.lift(self._height, self.plan.motion.approach_speed)
+                if not self._motion.lifted:  # a person must free it, and a slow disk may delay the last lines
+                    self._say(f"WARNING: {reason}; {lifted}")
                 writer.note(f"broken off: {reason}; {lifted}", "error")
             finally:
                 with suppress(DeviceError):  # the fault itself must be reported first

@@ -119,6 +119,10 @@ HOMING_REQUIRED = 11
 """The alarm of a controller that was just switched on (grblHAL)."""
 POSITION_KEPT = (2, 4, 5)
 """Alarms that keep the position: nothing moved, or the machine came to rest first."""
+DEAF = (1, 2, 17)
+"""Alarms of a machine at rest that obeys no line before a reset (grblHAL: ``error:79``, or no answer in older ones;
+Grbl sends nothing at all then). The emergency stop is not among them: while it is active, a reset ends nothing.
+"""
 UNLOCK = "reset it (Ctrl-X) and unlock it ($X) in a terminal, which keeps the position; then start again"
 """Remedy of such an alarm; limit alarms take no ``$X`` before a reset."""
 DAMAGED_LINE = (1, 2, 3, 4, 11, 20, 21, 22, 23, 24, 25, 26, 27, 28, 30, 31, 36)

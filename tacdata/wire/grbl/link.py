@@ -63,13 +63,11 @@ class GrblLink:
         self.notes: list[str] = []
         self.seen = bytearray()  # first bytes ever received, for a person who has to guess the baud rate
         self.statuses = Statuses(clock)
-        self.homing = False
-        self._held = False
+        self.homing = self.polled = self._held = False
         self._unanswered: deque[SentLine] = deque()
         self.silence = Silence(port, clock, poll_rate)
         self._commanded_ns = clock.now_ns()
         self._welcome_expected, self._reset_asked = True, False
-        self.polled = False
         self._stopped, self._changed = clock.host.event(), clock.host.condition()
         self._turn = clock.host.lock()  # answers carry no name: lines are written in the order in which they wait
         self._writing = clock.host.lock()  # reentrant: a signal handler may send a hold while its thread writes
@@ -241,7 +239,7 @@ class GrblLink:
         """Raise the fault, the interruption or the hold, if there is one; ``through_hold``: only the fault."""
         wrong = self.fault or (None if through_hold else self.interruption)
         if wrong:
-            # A new error each time: several threads raise it, each with its own notes.
+            # A new error for each thread, with its own notes.
             raise DeviceError(wrong.given, wrong.allowed, wrong.remedy)
         if self._held and not through_hold:
             raise DeviceError("the motion was stopped by a feed hold", "a running machine", "start again")
@@ -354,7 +352,9 @@ class GrblLink:
 
     def _take_alarm(self, line: str, number: int | None) -> None:
         self.alarm = number
-        if self.polled or self.homing:  # at its start grblHAL reports why it is locked; opening informs a person
+        # At its start grblHAL reports why it is locked; opening informs a person.
+        deaf = number in codes.DEAF and not (self.last and self.last.state.startswith("Alarm"))
+        if self.polled or self.homing or deaf:  # deaf from now on: no answer comes
             self.halted = True
             self._fail(*stopped_by(number, line), lost=number not in codes.POSITION_KEPT)
 

@@ -26,10 +26,6 @@ RESETS = 4
 """Attempts to reset a controller within `ANSWER` [count]: one byte may be lost on its way, or its welcome damaged."""
 TALKS = ("Idle", "Alarm")
 """States in which ``$`` commands are answered."""
-DEAF = (1, 2, 17)
-"""Alarms of a machine at rest that obeys no line before a reset (grblHAL: ``error:79``, or no answer in older ones;
-Grbl sends nothing at all then). The emergency stop is not among them: while it is active, a reset ends nothing.
-"""
 TELL_ALL = b"\x87"
 """grblHAL's query for a report with all fields: the alarm's number, and whether it was homed. FluidNC runs a macro at
 it.
@@ -115,7 +111,7 @@ def clear(link: GrblLink) -> str:
     """
     initial = _state(link)
     # Only at rest: a reset while motors run loses steps, and with them the position.
-    if initial in OPENED_AGAIN or (initial.startswith("Alarm") and link.alarm in DEAF):
+    if initial in OPENED_AGAIN or (initial.startswith("Alarm") and link.alarm in codes.DEAF):
         reset(link)
     state = _state(link)
     if link.pendant:
@@ -200,7 +196,7 @@ def unproved(link: GrblLink, settings: GrblSettings) -> str:
 
 def unblock(link: GrblLink) -> None:
     """Reset a controller that obeys no line before. Nothing moves."""
-    if link.alarm in DEAF:
+    if link.alarm in codes.DEAF:
         reset(link)
         _place(link)
 

@@ -4,8 +4,9 @@ import re
 
 import numpy as np
 import pytest
+from schedule import SECOND
 from simulated_rig import CLEARANCE, ORIGIN, SENSOR, World
-from simulated_run import Run
+from simulated_run import Run, longest_rest
 
 from tacdata.devices.device import OwesAnswer
 from tacdata.errors import DeviceError
@@ -30,7 +31,7 @@ LINES = {
     "the first travel": r"G1X-95.*Z-35",
     "the press": r"G1X-9.*Z-38\.8.*F30",
     "the hold": r"G4P2",
-    "the release": r"G1X-9.*Z-37\.7.*F30",
+    "the release": r"G1X-9.*Z-37\.7.*F30\.",
 }
 """Lines of a recording, by the pattern of the first whose answer is lost."""
 OPENING = {"$I", "$$", "$#", "$G", "$N"}
@@ -131,6 +132,53 @@ def test_a_pendant_is_seen_at_once_and_the_words_state_where_the_tip_is(tmp_path
     assert [float(value) for value in stands.groups()] == pytest.approx(run.here.tolist(), abs=0.02)
     assert ("not lifted" in run.words) == (run.here[2] < CLEAR), run.words
     assert not run.moves_at_the_end
+
+
+def test_a_person_reads_that_the_tip_stays_in_the_skin_before_a_slow_disk_has_the_file(world):
+    taken = []
+
+    def take():
+        now = world.schedule.now_ns
+        taken.append(world.schedule.now)
+        world.computer.disk.slow.append((now, now + 9 * SECOND))
+        world.controller.inject_pendant()
+
+    world.when_down_at(ORIGIN[2] - 0.7999, take, 0.5)
+    run = Run(world)
+    assert "not lifted" in run.words
+    assert run.end - taken[0] > 8.0, "the file waits for the disk"
+    assert 0.0 < world.warned[0] - taken[0] < 0.5
+    assert "a pendant has taken control" in world.said[-1]
+
+
+def test_a_line_of_motion_that_never_arrived_is_missed_at_once(world):
+    """The release is lost: the tip does not wait for the end of a motion that never began."""
+    lost = []
+
+    def to_controller(line):
+        if lost or not re.search(LINES["the release"], line):
+            return line
+        lost.append(line)
+        return None
+
+    world.controller.inject_wire(to_controller)
+    run = Run(world)
+    assert lost
+    assert isinstance(run.error, OwesAnswer)
+    assert run.here[2] > CLEAR
+    assert 1.0 < longest_rest(run) < 3.0
+
+
+@pytest.mark.parametrize("moment", [0.25, 0.35])
+@pytest.mark.parametrize(("alarm", "is_lost"), [(1, True), (2, False)])
+def test_an_alarm_in_the_middle_of_the_opening_is_named_at_once(world, alarm, is_lost, moment):
+    """Grbl answers nothing after it, whether it has reported once or not."""
+    world.schedule.at(round(moment * SECOND), lambda: world.controller.inject_alarm(alarm))
+    run = Run(world)
+    assert f"stopped with ALARM:{alarm}" in str(run.error), run.words
+    assert run.end < 1.0
+    assert "nothing was moved" in run.words
+    assert ("LOST" in run.words) == is_lost, run.words
 
 
 def registering(world, act):
