@@ -30,12 +30,9 @@ sys.path[:0] = [str(TESTS / "simulation"), str(TESTS)]  # pyserial imports the l
 
 import drawn_faults  # noqa: E402
 import simulated_run  # noqa: E402
-from simulated_rig import ORIGIN  # noqa: E402
 
 SEED = 700_000
 """Seed of hour 0."""
-IN_SKIN = 0.05
-"""Depth at which a tip rests in the skin [mm]."""
 COURSES = ("", "", "tools", "touch")
 """Courses that press: plain, with changes of the tool, with a touch before the first press."""
 MOVED = 0.01
@@ -60,26 +57,15 @@ def hour(presses: int, number: int) -> dict:
 
 
 def _figures(run) -> dict:
-    """Return the longest rest in the skin [s] and the way down while the machine's count was wrong [mm]."""
-    world = run.world
-    rows = simulated_run.between(world.path, run.begin, run.end)
-    time_s, height, moving, lost = rows[:, 0], rows[:, 3], rows[:, 4], rows[:, 5]
-    edges = np.flatnonzero(np.diff([0, *((height < ORIGIN[2] - IN_SKIN) & (moving == 0)), 0]))
-    rests = [_waking(world, time_s[a], time_s[b - 1]) for a, b in edges.reshape(-1, 2)]
-    down = np.maximum(-np.diff(height), 0.0)[lost[:-1] > 0].sum() if len(rows) else 0.0
-    return {"rest": round(float(max(rests, default=0.0)), 2), "down": round(float(down), 3)}
-
-
-def _waking(world, begin: float, end: float) -> float:
-    """Return a stretch of time without the stalls of the computer [s]."""
-    stalls = ((a * 1e-9, b * 1e-9) for a, b in world.computer.stalls)
-    return end - begin - sum(max(0.0, min(end, b) - max(begin, a)) for a, b in stalls)
+    """Return the longest rest beyond the hold [s] and the way down while the machine's count was wrong [mm]."""
+    rows = simulated_run.between(run.world.path, run.begin, run.end)
+    down = np.maximum(-np.diff(rows[:, 3]), 0.0)[rows[:-1, 5] > 0].sum() if len(rows) else 0.0
+    return {"rest": round(float(simulated_run.longest_rest(run)), 2), "down": round(float(down), 3)}
 
 
 def table(rows: list[dict], presses: int) -> str:
     """Return the month in lines of text."""
-    hold = 2.0  # of the plan
-    rests = [max((run["rest"] for run in row["runs"]), default=0.0) - hold for row in rows]
+    rests = [max((run["rest"] for run in row["runs"]), default=0.0) for row in rows]
     downs = sum(any(run["down"] > MOVED for run in row["runs"][1:]) for row in rows)
     kinds = Counter(name for row in rows for name in row["names"] if name in drawn_faults.ALL)
     return "\n".join(
@@ -87,7 +73,7 @@ def table(rows: list[dict], presses: int) -> str:
             f"hours                                    {len(rows)}, of {len(kinds)} kinds of fault",
             f"presses                                  {len(rows) * presses}",
             f"hours with a broken invariant            {sum(bool(row['found']) for row in rows)}",
-            f"rests in the skin above 5 s              {sum(rest > 5.0 for rest in rests)}",
+            f"rests in the skin above 5 s              {sum(rest > simulated_run.WAIT for rest in rests)}",
             f"longest rest in the skin [s]             {max(rests, default=0.0):.1f}",
             f"resumed runs that moved down while lost  {downs}",
             f"simulated [h]                            {sum(row['seconds'] for row in rows) / 3600:.1f}",

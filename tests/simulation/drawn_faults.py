@@ -17,6 +17,8 @@ SILENT = 3.0
 """Time after which a silent camera or controller is a fault [s]."""
 OVERRIDDEN = 6.0
 """Time within which a report must have stated a foreign override [s]: one in 20 states overrides, of 8 a second."""
+AT_REST = 1.0
+"""Time between two paths of the guide from which it counts as a wait [s]: for a person, the disk, or an opening."""
 PRESS_SECONDS = 9.5
 """About how long a press without faults takes [s]."""
 
@@ -31,7 +33,7 @@ class Faults:
         self.fatal, self.stalls = [], []
         """(time of a fault [s], time [s] within which it must have ended the run, if it goes on until then)."""
         self.names, self.visible, self.over = [], [], False
-        """(time [ns] from which the recorder can see it, its name)."""
+        """(time of a fault [ns], time [ns] after which the recorder can see it, its name)."""
         self.deaf = False
         """Whether the controller may hear nothing, so that nobody can stop it."""
         self.frozen, self.alarmed = False, np.inf
@@ -78,7 +80,7 @@ class Faults:
 
     def see(self, name, seconds=0.0):
         """Note that the recorder can see it from now on, or so much later [s]."""
-        self.visible.append((self.world.schedule.now_ns + round(seconds * SECOND), name))
+        self.visible.append((self.world.schedule.now_ns, round(seconds * SECOND), name))
 
     def must_end(self, seconds):
         """Note that the run must end within so many seconds from now [s], once it is under way."""
@@ -92,26 +94,36 @@ class Faults:
     def due(self):
         """Return the first time at which a fault must have ended the run [s]; None on a late computer.
 
-        While a person mounts a tool nothing moves, and the recorder waits for the person: that time does not count.
+        Waits in which nothing moves do not count: the next path notices it. Time in which this computer does not run
+        the thread that hears the controller does not count either.
         """
-        computer, changes = self.world.computer, self.world.tool_changes
+        computer, drives = self.world.computer, self.world.drives
         if not self.fatal or computer.stalls or computer.lateness:
             return None
-        return min(_outside(changes, at, most) for at, most in self.fatal)
+        ends, begins = [0.0, *(end for _, end in drives)], [*(begin for begin, _ in drives), np.inf]
+        waits = [(end, begin) for end, begin in zip(ends, begins, strict=True) if begin - end > AT_REST]
+        waits += [(begin / SECOND, end / SECOND) for begin, end in computer.unheard("grbl-listen")]
+        return min(_outside(waits, at, most) for at, most in self.fatal)
 
     def seen(self, cameras=True):
         """Return when the recorder could first see one of them [s], or None; without ``cameras``, one of the others."""
-        found = [entry for entry in self.visible if cameras or not entry[1].startswith("camera")]
-        if self.world.computer.disk.refused_ns is not None:
-            found.append((self.world.computer.disk.refused_ns, "full disk"))
+        computer = self.world.computer
+        # Readings and images are evidence by the time in which somebody reads them.
+        found = [
+            _outside([*computer.stalls, *computer.unheard("taxel-board" if name.startswith("board") else "")], at, most)
+            for at, most, name in self.visible
+            if cameras or not name.startswith("camera")
+        ]
+        if computer.disk.refused_ns is not None:
+            found.append(computer.disk.refused_ns)
         if not found:
             return None
-        first = min(found)[0]
-        starved = [(begin, end) for _, begin, end in self.world.computer.starved]  # who would see it does not run
-        for begin, end in sorted([*self.world.computer.stalls, *starved]):
+        first = min(found)
+        starved = [(begin, end) for _, begin, end in computer.starved]  # who would see it does not run
+        for begin, end in sorted([*computer.stalls, *starved]):
             if begin - SECOND // 2 <= first < end:
                 first = end
-        for begin, end in sorted(self.world.computer.disk.slow):
+        for begin, end in sorted(computer.disk.slow):
             if begin - SECOND // 2 <= first < end:
                 first = end
         return first / SECOND
@@ -277,9 +289,9 @@ def controller_mute(faults):
     faults.world.controller.inject_wire(to_host=lambda text: None)
 
 
-def _outside(changes, at, seconds):
-    """Return the time [s] at which so many seconds from ``at`` have passed outside of (begin, end) of changes."""
-    for begin, end in changes:
+def _outside(waits, at, seconds):
+    """Return the time at which so much time from ``at`` has passed outside of (begin, end) of waits."""
+    for begin, end in sorted(waits):
         if end > at and begin < at + seconds:
             at, seconds = end, seconds - max(begin - at, 0.0)
     return at + seconds

@@ -33,7 +33,7 @@ class SimulatedCamera(Camera):
 
     def read(self, timeout):
         self._look()
-        due = self._next * PERIOD_NS + LATENCY_NS
+        due = max(self._next * PERIOD_NS + LATENCY_NS, self.device.hangs_until_ns)
         self.clock.host.sleep(min(max((due - self.clock.now_ns()) / SECOND, 0.0), timeout))
         now, frames = self.clock.now_ns(), []
         self._look()

@@ -28,11 +28,14 @@ class SimulatedHost(Host):
 
     def late(self, time_ns, name):
         """Return by how much a task of this name that should run now must wait [ns]."""
-        starved = [(begin, end) for thread, begin, end in self.starved if thread == name]
-        for begin, end in [*self.stalls, *starved]:
+        for begin, end in [*self.stalls, *self.unheard(name)]:
             if begin <= time_ns < end:
                 return end - time_ns + self.schedule.random.randrange(1000, 1_000_000)
         return 0
+
+    def unheard(self, thread):
+        """Return the stretches of time (begin, end) [ns] in which one thread is starved."""
+        return [(begin, end) for name, begin, end in self.starved if name == thread]
 
     def run(self, work):
         """Run ``work`` as the main thread of a process and return what it returns, or raise what it raises."""

@@ -125,7 +125,9 @@ class World:
         """(time [s], true position [mm] as x, y, z, whether it moves, whether its position is truly lost)."""
         self.stops = []
         """Times at which the recorder stopped the motion [s]."""
-        self._awaited, self.mounted, self.tool_changes = [], [], []
+        self.drives, self.warned = [], []
+        """(begin, end) of each path of the guide, and when a person read that the tip was not lifted [s]."""
+        self._awaited, self.mounted = [], []
         self.raised = 0.0
         """Height of the skin above the registered one [mm]."""
         self.camera = CameraDevice() if camera else None
@@ -158,12 +160,12 @@ class World:
                 devices = RigDevices.of(rig)
                 state = MachineState(rig, devices.cnc)
                 guard = PositionGuard(state, devices.cnc, self._asked)
-                motion = self._noting_stops(GuardedMotion(devices.cnc, rig.clock, interruption, state))
+                motion = self._noted(GuardedMotion(devices.cnc, rig.clock, interruption, state))
                 try:
                     guard.before_homing(resumed=False)
                     with guard.opened(devices):
                         guard.require_known(ORIGIN[2] + CLEARANCE)
-                        where = rig, devices, ORIGIN[2] + CLEARANCE, 5.0, interruption, motion, self.said.append
+                        where = rig, devices, ORIGIN[2] + CLEARANCE, 5.0, interruption, motion, self._say
                         with guarded_probe(*where) as probe:
                             return register(probe, SENSOR, rig.registration, RegistrationSettings())
                 except BaseException as error:
@@ -174,16 +176,29 @@ class World:
 
         return self.computer.run(work)
 
-    def _noting_stops(self, motion):
-        stop = motion.stop
+    def _noted(self, motion):
+        stop, drive = motion.stop, motion.drive
+
+        def driven(*path):
+            begun = self.schedule.now
+            try:
+                return drive(*path)
+            finally:
+                self.drives.append((begun, self.schedule.now))
+
         motion.stop = lambda: (self.stops.append(self.schedule.now), stop())
+        motion.drive = driven
         return motion
+
+    def _say(self, words):
+        self.said.append(words)
+        if "not lifted" in words:
+            self.warned.append(self.schedule.now)
 
     def _mount(self, press):
         """Change the tool, as a person does; the guide stands still meanwhile."""
-        begun, moment = self.position(), self.schedule.now
+        begun = self.position()
         self.computer.sleep(4.0)
-        self.tool_changes.append((moment, self.schedule.now))
         self.mounted.append((press.indenter_name, begun, self.position()))
 
     def record(self, resume=False, sync_tap=False, confirmed="", prove=None, **controller):
@@ -204,13 +219,13 @@ class World:
                     devices,
                     interruption=interruption,
                     ask=self._asked,
-                    say=self.said.append,
+                    say=self._say,
                     sync_tap=sync_tap,
                     confirmed=confirmed,
                     prove=prove,
                     mount=self._mount if self.tools else None,
                 )
-                self._noting_stops(recorder._motion)
+                self._noted(recorder._motion)
                 return recorder.run(lambda summary: True)
 
         return self.computer.run(work)

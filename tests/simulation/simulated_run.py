@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from drawn_faults import Faults
-from schedule import Hung
+from schedule import SECOND, Hung
 from simulated_host import EPOCH, START
 from simulated_rig import CLEARANCE, ORIGIN, World
 
@@ -60,6 +60,8 @@ LIFTABLE = {
     "reader_starves",
 }
 """Faults that leave a controller able to lift the tip."""
+IN_SKIN, WAIT = 0.05, 5.0
+"""Depth at which a tip rests in the skin [mm], and the longest rest beyond the plan's hold [s]."""
 OUTSIDE = 1.0
 """Time that the tip may be outside the envelope [s]: the interval of two reports, their way, the hold, the braking."""
 
@@ -104,6 +106,29 @@ def between(path, begin, end):
     return np.array(path[first:last], float).reshape(-1, 6)
 
 
+def longest_rest(run):
+    """Return the longest rest in the skin beyond the plan's hold [s].
+
+    It ends at the latest when a person reads that the tip is not lifted: the machine obeys a person, or nobody. Time
+    does not count in which this computer, or the thread that hears the controller, does not run: nobody knows then
+    where the tip is.
+    """
+    world, longest = run.world, 0.0
+    rows = between(world.path, run.begin, run.end)
+    resting = (rows[:, 3] < ORIGIN[2] - IN_SKIN) & (rows[:, 4] == 0)
+    for first, last in np.flatnonzero(np.diff([0, *resting, 0])).reshape(-1, 2):
+        begin, end = rows[first, 0], rows[last - 1, 0]
+        end = min([end, *(moment for moment in world.warned if moment >= begin)])
+        longest = max(longest, _waking(world.computer, begin, end, "grbl-listen"))
+    return max(longest - world.plan.motion.hold, 0.0)
+
+
+def _waking(computer, begin, end, thread):
+    """Return how much of a stretch of time [s] this computer runs a thread."""
+    pauses = ((a / SECOND, b / SECOND) for a, b in [*computer.stalls, *computer.unheard(thread)])
+    return end - begin - sum(max(0.0, min(end, b) - max(begin, a)) for a, b in pauses)
+
+
 def broken(run, faults):
     """Yield what does not hold of a run, a sentence each."""
     if run.hung:
@@ -113,6 +138,8 @@ def broken(run, faults):
     if not known:
         yield f"not an error for a person: {_traced(run.error)}"
     yield from _threads(run)
+    if (rest := longest_rest(run)) > WAIT:
+        yield f"the tip rested in the skin for {rest:.1f} s more than planned"
     yield from _motion(run, faults)
     yield from _tools(run)
     if not run.killed:
@@ -267,8 +294,9 @@ def _frames(run, faults, path):
             yield f"{path.name} lacks images: {np.flatnonzero(np.diff(view.sequence) != 1)}"
     if run.killed and path.name.endswith(file_names.PARTIAL) and not touched and not run.world.computer.stalls:
         last = (episode.taxels.arrival_ns[-1] - EPOCH - START) * 1e-9 if len(counter) else run.begin
-        if run.end - last > 1.2 and len(counter) and not run.world.computer.disk.slow:
-            yield f"{path.name} ends {run.end - last:.2f} s before the kill"
+        lost = _waking(run.world.computer, last, run.end, "taxel-board")  # what waits in a port dies with its reader
+        if lost > 1.2 and len(counter) and not run.world.computer.disk.slow:
+            yield f"{path.name} ends {lost:.2f} s before the kill"
 
 
 def _true_path(run, episode):
